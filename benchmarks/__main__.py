@@ -3,23 +3,17 @@
 python -m benchmarks --out results/benchmark
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
-from benchmarks.ours import contestants
+from benchmarks.ours import contestants, start_up
 from benchmarks.results import in_turns, rows, save, shown
-from benchmarks.start_up import start_up
 
-
-def main() -> None:
-    """Measure, print and save."""
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
     parser.add_argument("--repeats", type=int, default=15, help="turns of everybody")
     parser.add_argument("--out", type=Path, help="folder for benchmark.json")
     given = parser.parse_args()
-
     found = contestants()
     in_turns(found, 1)  # compiles and warms
     for contestant in found:
@@ -32,7 +26,3 @@ def main() -> None:
     if given.out:
         save(given.out, rows(found), seconds)
         print(f"written to {given.out}")
-
-
-if __name__ == "__main__":
-    main()

@@ -5,10 +5,7 @@ substep the velocities are read in one batch and the clipped forces of the drive
 another, all by address from one compiled call; 16 iterations.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pymunk
@@ -21,16 +18,17 @@ from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.warehouse.packing import call_at, store_at
 
+Numbers = NDArray[np.float64]
 
-@dataclass(frozen=True)
-class Recording:
+
+class Recording(NamedTuple):
     """Swarm D-T from seed 0: what it commanded and how fast that made the robots want to go."""
 
     scenario: Scenario
-    commands: NDArray[np.float64]  # (T, N, 4)
-    wanted_velocity: NDArray[np.float64]  # (T, N, 2) [m/s], world frame
-    start: NDArray[np.float64]  # (N, 2) [m]
-    items: NDArray[np.float64]  # (I, 2) [m]
+    commands: Numbers  # (T, N, 4)
+    wanted_velocity: Numbers  # (T, N, 2) [m/s], world frame
+    start: Numbers  # (N, 2) [m]
+    items: Numbers  # (I, 2) [m]
 
 
 def record(scenario: Scenario, n_steps: int) -> Recording:
@@ -49,9 +47,7 @@ def record(scenario: Scenario, n_steps: int) -> Recording:
     return Recording(scenario, commands, wanted, starts, items)
 
 
-def _wanted(
-    commands: NDArray[np.float64], before: NDArray[np.float64], world: Warehouse
-) -> NDArray[np.float64]:
+def _wanted(commands: Numbers, before: Numbers, world: Warehouse) -> Numbers:
     """Return the wanted velocities (N, 2) [m/s]; who turns drives along its mean direction."""
     turned = np.remainder(world.state.robot_heading - before + np.pi, 2.0 * np.pi) - np.pi
     middle = before + 0.5 * turned
@@ -68,8 +64,8 @@ def space_of(recording: Recording) -> pymunk.Space:
     space = pymunk.Space()
     space.iterations, space.collision_slop = 16, 0.001
     width, height = scenario.warehouse_width, scenario.warehouse_height
-    corners = [(-0.5, -0.5), (width + 0.5, -0.5), (width + 0.5, height + 0.5)]
-    corners.append((-0.5, height + 0.5))
+    right, top = width + 0.5, height + 0.5
+    corners = [(-0.5, -0.5), (right, -0.5), (right, top), (-0.5, top)]
     for side in range(4):
         space.add(pymunk.Segment(space.static_body, corners[side - 1], corners[side], 0.5))
     for x, y in recording.items.tolist():
@@ -102,25 +98,22 @@ class _Batch:
 class ForceFloor:
     """A space that replays the wanted velocities of a recording, driven by forces.
 
-    Attributes:
-        state: (N + 1, 4) x, y [m] and velocity [m/s] of every body.
+    `state` is (N + 1, 4): x, y [m] and velocity [m/s] of every body.
     """
 
     def __init__(self, recording: Recording) -> None:
-        scenario = recording.scenario
+        scenario, fields = recording.scenario, batch.BodyFields
         n = scenario.n_robots
-        fields = batch.BodyFields
         self._wanted = np.ascontiguousarray(recording.wanted_velocity)
         self._space = space_of(recording)
         self._state = _Batch(n + 1, 4, fields.POSITION | fields.VELOCITY)
         self._velocity = _Batch(n + 1, 2, fields.VELOCITY)
         self._force = _Batch(n + 1, 2, fields.FORCE)
-        self._functions = (
-            _function("cpSpaceStep"),
-            _function("cpSpaceEachBody"),
-            _function("pmSpaceBodyGetIteratorFuncBatched"),
-            _function("pmSpaceBodySetIteratorFuncBatched"),
-        )
+        names = (
+            "cpSpaceStep", "cpSpaceEachBody", "pmSpaceBodyGetIteratorFuncBatched",
+            "pmSpaceBodySetIteratorFuncBatched",
+        )  # fmt: skip
+        self._functions = tuple(_address(ffi.addressof(lib, name)) for name in names)
         self.state = self._state.numbers
         self._drive = (
             scenario.max_acceleration, scenario.robot_mass, scenario.physics_period,
@@ -139,11 +132,11 @@ class ForceFloor:
 @kernel
 def _drive_by_force(
     space: int,
-    functions: tuple[int, int, int, int],
-    wanted: NDArray[np.float64],
+    functions: tuple[int, ...],
+    wanted: Numbers,
     drive: tuple[float, float, float, int],
-    velocity: NDArray[np.float64],
-    force: NDArray[np.float64],
+    velocity: Numbers,
+    force: Numbers,
     batches: tuple[tuple[int, int], tuple[int, int], tuple[int, int]],
 ) -> None:
     step, each_body, read, write = functions
@@ -164,10 +157,6 @@ def _drive_by_force(
         call_at(step, (space, period))
     store_at(n_state, 0)
     call_at(each_body, (space, read, state))
-
-
-def _function(name: str) -> int:
-    return _address(ffi.addressof(lib, name))
 
 
 def _address(thing: Any) -> int:

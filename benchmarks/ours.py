@@ -1,10 +1,15 @@
-"""What is measured of this package: the floor under it, its paths, many worlds, many robots."""
+"""What is measured of this package: the floor under it, its paths, many worlds, many robots; and
+what a process pays before its first step.
+"""
 
-from __future__ import annotations
-
-import itertools
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,15 +22,21 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
 FLOOR, ARRAYS = "force floor", "env.step_arrays"
 SENSES = "all sensors, logistics, timers"
-_STEPS, _AGENT_STEPS_OF_MANY = 1000, 40_000
-_MANY, _WORLDS = (1_000, 10_000), 8
+_STEPS, _AGENT_STEPS_OF_MANY, _WORLDS = 1000, 40_000, 8
+
+_TIMED = "import time; began = time.{0}()\n{1}\nprint(time.{0}() - began)"
+_FIRST_STEP = """
+from swarm_logistics_env import swarm_logistics_v0
+env = swarm_logistics_v0.parallel_env(); env.reset(seed=0)
+env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+"""
 
 
 def contestants() -> list[Contestant]:
     """Return everything of this package that is timed."""
     one, two = (vec_env(threads) for threads in (1, 2))
     two.base = one.name
-    many = itertools.chain.from_iterable(map(many_robots, _MANY))
+    many = [each for n_robots in (1_000, 10_000) for each in many_robots(n_robots)]
     return [*paths(record(Scenario(restock=True), _STEPS)), one, two, *many]
 
 
@@ -68,21 +79,12 @@ def many_robots(n_robots: int) -> Iterator[Contestant]:
     """Yield the floor and the world at the default density, with so many robots."""
     times = n_robots / 25
     side = 10.0 * times**0.5
-    scenario = Scenario(
-        n_robots=n_robots,
-        n_items=round(60 * times),
-        warehouse_width=side,
-        warehouse_height=side,
-        delivery_width=side / 5.0,
-        restock=True,
-    )
+    size = {"warehouse_width": side, "warehouse_height": side, "delivery_width": side / 5.0}
+    scenario = Scenario(n_robots=n_robots, n_items=round(60 * times), restock=True, **size)
     recording = record(scenario, max(_AGENT_STEPS_OF_MANY // n_robots, 4))
-    for contestant in paths(recording):
-        if contestant.name in (FLOOR, ARRAYS):
-            base = contestant.name
-            contestant.name = f"{base}, N = {n_robots:,}"
-            contestant.base = base
-            yield contestant
+    for one in paths(recording):
+        if one.name in (FLOOR, ARRAYS):
+            yield replace(one, name=f"{one.name}, N = {n_robots:,}", base=one.name)
 
 
 def vec_env(threads: int) -> Contestant:
@@ -112,3 +114,32 @@ def _timed(
     for each in given:
         step(each)
     return clock() - began
+
+
+def start_up() -> dict[str, float]:
+    """Return the seconds before the first step, of the processor and in the end of the wall.
+
+    To import the package, and what it stands on alone; to the first step where all has to be
+    compiled, and where nothing has to be.
+    """
+    with tempfile.TemporaryDirectory() as cache:
+        compiling = _seconds(_FIRST_STEP, NUMBA_CACHE_DIR=cache)
+    _seconds(_FIRST_STEP)  # warms the cache
+    return {
+        "import": _median("import swarm_logistics_env"),
+        "import_of_needed": _median("import pettingzoo, pymunk, numba"),
+        "first_step, empty cache": compiling,
+        "first_step": _median(_FIRST_STEP, "perf_counter"),
+    }
+
+
+def _median(script: str, clock: str = "process_time") -> float:
+    return statistics.median(_seconds(script, clock) for _ in range(5))
+
+
+def _seconds(script: str, clock: str = "process_time", **environment: str) -> float:
+    done = subprocess.run(
+        [sys.executable, "-c", _TIMED.format(clock, script)],
+        env={**os.environ, **environment}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return float(done.stdout)

@@ -1,7 +1,5 @@
 """Contestants that are run in turns, and what their runs took, as a table and as JSON."""
 
-from __future__ import annotations
-
 import json
 import os
 import platform
@@ -21,30 +19,18 @@ _SHOWN = ("agent_steps_per_second", "microseconds_per_step", "cost_to_base", "ba
 
 @dataclass
 class Contestant:
-    """Something that is run again and again.
-
-    Attributes:
-        name: as the table has it.
-        includes: what one of its steps includes.
-        run: takes its steps once; returns the seconds they took.
-        agent_steps: how many steps of one agent a run takes.
-        control_steps: how many steps of everything a run takes.
-        base: the contestant whose cost its own is divided by, or None.
-        timed_by: "processor", as on a machine that does other things too the clock counts them;
-            "wall" where several threads work.
-        seconds: of each run so far.
-    """
+    """Something that is run again and again; `run` takes its steps once and returns the seconds."""
 
     name: str
-    includes: str
+    includes: str  # what one of its steps includes
     run: Callable[[], float]
-    agent_steps: int
-    control_steps: int
-    base: str | None = None
-    timed_by: str = "processor"
-    seconds: list[float] = field(default_factory=list)
+    agent_steps: int  # of single agents, in a run
+    control_steps: int  # of everything, in a run
+    base: str | None = None  # the contestant whose cost its own is divided by
+    timed_by: str = "processor"  # on a machine that does other things too; of threads "wall"
+    seconds: list[float] = field(default_factory=list)  # of each run so far
 
-    def ratio_to(self, base: Contestant) -> float:
+    def ratio_to(self, base: "Contestant") -> float:
         """Return the median, over turns, of its cost per agent-step as a multiple of `base`'s."""
         here = [seconds / self.agent_steps for seconds in self.seconds]
         there = [seconds / base.agent_steps for seconds in base.seconds]
@@ -85,8 +71,11 @@ def shown(found: Sequence[Mapping[str, Any]]) -> str:
 
 def save(folder: Path, found: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) -> None:
     """Write benchmark.json: the rows, and where and with what they came about."""
+    cpuinfo = Path("/proc/cpuinfo")
+    text = cpuinfo.read_text(encoding="utf-8") if cpuinfo.exists() else ""
+    processor = re.search(r"^model name\s*: (.*)", text, re.MULTILINE)
     machine = {
-        "processor": _processor(),
+        "processor": processor[1] if processor else platform.processor() or platform.machine(),
         "cores": os.cpu_count(),
         "load": os.getloadavg()[0],
         "python": platform.python_version(),
@@ -96,10 +85,3 @@ def save(folder: Path, found: Sequence[Mapping[str, Any]], seconds: Mapping[str,
     record = {"machine": machine, "contestants": found, "seconds": seconds}
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "benchmark.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-
-
-def _processor() -> str:
-    cpuinfo = Path("/proc/cpuinfo")
-    text = cpuinfo.read_text(encoding="utf-8") if cpuinfo.exists() else ""
-    found = re.search(r"^model name\s*: (.*)", text, re.MULTILINE)
-    return found[1] if found else platform.processor() or platform.machine()

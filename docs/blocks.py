@@ -9,8 +9,6 @@ The blocks of a page are run in their order, in one folder and one Python namesp
     sh        is not recorded; `python docs/blocks.py --small` runs it with few seeds and steps
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re
@@ -24,8 +22,7 @@ from typing import Any, NamedTuple
 from swarm_logistics_env.cli import app
 
 DOCS = Path(__file__).parent
-EXAMPLES = DOCS.resolve().parent / "examples"
-README = DOCS.resolve().parent / "README.md"
+ROOT = DOCS.resolve().parent
 LANGUAGES = {"python", "toml", "console", "text", "sh", ""}
 
 _BLOCK = re.compile(r"^```(?P<language>[^\n]*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -47,9 +44,8 @@ def pages() -> list[Path]:
 
 
 def blocks(text: str) -> list[Block]:
-    """Return the blocks of a page, in order."""
-    found = (Block(match["language"], match["code"]) for match in _BLOCK.finditer(text))
-    return [block for block in found if not block.language.startswith("{")]
+    """Return the blocks of a page, in order, without directives of the site."""
+    return [Block(*found) for found in _BLOCK.findall(text) if not found[0].startswith("{")]
 
 
 def recorded(text: str) -> str:
@@ -60,17 +56,16 @@ def recorded(text: str) -> str:
 
     def anew(match: re.Match[str]) -> str:
         nonlocal printed, end
-        block, between = Block(match["language"], match["code"]), text[end : match.start()]
+        block, between = Block(*match.groups()), text[end : match.start()]
         if block.language.startswith("{"):
             return match[0]
         end, said = match.end(), printed
         printed = None if block.language == "text" else _printed(block, names)
-        if block.language == "text" and said is not None and not between.strip():
-            return f"```text\n{said}```"
-        return match[0]
+        is_output = block.language == "text" and said is not None and not between.strip()
+        return f"```text\n{said}```" if is_output else match[0]
 
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
-        Path("examples").symlink_to(EXAMPLES, target_is_directory=True)
+    with _folder() as folder:
+        (folder / "examples").symlink_to(ROOT / "examples", target_is_directory=True)
         return _BLOCK.sub(anew, text)
 
 
@@ -97,20 +92,20 @@ def commands(text: str, languages: Sequence[str] = ("console", "sh")) -> list[li
 
 
 @contextlib.contextmanager
-def _importable() -> Iterator[None]:
-    """Find modules in the present folder, and forget those that came from it."""
-    known = set(sys.modules)
-    path = list(sys.path)
-    here = Path.cwd()
-    sys.path.insert(0, str(here))
-    try:
-        yield
-    finally:
-        sys.path[:] = path
-        for name in set(sys.modules) - known:
-            file = getattr(sys.modules[name], "__file__", None)
-            if file is not None and Path(file).is_relative_to(here):
-                del sys.modules[name]
+def _folder() -> Iterator[Path]:
+    """Be in a new folder; find modules there, and forget those that came from it."""
+    known, path = set(sys.modules), list(sys.path)
+    with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
+        here = Path.cwd()
+        sys.path.insert(0, str(here))
+        try:
+            yield here
+        finally:
+            sys.path[:] = path
+            for module in set(sys.modules) - known:
+                file = getattr(sys.modules[module], "__file__", None)
+                if file is not None and Path(file).is_relative_to(here):
+                    del sys.modules[module]
 
 
 def _printed(block: Block, names: dict[str, Any]) -> str | None:
@@ -134,10 +129,8 @@ def _printed_by_command(line: str) -> str:
     assert program == "swarm-logistics", line
     if arguments[:2] == ["study", "run"] and "--engine" not in arguments:
         arguments += ["--engine", "local"]  # the same bits, without the start of processes
-    with (
-        contextlib.redirect_stdout(io.StringIO()) as out,
-        contextlib.redirect_stderr(io.StringIO()) as complaints,
-    ):
+    out, complaints = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(complaints):
         code = app.run(arguments)
     printed = out.getvalue() + (complaints.getvalue() if code else "")
     if code and not otherwise:
@@ -176,35 +169,32 @@ def in_small(arguments: list[str]) -> list[str] | None:
 
 
 def run_in_small(texts: Mapping[str, str]) -> None:
-    """Run the shell commands of the pages one after another in a folder that has all their files.
-
-    Raises:
-        SystemExit: one of them failed.
-    """
-    files = {path.name: path.read_text(encoding="utf-8") for path in EXAMPLES.glob("*.py")}
+    """Run the shell commands of the pages one after another in a folder with all their files."""
+    files = {path.name: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.py")}
     for block in (block for text in texts.values() for block in blocks(text)):
         if file := _FILE.match(block.code):
             files[file[1]] = block.code
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), _importable():
+    with _folder() as folder:
         for file_name, code in files.items():
-            Path(file_name).write_text(code, encoding="utf-8")
+            (folder / file_name).write_text(code, encoding="utf-8")
         for name, text in texts.items():
             for arguments in commands(text, ("sh", "")):
                 small = in_small(arguments)
-                sys.stdout.write(f"{name}: swarm-logistics {shlex.join(small or arguments)}")
-                sys.stdout.write("\n" if small else ": is not run, it serves a page\n")
-                sys.stdout.flush()
+                rest = "" if small else ": is not run, it serves a page"
+                print(f"{name}: swarm-logistics {shlex.join(small or arguments)}{rest}", flush=True)
                 if small and app.run(small):
                     raise SystemExit(f"{name}: swarm-logistics {shlex.join(arguments)} failed")
 
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["--small"]:
-        run_in_small({page.name: page.read_text("utf-8") for page in [*pages(), README]})
+        run_in_small(
+            {page.name: page.read_text("utf-8") for page in [*pages(), ROOT / "README.md"]}
+        )
         raise SystemExit
     for page in [Path(name) for name in sys.argv[1:]] or pages():
         text = page.read_text(encoding="utf-8")
         said = recorded(text)
         if comparable(said) != comparable(text):
             page.write_text(said, encoding="utf-8")
-            sys.stdout.write(f"{page}: recorded anew\n")
+            print(f"{page}: recorded anew")

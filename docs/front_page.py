@@ -1,10 +1,7 @@
 """Writes the README's numbers from the tables of docs/results.md, and draws their picture.
 
-`python docs/front_page.py`; `make tables` calls it. Nothing is played here: `make tables` records
-that page.
+`python docs/front_page.py`; `make tables`, which records that page, calls it. Nothing is played.
 """
-
-from __future__ import annotations
 
 import math
 import re
@@ -13,11 +10,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from tables import block_of, rewritten
+from tables import ROOT, block_of, rewritten
 
-DOCS = Path(__file__).parent
-README, RESULTS = DOCS.parent / "README.md", DOCS / "results.md"
-MEDIA = DOCS / "media"
+README, RESULTS = ROOT / "README.md", ROOT / "docs" / "results.md"
 
 _REFERENCE = "swarm-dt"  # the paper's controller
 _LEARNED = "ppo-"
@@ -25,6 +20,18 @@ _TRAINED = "ppo-robust"  # among faults: whether it bears them is told, whatever
 _STOCK = "homing-stock"
 _NUMBER = r"-?(?:[\d.,]+|∞)"
 _VALUE = re.compile(rf"({_NUMBER}) \[({_NUMBER}), ({_NUMBER})\]")
+_MODES = {
+    "FM1": "tells a false timer",
+    "FM2": "lifts nothing",
+    "FM3": "radio dead",
+    "FM4": "delivers nothing",
+}
+_R = {mode: f"R, {mode}, m = 2" for mode in _MODES}
+_PANELS = {
+    "P, N = 25": "P, N = 25\n[items in 500 s]",
+    "S, N 25 -> 100": "S, scalability\nN 25 → 100",
+    **{_R[mode]: f"R, {mode}\n{what}" for mode, what in _MODES.items()},
+}
 
 
 class Value(NamedTuple):
@@ -36,22 +43,20 @@ class Value(NamedTuple):
     high: float
 
 
-Rows = Mapping[str, Mapping[str, Value]]  # by the row's label and the column's heading
+Row = Mapping[str, Value]  # by the column's heading, of a policy without its trainings
+Rows = Mapping[str, Row]  # by the row's label
 
 
 def rows_of(block: str) -> Rows:
     """Return the values with intervals in the table of a block."""
-    head, _, *lines = [line for line in block.splitlines() if line.startswith("|")]
-    columns = [_plain(cell) for cell in head.split("|")[2:-1]]
+    head, _, *lines = [line.split("|")[1:-1] for line in block.splitlines() if line[:1] == "|"]
     found: dict[str, dict[str, Value]] = {}
-    for line in lines:
-        label, *cells = [cell.strip() for cell in line.split("|")[1:-1]]
-        matches = {name: _VALUE.match(cell) for name, cell in zip(columns, cells, strict=True)}
-        found[label] = {
-            name: Value(match[0], *(float(part.replace("∞", "inf")) for part in match.groups()))
-            for name, match in matches.items()
-            if match
-        }
+    for label, *cells in lines:
+        row = found.setdefault(label.strip(), {})
+        for name, cell in zip(head[1:], cells, strict=True):
+            if told := _VALUE.match(cell.strip()):
+                numbers = (float(part.replace("∞", "inf")) for part in told.groups())
+                row[_plain(name)] = Value(told[0], *numbers)
     return found
 
 
@@ -61,109 +66,76 @@ def _plain(name: str) -> str:
     return bare.partition(",")[0] if bare.startswith(_LEARNED) else bare
 
 
-_MODES = {
-    "FM1": "tells a false timer",
-    "FM2": "lifts nothing",
-    "FM3": "radio dead",
-    "FM4": "delivers nothing",
-}
-_PANELS = {
-    "P, N = 25": "P, N = 25\n[items in 500 s]",
-    "S, N 25 -> 100": "S, scalability\nN 25 → 100",
-}
-_PANELS |= {f"R, {mode}, m = 2": f"R, {mode}\n{what}" for mode, what in _MODES.items()}
-
-# -- what one finds out -------------------------------------------------------------------------
-
-
 def findings(page: str) -> str:
     """Return what the tables show, as a list: the numbers stand beside their intervals."""
-    rows = rows_of(block_of(page, "policies"))
-    seeds, times, slow = (
-        _seeds(block_of(page, name)) for name in ("policies", "clearing", "leans")
-    )
+    names = "policies", "clearing", "leans", "paper"
+    policies, clearing, leans, paper = (block_of(page, name) for name in names)
+    rows = rows_of(policies)
+    times = {_plain(name): row["no fault"] for name, row in rows_of(clearing).items()}
     told = [
-        *_clearing(block_of(page, "clearing")),
-        *_learned(rows),
-        *_slow_lifting(block_of(page, "leans")),
-        *_faults(rows),
-        *_sizes(rows),
-        *_paper(block_of(page, "paper")),
+        *_deliveries(times, rows["P, N = 25"], rows_of(leans)["lifting takes 1 s"]),
+        _faults({mode: rows[label] for mode, label in _R.items() if rows.get(label)}),
+        _sizes(rows["S, N 25 -> 100"]),
+        *_paper(paper),
     ]
-    lines = [f"* {one}" for one in told]
+    seeds, timed, slow = (
+        re.findall(r"(\d+) seeds from ", block)[0] for block in (policies, clearing, leans)
+    )
     note = (
-        f"95 % intervals: {seeds} seeds ({times} for times, {slow} for slow lifting), of networks "
+        f"95 % intervals: {seeds} seeds ({timed} for times, {slow} for slow lifting), of networks "
         "over trainings too."
     )
-    return "\n".join([*lines, "", note])
+    return "\n".join([*(f"* {one}" for one in told), "", note])
 
 
-def _seeds(block: str) -> int:
-    (found,) = re.findall(r"(\d+) seeds from ", block)
-    return int(found)
+def _learned(values: Row) -> list[str]:
+    """Return the networks, the one with the least value first."""
+    learned = [name for name in values if name.startswith(_LEARNED)]
+    return sorted(learned, key=lambda name: values[name].value)
 
 
-def _clearing(block: str) -> Iterator[str]:
-    """Yield how fast the best learned swarm clears the paper's warehouse."""
-    times = {name: row["no fault"] for name, row in rows_of(block).items()}
-    times = {_plain(name): one for name, one in times.items()}
-    best = min((name for name in times if name.startswith(_LEARNED)), key=lambda n: times[n].value)
-    ratio = times[_REFERENCE].value / times[best].value
-    beside = ""
-    if script := times.get(_STOCK):
-        beside = f"; `{_STOCK}`, a script, in {script.text} s"
+def _deliveries(times: Row, p: Row, slow: Row) -> Iterator[str]:
+    """Yield how fast the best learned swarms are, and what becomes of it with slow lifting."""
+    best, script = _learned(times)[0], times.get(_STOCK)
+    beside = f"; `{_STOCK}`, a script, in {script.text} s" if script else ""
     yield (
-        f"**The paper's warehouse, cleared {ratio:.0f} times as fast**: `{best}` delivers its 60 "
-        f"items in {times[best].text} s, the paper's Swarm D-T in {times[_REFERENCE].text} s"
-        f"{beside} (lifting takes no time)."
+        f"**The paper's warehouse, cleared {times[_REFERENCE].value / times[best].value:.0f} times "
+        f"as fast**: `{best}` delivers its 60 items in {times[best].text} s, the paper's Swarm D-T "
+        f"in {times[_REFERENCE].text} s{beside} (lifting takes no time)."
     )
-
-
-def _learned(rows: Rows) -> Iterator[str]:
-    p = rows["P, N = 25"]
-    best = max((name for name in p if name.startswith(_LEARNED)), key=lambda name: p[name].value)
+    best = _learned(p)[-1]
     yield (
         f"**Where items come back, {p[best].value / p[_REFERENCE].value:.1f} times as many**: "
         f"`{best}` {p[best].text} in 500 s; Swarm D-T {p[_REFERENCE].text}."
     )
-
-
-def _slow_lifting(block: str) -> Iterator[str]:
-    """Yield what becomes of the large numbers where lifting takes time."""
-    p = rows_of(block)["lifting takes 1 s"]
-    best = max((name for name in p if name.startswith(_LEARNED)), key=lambda name: p[name].value)
+    best = _learned(slow)[-1]
     yield (
         f"**They lean on lifting that takes no time**: where it takes 1 s, `{best}` delivers "
-        f"{p[best].text}, `homing`, a script, {p['homing'].text}."
+        f"{slow[best].text}, `homing`, a script, {slow['homing'].text}."
     )
 
 
-def _faults(rows: Rows) -> Iterator[str]:
-    """Yield the greatest difference that a failure mode makes."""
-    r = {mode: row for mode in _MODES if (row := rows.get(f"R, {mode}, m = 2"))}
+def _faults(r: Rows) -> str:
+    """Return the greatest difference that a failure mode makes."""
     worst = {mode: min(row, key=lambda name: row[name].high) for mode, row in r.items()}
     best = {mode: max(row, key=lambda name: row[name].low) for mode, row in r.items()}
     mode = max(r, key=lambda mode: r[mode][best[mode]].value - r[mode][worst[mode]].value)
     lost, kept = worst[mode], best[mode]
     told = [kept, *(name for name in r[mode] if name.startswith(_TRAINED) and name != kept)]
     others = ", ".join(f"of `{name}` {r[mode][name].text}" for name in told)
-    yield (
+    return (
         f"**One collapses under a fault that another bears**: with two robots in {mode} R of "
         f"`{lost}` is {r[mode][lost].text}, {others}."
     )
 
 
-def _sizes(rows: Rows) -> Iterator[str]:
-    s = rows["S, N 25 -> 100"]
-    most = max(s, key=lambda name: s[name].value)
-    least = min(s, key=lambda name: s[name].value)
+def _sizes(s: Row) -> str:
     title = "Four times the robots do not deliver four times as much"
     if max(one.high for one in s.values()) >= 1.0:
         title = "More robots help some swarms more than others"
-    yield (
-        f"**{title}**: from 25 to 100 S of `{most}` is {s[most].text}, of `{least}` "
-        f"{s[least].text}."
-    )
+    least, *_, most = sorted(s, key=lambda name: s[name].value)
+    told = f"S of `{most}` is {s[most].text}, of `{least}` {s[least].text}"
+    return f"**{title}**: from 25 to 100 {told}."
 
 
 def _paper(block: str) -> Iterator[str]:
@@ -178,17 +150,9 @@ def _paper(block: str) -> Iterator[str]:
 def speed(page: str) -> str:
     """Return the sentence on speed, from the table of costs."""
     costs = block_of(page, "costs")
-    cells = {
-        line.split("|")[1].partition(":")[0].strip(): [c.strip() for c in line.split("|")[2:-1]]
-        for line in costs.splitlines()
-        if line.startswith("| ")
-    }
-    arrays = cells["env.step_arrays"]
-    (machine,) = re.findall(r"^On (.*), \d+ cores?, Python .*\.$", costs, flags=re.MULTILINE)
-    return f"A step of 25 robots takes {arrays[1]} µs on one core of {machine}."
-
-
-# -- the picture --------------------------------------------------------------------------------
+    (took,) = re.findall(r"^\| env\.step_arrays:[^|]*\|[^|]*\| *([^ |]+)", costs, re.MULTILINE)
+    (machine,) = re.findall(r"^On (.*), \d+ cores?, Python .*\.$", costs, re.MULTILINE)
+    return f"A step of 25 robots takes {took} µs on one core of {machine}."
 
 
 def draw(rows: Rows, path: Path) -> None:
@@ -211,8 +175,9 @@ def draw(rows: Rows, path: Path) -> None:
             for place, name in zip(places, names, strict=True):
                 if (one := rows[label].get(name)) is None:
                     continue
-                colour = "#d55e00" if name.startswith(_LEARNED) else "#0072b2"
-                marker = "s" if name.startswith(_LEARNED) else "o"
+                colour, marker = "#0072b2", "o"
+                if name.startswith(_LEARNED):
+                    colour, marker = "#d55e00", "s"
                 if math.isinf(one.high - one.low):  # no limit: dotted from side to side
                     axes.axhline(place, color=colour, linewidth=1.4, linestyle=":")
                 else:
@@ -227,8 +192,6 @@ def draw(rows: Rows, path: Path) -> None:
         panels[0].set_xlim(left=0.0)
         figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
 
-
-# -- links --------------------------------------------------------------------------------------
 
 NOTE = "A package index does not show them: relative pictures and links.\n"
 
@@ -247,7 +210,7 @@ def with_address(text: str, address: str | None) -> str:
 
 def written() -> str:
     """Return the README as the tables have it, with links to the repository of [project.urls]."""
-    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     address = project.get("urls", {}).get("Repository")
     page, readme = RESULTS.read_text(encoding="utf-8"), README.read_text(encoding="utf-8")
     blocks = {"findings": findings(page), "speed": speed(page)}
@@ -255,10 +218,10 @@ def written() -> str:
 
 
 def main() -> None:
-    """Write the README and its pictures."""
+    """Write the README and its picture."""
     README.write_text(written(), encoding="utf-8")
-    page = RESULTS.read_text(encoding="utf-8")
-    draw(rows_of(block_of(page, "policies")), MEDIA / "policies.svg")
+    policies = block_of(RESULTS.read_text(encoding="utf-8"), "policies")
+    draw(rows_of(policies), ROOT / "docs" / "media" / "policies.svg")
 
 
 if __name__ == "__main__":

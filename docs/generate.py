@@ -1,17 +1,14 @@
 """Writes what two pages tell of the code, between their markers: `python docs/generate.py`."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import re
-from collections.abc import Container, Iterator, Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Container, Iterable, Iterator
+from typing import Any, get_args, get_origin
 
 import numpy as np
 from pydantic_core import PydanticUndefined
-from tables import rewritten, table
+from tables import ROOT, rewritten, table
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
 from swarm_logistics_env.cli.app import command_line
@@ -19,66 +16,48 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
 from swarm_logistics_env.environment.spaces import ITEM_FEATURES, ROBOT_FEATURES
 from swarm_logistics_env.observations import columns, n_columns
-from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS, Columns
-from swarm_logistics_env.studies.specification import (
-    Ablation,
-    Faults,
-    Parameter,
-    Sizes,
-    Specification,
-)
-from swarm_logistics_env.train.settings import (
-    Conditions,
-    Evaluation,
-    Indicators,
-    PPOSettings,
-    Scores,
-    WorldKind,
-)
+from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.train.training import Training, load_training, preset_names
 
-DOCS = Path(__file__).parent
-Kinds = Mapping[str, type[Record]]
-FACTORS: Kinds = {"sizes": Sizes, "faults": Faults, "parameters": Parameter, "ablations": Ablation}
-PARTS: Kinds = {
-    "[network]": Network,
-    "[[worlds]]": WorldKind,
-    "[[conditions]]": Conditions,
-    "[indicators]": Indicators,
-    "[ppo]": PPOSettings,
-    "[evaluation]": Evaluation,
-    "[scores]": Scores,
-}
+FACTORS = ("sizes", "faults", "parameters", "ablations")
+PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")
 
 
 def environment() -> dict[str, str]:
     """Return the blocks of the page about the environment."""
     scenario = Scenario()
     env = SwarmLogisticsEnv(scenario)
-    shapes = {
-        "observations": env.observation_space("robot_0").shape,
-        "actions": env.action_space("robot_0").shape,
-        "state": env.state_space.shape,
-    }
+    shapes = [
+        ("observations", env.observation_space("robot_0").shape),
+        ("actions", env.action_space("robot_0").shape),
+        ("state", env.state_space.shape),
+    ]
     rewards = [
-        (f"`{name}`", f"{DEFAULT_WEIGHTS.get(name, 0.0):g}", summary(term))
+        (f"`{name}`", f"{DEFAULT_WEIGHTS.get(name, 0.0):g}", summary(term.__doc__))
         for name, term in REWARD_TERMS.items()
     ]
+    head = ("field", "default", "meaning; where the default comes from")
+    conditions = [
+        (f"`{name}`{' *' if name in CHANGES_DURING_RUN else ''}", f"`{value!r}`", field.description)
+        for (name, field), (_, value) in zip(Scenario.model_fields.items(), scenario)
+    ]
     modes = [(f"`{name}`", mode.description) for name, mode in FAILURE_MODES.items()]
-    wrapped = [(f"`{name}`", summary(getattr(wrappers, name))) for name in wrappers.__all__]
+    wrapped = [(f"`{name}`", summary(getattr(wrappers, name).__doc__)) for name in wrappers.__all__]
     sources = ", ".join(f"[{name}]({address})" for name, address in SOURCES.items())
     state = [("robot", ", ".join(ROBOT_FEATURES)), ("item", ", ".join(ITEM_FEATURES))]
     return {
-        "shapes": table(("of 25 robots", "shape"), list(shapes.items())),
+        "shapes": table(("of 25 robots", "shape"), shapes),
         "observations": observation_table(scenario),
         "state": table(("of each", "numbers"), [*state, ("world", "the time [s]")]),
         "rewards": table(("term", "default weight", "pays"), rewards),
-        "arguments": arguments_list(),
-        "scenario": f"{scenario_table(scenario)}\n\nSources: {sources}.",
+        "arguments": "\n".join(
+            f"* `{name}`: {meaning}" for name, meaning in meanings(SwarmLogisticsEnv).items()
+        ),
+        "scenario": f"{table(head, conditions)}\n\nSources: {sources}.",
         "fault": f"`Fault({', '.join(Fault.model_fields)})`",
         "failures": table(("mode", "the robot"), modes),
         "wrappers": table(("wrapper", "what it does"), wrapped),
@@ -89,36 +68,13 @@ def observation_table(scenario: Scenario) -> str:
     """Return the table of the named columns of a row."""
     rows = []
     for column in columns(scenario):
-        places = np.arange(n_columns(scenario))[column.columns]
-        where = str(places[0])
-        if len(places) > 1:
-            step = places[1] - places[0]
-            where = f"{places[0]}-{places[-1]}" + (f", every {step}th" if step > 1 else "")
+        first, *others = np.arange(n_columns(scenario))[column.columns]
+        where = f"{first}-{others[-1]}" if others else str(first)
+        if others and (step := others[0] - first) > 1:
+            where += f", every {step}th"
         between = f"[{column.low:g}, {column.high:g}]"
         rows.append((where, f"`{column.name}`", column.unit, between, column.meaning))
     return table(("columns", "name", "unit", "values", "meaning"), rows)
-
-
-def scenario_table(scenario: Scenario) -> str:
-    """Return the table of all conditions."""
-    rows = []
-    for name, field in Scenario.model_fields.items():
-        mark = " *" if name in CHANGES_DURING_RUN else ""
-        rows.append((f"`{name}`{mark}", f"`{getattr(scenario, name)!r}`", field.description))
-    return table(("field", "default", "meaning; where the default comes from"), rows)
-
-
-def arguments_list() -> str:
-    """Return the arguments in the environment's docstring as a list."""
-    text = (SwarmLogisticsEnv.__doc__ or "").split("Args:\n")[1].split("\n\n")[0]
-    entries: list[str] = []
-    for line in text.splitlines():
-        if line.startswith(" " * 12):
-            entries[-1] += " " + line.strip()
-        else:
-            entries.append(line.strip())
-    pairs = (entry.split(":", 1) for entry in entries)
-    return "\n".join(f"* `{name}`:{meaning}" for name, meaning in pairs)
 
 
 def reference() -> dict[str, str]:
@@ -128,14 +84,14 @@ def reference() -> dict[str, str]:
     return {
         "commands": table(head, list(commands(command_line(), "swarm-logistics"))),
         "training": fields(Training),
-        "parts of a training": sections(PARTS),
+        "parts of a training": sections(Training, PARTS),
         "trainings": "\n".join(
             f"* `{name}`: {training.about} {training.agent_steps:,} agent-steps."
             for name, training in trainings.items()
         ),
         "study": fields(Specification, leave_out=FACTORS),
         "scenarios": f"Presets of the scenario: {', '.join(SCENARIO_PRESETS)}.",
-        "factors": sections({f"[[{name}]]": kind for name, kind in FACTORS.items()}),
+        "factors": sections(Specification, FACTORS),
         "studies": "\n".join(f"* `{name}`: {about(study)}" for name, study in PRESETS.items()),
         "performance": columns_of(CELL_COLUMNS),
         "indicators": columns_of(VERDICT_COLUMNS),
@@ -147,8 +103,7 @@ def commands(command: Any, name: str) -> Iterator[tuple[str, str, str]]:
     below = getattr(command, "commands", None)
     if below is None:
         options = (one.opts[0] for one in command.params if one.opts[0].startswith("-"))
-        said = " ".join((command.help or "").split("\n\n")[0].split())
-        yield f"`{name}`", said, ", ".join(f"`{one}`" for one in options)
+        yield f"`{name}`", summary(command.help), ", ".join(f"`{one}`" for one in options)
     for part, one in (below or {}).items():
         yield from commands(one, f"{name} {part}")
 
@@ -166,21 +121,24 @@ def columns_of(known: Columns) -> str:
     return table(("column", "meaning"), [(f"`{name}`", text) for name, (*_, text) in known.items()])
 
 
-def sections(kinds: Kinds) -> str:
-    """Return a section with the fields of each record."""
-    return "\n\n".join(
-        f"### `{name}`\n\n{summary(kind)}\n\n{fields(kind)}" for name, kind in kinds.items()
-    )
+def sections(record: type[Record], names: Iterable[str]) -> str:
+    """Return a section for each of these fields, which are records or several of one kind."""
+    told = []
+    for name in names:
+        annotation: Any = record.model_fields[name].annotation
+        kind, *_ = get_args(annotation) or [annotation]
+        heading = f"[[{name}]]" if get_origin(annotation) is tuple else f"[{name}]"
+        told.append(f"### `{heading}`\n\n{summary(kind.__doc__)}\n\n{fields(kind)}")
+    return "\n\n".join(told)
 
 
 def fields(record: type[Record], leave_out: Container[str] = ()) -> str:
     """Return a table of a record's fields with their defaults and what its docstring says."""
-    said = meanings(record)
-    rows = [
-        (f"`{name}`", default(record, name), said.get(name, ""))
-        for name in record.model_fields
-        if name not in leave_out
-    ]
+    said: dict[str, str] = {}
+    for kind in reversed(record.__mro__):
+        said |= meanings(kind)
+    names = [name for name in record.model_fields if name not in leave_out]
+    rows = [(f"`{name}`", default(record, name), said.get(name, "")) for name in names]
     return table(("field", "default", "meaning"), rows)
 
 
@@ -201,24 +159,20 @@ def default(record: type[Record], name: str) -> str:
     return f"`{json.dumps(value, default=str)}`"
 
 
-def meanings(record: type[Record]) -> dict[str, str]:
-    """Return what the docstrings of a record and its bases say of each field."""
+def meanings(kind: type) -> dict[str, str]:
+    """Return what a class's own docstring says of each of its arguments."""
+    # Python 3.13 takes the indent of a docstring away by itself.
+    _, _, text = inspect.cleandoc(vars(kind).get("__doc__") or "").partition("Args:\n")
+    text, _, _ = text.partition("\n\n")
     found: dict[str, str] = {}
-    for kind in reversed(record.__mro__):
-        # Python 3.13 takes the indent of a docstring away by itself.
-        _, _, text = inspect.cleandoc(vars(kind).get("__doc__") or "").partition("Args:\n")
-        text, _, _ = text.partition("\n\n")
-        for names, meaning in re.findall(
-            r"^ {4}([\w, ]+): (.*(?:\n {8}.*)*)", text + "\n", flags=re.MULTILINE
-        ):
-            sentence = " ".join(meaning.split())
-            found |= dict.fromkeys(names.split(", "), sentence)
+    for names, meaning in re.findall(r"^ {4}([*\w, ]+): (.*(?:\n {8}.*)*)", text, re.MULTILINE):
+        found |= dict.fromkeys(names.split(", "), " ".join(meaning.split()))
     return found
 
 
-def summary(documented: object) -> str:
+def summary(text: str | None) -> str:
     """Return the first paragraph of a docstring, on one line."""
-    return " ".join((documented.__doc__ or "").split("\n\n")[0].split())
+    return " ".join((text or "").split("\n\n")[0].split())
 
 
 PAGES = {"environment": environment, "reference": reference}
@@ -226,9 +180,10 @@ PAGES = {"environment": environment, "reference": reference}
 
 def written(page: str) -> str:
     """Return a page as the code has it."""
-    return rewritten((DOCS / f"{page}.md").read_text(encoding="utf-8"), PAGES[page]())
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    return rewritten(text, PAGES[page]())
 
 
 if __name__ == "__main__":
     for name in PAGES:
-        (DOCS / f"{name}.md").write_text(written(name), encoding="utf-8")
+        (ROOT / "docs" / f"{name}.md").write_text(written(name), encoding="utf-8")

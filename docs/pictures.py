@@ -1,17 +1,15 @@
 """Draws the pictures of the pages into docs/media: `python -m docs.pictures`."""
 
-from __future__ import annotations
-
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse, policies
+from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, policies
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.rendering import Renderer
 from swarm_logistics_env.rendering.palette import film_colours
 from swarm_logistics_env.watch import Session
@@ -20,26 +18,26 @@ from swarm_logistics_env.watch.messages import recorded_page
 from verification.browser import Browser
 
 MEDIA = Path(__file__).parent / "media"
-SIZE = 560  # px
 SMALL = Scenario(n_robots=16, warehouse_width=8.0, warehouse_height=6.0, n_items=30)
+TINY = Scenario(
+    n_robots=8, warehouse_width=5.0, warehouse_height=4.0, delivery_width=1.2, n_items=10,
+    restock=True,
+)  # fmt: skip
+RESTOCKED = Scenario(restock=True)
 
 
-def scene(
-    seconds: float,
-    faults: tuple[Fault, ...] = (),
-    scenario: Scenario = SMALL,
-    name: str = "swarm-dt",
-) -> NDArray[np.uint8]:
-    """Return a picture of a policy's swarm after some time."""
-    world = Warehouse(scenario)
-    observations = world.reset(seed=4, faults=faults)
-    policy = policies.load(name)
-    start(policy, scenario, 4)
-    renderer = Renderer(scenario, "rgb_array", SIZE)
-    while world.state.time < seconds:
-        observations = world.step(decide(policy, observations, world.state))
-        picture = renderer.frame(world.state, scenario)
-    return picture
+def run(name: str, scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> Play:
+    """Return a policy's run at its beginning."""
+    return Play(scenario, policies.load(name), seed, faults)
+
+
+def scene(file: str, play: Play, seconds: float) -> None:
+    """Write a picture of a run after some time."""
+    while play.world.state.time < seconds:
+        play.step()
+    renderer = Renderer(play.world.scenario, "rgb_array", 560)
+    picture = renderer.frame(play.world.state, play.world.scenario)
+    in_film_colours(picture).save(MEDIA / file, optimize=True)
 
 
 def browser_view(name: str) -> None:
@@ -61,48 +59,33 @@ def browser_view(name: str) -> None:
     Image.open(MEDIA / name).convert("RGB").save(MEDIA / name, optimize=True)
 
 
-def collapse(name: str) -> None:
-    """Film one seed of a learned swarm without faults and with two robots that deliver nothing."""
-    scenario, load = Scenario(restock=True), policies.load
-    takes = [
-        Take(title, Play(scenario, load("ppo-delivery"), 0, faults))
-        for title, faults in (
-            ("25 robots, no fault", ()),
-            ("two of them deliver nothing (FM4)", ("FM4:2",)),
-        )
-    ]
-    keep(Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400), name, 80)
-
-
-def keep(film: Film, name: str, milliseconds: int) -> None:
+def keep(film: Film, name: str, milliseconds: int = 125) -> None:
     """Write a film that loops, each frame for so long."""
-    first, *rest = (in_film_colours(frame) for frame in film.frames())
+    first, *rest = map(in_film_colours, film.frames())
     timing = {"duration": milliseconds, "loop": 0}
     first.save(MEDIA / name, None, save_all=True, append_images=rest, optimize=True, **timing)
 
 
-def gallery() -> None:
-    """Film each failure mode in a small swarm, and each kind of policy in a large one."""
-    small = Scenario(
-        n_robots=8, warehouse_width=5.0, warehouse_height=4.0, delivery_width=1.2, n_items=10,
-        restock=True,
-    )  # fmt: skip
+def films() -> None:
+    """Film a learned swarm without and with faults, each failure mode, and each kind of policy."""
+    takes = [
+        Take("25 robots, no fault", run("ppo-delivery", RESTOCKED, 0)),
+        Take(
+            "two of them deliver nothing (FM4)",
+            run("ppo-delivery", RESTOCKED, 0, [Fault("FM4", 2)]),
+        ),
+    ]
+    keep(Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400), "fm4.gif", 80)
     for mode in FAILURE_MODES:
-        faults = [Fault(mode, 2, onset=3.0)]
-        take = Take(f"{mode}, 2 of 8", Play(small, policies.load("homing"), 2, faults))
-        keep(Film([take], 30.0, 8.0, 8.0, size=400), f"mode-{mode}.gif", 125)
+        take = Take(f"{mode}, 2 of 8", run("homing", TINY, 2, [Fault(mode, 2, onset=3.0)]))
+        keep(Film([take], 30.0, 8.0, 8.0, size=400), f"mode-{mode}.gif")
     for name in ("swarm-dt", "homing", "homing-stock", "central", "ppo-delivery", "ppo-robust"):
-        take = Take(name, Play(Scenario(restock=True), policies.load(name), 0))
-        keep(Film([take], 90.0, 20.0, 8.0, size=300), f"policy-{name}.gif", 125)
-
-
-def save(picture: NDArray[np.uint8], name: str) -> None:
-    """Write a picture: in the colours of films it takes a third, and none shifts."""
-    in_film_colours(picture).save(MEDIA / name, optimize=True)
+        take = Take(name, run(name, RESTOCKED, 0))
+        keep(Film([take], 90.0, 20.0, 8.0, size=300), f"policy-{name}.gif")
 
 
 def in_film_colours(picture: NDArray[np.uint8]) -> Image.Image:
-    """Return a picture in the colours that all films have."""
+    """Return a picture in the colours of all films: it takes a third, and none shifts."""
     palette = Image.new("P", (1, 1))
     palette.putpalette([part for colour in film_colours() for part in colour])
     return Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
@@ -110,10 +93,9 @@ def in_film_colours(picture: NDArray[np.uint8]) -> Image.Image:
 
 if __name__ == "__main__":
     MEDIA.mkdir(exist_ok=True)
-    save(scene(30.0), "warehouse.png")
-    save(scene(60.0, (Fault("FM1", 2), Fault("FM4", [0, 5]))), "faults.png")
-    learned = scene(300.0, scenario=Scenario(restock=True), name="ppo-delivery")
-    save(learned, "stock.png")
-    collapse("fm4.gif")
-    gallery()
+    scene("warehouse.png", run("swarm-dt", SMALL, 4), 30.0)
+    failed = [Fault("FM1", 2), Fault("FM4", [0, 5])]
+    scene("faults.png", run("swarm-dt", SMALL, 4, failed), 60.0)
+    scene("stock.png", run("ppo-delivery", RESTOCKED, 4), 300.0)
+    films()
     browser_view("watch.png")

@@ -5,19 +5,16 @@ each (two hours of one core), plays all of them, and writes a table into docs/tr
 trained and played is kept in results/ablations, and the same command goes on after an interruption.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import re
 import shutil
-from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
+from itertools import product
 
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
-from tables import rewritten, table
+from tables import ROOT, rewrite, seeds_from, table
 
 from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.report import section
@@ -27,10 +24,8 @@ from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.train.trainer import train
 from swarm_logistics_env.train.training import load_training
 
-ROOT = Path(__file__).parents[1]
-PAGE, OUT = ROOT / "docs" / "training.md", ROOT / "results" / "ablations"
+OUT = ROOT / "results" / "ablations"
 AGENT_STEPS, TRAININGS = 16_000_000, 3
-SEEDS, FIRST_SEED = 10, 430_000
 FAULT_INPUTS = ("failed", "stuck", "cannot_deliver", "cannot_lift", "delivering_in_vain")
 MEMORY = (
     *FAULT_INPUTS, "requested_recently_held", "home_along", "home_aside", "home_certainty",
@@ -45,7 +40,7 @@ WITHOUT: dict[str, tuple[str, ...]] = {
 class WithoutInputs(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
     """Keeps the weights of some inputs at zero, in the network that decides and in the critic."""
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: tuple[str, ...]) -> None:
         super().__init__()
         self._columns = [INPUTS.index(name) for name in names]
 
@@ -63,7 +58,7 @@ class WithoutInputs(BaseCallback):  # type: ignore[misc]  # not in the environme
         return True
 
 
-def train_one(name: str, seed: int) -> None:
+def train_one(seed: int, name: str) -> None:
     """Train one variant from one seed, or go on with it, into OUT/NAME@SEED.safetensors."""
     recipe = load_training("robust")
     paid = {"stocking": 0.0} if name == "without-stocking" else {}
@@ -84,8 +79,8 @@ def study() -> Study:
     return Study(
         name="ablations",
         policies=[f"{OUT / name}@all.safetensors" for name in WITHOUT],
-        seeds=SEEDS,
-        first_seed=FIRST_SEED,
+        seeds=10,
+        first_seed=430_000,
         scenario=Scenario(restock=True),
         faults=[
             {"modes": ["FM1", "FM2", "FM3", "FM4"], "robots": [3]},
@@ -102,25 +97,21 @@ def block(found: StudyResults) -> str:
     arms = [arm for arm in arms if not re.match("removed|.*behaviour seeds", str(arm))]
     cells = {(cell.policy, cell.arm.setting): cell for cell in found.cells}
     rows = [(one, *(section.mean_p(cells[one, arm]) for arm in arms)) for one in found.policies]
-    text = (
-        f"P, items delivered in 500 s by 25 robots where items come back; {SEEDS} seeds from "
-        f"{FIRST_SEED:,} on, of each training. Three trainings are too few for a verdict."
+    return (
+        f"{table(('', *arms), rows)}\n\nP, items delivered in 500 s by 25 robots where items come "
+        f"back; {seeds_from(found)}, of each training. Three trainings are too few for a verdict."
     )
-    return "\n".join([table(("", *map(str, arms)), rows), "", text])
 
 
 def main() -> None:
     """Train what is missing, a training a core, then play all and write the table."""
     cores = len(os.sched_getaffinity(0))
-    jobs = [(name, seed) for seed in range(TRAININGS) for name in WITHOUT]
     spawned = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(cores, mp_context=spawned) as pool:
-        for done in [pool.submit(train_one, *job) for job in jobs]:
-            done.result()
+        list(pool.map(train_one, *zip(*product(range(TRAININGS), WITHOUT))))
     ours = study()
     ours.run(processes=cores)
-    text = rewritten(PAGE.read_text(encoding="utf-8"), {"ablations": block(ours.findings())})
-    PAGE.write_text(text, encoding="utf-8")
+    rewrite(ROOT / "docs" / "training.md", {"ablations": block(ours.findings())})
 
 
 if __name__ == "__main__":

@@ -5,8 +5,6 @@ benchmark, over 4 seeds of its own; the one whose P, averaged over these conditi
 (of an even number the lower one of the two) is shipped under the recipe's name.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
@@ -16,22 +14,19 @@ from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.presets import load_preset
 
-SEEDS, FIRST_SEED = 4, 700_000
-DEVELOPMENT = "Development"
-
 
 def means(files: list[str]) -> dict[str, float]:
     """Return P of each policy, averaged over the development conditions."""
     whole = load_preset("benchmark")
     tables = {
-        name: [one for one in getattr(whole, name) if one.title.startswith(DEVELOPMENT)]
+        name: [one for one in getattr(whole, name) if one.title.startswith("Development")]
         for name in ("faults", "parameters")
     }
     study = Study(
         name="medians",
         policies=[{"name": one, "label": one} for one in files],
-        seeds=SEEDS,
-        first_seed=FIRST_SEED,
+        seeds=4,
+        first_seed=700_000,
         scenario=whole.scenario,
         out=Path("results", "medians", "-".join(Path(one).stem for one in files)),
         **tables,
@@ -44,14 +39,9 @@ def means(files: list[str]) -> dict[str, float]:
     }
 
 
-def main() -> None:
-    """Print the mean of each file, the least first, and the median one."""
+if __name__ == "__main__":
     found = means(sys.argv[1:])
     ascending = sorted(found, key=lambda one: found[one])
     for one in ascending:
         print(f"{one}: training seed {read_card(Path(one)).seed}, mean P {found[one]:.1f}")
     print(f"Median: {ascending[(len(ascending) - 1) // 2]}")
-
-
-if __name__ == "__main__":
-    main()

@@ -4,18 +4,15 @@ Of each study in examples/questions this writes the tables into one page, and a 
 played is kept, as by `play_tables.py`.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import question_tables as tables
-from play_tables import OUT, ROOT, play
-from tables import rewritten
+from play_tables import OUT, play
+from tables import ROOT, example, rewrite
 
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
@@ -33,26 +30,22 @@ DOCS = ROOT / "docs"
 Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and its height [inch]
 
 
-def study(name: str, seeds: int | None = None) -> Study:
-    """Return the study of a question; `seeds`: None: as many as its file says."""
-    changed: dict[str, Any] = {} if seeds is None else {"seeds": seeds}
-    file = ROOT / "examples" / "questions" / f"{name}.toml"
-    return Study.from_file(file, out=OUT / "questions" / name, **changed)
+def study(name: str, **changed: Any) -> Study:
+    """Return the study of a question."""
+    return example(OUT, f"questions/{name}", **changed)
 
 
 def policies_compared(found: StudyResults) -> Answer:
     """Answer with all policies side by side, and the report's figure of R."""
-    blocks = {"answer": tables.side_by_side(found)}
     figure = next(f for f in document(found).figures() if f.name.startswith("R-Two-robots"))
-    return blocks, figure.draw, figure.height
+    return {"answer": tables.side_by_side(found)}, figure.draw, figure.height
 
 
 def larger_swarms(found: StudyResults) -> Answer:
     """Answer with P and R against N."""
     blocks = {
         "performance": tables.performances_by_size(found),
-        "robustness": f"{tables.by_size(found)}\n\n{tables.over(found)}. [95 %]; the "
-        f"last column is paired by seed and unadjusted. {tables.LEGEND}.",
+        "robustness": tables.by_size(found),
     }
     known = [test for test in found.verdicts if test.compared.indicator == "R"]
     panels = []
@@ -73,12 +66,12 @@ def larger_swarms(found: StudyResults) -> Answer:
     return blocks, partial(on_one_scale, panels=panels), 0.7 + 1.8 * len(panels)
 
 
-def on_one_scale(canvas: Canvas, panels: Sequence[Panel]) -> None:
+def on_one_scale(canvas: "Canvas", panels: Sequence[Panel]) -> None:
     """Draw values with their intervals, one panel below the other, all on one scale."""
     drawing.intervals(canvas, panels)
-    limits = np.array([axes.get_ylim() for axes in canvas.axes])
+    lows, highs = zip(*(axes.get_ylim() for axes in canvas.axes))
     for axes in canvas.axes:
-        axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
+        axes.set_ylim(min(lows), max(highs))
 
 
 def wear_and_repair(found: StudyResults) -> Answer:
@@ -86,7 +79,7 @@ def wear_and_repair(found: StudyResults) -> Answer:
     blocks = {
         "wear": tables.wear(found),
         "repair": tables.repairs(found),
-        "after": f"{tables.after_repairs(found)}\n\n{tables.over(found)}. [95 %]. {tables.LEGEND}.",
+        "after": tables.after_repairs(found),
     }
     panels: dict[str, dict[str, RateCurve]] = {}
     for test in found.verdicts:
@@ -94,10 +87,10 @@ def wear_and_repair(found: StudyResults) -> Answer:
             curves = {curve.runs: curve for curve in rate_curves(found, test.compared)}
             whole = float(curves["no fault"].deliveries.mean())
             drawn = panels.setdefault(f"{test.compared.policy}, 100 % are {whole:.1f} items", {})
-            told = {"fault": test.compared.table.lower(), "no fault": "no fault"}
             for runs, curve in curves.items():
+                told = test.compared.table.lower() if runs == "fault" else runs
                 numbers = (100.0 / whole * column for column in curve[2:])
-                drawn[told[runs]] = RateCurve(told[runs], curve.seconds, *numbers)
+                drawn[told] = RateCurve(told, curve.seconds, *numbers)
     shown = {title: list(curves.values()) for title, curves in panels.items()}
     draw = partial(drawing.rates, panels=shown, onset=100.0, y_label="deliveries [%]")
     return blocks, draw, 0.5 + 1.9 * len(panels)
@@ -120,14 +113,13 @@ QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
 
 def main(names: list[str]) -> None:
     """Play the studies of these names, and rewrite their tables and figures."""
-    page = DOCS / "research" / "questions_of_the_field.md"
     for name in names or QUESTIONS:
         (found,) = play([study(name)])
         blocks, draw, height = QUESTIONS[name](found)
         svg, _ = drawing.images(draw, height)
         (DOCS / "media" / f"{name}.svg").write_text(svg, encoding="utf-8")
         named = {f"{name} {part}": block for part, block in blocks.items()}
-        page.write_text(rewritten(page.read_text(encoding="utf-8"), named), encoding="utf-8")
+        rewrite(DOCS / "research" / "questions_of_the_field.md", named)
 
 
 if __name__ == "__main__":

@@ -5,8 +5,6 @@
 A reading that changes what sound robots do changes all other cells, too.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 import sys
@@ -98,8 +96,7 @@ def delivered(number: int, n: int, n_items: int, m: int, seed: int) -> int:
     return world.state.delivered
 
 
-def main() -> None:
-    """Play and print."""
+if __name__ == "__main__":
     n_seeds = int(sys.argv[1])
     print("| mode | reading | m = 1 | m = 2 | m = 3 | mean abs ln | other cells |")
     print("|---" * 7 + "|")
@@ -117,7 +114,3 @@ def main() -> None:
         price = f"{np.mean(errors[3:]):.2f}" if is_for_all else "as shipped"
         told = " | ".join([of, words, *shown[:3], f"{np.mean(errors[:3]):.2f}", price])
         print(f"| {told} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,34 +1,33 @@
 """Plays the studies behind docs/results.md and writes its tables: `python docs/play_tables.py`.
 
 From these tables follow the README's numbers and picture; `judge` gets what it ranks beside.
-
 What is played is kept, so that a second call plays nothing, and one after an interruption the rest.
 Costs are not measured here: their table is written from what `make benchmark` left, if it did.
 """
-
-from __future__ import annotations
 
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import front_page
-from play_ladder import draw_ladder, ladder_block, ladder_studies, leans_block
 from play_paper import draw_figures, paper_block, paper_studies, sentences_block
-from tables import rewritten, table
+from tables import ROOT, asked, by_policy, example, rewrite, seeds_from, table
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.cli.judging import ENTRIES, RECORDED, STUDY
 from swarm_logistics_env.policies import NAMES, load
-from swarm_logistics_env.report import benchmark, section
-from swarm_logistics_env.spi import median_interval
+from swarm_logistics_env.report import benchmark, drawing, section
+from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import NO_FAULT
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import UNAFFECTED, Verdict, grouped
+from swarm_logistics_env.studies.verdict import UNAFFECTED, Cell, grouped
 
-ROOT = Path(__file__).parents[1]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 PAGE = ROOT / "docs" / "results.md"
 MEDIA = ROOT / "docs" / "media"
 OUT = ROOT / "results" / "tables"
@@ -39,20 +38,8 @@ FIRST_SEED = 20_000
 PROCESSES = os.cpu_count() or 1
 
 
-def policy_studies(out: Path) -> tuple[Study, ...]:
-    """Return the studies of the shipped policies, and of `ppo-robust` under three failed robots."""
-    return tuple(
-        Study.from_file(ROOT / "examples" / f"{name}.toml", out=out / name)
-        for name in ("shipped_policies", "robust_policy")
-    )
-
-
 def play(studies: Iterable[Study]) -> list[StudyResults]:
-    """Play what is missing of each study; return what the runs say.
-
-    Raises:
-        SystemExit: a run failed.
-    """
+    """Play what is missing of each study; return what the runs say, or exit if one failed."""
     found = []
     for study in studies:
         tally = study.run(processes=PROCESSES)
@@ -64,33 +51,32 @@ def play(studies: Iterable[Study]) -> list[StudyResults]:
 
 _EXACT = " ="
 
-# -- the table of policies ----------------------------------------------------------------------
+
+def policy_studies(out: Path) -> tuple[Study, ...]:
+    """Return the studies of the shipped policies, and of `ppo-robust` under three failed robots."""
+    return example(out, "shipped_policies"), example(out, "robust_policy")
 
 
 def policies_block(results: StudyResults) -> str:
     """Return P and the indicators of every policy."""
-    names = results.policies
     rows: dict[str, dict[str, str]] = {}
     for cell in results.cells:
         if cell.arm.setting.kind in ("size", "parameter"):
             rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
+    exact = ""
     for test in results.verdicts:
         mark = _EXACT if test.plain == UNAFFECTED else ""
-        rows.setdefault(_asked(test), {})[test.compared.policy] = section.ratio(test) + mark
-    first, count = results.plan.seeds[0], len(results.plan.seeds)
-    text = (
-        f"{count} seeds from {first:,} on, of each training. Each "
+        rows.setdefault(asked(test), {})[test.compared.policy] = section.ratio(test) + mark
+        if mark:
+            exact = (
+                f"\nThe sign{_EXACT} marks what is {section.UNAFFECTED}: equal runs, an exact "
+                "value, and no evidence."
+            )
+    return (
+        f"{by_policy(rows, results.policies)}\n\n{seeds_from(results)}, of each training. Each "
         "interval is of 95 % by itself; verdicts are not shown. A divides by the relative change "
-        "of the parameter, which is 4 from 0.02 to 0.1: there A = 0.96 is 16 % fewer items."
+        "of the parameter, which is 4 from 0.02 to 0.1: there A = 0.96 is 16 % fewer items." + exact
     )
-    head = ("", *(f"`{name}`" for name in names))
-    body = [(label, *(row.get(name, "") for name in names)) for label, row in rows.items()]
-    if any(test.plain == UNAFFECTED for test in results.verdicts):
-        text += (
-            f"\nThe sign{_EXACT} marks what is {section.UNAFFECTED}: equal runs, an exact value, "
-            "and no evidence."
-        )
-    return "\n".join([table(head, body), "", text])
 
 
 def robust_block(results: StudyResults) -> str:
@@ -105,24 +91,17 @@ def robust_block(results: StudyResults) -> str:
         for symbol, word in words.items():
             told.setdefault(word, []).append(f"{symbol} under {label}")
     found = "; ".join(f"{words}: {section.listed(what)}" for words, what in told.items())
-    seeds, name = results.plan.seeds, results.policies[0]
-    text = (
-        f"`{name}`, {len(seeds)} seeds of each from {seeds[0]:,} on; verdicts by Holm's method. "
+    head = "", "P", "R above 0?", "FT above 0?"
+    return (
+        f"{table(head, rows)}\n\n`{results.policies[0]}`, "
+        f"{seeds_from(results, 'seeds of each')}; verdicts by Holm's method. "
         f"{found[:1].upper()}{found[1:]}."
     )
-    return "\n".join([table(("", "P", "R above 0?", "FT above 0?"), rows), "", text])
-
-
-def _asked(test: Verdict) -> str:
-    return f"{test.compared.indicator}, {test.compared.label}"
-
-
-# -- the table of clearing ----------------------------------------------------------------------
 
 
 def clearing_study(out: Path) -> Study:
     """Return the study of how fast the shipped swarms clear the paper's warehouse."""
-    return Study.from_file(ROOT / "examples" / "clearing.toml", out=out / "clearing")
+    return example(out, "clearing")
 
 
 def clearing_block(results: StudyResults) -> str:
@@ -133,40 +112,138 @@ def clearing_block(results: StudyResults) -> str:
         (f"`{policy}`", *(section.time_to_clear(by_place[policy, one]) for one in settings))
         for policy in results.policies
     ]
-    head = ("", *(str(one) for one in settings))
-    seeds = results.plan.seeds
     limit = results.plan.cases[0].scenario.duration
     text = (
         "Median time until all items are delivered [s], with its 95 % interval: less is better; N "
-        f"is 25; {len(seeds)} seeds from {seeds[0]:,} on; of several trainings the mean. "
+        f"is 25; {seeds_from(results)}; of several trainings the mean. "
         f'"x of y": so many runs were not done after {limit:g} s.'
     )
+    cells = {policy: by_place[policy, settings[0]] for policy in results.policies}
     medians = {
-        policy: median_interval(
-            [run.time_to_clear for run in by_place[policy, settings[0]].outcomes]
-        )
-        for policy in results.policies
+        policy: spi.median_interval([run.time_to_clear for run in cell.outcomes]).value
+        for policy, cell in cells.items()
     }
-    fastest = min(medians, key=lambda policy: medians[policy].value)
+    fastest = min(medians, key=lambda policy: medians[policy])
     if not fastest.startswith("ppo-"):
         text += (
             f"\nWithout a failure the script `{fastest}` is the fastest, "
-            f"with {medians[fastest].value:.0f} s."
+            f"with {medians[fastest]:.0f} s."
         )
     learned = [policy for policy in medians if policy.startswith("ppo-robust")]
     if learned and {"swarm-dt", "homing", "homing-stock"} <= medians.keys():
-        slow, fast = medians["swarm-dt"].value, medians[learned[0]].value
-        saved = {one: slow - medians[one].value for one in ("homing", "homing-stock")}
+        slow, fast = medians["swarm-dt"], medians[learned[0]]
+        saved = {one: slow - medians[one] for one in ("homing", "homing-stock")}
         shares = [f"`{one}` {s:.0f} s ({s / (slow - fast):.0%})" for one, s in saved.items()]
         text += (
             f"\n`ppo-robust` is {slow - fast:.0f} s faster than `swarm-dt`. Two "
             f"scripts, which learned nothing, save most of that: {' and '.join(shares)}. Of the "
             "deliveries where items come back they reach [less](#what-the-scripts-owe-to-what)."
         )
-    return "\n".join([table(head, rows), "", text])
+    return f"{table(('', *settings), rows)}\n\n{text}"
 
 
-# -- the table of costs -------------------------------------------------------------------------
+def ladder_studies(out: Path) -> tuple[Study, ...]:
+    """Return the studies of both tables."""
+    return tuple(example(out, name) for name in ("ladder", "ladder_restocked", "leans"))
+
+
+def _worlds(found: StudyResults) -> dict[str, dict[str, Cell]]:
+    """Return the cells of each table of ablations, by policy."""
+    titles = dict.fromkeys(one.title for one in found.plan.specification.ablations)
+    cells = found.cells
+    return {name: {c.arm.setting.name: c for c in cells if c.table == name} for name in titles}
+
+
+def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
+    """Return a row for each rung: its time to clear and P, and what it adds to the one before."""
+    times, gains, rungs = _worlds(cleared), _worlds(restocked), cleared.policies
+    kinds = "time to clear [s]", "P where items come back"
+    rows = []
+    for rung, above in zip(rungs, ("", *rungs)):
+        before = "" if rung.startswith("ppo-") else "homing" if rung == "central" else above
+        row = [f"`{rung}`"]
+        for name in times:
+            row += [section.time_to_clear(times[name][rung]), _gain(gains[name], rung, before)]
+        rows.append(row)
+    head = ["", *(f"{kind}, {name}" for name in times for kind in kinds)]
+    return (
+        f"{table(head, rows)}\n\n"
+        f"{seeds_from(cleared)}. Times are medians with 95 % intervals: less is "
+        "better; those of networks are means over their trainings and seeds. P is the items "
+        "delivered in 500 s, and in brackets the gain over the rung above, seed by seed; that of "
+        "`central`, which has no stock, is over `homing`."
+    )
+
+
+def _gain(cells: dict[str, Cell], rung: str, before: str) -> str:
+    told = section.mean_p(cells[rung])
+    if not before:
+        return told
+    more = t_interval(cells[rung].by_seed - cells[before].by_seed)
+    return f"{told} (+{section.bracketed(more, 1)})".replace("+-", "-")
+
+
+def leans_block(found: StudyResults) -> str:
+    """Return a row for each world: P of every policy."""
+    worlds = _worlds(found)
+    for fault in found.plan.specification.faults:
+        ours = [c for c in found.cells if c.table == fault.title]
+        worlds[fault.title] = {c.policy: c for c in ours if c.arm.setting.name in fault.modes}
+    rows = [
+        (name, *(_p_and_stalls(cells[one]) for one in found.policies))
+        for name, cells in worlds.items()
+    ]
+    head = ["", *(f"`{one}`" for one in found.policies)]
+    return (
+        f"{table(head, rows)}\n\n"
+        f"P, items delivered in 500 s by 25 robots, with 95 % intervals; {seeds_from(found)}, of "
+        f"each training. {section.SATURATED}: in at least one run every item was delivered. "
+        "Stalled: so many of the runs delivered less than a quarter of the median.\n"
+        + _shares(next(iter(worlds.values())))
+    )
+
+
+def _p_and_stalls(cell: Cell) -> str:
+    stalled = spi.share_stalled(cell.by_seed.ravel())
+    return section.mean_p(cell) + (f"; {stalled:.0%} stalled" if stalled else "")
+
+
+def _shares(cells: dict[str, Cell]) -> str:
+    """Return in a sentence how much of the networks' gains a script reaches."""
+    p = {one: cell.mean.value for one, cell in cells.items()}
+    told = []
+    for network in (one for one in p if one.startswith("ppo-")):
+        shares = [
+            f"{(p[script] - p['swarm-dt']) / (p[network] - p['swarm-dt']):.0%}"
+            for script in ("homing", "homing-stock")
+        ]
+        told.append(
+            f"`homing` has {shares[0]} and `homing-stock` {shares[1]} of those of `{network}`"
+        )
+    if not told:
+        return ""
+    return f"As it is, of the deliveries that a network has over `swarm-dt`: {'; '.join(told)}."
+
+
+def draw_ladder(restocked: StudyResults, path: Path) -> None:
+    """Draw P of each rung with its interval, without and with a handling time."""
+
+    def draw(canvas: "Figure") -> None:
+        axes = canvas.subplots()
+        places = range(len(restocked.policies), 0, -1)
+        worlds = zip(_worlds(restocked).items(), drawing.COLOURS, drawing.MARKERS)
+        for shift, ((name, cells), colour, marker) in enumerate(worlds):
+            for place, rung in zip(places, restocked.policies):
+                value, low, high = cells[rung].mean
+                at = place + 0.14 - 0.28 * shift
+                axes.plot([low or value, high or value], [at, at], color=colour)
+                axes.plot(value, at, marker, color=colour)
+            axes.plot([], [], marker, color=colour, label=name)
+        axes.set_yticks(list(places), restocked.policies)
+        axes.set(xlabel="P, items delivered in 500 s where items come back", xlim=(0.0, None))
+        axes.legend(loc="upper right")
+
+    path.write_text(drawing.images(draw, 2.9)[0], encoding="utf-8")
 
 
 def costs_block(found: Mapping[str, Any]) -> str:
@@ -181,20 +258,16 @@ def costs_block(found: Mapping[str, Any]) -> str:
         for row in found["contestants"]
     ]
     machine = found["machine"]
-    lines = [
-        table(("", "agent-steps per s", "us per step", "cost per agent-step"), rows),
-        "",
-        "Cost: less is better; the median over rounds of the ratio in each.",
-        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}.",
-    ]
-    if "first_step" in found.get("seconds", {}):
-        lines.append(
-            f"A second process takes its first step after {found['seconds']['first_step']:.1f} s."
-        )
-    return "\n".join(lines)
+    head = "", "agent-steps per s", "us per step", "cost per agent-step"
+    text = (
+        f"{table(head, rows)}\n\n"
+        "Cost: less is better; the median over rounds of the ratio in each.\n"
+        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}."
+    )
+    if seconds := found.get("seconds", {}).get("first_step"):
+        text += f"\nA second process takes its first step after {seconds:.1f} s."
+    return text
 
-
-# -- the benchmark ------------------------------------------------------------------------------
 
 ENTRANTS = (
     "swarm-dt", "swarm-dt-follow", "homing", "homing-stock", "central", "central-stock",
@@ -206,13 +279,13 @@ LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "bench
 
 def benchmark_studies(out: Path) -> tuple[Study, ...]:
     """Return the benchmark's study of each entrant, each in a directory of its own."""
-    files = [ROOT / "results" / "interop" / f"{name}@all.safetensors" for name in LEARNERS]
-    there = [str(path) for path in files if path.with_stem(path.stem[:-3] + "0").exists()]
+    trained = ROOT / "results" / "interop"
+    there = [one for one in LEARNERS if (trained / f"{one}@0.safetensors").exists()]
+    names = [*ENTRANTS, *(f"{trained / one}@all.safetensors" for one in there)]
+    folders = [out / "benchmark" / section.slug(Path(name).stem) for name in names]
     return tuple(
-        Study.preset(
-            benchmark.STUDY, out=out / "benchmark" / section.slug(Path(name).stem), policies=[name]
-        )
-        for name in (*ENTRANTS, *there)
+        Study.preset(benchmark.STUDY, out=folder, policies=[name])
+        for name, folder in zip(names, folders)
     )
 
 
@@ -227,12 +300,9 @@ def benchmark_block(found: Sequence[StudyResults]) -> str:
         worst[results.policies[0]] = f"{test.compared.table}, {test.after}: {share:.0%}"
     rows = [(f"`{name}`", *rest, worst[name]) for name, *rest in board.rows]
     head = (*board.columns, "worst cell, share of P without it")
-    seeds = found[0].plan.seeds
-    text = f"{len(seeds)} seeds from {seeds[0]:,} on, of each training. {' '.join(board.lines)}"
-    return "\n".join([table(head, rows), "", text])
-
-
-# -- what `judge` ranks a policy beside ---------------------------------------------------------
+    return (
+        f"{table(head, rows)}\n\n{seeds_from(found[0])}, of each training. {' '.join(board.lines)}"
+    )
 
 
 def record_scores(out: Path) -> None:
@@ -240,11 +310,9 @@ def record_scores(out: Path) -> None:
     loaded = {name: load(name) for name in NAMES if "@" not in name}
     names = [name for name, one in loaded.items() if not getattr(one, "needs_state", False)]
     # Of that study the sound swarm alone is recorded, so one fault is enough.
-    fault = {"modes": ["FM1"], "robots": [1]}
-    study = Study.preset(
-        STUDY, out=out / STUDY, policies=names, sizes=(), parameters=(), faults=[fault]
-    )
-    (found,) = play([study])
+    fields: dict[str, Any] = {"faults": [{"modes": ["FM1"], "robots": [1]}]}
+    fields |= {"policies": names, "sizes": (), "parameters": ()}
+    (found,) = play([Study.preset(STUDY, out=out / STUDY, **fields)])
     p = {c.policy: {"p": c.by_seed.tolist()} for c in found.cells if c.arm.setting == NO_FAULT}
     seeds = [found.plan.seeds[0], found.plan.seeds[-1]]
     recorded = {"command": "python docs/play_tables.py", "seeds": seeds, "policies": p}
@@ -271,7 +339,7 @@ def main() -> None:
     }
     if BENCHMARK.exists():
         blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))
-    PAGE.write_text(rewritten(PAGE.read_text(encoding="utf-8"), blocks), encoding="utf-8")
+    rewrite(PAGE, blocks)
     front_page.main()
     record_scores(OUT)
 

@@ -1,31 +1,23 @@
 """The tables of the page that answers questions of the field, from the results of its studies."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from tables import table
+from tables import asked, by_policy, seeds_from, table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
-from swarm_logistics_env.spi.estimate import SIGNS, Estimate
+from swarm_logistics_env.spi.estimate import SIGNS
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
+from swarm_logistics_env.studies.verdict import Verdict, grouped
 
 LEGEND = (
     "supported: above the threshold; refuted: below it; equivalent: open there, but P within a "
     "tenth of P_o; under Holm"
 )
-
-
-def over(found: StudyResults) -> str:
-    """Return over which seeds a table is."""
-    seeds = found.plan.seeds
-    return f"{len(seeds)} paired seeds from {seeds[0]:,} on"
+Counts = NDArray[np.float64]  # of every seed, or of every training and seed
 
 
 def with_verdict(test: Verdict) -> str:
@@ -33,25 +25,26 @@ def with_verdict(test: Verdict) -> str:
     return f"{section.ratio(test)} {SIGNS[test.conclusion or 'blocked'].word}"
 
 
-def asked(test: Verdict) -> str:
-    """Return an indicator and what is changed."""
-    return f"{test.compared.indicator}, {test.compared.label}"
+def _over(found: StudyResults) -> str:
+    return f"{seeds_from(found, 'paired seeds')}. [95 %]"
 
 
-Judged = tuple[StudyResults, Verdict]
+def _change(before: Counts, after: Counts) -> str:
+    """Return the relative change of P in percent."""
+    change = spi.relative_change(before, after)
+    limits = (None if x is None else 100 * x for x in (change.low, change.high))
+    return section.bracketed(Interval(100 * change.value, *limits), 1)
 
 
-def difference(one: Judged, other: Judged) -> Interval:
+def difference(found: StudyResults, one: Verdict, other: Verdict) -> Interval:
     """Return how much an indicator is above another over the same seeds, with its interval."""
-    seeds, others = (judged[0].plan.seeds for judged in (one, other))
-    assert list(seeds) == list(others)
 
-    def value(judged: Judged, some: NDArray[np.intp]) -> float:
-        results, compared = judged[0], judged[1].compared
-        p = {arm: cell.by_seed[some] for arm, cell in results.cells_of(compared).items()}
-        return compared.estimate(p).value
+    def value(test: Verdict, some: NDArray[np.intp]) -> float:
+        cells = found.cells_of(test.compared)
+        return test.compared.estimate({arm: c.by_seed[some] for arm, c in cells.items()}).value
 
-    return jackknife_interval(len(seeds), lambda some: value(one, some) - value(other, some))
+    n_seeds = len(found.plan.seeds)
+    return jackknife_interval(n_seeds, lambda some: value(one, some) - value(other, some))
 
 
 def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], float]) -> Interval:
@@ -64,44 +57,20 @@ def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], flo
     return Interval(value, *limits)
 
 
-# -- policies side by side ----------------------------------------------------------------------
-
-
 def side_by_side(found: StudyResults) -> str:
     """Return P and the indicators of every policy, a column a policy."""
     rows: dict[str, dict[str, str]] = {}
-    for label, cell in performances(found):
-        rows.setdefault(label, {})[cell.policy] = section.mean_p(cell)
-    for own in _of_all_policies(found):
-        rows[asked(own[0])] = {test.compared.policy: with_verdict(test) for test in own}
-    return f"{_columns(rows, found.policies)}\n\n{over(found)}. [95 %]; {LEGEND}."
-
-
-def _of_all_policies(found: StudyResults) -> list[list[Verdict]]:
-    """Return the verdicts on every question, one a policy, the first policy's first."""
-    compared = [one for one in found.verdicts if one.after.kind != "policy"]
-    questions = grouped(compared, lambda v: (v.compared.table, v.compared.question))
-    return [own for own in questions.values() if len(own) > 1]
-
-
-def performances(found: StudyResults) -> Iterator[tuple[str, Cell]]:
-    """Yield label and cell of each condition without faults."""
-    known: set[str] = set()
     cells = [c for c in found.cells if c.arm.setting.kind != "policy" and not c.arm.case.faults]
-    by_condition = grouped(cells, lambda cell: (cell.table, cell.arm.setting))
-    for (_, setting), own in sorted(by_condition.items(), key=lambda one: one[0][1].kind != "size"):
-        for cell in own:
-            if cell.arm.case.key not in known:
-                known.add(cell.arm.case.key)
-                yield f"P, {setting}", cell
-
-
-def _columns(rows: Mapping[str, Mapping[str, str]], policies: Sequence[str]) -> str:
-    body = [(label, *(row.get(policy, "") for policy in policies)) for label, row in rows.items()]
-    return table(("", *(f"`{policy}`" for policy in policies)), body)
-
-
-# -- larger swarms ------------------------------------------------------------------------------
+    known: set[str] = set()
+    for cell in sorted(cells, key=lambda one: one.arm.setting.kind != "size"):
+        if cell.arm.case.key not in known:  # a case may stand in several tables
+            known.add(cell.arm.case.key)
+            rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
+    compared = [one for one in found.verdicts if one.after.kind != "policy"]
+    for own in grouped(compared, lambda v: (v.compared.table, v.compared.question)).values():
+        if len(own) > 1:  # asked of all policies
+            rows[asked(own[0])] = {test.compared.policy: with_verdict(test) for test in own}
+    return f"{by_policy(rows, found.policies)}\n\n{_over(found)}; {LEGEND}."
 
 
 def by_size(found: StudyResults) -> str:
@@ -110,16 +79,12 @@ def by_size(found: StudyResults) -> str:
     tests = grouped(robustness, lambda test: (test.compared.policy, test.after.name))
     sizes = [test.compared.n_robots for test in next(iter(tests.values()))]
     head = ("policy", "mode", *(f"N = {n}" for n in sizes), f"N = {sizes[-1]} less N = {sizes[0]}")
-    body = [
-        (
-            f"`{policy}`",
-            mode,
-            *map(with_verdict, own),
-            section.bracketed(difference((found, own[-1]), (found, own[0])), 3),
-        )
-        for (policy, mode), own in tests.items()
-    ]
-    return table(head, body)
+    body = []
+    for (policy, mode), own in tests.items():
+        more = section.bracketed(difference(found, own[-1], own[0]), 3)
+        body.append((f"`{policy}`", mode, *map(with_verdict, own), more))
+    note = f"{_over(found)}; the last column is paired by seed and unadjusted. {LEGEND}."
+    return f"{table(head, body)}\n\n{note}"
 
 
 def performances_by_size(found: StudyResults) -> str:
@@ -128,15 +93,15 @@ def performances_by_size(found: StudyResults) -> str:
     sizes = dict.fromkeys(cell.arm.setting.value for cell in cells)
     body = []
     for policy, own in grouped(cells, lambda cell: cell.policy).items():
-        body.append((f"P, `{policy}`", *map(section.mean_p, own)))
         each = (f"{c.mean.value / c.arm.setting.value:.2f}" for c in own)
-        body.append((f"P / N, `{policy}`", *each))
         steps = [test for test in found.verdicts if test.compared.family == (policy, "S")]
-        body.append((f"S up to this N, `{policy}`", "", *map(with_verdict, steps)))
+        body += [
+            (f"P, `{policy}`", *map(section.mean_p, own)),
+            (f"P / N, `{policy}`", *each),
+            (f"S up to this N, `{policy}`", "", *map(with_verdict, steps)),
+        ]
     return table(("", *(f"N = {n:g}" for n in sizes)), body)
 
-
-# -- wear and repair ----------------------------------------------------------------------------
 
 REPAIRED_AT = 200.0  # [s]: failed at 100 s, for 100 s
 
@@ -153,8 +118,8 @@ def repairs(found: StudyResults) -> str:
     """Return what a repair brings."""
     body = []
     for policy, mode, tests in repaired_tests(found):
-        gain = spi.relative_change(*(_by_seed(found, one, one.compared.changed) for one in tests))
-        body.append((policy, mode, *map(with_verdict, tests), _share(gain)))
+        gain = _change(*(found.cells_of(t.compared)[t.compared.changed].by_seed for t in tests))
+        body.append((policy, mode, *map(with_verdict, tests), gain))
     head = ("policy", "mode", "R, not repaired", "R, repaired", "the repair adds to P [%]")
     return table(head, body)
 
@@ -163,28 +128,15 @@ def after_repairs(found: StudyResults) -> str:
     """Return whether anything of a fault is left after its repair."""
     margin, body = found.plan.specification.margin, []
     for policy, mode, tests in repaired_tests(found):
-        whole = deliveries_after(found, tests[0].compared.original)
-        after = [deliveries_after(found, test.compared.changed) for test in tests]
-        left = [spi.relative_change(whole, counts) for counts in after]
+        arms = tests[0].compared.original, *(test.compared.changed for test in tests)
+        whole, *after = (
+            np.array([np.count_nonzero(run > REPAIRED_AT) for run in found.times_of(arm)]) * 1.0
+            for arm in arms
+        )
         back = section.said(spi.equivalence(whole, after[1], margin=margin).verdict)
-        body.append((policy, mode, *map(_share, left), back))
-    return table(("policy", "mode", "not repaired [%]", "repaired [%]", "all back"), body)
-
-
-def _by_seed(found: StudyResults, test: Verdict, arm: Arm) -> NDArray[np.float64]:
-    return found.by_place[test.compared.policy, test.compared.table, arm].by_seed
-
-
-def deliveries_after(found: StudyResults, arm: Arm) -> NDArray[np.float64]:
-    """Return the deliveries of every seed after the repair, shape (n_seeds,)."""
-    times = found.times_of(arm)
-    return np.array([np.count_nonzero(run > REPAIRED_AT) for run in times], dtype=np.float64)
-
-
-def _share(change: Estimate) -> str:
-    """Return a relative change in percent."""
-    limits = (None if x is None else 100 * x for x in (change.low, change.high))
-    return section.bracketed(Interval(100 * change.value, *limits), 1)
+        body.append((policy, mode, *(_change(whole, counts) for counts in after), back))
+    head = ("policy", "mode", "not repaired [%]", "repaired [%]", "all back")
+    return f"{table(head, body)}\n\n{_over(found)}. {LEGEND}."
 
 
 def wear(found: StudyResults) -> str:
@@ -192,24 +144,20 @@ def wear(found: StudyResults) -> str:
     body = []
     for test in found.verdicts:
         if test.compared.table == "Wear":
-            arms = test.compared.original, test.compared.changed
-            change = spi.relative_change(*(_by_seed(found, test, arm) for arm in arms))
-            policy, label = test.compared.policy, test.compared.label
-            body.append((f"`{policy}`", label, with_verdict(test), _share(change)))
+            cells, asked_of = found.cells_of(test.compared), test.compared
+            change = _change(*(cells[a].by_seed for a in (asked_of.original, asked_of.changed)))
+            body.append((f"`{asked_of.policy}`", asked_of.label, with_verdict(test), change))
     return table(("policy", "worn robots", "R", "change of P [%]"), body)
-
-
-# -- two studies of the same questions ----------------------------------------------------------
 
 
 def beside_another_world(found: StudyResults, ideal: StudyResults) -> str:
     """Return what each policy loses from one study's world to the other's, paired by seed."""
     before = {(cell.policy, cell.arm.setting): cell for cell in ideal.cells}
-    body: list[tuple[str, ...]] = []
+    body = []
     for cell in found.cells:
         known = before.get((cell.policy, cell.arm.setting))
         if known is not None and cell.arm.setting.kind == "size":
-            change = spi.relative_change(known.by_seed, cell.by_seed)
+            change = f"{_change(known.by_seed, cell.by_seed)} %"
             means = section.mean_p(known), section.mean_p(cell)
-            body.append((f"`{cell.policy}`", f"P, {cell.words}", *means, f"{_share(change)} %"))
+            body.append((f"`{cell.policy}`", f"P, {cell.words}", *means, change))
     return table(("policy", "", "ideal", "realistic", "change"), body)

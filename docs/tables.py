@@ -1,40 +1,69 @@
-"""Blocks of a page between markers, and Markdown tables to put there."""
+"""What the scripts share: blocks of a page between markers, and tables to put there."""
 
-from __future__ import annotations
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
-from collections.abc import Mapping, Sequence
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.studies.verdict import Verdict
 
+ROOT = Path(__file__).parents[1]
 BLOCK = "<!-- tables: {name} -->"
 END = "<!-- end of tables -->"
 
 
-def block_of(text: str, name: str) -> str:
-    """Return what stands between the markers of a block.
-
-    Raises:
-        SystemExit: the page has no such block.
-    """
-    _, found, rest = text.partition(BLOCK.format(name=name))
-    block, ended, _ = rest.partition(END)
+def _split(text: str, name: str) -> tuple[str, str, str]:
+    """Return what stands before, between and after the inner sides of a block's markers."""
+    before, found, rest = text.partition(BLOCK.format(name=name))
+    block, ended, after = rest.partition(END)
     if not (found and ended):
         raise SystemExit(f"the page has no {BLOCK.format(name=name)} followed by {END}")
-    return block.strip()
+    return before + found, block.strip(), ended + after
+
+
+def block_of(text: str, name: str) -> str:
+    """Return what stands between the markers of a block."""
+    return _split(text, name)[1]
 
 
 def rewritten(text: str, blocks: Mapping[str, str]) -> str:
-    """Return a page with other text between the markers of each block.
-
-    Raises:
-        SystemExit: a block has no pair of markers.
-    """
+    """Return a page with other text between the markers of each block."""
     for name, block in blocks.items():
-        block_of(text, name)  # it is there
-        before, start, rest = text.partition(BLOCK.format(name=name))
-        text = f"{before}{start}\n\n{block}\n\n{END}{rest.partition(END)[2]}"
+        before, _, after = _split(text, name)
+        text = f"{before}\n\n{block}\n\n{after}"
     return text
 
 
-def table(head: tuple[str, ...], rows: Sequence[tuple[object, ...]]) -> str:
+def rewrite(page: Path, blocks: Mapping[str, str]) -> None:
+    """Write other text between the markers of each block of a page."""
+    text = rewritten(page.read_text(encoding="utf-8"), blocks)
+    page.write_text(text, encoding="utf-8")
+
+
+def table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
     """Return a Markdown table."""
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(str(cell) for cell in line)} |" for line in lines)
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+
+
+def by_policy(rows: Mapping[str, Mapping[str, str]], policies: Sequence[str]) -> str:
+    """Return a table of labelled rows with a column for each policy."""
+    body = [(label, *(row.get(policy, "") for policy in policies)) for label, row in rows.items()]
+    return table(("", *(f"`{policy}`" for policy in policies)), body)
+
+
+def seeds_from(results: StudyResults, noun: str = "seeds") -> str:
+    """Return over which seeds a table is, e.g. "20 seeds from 20,000 on"."""
+    seeds = results.plan.seeds
+    return f"{len(seeds)} {noun} from {seeds[0]:,} on"
+
+
+def asked(test: Verdict) -> str:
+    """Return an indicator and what is changed."""
+    return f"{test.compared.indicator}, {test.compared.label}"
+
+
+def example(out: Path, name: str, **changed: Any) -> Study:
+    """Return the study of a file in examples/, which keeps its runs in a folder of `out`."""
+    return Study.from_file(ROOT / "examples" / f"{name}.toml", out=out / name, **changed)

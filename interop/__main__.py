@@ -7,7 +7,7 @@ What results/interop has already is not trained again. One training more of a ro
 from __future__ import annotations
 
 import argparse
-import csv
+import contextlib
 import json
 import subprocess
 import sys
@@ -28,20 +28,15 @@ ROOT = RESULTS.parents[1]
 TRAININGS = range(3)
 BEST = 2  # learners that learn in the paper's world too
 REFERENCES = ("swarm-dt", "ppo-delivery")
+Beside = dict[str, dict[str, list[float]]]  # P of policies on the same seeds, by world and name
 
 
 class Learner(NamedTuple):
-    """Where a learner lives, and what a run costs.
+    """Where a learner lives, and what a run costs."""
 
-    Attributes:
-        venv: its virtual environment in .venvs.
-        module: its script.
-        minutes: of one core, for a training in each world and its row, as measured.
-    """
-
-    venv: str
+    venv: str  # in .venvs
     module: str
-    minutes: dict[str, float]
+    minutes: dict[str, float]  # of one core, for a training in each world and its row, as measured
 
 
 LEARNERS = {
@@ -109,24 +104,20 @@ def train(world: str, runs: list[tuple[str, int]], processes: int) -> None:
         list(pool.map(one, runs))
 
 
-def references() -> dict[str, dict[str, list[float]]]:
+def references() -> Beside:
     """Return P of the shipped policies on the same seeds, by world; some may not be there."""
     path = RESULTS / "references.json"
-    found: dict[str, dict[str, list[float]]] = {}
-    if path.exists():
-        found = json.loads(path.read_text("utf-8"))
+    found: Beside = json.loads(path.read_text("utf-8")) if path.exists() else {}
     for world, name in product(WORLDS, REFERENCES):
         if name not in found.setdefault(world, {}):
-            try:
-                policy = policies.load(name)
-            except PolicyError:
-                continue
-            found[world][name] = performances(policy, WORLDS[world], [()], SEEDS)[0].tolist()
+            with contextlib.suppress(PolicyError):
+                p = performances(policies.load(name), WORLDS[world], [()], SEEDS)[0]
+                found[world][name] = p.tolist()
     path.write_text(json.dumps(found) + "\n", encoding="utf-8")
     return found
 
 
-def table(beside: dict[str, dict[str, list[float]]]) -> str:
+def table(beside: Beside) -> str:
     """Return the rows as Markdown: P and R over trainings and seeds, each with its interval."""
     head = ["learner", "world", "agent-steps", "CPU minutes", "P", "P of each training"]
     head += ["clear of Swarm D-T", *(f"R, {mode}, m = {FAULTY}" for mode in MODES)]
@@ -153,10 +144,9 @@ def each_training(found: list[dict[str, Any]]) -> str:
     """Return mean P of each training; one more stands beside the interval predicted for it."""
     kept = [float(np.mean(row["P"])) for row in first(found)]
     words = ", ".join(f"{mean:.1f}" for mean in kept)
-    for row in found:
-        if row["seed"] not in TRAININGS:
-            words += f"; seed {row['seed']}: {np.mean(row['P']):.1f}, predicted "
-            words += bracketed(spi.prediction_interval(kept), 1)
+    predicted = bracketed(spi.prediction_interval(kept), 1)
+    for row in found[len(kept) :]:
+        words += f"; seed {row['seed']}: {np.mean(row['P']):.1f}, predicted {predicted}"
     return words
 
 
@@ -165,21 +155,18 @@ def is_clear(p: list[float], reference: list[float]) -> bool:
     return spi.relative_change(reference, p).verdict == "supported"
 
 
-def draw(canvas: Any, beside: dict[str, dict[str, list[float]]]) -> None:
+def draw(canvas: Any, beside: Beside) -> None:
     """Draw P over agent-steps of every training, a panel for each world."""
     for world, axes in zip(WORLDS, canvas.subplots(len(WORLDS))):
         for (name, colour), seed in product(zip(LEARNERS, COLOURS), TRAININGS):
             path = RESULTS / f"{name}-{world}@{seed}.csv"
             if path.exists():
-                points = list(csv.DictReader(path.read_text("utf-8").splitlines()))
-                steps = [float(point["agent_steps"]) / 1e6 for point in points]
-                p = [float(point["P"]) for point in points]
-                axes.plot(steps, p, color=colour, label=name if seed == 0 else None)
+                steps, _, p = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
+                axes.plot(steps / 1e6, p, color=colour, label=name if seed == 0 else None)
         for (name, delivered), line in zip(beside[world].items(), LINES[1:]):
             axes.axhline(np.mean(delivered), color=INK, linestyle=line, linewidth=1, label=name)
-        axes.set(
-            title=f"{world} world", xlabel="million agent-steps", ylabel="P [items]", ylim=(0, None)
-        )
+        axes.set(title=f"{world} world", ylim=(0, None))
+        axes.set(xlabel="million agent-steps", ylabel="P [items]")
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7)
 
 

@@ -29,11 +29,8 @@ def learn(learning: Learning) -> Tensors:
     config.on_policy_n_envs_per_worker, config.evaluation_episodes = learning.n_worlds, 1
     config.on_policy_n_minibatch_iters = SETTINGS.epochs
     config.on_policy_minibatch_size = frames // SETTINGS.n_minibatches
-    config.lr, config.gamma, config.clip_grad_val = (
-        SETTINGS.learning_rate,
-        SETTINGS.gamma,
-        SETTINGS.max_grad_norm,
-    )
+    config.lr, config.gamma = SETTINGS.learning_rate, SETTINGS.gamma
+    config.clip_grad_val = SETTINGS.max_grad_norm
     algorithm, model = ALGORITHMS[learning.learner].get_from_yaml(), MlpConfig.get_from_yaml()
     algorithm.lmbda, algorithm.clip_epsilon = SETTINGS.gae_lambda, SETTINGS.clip
     algorithm.scale_mapping, algorithm.use_tanh_normal = NOISE, False
@@ -65,10 +62,7 @@ class Watch(Callback):  # type: ignore[misc]  # BenchMARL is not in the gate
         self._learning = learning
 
     def begin(self, parts: list[torch.nn.Parameter]) -> None:
-        """Let the network drive ahead, with noise that does not depend on what it reads.
-
-        The last layer has six outputs: the means of three numbers, then their noise.
-        """
+        """Let the network drive ahead; its last three outputs, the noise, depend on no input."""
         self._parts, n = parts, len(OUTPUTS)
         drive_ahead(parts)
         with torch.no_grad():

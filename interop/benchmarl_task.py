@@ -32,12 +32,7 @@ class SwarmLogisticsClass(TaskClass):  # type: ignore[misc]  # BenchMARL is not 
     def get_env_fun(
         self, num_envs: int, continuous_actions: bool, seed: int | None, device: Any
     ) -> Callable[[], TorchRLWorlds]:
-        """Return a maker of `num_envs` worlds side by side.
-
-        Raises:
-            ScenarioError, SetupError, FaultError: when it is called, if the configuration has a
-                field that is unknown or cannot be.
-        """
+        """Return a maker of `num_envs` worlds side by side, which refuses fields that cannot be."""
         config = dict(self.config)
         given = {name: config.pop(name) for name in ("rewards", "faults") if name in config}
 
@@ -48,31 +43,24 @@ class SwarmLogisticsClass(TaskClass):  # type: ignore[misc]  # BenchMARL is not 
         return lambda: TorchRLWorlds(make, seeds)
 
     def supports_continuous_actions(self) -> bool:
-        """Return True."""
         return True
 
     def supports_discrete_actions(self) -> bool:
-        """Return False."""
         return False
 
     def max_steps(self, env: Any) -> int:
-        """Return the length of an episode."""
         return env.base_env.worlds.envs[0].warehouse.scenario.n_steps  # type: ignore[no-any-return]
 
     def has_render(self, env: Any) -> bool:
-        """Return False."""
         return False
 
     def group_map(self, env: Any) -> dict[str, list[str]]:
-        """Return the robots of the one group."""
         return env.group_map  # type: ignore[no-any-return]
 
     def observation_spec(self, env: Any) -> Any:
-        """Return the observations of one world."""
         return env.full_observation_spec_unbatched
 
     def action_spec(self, env: Any) -> Any:
-        """Return the actions of one world."""
         return env.full_action_spec_unbatched
 
     def info_spec(self, env: Any) -> None:
@@ -86,7 +74,6 @@ class SwarmLogisticsClass(TaskClass):  # type: ignore[misc]  # BenchMARL is not 
 
     @staticmethod
     def env_name() -> str:
-        """Return the name of the folder with the YAMLs."""
         return "swarm_logistics"
 
 
@@ -98,7 +85,6 @@ class SwarmLogisticsTask(Task):  # type: ignore[misc]  # as above
 
     @staticmethod
     def associated_class() -> type[SwarmLogisticsClass]:
-        """Return what makes the environments."""
         return SwarmLogisticsClass
 
     def get_from_yaml(self, path: str | None = None) -> SwarmLogisticsClass:

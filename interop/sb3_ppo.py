@@ -17,6 +17,7 @@ def learn(learning: Learning) -> Tensors:
         n_worlds=learning.n_worlds,
         seed=learning.seed,
     )
+    network = {"net_arch": list(SETTINGS.hidden), "log_std_init": math.log(SETTINGS.deviation)}
     model = PPO(
         "MlpPolicy",
         env,
@@ -28,10 +29,7 @@ def learn(learning: Learning) -> Tensors:
         gae_lambda=SETTINGS.gae_lambda,
         clip_range=SETTINGS.clip,
         max_grad_norm=SETTINGS.max_grad_norm,
-        policy_kwargs={
-            "net_arch": list(SETTINGS.hidden),
-            "log_std_init": math.log(SETTINGS.deviation),
-        },
+        policy_kwargs=network,
         seed=learning.seed,
         device="cpu",
     )

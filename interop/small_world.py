@@ -62,27 +62,19 @@ LIBRARIES = ("torchrl", "benchmarl")
 
 
 class Settings(NamedTuple):
-    """Of PPO, the same for all; one network, of which every robot is a row.
-
-    Attributes:
-        n_steps: control steps between updates, in every world.
-        n_minibatches: parts of the batch of all robots' steps.
-        learning_rate: at the start; it falls linearly to 0.
-        deviation: of the outputs' noise at the start; it is learned, the same for all states.
-        along: the first output of an untrained network, which therefore drives ahead.
-    """
+    """Of PPO, the same for all; one network, of which every robot is a row."""
 
     hidden: tuple[int, ...] = (128, 64)
-    n_steps: int = 128
-    n_minibatches: int = 32
+    n_steps: int = 128  # of control between updates, in every world
+    n_minibatches: int = 32  # parts of the batch of all robots' steps
     epochs: int = 4
-    learning_rate: float = 1e-3
+    learning_rate: float = 1e-3  # at the start; it falls linearly to 0
     gamma: float = 0.99
     gae_lambda: float = 0.95
     clip: float = 0.2
     max_grad_norm: float = 0.5
-    deviation: float = 0.5
-    along: float = 0.8
+    deviation: float = 0.5  # of the outputs' noise at the start; learned, the same for all states
+    along: float = 0.8  # the first output of an untrained network, which therefore drives ahead
 
 
 SETTINGS = Settings()
@@ -94,11 +86,7 @@ def make_env(scenario: Scenario) -> MotionFrame:
 
 
 def drive_ahead(parts: Sequence[torch.nn.Parameter]) -> None:
-    """Let an untrained network drive ahead whatever it reads.
-
-    Args:
-        parts: weight and bias of each layer from the inputs to the outputs, in turn.
-    """
+    """Let an untrained network, weight and bias of each layer in turn, drive ahead."""
     with torch.no_grad():
         parts[-2].mul_(0.01)
         parts[-1].zero_()
@@ -106,12 +94,7 @@ def drive_ahead(parts: Sequence[torch.nn.Parameter]) -> None:
 
 
 def tensors_of(parts: Sequence[torch.Tensor], deviations: torch.Tensor) -> Tensors:
-    """Return the tensors of a policy file, float32.
-
-    Args:
-        parts: as `drive_ahead`; of the last layer the first three outputs count.
-        deviations: of the outputs' noise, (3,).
-    """
+    """Return the tensors of a policy file, float32; of the last layer three outputs count."""
     named = {
         f"layers.{place // 2}.{'bias' if place % 2 else 'weight'}": part
         for place, part in enumerate(parts)
@@ -123,21 +106,9 @@ def tensors_of(parts: Sequence[torch.Tensor], deviations: torch.Tensor) -> Tenso
 
 
 class Learning:
-    """One learner in one world at one seed.
-
-    Args:
-        learner: what NAME begins with.
-        world: a key of `WORLDS`.
-        seed: of the training; a whole number of at least 0.
-        agent_steps: decisions of single robots to learn from; None: those of the world.
-
-    Raises:
-        SetupError: there is no such world.
-    """
+    """One learner in one world at one seed; `agent_steps` None: as many as the world asks for."""
 
     def __init__(self, learner: str, world: str, seed: int, agent_steps: int | None = None) -> None:
-        if world not in WORLDS:
-            raise SetupError(f"world = {world!r}: should be one of {', '.join(WORLDS)}")
         self.learner, self.world, self.seed = learner, world, seed
         self.scenario, self.n_worlds = WORLDS[world], N_WORLDS[world]
         self.rows = self.n_worlds * self.scenario.n_robots
@@ -153,10 +124,7 @@ class Learning:
         return max(0.0, 1.0 - agent_steps / self.agent_steps)
 
     def tell(self, agent_steps: int, tensors: Callable[[], Tensors]) -> None:
-        """Add a point to the curve where one is due, and write it; costs nothing elsewhere.
-
-        The processor's time counts without what the points cost.
-        """
+        """Add a point to the curve where one is due; the processor's time counts without it."""
         if agent_steps < len(self._curve) * self.agent_steps / POINTS:
             return
         self._seconds += time.process_time() - self._since
@@ -222,24 +190,14 @@ class Learning:
 
 
 def robustness(p_o: Sequence[Any], p_f: Sequence[Any], world: str = "small") -> str:
-    """Return R with its interval, in words; "-" where nothing was delivered.
-
-    Args:
-        p_o, p_f: deliveries without and with faults, (seeds,) or (trainings, seeds).
-    """
+    """Return R with its interval from (seeds,) or (trainings, seeds); "-": nothing delivered."""
     if not np.any(p_o):
         return "-"
-    r = spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY)
-    return bracketed(r, 2)
+    return bracketed(spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY), 2)
 
 
 def main(learn: Callable[[Learning], Tensors], learners: Sequence[str]) -> None:
-    """Read the command line, learn, and write and print the row.
-
-    Args:
-        learn: trains as it is asked, tells of it on the way, and returns what was learned.
-        learners: the names that it may have; the first one where none is asked for.
-    """
+    """Read the command line, learn as it asks (the first learner if none), and write the row."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--learner", choices=learners, default=learners[0])
     parser.add_argument("--world", choices=list(WORLDS), default="small")

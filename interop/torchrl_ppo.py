@@ -53,10 +53,8 @@ def learn(learning: Learning) -> Tensors:
     seeds = [key(learning.seed, "world", world) >> 1 for world in range(learning.n_worlds)]
     worlds = TorchRLWorlds(lambda: make_env(learning.scenario), seeds)
     frames = learning.n_worlds * SETTINGS.n_steps
-    collector = Collector(
-        worlds, actor, frames_per_batch=frames, total_frames=learning.updates * frames
-    )
-    done = 0
+    total, done = learning.updates * frames, 0
+    collector = Collector(worlds, actor, frames_per_batch=frames, total_frames=total)
     learning.tell(done, learned)
     for batch in collector:
         update(loss, optimizer, batch)

@@ -22,14 +22,7 @@ class TorchRLWorlds(EnvBase):  # type: ignore[misc]  # TorchRL is not in the gat
 
     `("robots", "observation")` is (W, N, D), `("robots", "action")` (W, N, A), `("robots",
     "reward")` (W, N, 1); "done", "terminated" and "truncated" are (W, 1). A robot that is removed
-    observes zeros and earns nothing until its world ends.
-
-    Args:
-        make: makes one world; all have as many robots.
-        seeds: of the first episode of each world; later ones follow from them.
-
-    Raises:
-        SetupError: worlds whose rows or commands differ in length.
+    observes zeros and earns nothing until its world ends. `seeds` are those of each first episode.
     """
 
     def __init__(self, make: Callable[[], World], seeds: Sequence[int]) -> None:

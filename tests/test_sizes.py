@@ -47,8 +47,8 @@ MOST = {
     "tokens of the package": 163_860,
     "files of the package": 124,
     "lines of code of studies and report": 4_053,
-    "lines of tests": 19_035,
-    "lines of verification, benchmarks, interop and the scripts of docs": 5_790,
+    "lines of tests": 15_000,
+    "lines of verification, benchmarks, interop and the scripts of docs": 5_132,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,

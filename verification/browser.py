@@ -1,7 +1,5 @@
 """A headless Chromium that is driven by real mouse and key events."""
 
-from __future__ import annotations
-
 import base64
 import fcntl
 import itertools
@@ -20,15 +18,8 @@ _NAMES = ("chromium", "chromium-browser", "google-chrome")
 class Browser:
     """A browser, spoken to in the DevTools protocol over two pipes: no port, no websocket.
 
-    Args:
-        profile: an empty folder for the browser's own files.
-        size: width and height of the window [px].
-
-    Attributes:
-        console: the errors that the page has logged.
-
-    Raises:
-        FileNotFoundError: there is no Chromium on this machine.
+    `profile` is an empty folder for its files; `size` that of the window [px]. `console` has the
+    errors that the page has logged. FileNotFoundError: there is no Chromium on this machine.
     """
 
     def __init__(self, profile: Path, size: tuple[int, int]) -> None:
@@ -51,27 +42,21 @@ class Browser:
                 "--remote-debugging-pipe", f"--user-data-dir={profile}",
                 f"--window-size={size[0]},{size[1]}", "about:blank",
             ],
-            close_fds=False,
-            preexec_fn=place_pipes,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            close_fds=False, preexec_fn=place_pipes, stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         for end in (to_browser, from_browser, *ends):
             os.close(end)
         self._numbers, self._buffer, self._session = itertools.count(1), b"", None
         self.console: list[str] = []
         targets = self.call("Target.getTargets")["targetInfos"]
-        page = next(target for target in targets if target["type"] == "page")
-        attached = self.call("Target.attachToTarget", targetId=page["targetId"], flatten=True)
+        page = next(target["targetId"] for target in targets if target["type"] == "page")
+        attached = self.call("Target.attachToTarget", targetId=page, flatten=True)
         self._session = attached["sessionId"]
-        self.call("Page.enable")
-        self.call("Runtime.enable")
-        self.call("Log.enable")
-        self.call(
-            "Emulation.setDeviceMetricsOverride",
-            width=size[0], height=size[1], deviceScaleFactor=1, mobile=False,
-        )  # fmt: skip
+        for domain in ("Page", "Runtime", "Log"):
+            self.call(f"{domain}.enable")
+        shape = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **shape)
 
     def call(self, method: str, **parameters: Any) -> Any:
         """Send a command of the protocol and return its result."""
@@ -80,13 +65,11 @@ class Browser:
         if self._session:
             message["sessionId"] = self._session
         os.write(self._out, json.dumps(message).encode() + b"\0")
-        while True:
-            answer = self._read()
-            if answer.get("id") == number:
-                assert "error" not in answer, answer
-                return answer["result"]
+        while (answer := self._read()).get("id") != number:
             if answer.get("method") in {"Runtime.exceptionThrown", "Log.entryAdded"}:
                 self.console.append(json.dumps(answer["params"]))
+        assert "error" not in answer, answer
+        return answer["result"]
 
     def _read(self) -> Any:
         while b"\0" not in self._buffer:
@@ -110,22 +93,23 @@ class Browser:
     def wait_for(self, expression: str) -> Any:
         """Return the value of a JavaScript expression once it is true."""
         for _ in range(600):
-            value = self.value(expression)
-            if value:
+            if value := self.value(expression):
                 return value
             time.sleep(0.05)
         raise AssertionError(f"never true: {expression}; {self.console}")
 
-    def click(self, x: float, y: float, button: str = "left") -> None:
+    def click(self, x: float, y: float) -> None:
         """Click at a place of the window [px]."""
+        place = {"x": x, "y": y, "button": "left", "clickCount": 1}
         for kind in ("mousePressed", "mouseReleased"):
-            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
+            self.call("Input.dispatchMouseEvent", type=kind, **place)
 
     def click_on(self, selector: str) -> None:
         """Click the middle of the element that a CSS selector finds."""
         box = f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()"
-        x, y = self.value(f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])({box})")
-        self.click(x, y)
+        self.click(
+            *self.value(f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])({box})")
+        )
 
     def press(self, key: str) -> None:
         """Press and release a key, by the name that browsers have for it."""

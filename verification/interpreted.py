@@ -6,11 +6,11 @@ What only compiled code can do, calling C by address and changing integers that 
 done by ctypes meanwhile.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import threading
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,21 +30,16 @@ class _Doubles(ctypes.Structure):
 
 def _call_at(address: int, arguments: tuple[Any, ...], returned: Any = None) -> Any:
     given = [_passed(argument) for argument in arguments]
-    function = ctypes.CFUNCTYPE(returned, *(type(argument) for argument in given))
+    function = ctypes.CFUNCTYPE(returned, *map(type, given))
     return function(int(address))(*given)
 
 
-def _made_at(address: int, arguments: tuple[Any, ...]) -> int:
-    return int(_call_at(address, arguments, ctypes.c_int64))
-
-
 def _passed(argument: Any) -> Any:
-    if not isinstance(argument, tuple):
-        is_real = isinstance(argument, float)
-        return ctypes.c_double(argument) if is_real else ctypes.c_int64(int(argument))
-    if isinstance(argument[0], float):
-        return _Doubles(*argument)
-    return _Words(*(int(word) for word in argument))
+    if isinstance(argument, tuple):
+        is_real = isinstance(argument[0], float)
+        return _Doubles(*argument) if is_real else _Words(*map(int, argument))
+    is_real = isinstance(argument, float)
+    return ctypes.c_double(argument) if is_real else ctypes.c_int64(int(argument))
 
 
 def _unpacked_at(structure: type, address: int) -> Any:
@@ -70,9 +65,6 @@ def _store_at(address: int, value: int) -> None:
     ctypes.c_int32.from_address(int(address)).value = int(value)
 
 
-_ONE_AT_A_TIME = threading.Lock()
-
-
 def _word_at(address: int, place: int = 0) -> ctypes.c_int64:
     return ctypes.c_int64.from_address(int(address) + 8 * int(place))
 
@@ -81,42 +73,35 @@ def _load(address: int, place: int = 0) -> int:
     return _word_at(address, place).value
 
 
-def _exchange(address: int, place: int, value: int) -> int:
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def _changed(address: int, place: int, new: Callable[[int], int]) -> int:
+    """Change a word without anybody in between; return what it was."""
     with _ONE_AT_A_TIME:
-        before, _word_at(address, place).value = _load(address, place), int(value)
+        word = _word_at(address, place)
+        before = word.value
+        word.value = int(new(before))
     return before
-
-
-def _add(address: int, place: int, value: int) -> int:
-    with _ONE_AT_A_TIME:
-        before = _load(address, place)
-        _word_at(address, place).value = before + int(value)
-    return before
-
-
-def _replace(address: int, place: int, old: int, new: int) -> bool:
-    with _ONE_AT_A_TIME:
-        is_there = _load(address, place) == int(old)
-        if is_there:
-            _word_at(address, place).value = int(new)
-    return is_there
 
 
 def interpret_kernels() -> None:
-    """Replace what only compiled code can do by functions of the interpreter.
-
-    Raises:
-        pytest.UsageError: kernels are compiled all the same, as NUMBA_DISABLE_JIT is not 1.
-    """
+    """Replace what only compiled code can do by functions of the interpreter."""
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
         raise pytest.UsageError("verification.interpreted needs NUMBA_DISABLE_JIT=1")
-    vars(physics).update(call_at=_call_at, made_at=_made_at, store_at=_store_at)
+    made_at = partial(_call_at, returned=ctypes.c_int64)
+    vars(physics).update(call_at=_call_at, made_at=made_at, store_at=_store_at)
     for module in (physics, stepping, thread_pool):
         vars(module).update(unpacked_at=_unpacked_at)
-    vars(thread_pool).update(pointer_at=lambda address: ctypes.c_void_p(int(address)))
-    # A look takes a thousand times as long.
     vars(thread_pool).update(
-        load=_load, exchange=_exchange, add=_add, replace=_replace, _PATIENCE=40
+        pointer_at=lambda address: ctypes.c_void_p(int(address)),
+        load=_load,
+        exchange=lambda address, place, value: _changed(address, place, lambda _: value),
+        add=lambda address, place, value: _changed(address, place, lambda old: old + value),
+        replace=lambda address, place, old, new: (
+            _changed(address, place, lambda found: new if found == old else found) == old
+        ),
+        _PATIENCE=40,  # a look takes a thousand times as long
     )
 
 

@@ -4,19 +4,18 @@ In plain Python from what the documentation says, robot by robot and in whole nu
 control periods, so that it shares no rounding and no shortcut with the package.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.warehouse import FailureMode
 from swarm_logistics_env.warehouse.failure_modes import LOST_AS_A_WHOLE, failure_mode
 from swarm_logistics_env.warehouse.faults import failed_robots
 from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.warehouse.state import WarehouseState as State
+
+Able = dict[str, Any]  # what one robot can do
 
 
 @dataclass
@@ -42,11 +41,6 @@ class Planned:
         """Return whether it holds at a step, breaks included."""
         return self.begins <= 2 * step and (self.ends is None or 2 * step < self.ends)
 
-    @property
-    def lost(self) -> FailureMode:
-        """What its mode takes."""
-        return failure_mode(self.mode)
-
 
 class Faults:
     """What planned faults leave the robots of one world, step by step."""
@@ -67,7 +61,7 @@ class Faults:
                 like = Fault("FM1", one.robots)
                 one.struck = failed_robots(like, self._seed, self._scenario.n_robots).tolist()
 
-    def expected(self, world: Warehouse, before: State) -> list[dict[str, Any]]:
+    def expected(self, world: Warehouse, before: State) -> list[Able]:
         """Return of each robot what it can do now, its modes and whether it is there."""
         now = world.state
         left = [self._sound(robot) for robot in range(self._scenario.n_robots)]
@@ -88,7 +82,7 @@ class Faults:
             able["present"] = not self.gone[robot]
         return left
 
-    def _sound(self, robot: int) -> dict[str, Any]:
+    def _sound(self, robot: int) -> Able:
         s = self._scenario
         speed = s.speed_mix[robot % len(s.speed_mix)]
         sensing = s.sensing_mix[robot % len(s.sensing_mix)]
@@ -104,9 +98,9 @@ class Faults:
             "there": True,
         }
 
-    def _take(self, one: Planned, able: dict[str, Any], step: int) -> None:
+    def _take(self, one: Planned, able: Able, step: int) -> None:
         """Take from a robot what a fault of its takes; several faults add up."""
-        s, lost = self._scenario, one.lost
+        s, lost = self._scenario, failure_mode(one.mode)
         speed, view = lost.speed, lost.view
         if one.factor is not None:
             speed, view = (one.factor, view) if lost.factor == "speed" else (speed, one.factor)
@@ -128,13 +122,12 @@ class Faults:
 
     def _is_broken(self, one: Planned, robot: int, now: State) -> bool:
         """Return whether an intermittent fault holds, which the robot's own stream decides."""
-        told = now.failure_modes[robot]
         others = [
             other.mode
             for other in self._planned
             if other is not one and other.holds(now.step) and robot in (other.struck or ())
         ]
-        return told.count(one.mode) > others.count(one.mode)
+        return now.failure_modes[robot].count(one.mode) > others.count(one.mode)
 
     def _in_role(self, one: Planned, now: State, views: list[float]) -> list[int]:
         """Return the robots that a fault by role strikes: those in it, then those nearest."""
@@ -171,11 +164,11 @@ class Radio:
         self._own: list[list[float]] = []  # by step and robot, before delays and lies
         self._given = [[[0.0] * scenario.message_size] * scenario.n_robots]
 
-    def told(self, now: State, before: State, able: list[dict[str, Any]]) -> list[float]:
+    def told(self, now: State, before: State, able: list[Able]) -> list[float]:
         """Return the timer that each robot tells [s], NaN: none; to be asked once a step."""
-        s, told = self._scenario, []
+        s, told, own = self._scenario, [], list[float]()
+        self._own.append(own)
         limit, period = s.timer_limit - 1e-9, s.control_period
-        self._own.append([])
         for robot, one in enumerate(able):
             if now.robot_in_delivery[robot]:
                 self._last_inside[robot] = now.step
@@ -184,25 +177,24 @@ class Radio:
                 timer = (now.step - self._last_inside[robot]) * period
             passes_on = s.is_gossip and one["present"]
             heard = before.robot_heard[robot] + period if passes_on else math.nan
-            known = [value for value in (timer, heard) if value < limit]
-            self._own[-1].append(min(known, default=math.nan))
+            own.append(min((t for t in (timer, heard) if t < limit), default=math.nan))
             then = now.step - one["radio_delay"]
             late = self._own[then][robot] if then >= 0 else math.nan
             late = late if late < limit else math.nan
-            told.append(late if one["honest"] else 0.0)
-        return [value if one["present"] else math.nan for value, one in zip(told, able)]
+            told.append((late if one["honest"] else 0.0) if one["present"] else math.nan)
+        return told
 
-    def messages(
-        self, commands: Sequence[Sequence[float]], able: list[dict[str, Any]]
-    ) -> list[list[float]]:
+    def messages(self, commands: Sequence[Sequence[float]], able: list[Able]) -> list[list[float]]:
         """Return the message of each robot after a step; what it could do as the step began."""
-        given = [
-            [min(max(word, -1.0), 1.0) for word in command[4:]]
-            if one["present"] and one["obeys"]
-            else [0.0] * self._scenario.message_size
-            for command, one in zip(commands, able)
-        ]
-        self._given.append(given)
+        nothing = [0.0] * self._scenario.message_size
+        self._given.append(
+            [
+                [min(max(word, -1.0), 1.0) for word in command[4:]]
+                if one["present"] and one["obeys"]
+                else nothing
+                for command, one in zip(commands, able)
+            ]
+        )
         step = len(self._given) - 1
         return [
             self._given[max(step - one["radio_delay"], 0)][robot] for robot, one in enumerate(able)
@@ -218,7 +210,7 @@ def rewards(
     was, is_ = before.carrier, now.carrier
     for robot in range(now.n_robots):
         x, x_before = (moment.robot_position[robot, 0] for moment in (now, before))
-        same_request = not new and is_ == was == robot and now.requested == before.requested
+        carries_on = is_ == was == robot and now.requested == before.requested
         way = 0.0
         for item, after in enumerate(now.item_carrier):
             who = before.item_carrier[item] if after == NOBODY else after
@@ -227,18 +219,17 @@ def rewards(
                 way += min(now.item_position[item, 0], edge)
                 way -= min(before.item_position[item, 0], edge)
         delivers = now.delivers[robot]
-        deeper = 0.0
-        if is_ == was == robot and now.requested == before.requested:
-            deeper = 2.0 * (max(x, edge) - max(x_before, edge))
+        deeper = 2.0 * (max(x, edge) - max(x_before, edge)) if carries_on else 0.0
+        nearer = min(x, edge) - min(x_before, edge) if carries_on and not new else 0.0
         terms = {
             "delivery": len(new),
             "own_delivery": new.count(robot),
             "lift_requested": 0 if new else ((is_ == robot) - (was == robot)) * delivers,
-            "approach": min(x, edge) - min(x_before, edge) if same_request else 0.0,
+            "approach": nearer,
             "stocking": way,
             "contact": period * now.robot_contact[robot],
             "blocked_request": (period + deeper) * (is_ == robot and not delivers),
-        }  # fmt: skip
+        }
         paid = sum(weights.get(name, 0.0) * value for name, value in terms.items())
         total.append(paid if before.robot_present[robot] else 0.0)
     return total
@@ -246,9 +237,8 @@ def rewards(
 
 def ends(before: State, now: State, last_step: int) -> tuple[list[bool], list[bool]]:
     """Return which robots terminate and which are truncated; none does both."""
-    is_all = now.requested == NOBODY
+    is_all, is_late = now.requested == NOBODY, now.step >= last_step
     were, are = before.robot_present.tolist(), now.robot_present.tolist()
     terminated = [was and (is_all or not is_) for was, is_ in zip(were, are)]
-    is_late = now.step >= last_step
     truncated = [is_late and was and not t for was, t in zip(were, terminated)]
     return terminated, truncated

@@ -6,9 +6,8 @@
 Ends with 1 at the first broken promise, naming the world that shows it.
 """
 
-from __future__ import annotations
-
 import argparse
+import contextlib
 import random
 import sys
 import time
@@ -33,21 +32,13 @@ POLICIES = ("swarm-dt", "swarm-dt-follow", "random-walk", "central", "anything",
 
 @dataclass
 class Tally:
-    """What was played.
-
-    Attributes:
-        worlds: how many.
-        steps: control steps in all.
-        delivered: items in all.
-        deepest: the greatest overlap of two bodies [m].
-        no_room: scenarios whose things found no room at the reset.
-    """
+    """What was played: numbers of worlds, steps and items, and the greatest overlap [m]."""
 
     worlds: int = 0
     steps: int = 0
     delivered: int = 0
     deepest: float = 0.0
-    no_room: int = 0
+    no_room: int = 0  # scenarios whose things found none at the reset
 
     def __str__(self) -> str:
         return (
@@ -63,15 +54,10 @@ CHANGEABLE = ("delivery_width", "max_speed", "view_range", "radio_range", "picku
 
 
 def some_scenario(source: random.Random) -> Scenario:
-    """Return a scenario, drawn again until one can be.
-
-    A robot sinks into nothing only where drives are of a robot's strength.
-    """
+    """Return a scenario, drawn again until one can be."""
     while True:
-        try:
+        with contextlib.suppress(ScenarioError):
             return Scenario(**_fields(source))
-        except ScenarioError:
-            continue
 
 
 def _fields(source: random.Random) -> dict[str, Any]:
@@ -86,7 +72,7 @@ def _fields(source: random.Random) -> dict[str, Any]:
     physics_period = source.choice([0.01, 0.02, 0.005])
     control_period = physics_period * source.randint(1, 5)
     n_items = int(number(1, 60))
-    fields: dict[str, Any] = {
+    return {
         "robot_radius": radius,
         "item_radius": number(0.03, 0.3),
         "warehouse_width": width,
@@ -102,6 +88,7 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "restock": source.random() < 0.5,
         "n_obstacles": rarely(source.randint(1, 6), 0),
         "obstacle_radius": number(0.05, 0.6),
+        # A robot sinks into nothing only where drives are of a robot's strength.
         "robot_mass": number(0.1, 50.0),
         "max_speed": min(number(0.2, 4.0), LONGEST_STRIDE * radius / physics_period),
         "max_acceleration": number(0.5, 40.0),
@@ -125,7 +112,6 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "control_period": control_period,
         "physics_period": physics_period,
     }
-    return fields
 
 
 def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> list[Fault]:
@@ -149,19 +135,13 @@ def drawn_change(source: random.Random, scenario: Scenario) -> dict[str, Any]:
     fields = _fields(source)
     fields["delivery_width"] = scenario.warehouse_width * source.uniform(0.05, 0.6)
     fields["max_speed"] = scenario.max_speed * source.uniform(0.3, 1.0)
-    chosen = source.sample(CHANGEABLE, source.randint(1, 2))
-    return {name: fields[name] for name in chosen}
+    return {name: fields[name] for name in source.sample(CHANGEABLE, source.randint(1, 2))}
 
 
 def play(source: random.Random, steps: int, tally: Tally) -> None:
-    """Play one random world and look at it after every step.
-
-    Raises:
-        BrokenPromiseError: an invariant does not hold.
-    """
+    """Play one random world and look at it after every step."""
     scenario = some_scenario(source)
-    seconds = steps * scenario.control_period
-    seed = source.randrange(2**32)
+    seconds, seed = steps * scenario.control_period, source.randrange(2**32)
     world = Warehouse(scenario)
     tally.worlds += 1
     try:
@@ -190,10 +170,8 @@ def play(source: random.Random, steps: int, tally: Tally) -> None:
 
 def _disturb(source: random.Random, world: Warehouse, seconds: float) -> None:
     if source.random() < 0.5:
-        try:
+        with contextlib.suppress(ScenarioError):
             world.change(**drawn_change(source, world.scenario))
-        except ScenarioError:
-            return
     else:
         world.set_faults(drawn_faults(source, world.scenario, seconds))
 
@@ -216,9 +194,8 @@ def towards(world: Warehouse, target: NDArray[np.float64], width: int) -> NDArra
     away = target - world.state.robot_position
     angle = np.arctan2(away[:, 1], away[:, 0]) - world.state.robot_heading
     commands = np.zeros((len(away), width))
-    commands[:, 0], commands[:, 1] = np.cos(angle), np.sin(angle)
-    commands[:, 2] = np.clip(angle, -1.0, 1.0)
-    commands[:, 3] = 1.0
+    driven = np.cos(angle), np.sin(angle), np.clip(angle, -1.0, 1.0), np.ones(len(away))
+    commands[:, :4] = np.stack(driven, axis=1)
     return commands
 
 
@@ -230,20 +207,20 @@ def main() -> int:
     parser.add_argument("--worlds", type=int, default=sys.maxsize, help="at most so many")
     parser.add_argument("--steps", type=int, default=400, help="of each world")
     asked = parser.parse_args()
-    until = time.monotonic() + 60.0 * asked.minutes
     said, tally = time.monotonic(), Tally()
+    until = said + 60.0 * asked.minutes
     for number in range(asked.first, asked.first + asked.worlds):
         try:
             play(random.Random(number), asked.steps, tally)
         except BrokenPromiseError as error:
-            print(
-                f"world {number}: {error} (python -m verification.soak --first {number} --worlds 1)"
-            )
+            again = f"python -m verification.soak --first {number} --worlds 1"
+            print(f"world {number}: {error} ({again})")
             return 1
-        if time.monotonic() - said > 60.0:
-            said = time.monotonic()
+        now = time.monotonic()
+        if now - said > 60.0:
+            said = now
             print(tally, flush=True)
-        if time.monotonic() > until:
+        if now > until:
             break
     print(f"no promise broken: {tally}")
     return 0

@@ -6,8 +6,6 @@ A hop is a function of ours that receives the value and returns or forwards it, 
 tuple or dict; one that only reads it is none. A container is a type or table that holds it.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections.abc import Callable
@@ -35,35 +33,14 @@ SMALL: dict[str, Any] = {
 }
 
 
-def _holds(value: object, kinds: tuple[type, ...]) -> str | None:
-    """Return the name of the kind that a value is or has among its elements."""
-    if isinstance(value, dict):
-        value = tuple(value.values())
-    for one in value if isinstance(value, list | tuple) else (value,):
-        for each in one if isinstance(one, tuple) else (one,):
-            if isinstance(each, kinds):
-                return next(kind.__name__ for kind in kinds if isinstance(each, kind))
-    return None
-
-
 class Trace:
-    """Notes the functions of the package that hand on a value of some kinds.
-
-    Attributes:
-        hops: their names, in the order in which they were entered.
-        containers: names of the kinds that were met.
-    """
+    """Notes the functions of the package that hand on a value of some kinds, and these kinds."""
 
     def __init__(self, *kinds: type) -> None:
+        self.hops: dict[str, None] = {}  # in the order in which they handed it on
         self.containers: dict[str, None] = {}
         self._kinds = kinds
-        self._entered: list[list[bool]] = []  # of each frame: whether one below it hands it on
-        self._found: dict[str, int] = {}
-        self._number = 0
-
-    @property
-    def hops(self) -> list[str]:
-        return sorted(self._found, key=lambda name: self._found[name])
+        self._entered: list[bool] = []  # of each frame: whether one below it hands it on
 
     def of(self, action: Callable[[], object]) -> None:
         """Note what happens during a call."""
@@ -73,34 +50,41 @@ class Trace:
         finally:
             sys.setprofile(None)
 
+    def _held(self, value: object) -> str | None:
+        """Return the name of the kind that a value is or has among its elements."""
+        if isinstance(value, dict):
+            value = tuple(value.values())
+        for one in value if isinstance(value, list | tuple) else (value,):
+            for each in one if isinstance(one, tuple) else (one,):
+                if isinstance(each, self._kinds):
+                    return next(kind.__name__ for kind in self._kinds if isinstance(each, kind))
+        return None
+
     def _note(self, frame: FrameType, event: str, argument: object) -> None:
         code = frame.f_code
         if event not in ("call", "return") or not code.co_filename.startswith(PACKAGE):
             return
-        self._number += 1
         if event == "call":
-            self._entered.append([False])
+            self._entered.append(False)
             return
-        (below,) = self._entered.pop() if self._entered else [False]
+        below = self._entered.pop() if self._entered else False
         given = [frame.f_locals.get(n) for n in code.co_varnames[: code.co_argcount]]
         own = code.co_varnames[:1] in (("self",), ("cls",))
-        received = [kind for value in given[own:] if (kind := _holds(value, self._kinds))]
-        returned = _holds(argument, self._kinds)
+        received = [kind for value in given[own:] if (kind := self._held(value))]
+        returned = self._held(argument)
         self.containers |= dict.fromkeys(filter(None, [*received, returned]))
         is_hop = returned is not None or bool(received and below)
         if is_hop and not code.co_name.startswith(("<", "__")):
-            name = f"{Path(code.co_filename).stem}.{code.co_qualname}"
-            self._found.setdefault(name, self._number)
+            self.hops[f"{Path(code.co_filename).stem}.{code.co_qualname}"] = None
         if self._entered and (is_hop or received or below):
-            self._entered[-1][0] = True
+            self._entered[-1] = True
 
 
 def episode_to_table(out: Path) -> Trace:
     """Trace an episode into a cell of the table that the report prints."""
     trace = Trace(Episode, Outcome, Cell, Section)
-    study = Study(out=out, **SMALL)
-    study.run()  # compiled, and kept away from what is traced
-    traced = Study(out=out.with_name("traced"), **SMALL)
+    Study(out=out / "study", **SMALL).run()  # compiled, and kept away from what is traced
+    traced = Study(out=out / "traced", **SMALL)
     trace.of(traced.run)
     trace.of(lambda: [section_markdown(one) for one in tables(traced.findings())])
     trace.containers["the table `runs` of the store"] = None
@@ -114,18 +98,13 @@ def text_to_policy() -> Trace:
     return trace
 
 
-def main() -> None:
-    """Print both."""
+if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         traces = {
-            "An episode to a cell of the paper's table": episode_to_table(Path(folder) / "study"),
+            "An episode to a cell of the paper's table": episode_to_table(Path(folder)),
             "A policy's text to a running policy": text_to_policy(),
         }
     for title, trace in traces.items():
         print(f"{title}: {len(trace.hops)} hops, {len(trace.containers)} containers")
         print("  hops:", *trace.hops, sep="\n    ")
         print("  containers:", ", ".join(trace.containers))
-
-
-if __name__ == "__main__":
-    main()

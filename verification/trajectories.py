@@ -7,19 +7,17 @@ The record says on which machine it was written. Its key "stories" is the former
 trajectories.
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 import hashlib
 import json
 import platform
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,117 +45,94 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "counts": ("step", "time", "requested", "delivery_times", "delivered_by", "anchoring_seconds"),
 }  # fmt: skip
 
-Act = Callable[[Warehouse], None]
+Events = Mapping[int, Callable[[Warehouse], None]]  # what is done to the world before a step
 Digests = dict[str, str]  # step -> digests, one per group
 
 
-@dataclass(frozen=True)
-class GoldenTrajectory:
-    """The inputs that decide a trajectory whose digests are recorded.
-
-    Attributes:
-        scenario: the world is reset to it.
-        faults: they are scheduled at the reset.
-        steps: the number of steps to play.
-        policy: the name of the policy; every fifth of its commands is replaced by a random one.
-        events: step -> what is done to the world before that step.
-        seed: it decides layout, requests, the robots that fail, and the random commands.
-    """
+class GoldenTrajectory(NamedTuple):
+    """What decides a trajectory; every fifth command of the policy is replaced by a random one."""
 
     scenario: Scenario
     faults: tuple[Fault, ...] = ()
     steps: int = 200
     policy: str = "swarm-dt"
-    events: dict[int, Act] = field(default_factory=dict)
     seed: int = 0
+    events: Events = MappingProxyType({})
 
 
-def small(**fields: Any) -> Scenario:
-    """Return a warehouse in which six robots deliver within seconds."""
-    size = {"n_robots": 6, "n_items": 10, "warehouse_width": 4.0, "warehouse_height": 3.0}
-    return Scenario(**{**size, "delivery_width": 1.0, **fields})
-
-
-def _golden() -> dict[str, GoldenTrajectory]:
-    golden = {
-        "preset paper": GoldenTrajectory(Scenario.preset("paper"), steps=100),
-        "preset paper_scalability": GoldenTrajectory(
-            Scenario.preset("paper_scalability"), steps=50
-        ),
-        "preset dots": GoldenTrajectory(Scenario.preset("dots"), steps=100),
-        "preset realistic": GoldenTrajectory(
-            Scenario.preset("realistic").replace(handling_time=0.0), steps=100
-        ),
-        "seed 1": GoldenTrajectory(small(), seed=1),
-        "long, past the rebuilding of bodies": GoldenTrajectory(small(restock=True), steps=650),
-        "until all is delivered": GoldenTrajectory(small(n_items=2, n_robots=8), steps=300),
-        "obstacles": GoldenTrajectory(small(n_obstacles=4, obstacle_radius=0.2)),
-        "restock": GoldenTrajectory(small(restock=True, n_items=3), steps=300),
-        "gossip": GoldenTrajectory(small(relay="gossip", radio_range=1.0)),
-        "ranger noise": GoldenTrajectory(small(ranger_noise=0.05)),
-        "position noise": GoldenTrajectory(small(position_noise=0.05)),
-        "sensor dropout": GoldenTrajectory(small(sensor_dropout=0.3)),
-        "radio loss": GoldenTrajectory(small(radio_loss=0.5)),
-        "all noise": GoldenTrajectory(
-            small(ranger_noise=0.1, position_noise=0.1, sensor_dropout=0.1, radio_loss=0.1)
-        ),
-        "messages": GoldenTrajectory(small(message_size=3)),
-        "differential drive": GoldenTrajectory(small(drive="differential")),
-        "mixed swarm": GoldenTrajectory(small(speed_mix=(1.0, 0.5), sensing_mix=(1.0, 0.6, 0.3))),
-        "no memory": GoldenTrajectory(small(memory_size=0)),
-        "long memory": GoldenTrajectory(small(memory_size=5)),
-        "other periods": GoldenTrajectory(
-            small(control_period=0.2, physics_period=0.01, max_speed=1.0)
-        ),
-        "jam": GoldenTrajectory(small(n_robots=30, n_items=1), steps=100),
-        "swarm-dt-follow": GoldenTrajectory(small(), policy="swarm-dt-follow"),
-        "random-walk": GoldenTrajectory(small(), policy="random-walk"),
-        "central": GoldenTrajectory(small(), policy="central"),
+def _small(*faults: Fault, **fields: Any) -> GoldenTrajectory:
+    """Return one of a warehouse in which six robots deliver within seconds."""
+    told = {
+        name: fields.pop(name) for name in ("steps", "policy", "seed", "events") if name in fields
     }
-    for mode in FAILURE_MODES:
-        golden[f"{mode} from the start"] = GoldenTrajectory(small(), (Fault(mode, 2),))
-        passing = None if mode == "removed" else 6.0
-        golden[f"{mode} for a while"] = GoldenTrajectory(small(), (Fault(mode, 3, 5.0, passing),))
-    golden["several faults at once"] = GoldenTrajectory(
-        small(),
-        (Fault("FM1", (0, 1)), Fault("motor_slow", (1, 2), 3.0, 5.0, 0.3), Fault("FM4", 2, 8.0)),
-    )
-    golden["faults that come and go"] = GoldenTrajectory(
-        small(),
-        (
-            Fault("motor_wear", 2, intermittent=(2.0, 1.0)),
-            Fault("FM3", 3, 2.0, 9.0, None, (1.0, 1.0)),
-        ),
-    )
-    golden["without drift"] = GoldenTrajectory(small(heading_drift=0.0))
-    golden["changes during the run"] = GoldenTrajectory(
-        small(delivery_width=0.5),
+    size = {"n_robots": 6, "n_items": 10, "warehouse_width": 4.0, "warehouse_height": 3.0}
+    return GoldenTrajectory(Scenario(**{**size, "delivery_width": 1.0, **fields}), faults, **told)
+
+
+def _preset(name: str, steps: int, **changed: Any) -> GoldenTrajectory:
+    return GoldenTrajectory(Scenario.preset(name).replace(**changed), steps=steps)
+
+
+GOLDEN = {
+    "preset paper": _preset("paper", 100),
+    "preset paper_scalability": _preset("paper_scalability", 50),
+    "preset dots": _preset("dots", 100),
+    "preset realistic": _preset("realistic", 100, handling_time=0.0),
+    "seed 1": _small(seed=1),
+    "long, past the rebuilding of bodies": _small(restock=True, steps=650),
+    "until all is delivered": _small(n_items=2, n_robots=8, steps=300),
+    "obstacles": _small(n_obstacles=4, obstacle_radius=0.2),
+    "restock": _small(restock=True, n_items=3, steps=300),
+    "gossip": _small(relay="gossip", radio_range=1.0),
+    "ranger noise": _small(ranger_noise=0.05),
+    "position noise": _small(position_noise=0.05),
+    "sensor dropout": _small(sensor_dropout=0.3),
+    "radio loss": _small(radio_loss=0.5),
+    "all noise": _small(ranger_noise=0.1, position_noise=0.1, sensor_dropout=0.1, radio_loss=0.1),
+    "messages": _small(message_size=3),
+    "differential drive": _small(drive="differential"),
+    "mixed swarm": _small(speed_mix=(1.0, 0.5), sensing_mix=(1.0, 0.6, 0.3)),
+    "no memory": _small(memory_size=0),
+    "long memory": _small(memory_size=5),
+    "other periods": _small(control_period=0.2, physics_period=0.01, max_speed=1.0),
+    "jam": _small(n_robots=30, n_items=1, steps=100),
+    "swarm-dt-follow": _small(policy="swarm-dt-follow"),
+    "random-walk": _small(policy="random-walk"),
+    "central": _small(policy="central"),
+}
+for _mode in FAILURE_MODES:
+    _passing = None if _mode == "removed" else 6.0
+    GOLDEN[f"{_mode} from the start"] = _small(Fault(_mode, 2))
+    GOLDEN[f"{_mode} for a while"] = _small(Fault(_mode, 3, 5.0, _passing))
+GOLDEN |= {
+    "several faults at once": _small(
+        Fault("FM1", (0, 1)), Fault("motor_slow", (1, 2), 3.0, 5.0, 0.3), Fault("FM4", 2, 8.0)
+    ),
+    "faults that come and go": _small(
+        Fault("motor_wear", 2, intermittent=(2.0, 1.0)),
+        Fault("FM3", 3, 2.0, 9.0, None, (1.0, 1.0)),
+    ),
+    "without drift": _small(heading_drift=0.0),
+    "changes during the run": _small(
+        delivery_width=0.5,
         events={
             50: lambda world: world.change(delivery_width=1.5, max_speed=1.0),
             100: lambda world: world.change(relay="gossip", radio_loss=0.2, ranger_noise=0.02),
             150: lambda world: world.change(drive="differential", view_range=0.4, restock=True),
         },
-    )
-    golden["faults set during the run"] = GoldenTrajectory(
-        small(),
+    ),
+    "faults set during the run": _small(
         events={
             40: lambda world: world.set_faults([Fault("dead", 2)]),
             80: lambda world: world.set_faults([Fault("FM3", 3), Fault("removed", (5,))]),
             120: lambda world: world.set_faults([]),
         },
-    )
-    return golden
+    ),
+}
 
 
-GOLDEN = _golden()
-
-
-def moments(golden: GoldenTrajectory, *, copied_at: int | None = None) -> Iterator[Warehouse]:
-    """Yield the world after the reset and after every step.
-
-    Args:
-        copied_at: before this step world and policy are replaced by copies.
-    """
+def _moments(golden: GoldenTrajectory, copied_at: int | None) -> Iterator[Warehouse]:
+    """Yield the world after the reset and after every step; from `copied_at` on it is a copy."""
     world, policy = Warehouse(golden.scenario), policies.load(golden.policy)
     observations = world.reset(golden.seed, golden.faults)
     start(policy, golden.scenario, golden.seed)
@@ -183,7 +158,7 @@ def digests(golden: GoldenTrajectory, *, copied_at: int | None = None) -> Digest
     """Return the digests of all that was up to each noted step: observations, then `GROUPS`."""
     running = {name: hashlib.blake2b(digest_size=5) for name in ("observations", *GROUPS)}
     noted: Digests = {}
-    for step, world in enumerate(moments(golden, copied_at=copied_at)):
+    for step, world in enumerate(_moments(golden, copied_at)):
         running["observations"].update(_bytes(world.observe()))
         for group, names in GROUPS.items():
             for name in names:
@@ -216,7 +191,7 @@ def read_record() -> dict[str, Any]:
     return record
 
 
-def parting(recorded: Digests, played: Digests) -> str | None:
+def _parting(recorded: Digests, played: Digests) -> str | None:
     """Return in words where two trajectories part, or None if they are equal."""
     if list(recorded) != list(played):
         return f"noted after the steps {', '.join(recorded)} then, {', '.join(played)} now"
@@ -232,20 +207,23 @@ def parting(recorded: Digests, played: Digests) -> str | None:
 def explained(played: dict[str, Digests]) -> str | None:
     """Return which trajectories are not as recorded, where they part and on what machine."""
     record, now = read_record(), here()
-    partings = {name: parting(record["stories"][name], noted) for name, noted in played.items()}
+    partings = {name: _parting(record["stories"][name], noted) for name, noted in played.items()}
     lines = [f"{name}: {words}" for name, words in partings.items() if words]
     if not lines:
         return None
-    recorded = record["recorded_on"]
-    other = [f"{what}: {recorded[what]} there, {now[what]} here"
-             for what in now if recorded.get(what) != now[what]]  # fmt: skip
+    then = record["recorded_on"]
+    other = [
+        f"{what}: {then[what]} there, {now[what]} here"
+        for what in now
+        if then.get(what) != now[what]
+    ]
     why = "; ".join(other) or "the same platform and versions, so the code has changed it"
     return "\n".join([f"{len(lines)} golden trajectories are not as recorded ({why})", *lines])
 
 
 def main() -> int:
     """Compare or record, as the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser = argparse.ArgumentParser(description="Golden trajectories, compared with their record.")
     parser.add_argument("--record", action="store_true", help="write the record anew")
     asked = parser.parse_args()
     played = {name: digests(golden) for name, golden in GOLDEN.items()}

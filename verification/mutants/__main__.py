@@ -4,8 +4,6 @@ python -m verification.mutants             # all of them; ends with 1 if more su
 python -m verification.mutants gate train  # those whose names, files or lists hold one of these
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
@@ -13,35 +11,25 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
 
-from .mutation import LEFT_OUT, PACKAGE, ROOT, Mutant, mutated, read_mutants
+from .mutation import PACKAGE, ROOT, Mutant, mutated, read_mutants
 
-WORKERS = 2  # test runs at once
 LONGEST = 240.0  # [s]; what takes longer hangs, so it is caught
-COPIES = ROOT / "build" / "mutants"  # kept, with their compiled kernels
+COPIES = ROOT / "build" / "mutants"  # kept, with their compiled kernels; one for each worker
+LEFT_OUT = shutil.ignore_patterns(
+    ".git", ".venv*", "results", "build", "dist", "*.egg-info", "__pycache__", ".*_cache",
+    ".hypothesis",
+)  # fmt: skip
 # Those that take the interpreter a minute or more; see KERNELS in the Makefile.
 SLOW = "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or in_a_run)"
 
 
-def fresh_copies() -> list[Path]:
-    """Return copies of the tree as it is, one for each worker."""
-    copies = [COPIES / str(worker) for worker in range(WORKERS)]
-    for copy in copies:
-        shutil.rmtree(copy, ignore_errors=True)
-        shutil.copytree(ROOT, copy, symlinks=True, ignore=LEFT_OUT)
-    return copies
-
-
-def run_tests(copy: Path, tests: Sequence[str], *, interpreted: bool, limit: float) -> str:
-    """Return the first test that fails in a copy, as pytest names it; empty: none does.
-
-    Raises:
-        RuntimeError: pytest did not come to run them.
-    """
+def run_tests(copy: Path, tests: Iterable[str], *, interpreted: bool, limit: float) -> str:
+    """Return the first test that fails in a copy, as pytest names it; empty: none does."""
     environment = {
         **os.environ,
         "NUMBA_CACHE_DIR": str(COPIES / "numba"),
@@ -103,9 +91,11 @@ def main(words: Sequence[str]) -> int:
         for mutant in read_mutants()
         if not words or any(word in f"{mutant.room} {mutant.file} {mutant.name}" for word in words)
     ]
-    start, copies = time.monotonic(), fresh_copies()
+    start, copies = time.monotonic(), [COPIES / "0", COPIES / "1"]
     free: SimpleQueue[Path] = SimpleQueue()
     for copy in copies:
+        shutil.rmtree(copy, ignore_errors=True)
+        shutil.copytree(ROOT, copy, symlinks=True, ignore=LEFT_OUT)
         free.put(copy)
 
     def made(mutant: Mutant) -> str:
@@ -114,14 +104,11 @@ def main(words: Sequence[str]) -> int:
             test = caught_by(mutant, copy)
         finally:
             free.put(copy)
-        print(
-            f"{time.monotonic() - began:4.0f} s  {mutant.room}: {mutant.name}: "
-            f"{test or 'SURVIVES'}",
-            flush=True,
-        )
+        took = f"{time.monotonic() - began:4.0f} s"
+        print(f"{took}  {mutant.room}: {mutant.name}: {test or 'SURVIVES'}", flush=True)
         return test
 
-    with ThreadPoolExecutor(WORKERS) as pool:
+    with ThreadPoolExecutor(len(copies)) as pool:
         found = list(zip(chosen, pool.map(made, chosen)))
     survivors = [mutant for mutant, test in found if not test]
     rooms = Counter(mutant.room for mutant in survivors)

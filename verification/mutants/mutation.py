@@ -1,47 +1,26 @@
 """A fault made on purpose: where it is, what it changes, and the source with it."""
 
-from __future__ import annotations
-
 import ast
-import shutil
 import tomllib
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = "swarm_logistics_env"
-LEFT_OUT = shutil.ignore_patterns(
-    ".git", ".venv*", "results", "build", "dist", "*.egg-info", "__pycache__", ".*_cache",
-    ".hypothesis",
-)  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Mutant:
-    """A fault: one node of a syntax tree becomes another.
+class Mutant(NamedTuple):
+    """A fault: one node of a syntax tree becomes another; elsewhere than in Python a text does."""
 
-    Attributes:
-        name: what goes wrong with the mutant.
-        file: the module, in the package; of another file than Python's a text is replaced.
-        where: the function, method (`Class.method`) or constant that holds the node; the whole
-            file of what is not Python.
-        node: the expression or statement, as Python source; its layout does not matter.
-        becomes: what replaces it, as Python source; an expression replaces an expression.
-        tests: those that stand nearest to the fault, for pytest, the likely killer first.
-        interpreted: whether kernels run in the interpreter, as it changes one.
-        survives: why no test catches it; empty: one should.
-        room: the list that it stands in.
-    """
-
-    name: str
-    file: str
-    where: str
-    node: str
-    becomes: str
-    tests: tuple[str, ...]
-    interpreted: bool = False
-    survives: str = ""
-    room: str = ""
+    name: str  # what goes wrong with it
+    room: str  # the list that it stands in
+    file: str  # in the package
+    where: str  # function, method (`Class.method`) or constant that holds the node
+    node: str  # expression or statement, as Python source; its layout does not matter
+    becomes: str  # what replaces it; an expression replaces an expression
+    tests: list[str]  # those that stand nearest to the fault, the likely killer first
+    interpreted: bool = False  # whether kernels run in the interpreter, as it changes one
+    survives: str = ""  # why no test catches it; empty: one should
 
 
 class MutantError(ValueError):
@@ -53,21 +32,16 @@ def read_mutants() -> tuple[Mutant, ...]:
     found = []
     for path in sorted(Path(__file__).parent.glob("*.toml")):
         listed = tomllib.loads(path.read_text(encoding="utf-8"))
-        tests, interpreted = listed.pop("tests"), listed.pop("interpreted", False)
+        common = {key: listed.pop(key) for key in ("tests", "interpreted") if key in listed}
         for name, told in listed.items():
             file, _, where = told.pop("at").partition(" ")
-            node, chosen = told.pop("was"), tuple(told.pop("tests", tests))
-            rest = {"interpreted": interpreted, "room": path.stem, **told}
-            found.append(Mutant(name, file, where, node, tests=chosen, **rest))
+            place = name, path.stem, file, where, told.pop("was")
+            found.append(Mutant(*place, **{**common, **told}))
     return tuple(found)
 
 
 def mutated(mutant: Mutant, source: str) -> str:
-    """Return the source of `mutant.file` with the fault in it, of Python without comments.
-
-    Raises:
-        MutantError: the code no longer has the place that the mutant was written for.
-    """
+    """Return the source of `mutant.file` with the fault in it, of Python without comments."""
     if not mutant.file.endswith(".py"):
         _check_once(mutant, source.count(mutant.node))
         return source.replace(mutant.node, mutant.becomes)
@@ -124,6 +98,5 @@ def _names(node: ast.stmt) -> list[str]:
     """Return the names that a statement defines."""
     if isinstance(node, ast.Assign):
         return [target.id for target in node.targets if isinstance(target, ast.Name)]
-    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-        return [node.name]
-    return []
+    definitions = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+    return [node.name] if isinstance(node, definitions) else []
