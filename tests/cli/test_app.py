@@ -31,7 +31,7 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
         ("run --policy a\x1b[31m\udc80", r"'a\x1b[31m\udc80'"),
         ("run --policy swarm-td", "did you mean 'swarm-dt'?"),
         ("run --set n_robot=40", "did you mean 'n_robots'?"),
-        ("run --scenario none.toml", "--scenario none.toml: No such file"),
+        ("run --scenario n\x1b]0;x\x07", r"--scenario n\x1b]0;x\x07: No such file"),
         ("run --fault fm4", "did you mean 'FM4' or 'FM4_jam'?"),
         ("run --fault FM1:2@500", "should begin before the episode ends at 500 s"),
         ("run --film nowhere/film.mp4", "a folder that can be written to"),
