@@ -18,7 +18,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from swarm_logistics_env.errors import PolicyError, TrainingError
-from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies import PolicySpec, load
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.progress_bar import ProgressBar
@@ -130,7 +130,9 @@ def _new_view(training: Training) -> NetworkView:
 
 
 def _tensors_of_start(training: Training, name: str) -> Mapping[str, NDArray[np.float32]]:
-    policy, network = load(name), training.network
+    # A training file may come from elsewhere, so it imports nothing.
+    policy = None if PolicySpec(name=name).runs_code else load(name)
+    network = training.network
     if not isinstance(policy, LearnedPolicy):
         raise TrainingError(f"start = {name!r}: should be a trained policy")
     # What it hears and how it explores may differ; its tensors have to fit.

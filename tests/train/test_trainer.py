@@ -144,6 +144,7 @@ def test_a_policy_follows_from_its_seed_whatever_callbacks_see_or_stop(
         ({}, "cuda", "device = 'cuda': torch finds no GPU here"),
         ({"indicators": Indicators(weights={"Q": 1.0}, references=9.0)}, "cpu", "no indicator 'Q'"),
         ({"start": "homing"}, "cpu", "start = 'homing': should be a trained policy"),
+        ({"start": "antigravity:Mine"}, "cpu", "start = 'antigravity:Mine': should be a trained"),
         ({"start": "ppo-delivery"}, "cpu", "start = 'ppo-delivery': its tensors lack .* and have"),
     ],
 )
