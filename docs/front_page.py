@@ -100,7 +100,7 @@ def _deliveries(times: Row, p: Row, slow: Row) -> Iterator[str]:
     beside = f"; `{_STOCK}`, a script, in {script.text} s" if script else ""
     yield (
         f"**The paper's warehouse, cleared {times[_REFERENCE].value / times[best].value:.0f} times "
-        f"as fast**: `{best}` delivers its 60 items in {times[best].text} s, the paper's Swarm D-T "
+        f"as fast**: `{best}` delivers 60 items in {times[best].text} s, the paper's Swarm D-T "
         f"in {times[_REFERENCE].text} s{beside} (lifting takes no time)."
     )
     best = _learned(p)[-1]
@@ -141,9 +141,10 @@ def _sizes(s: Row) -> str:
 def _paper(block: str) -> Iterator[str]:
     pattern = r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?);\s(\d+ are open)\."
     for count, supported, contradicts, still in re.findall(pattern, block):
+        fm1 = " FM1 is not reproduced." if "FM1" in contradicts else ""
         yield (
-            f"**Of {count} claims of the paper's text** this re-implementation, with constants "
-            f"that are partly fitted, supports {supported} and {contradicts}; {still}."
+            f"**Of {count} claims of the paper's text** this re-implementation (constants "
+            f"partly fitted) supports {supported} and {contradicts}; {still}.{fm1}"
         )
 
 
@@ -193,19 +194,13 @@ def draw(rows: Rows, path: Path) -> None:
         figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
 
 
-NOTE = "A package index does not show them: relative pictures and links.\n"
-
-
 def with_address(text: str, address: str | None) -> str:
-    """Return the README whose pictures and links lead to a repository, "https://.."; None: as is.
-
-    A package index shows nothing else; relative links stand below a note that says so.
-    """
+    """Return the README whose pictures and links lead to a repository, "https://.."; None: as is."""
     if address is None:
         return text
     text = re.sub(r'(src="|!\[[^]]*\]\()(?=docs/)', rf"\g<1>{address}/raw/main/", text)
     links = rf"\g<1>{address}/blob/main/"
-    return re.sub(r"(?<!!)(\[[^]]+\]\()(?!https://)", links, text.replace(NOTE, ""))
+    return re.sub(r"(?<!!)(\[[^]]+\]\()(?!https://)", links, text)
 
 
 def written() -> str:

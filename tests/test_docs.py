@@ -101,7 +101,9 @@ def test_readme_runs_as_written(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(names["observations"]) == 25
     assert all(names["truncations"].values())
     assert "swarm-logistics judge wanderer:Wanderer" in README
-    wanderer = run((ROOT / "examples" / "wanderer.py").read_text(encoding="utf-8"))["Wanderer"]
+    example = (ROOT / "examples" / "wanderer.py").read_text(encoding="utf-8")
+    assert example.partition("\n\n")[2] in PAGES["quickstart.md"]
+    wanderer = run(example)["Wanderer"]
     assert run_episode(Scenario(), wanderer(), seed=0).delivered > 3
 
 
