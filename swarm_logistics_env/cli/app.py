@@ -200,8 +200,7 @@ FaultOption = Annotated[
     ),
 ]
 PolicyOption = Annotated[
-    str,
-    typer.Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class."),
+    str, typer.Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
 ]
 SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[

@@ -95,8 +95,7 @@ def judge_command(
         ),
     ] = None,
     ignore: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="Column to leave out; may be repeated."),
+        list[str] | None, typer.Option(metavar="NAME", help="Column to leave out; may be repeated.")
     ] = None,
     duration: Annotated[
         float | None,
@@ -319,8 +318,7 @@ def attack_command(
     ],
     robots: Annotated[int, typer.Option(min=1, help="How many robots fail.")] = 2,
     modes: Annotated[
-        list[str] | None,
-        typer.Option("--mode", help="Mode to search; may be repeated."),
+        list[str] | None, typer.Option("--mode", help="Mode to search; may be repeated.")
     ] = None,
     budget: Annotated[int, typer.Option(min=10, help="Runs of faults in the search.")] = 200,
     fresh: Annotated[int, typer.Option(min=3, help="Other seeds, for the estimates.")] = 30,

@@ -60,8 +60,7 @@ def run_command(
         ),
     ] = None,
     twin: Annotated[
-        bool,
-        typer.Option("--twin", help="In the film beside the same seed without its faults."),
+        bool, typer.Option("--twin", help="In the film beside the same seed without its faults.")
     ] = False,
     until: Annotated[
         float | None, typer.Option(help="Where the film ends [s]; with the episode if not given.")
@@ -119,8 +118,7 @@ def watch_command(
     faults: FaultOption = None,
     speed: Annotated[float, typer.Option(help="How many times real time it plays.")] = 8.0,
     port: Annotated[
-        int,
-        typer.Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free."),
+        int, typer.Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free.")
     ] = 8765,
     host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0: all.")] = "127.0.0.1",
     no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser.")] = False,

@@ -130,11 +130,7 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
     policies = {case.policy.title: case.identity for case in plan.cases}
     return (
         Section("Study", lines=(f"{_version()}, code version {plan.code}.",)),
-        Section(
-            "Policies",
-            ("policy", "identity"),
-            tuple(sorted(policies.items())),
-        ),
+        Section("Policies", ("policy", "identity"), tuple(sorted(policies.items()))),
         *_failure_modes(plan),
         Section(
             "Base scenario",

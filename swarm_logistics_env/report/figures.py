@@ -74,9 +74,7 @@ def indicator_panels(results: StudyResults) -> Iterator[tuple[str, Panel]]:
             yield _where(table, onset, swarm), _panel(results, tests, definition)
 
 
-def _by_figure(
-    results: StudyResults,
-) -> dict[tuple[str, Factor, float, int], list[Verdict]]:
+def _by_figure(results: StudyResults) -> dict[tuple[str, Factor, float, int], list[Verdict]]:
     """Return each value once, by table, kind, onset, and swarm size where robots fail."""
 
     def place(test: Verdict) -> tuple[str, Factor, float, int]:
