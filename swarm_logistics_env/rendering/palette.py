@@ -105,11 +105,8 @@ def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
     heard = state.robot_present & state.sends & (square <= scenario.radio_range**2)
     heard &= ~np.isnan(state.robot_told)
     heard[robot] = False
-    candidates = np.flatnonzero(heard)
-    if not candidates.size:
-        return NOBODY
-    order = np.lexsort((square[candidates], state.robot_told[candidates]))
-    return int(candidates[order[0]])
+    first = int(np.lexsort((square, state.robot_told, ~heard))[0])
+    return first if heard[first] else NOBODY
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
-from .sprites import Point, badge, blank, draw_line, new_canvas, stamp, words
+from .sprites import Pixels, Point, badge, blank, draw_line, new_canvas, stamp, words
 
 _MARGIN = 0.025  # a part of the picture's size, on each side
 
@@ -136,13 +136,9 @@ class Picture:
     def _draw_halos(self, state: WarehouseState, scenario: Scenario, robots: list[Point]) -> None:
         age = state.robot_timer / scenario.timer_limit
         glowing = np.flatnonzero(state.robot_present & (age < 1.0)).tolist()
-        stamp(
-            self._canvas,
-            (
-                (sprites.halo(self._robot_radius, int(age[robot] * sprites.HALOS)), robots[robot])
-                for robot in glowing
-            ),
-        )
+        ages = (int(age[robot] * sprites.HALOS) for robot in glowing)
+        halos = (sprites.halo(self._robot_radius, one) for one in ages)
+        stamp(self._canvas, zip(halos, [robots[robot] for robot in glowing]))
 
     def _draw_robots(self, state: WarehouseState, robots: list[Point]) -> None:
         radius, stamps = self._robot_radius, []
@@ -161,16 +157,10 @@ class Picture:
     def _draw_requested(self, state: WarehouseState, items: list[Point]) -> None:
         if state.requested == NOBODY:
             return
-        at = items[state.requested]
-        is_carried = state.carrier != NOBODY
-        half = 0.5 * self._robot_radius if is_carried else 1.4 * self._item_half
-        stamp(
-            self._canvas,
-            [
-                (sprites.target(1.9 * self._robot_radius + 1.0), at),
-                (sprites.item(max(1.5, half), True), at),
-            ],
-        )
+        at, radius = items[state.requested], self._robot_radius
+        half = 1.4 * self._item_half if state.carrier == NOBODY else 0.5 * radius
+        shown = sprites.target(1.9 * radius + 1.0), sprites.item(max(1.5, half), True)
+        stamp(self._canvas, [(sprite, at) for sprite in shown])
 
     def _draw_badges(self, state: WarehouseState, robots: list[Point]) -> None:
         height = max(11, round(1.2 * self._robot_radius))
@@ -187,8 +177,7 @@ def background(
     projection: Projection, scenario: Scenario, height: int, text_height: int
 ) -> pygame.Surface:
     """Return the empty warehouse on a picture of that height [px]."""
-    picture = np.empty((height, projection.width, 3), np.uint8)
-    picture[:] = palette.SURROUNDINGS
+    picture = np.full((height, projection.width, 3), palette.SURROUNDINGS, np.uint8)
     left, right = projection.left, projection.right
     top, bottom = projection.top, projection.bottom
     wall = max(2, projection.margin // 5)
@@ -208,19 +197,18 @@ def background(
     name = pygame.transform.rotate(words("DELIVERY", text_height, palette.DELIVERY_WORD), 90)
     if area.shape[1] > 1.5 * name.get_width() and area.shape[0] > name.get_height():
         middle = (left + edge + area.shape[1] // 2, (top + bottom) // 2)
-        surface.fill(palette.DELIVERY_AREA, name.get_rect(center=middle).inflate(6, 12))
-        surface.blit(name, name.get_rect(center=middle))
+        place = name.get_rect(center=middle)
+        surface.fill(palette.DELIVERY_AREA, place.inflate(6, 12))
+        surface.blit(name, place)
     return surface
 
 
-def _hatched(height: int, width: int, period: float) -> NDArray[np.uint8]:
-    x, y = np.arange(width)[np.newaxis, :], np.arange(height)[:, np.newaxis]
+def _hatched(height: int, width: int, period: float) -> Pixels:
+    y, x = np.ogrid[:height, :width]
     across = np.abs((x + y) / math.sqrt(2.0) % period - period / 2) - 0.06 * period
     cover = np.clip(0.5 - across, 0.0, 1.0)[..., np.newaxis]
-    colour = np.array(palette.DELIVERY_HATCH) * cover + np.array(palette.DELIVERY_AREA) * (
-        1.0 - cover
-    )
-    return np.rint(colour).astype(np.uint8)
+    colour = cover * palette.DELIVERY_HATCH + (1.0 - cover) * palette.DELIVERY_AREA
+    return np.asarray(np.rint(colour), np.uint8)
 
 
 def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float) -> None:
@@ -301,7 +289,8 @@ class Caption:
     def _flow(self, chips: Sequence[pygame.Surface]) -> list[tuple[int, int]]:
         """Return where these go: x [px] and number of the line."""
         places, x, line = [], 0, 0
-        for width in [chip.get_width() for chip in chips]:
+        for chip in chips:
+            width = chip.get_width()
             if x and x + width > self._width:
                 x, line = 0, line + 1
             places.append((x, line))

@@ -22,6 +22,7 @@ from . import palette
 from .palette import RGB
 
 Point = tuple[float, float]  # [px]
+Pixels = NDArray[np.uint8]  # (H, W, 3), red, green, blue; or (H, W, 4), with opacity
 
 # The bytes are in the order red, green, blue, as in sprites: drawing is ten times faster so.
 _MASKS = (0xFF, 0xFF00, 0xFF0000, 0)
@@ -57,7 +58,7 @@ def draw_line(canvas: pygame.Surface, start: Point, end: Point, width: float) ->
         )
 
 
-def to_array(canvas: pygame.Surface) -> NDArray[np.uint8]:
+def to_array(canvas: pygame.Surface) -> Pixels:
     """Return the pixels of a surface as an array of its own: (H, W, 3)."""
     width, height = canvas.get_size()
     pixels = np.empty((height, width, 3), np.uint8)
@@ -116,7 +117,7 @@ def wedge(
     return np.maximum(sides, base - along)
 
 
-def painted(*layers: Layer) -> NDArray[np.uint8]:
+def painted(*layers: Layer) -> Pixels:
     """Return the layers, the first lowest, as straight RGBA (H, W, 4)."""
     shape = np.broadcast_shapes(*(distance.shape for distance, _, _ in layers))
     colour, alpha = np.zeros((*shape, 3)), np.zeros((*shape, 1))
@@ -125,27 +126,29 @@ def painted(*layers: Layer) -> NDArray[np.uint8]:
         colour = np.array(rgb) * cover + colour * (1.0 - cover)
         alpha = cover + alpha * (1.0 - cover)
     straight = np.divide(colour, alpha, out=np.zeros_like(colour), where=alpha > 0.0)
-    rgba: NDArray[np.uint8] = np.rint(np.dstack([straight, 255.0 * alpha])).astype(np.uint8)
-    return rgba
+    return np.asarray(np.rint(np.dstack([straight, 255.0 * alpha])), np.uint8)
 
 
-def _sprite(paint: Callable[P, NDArray[np.uint8]]) -> Callable[P, pygame.Surface]:
+def _sprite(paint: Callable[P, Pixels]) -> Callable[P, pygame.Surface]:
     @lru_cache(maxsize=2048)
     def surface(*args: P.args, **kwargs: P.kwargs) -> pygame.Surface:
-        rgba = paint(*args, **kwargs)
-        return pygame.image.frombytes(rgba.tobytes(), (rgba.shape[1], rgba.shape[0]), "RGBA")
+        return _surface(paint(*args, **kwargs))
 
     # The cache's type forgets the parameters.
     return surface  # type: ignore[return-value]
 
 
+def _surface(rgba: Pixels) -> pygame.Surface:
+    return pygame.image.frombytes(rgba.tobytes(), rgba.shape[1::-1], "RGBA")
+
+
 def blank(width: int, height: int) -> pygame.Surface:
     """Return a picture of that size [px] with nothing on it."""
-    return pygame.image.frombytes(bytes(4 * width * height), (width, height), "RGBA")
+    return _surface(np.zeros((height, width, 4), np.uint8))
 
 
 @_sprite
-def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> NDArray[np.uint8]:
+def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> Pixels:
     """Return a disc with a nose; a faulty robot's edge is thick.
 
     Args:
@@ -164,7 +167,7 @@ def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> NDArray[
 
 
 @_sprite
-def halo(radius: float, age: int) -> NDArray[np.uint8]:
+def halo(radius: float, age: int) -> Pixels:
     """Return the glow about a robot of that radius [px]; `age` in [0, HALOS), oldest last."""
     strength = 1.0 - age / HALOS
     reach = radius * (1.5 + 1.0 * strength)
@@ -176,42 +179,35 @@ def halo(radius: float, age: int) -> NDArray[np.uint8]:
 
 
 @_sprite
-def item(half: float, is_requested: bool) -> NDArray[np.uint8]:
+def item(half: float, is_requested: bool) -> Pixels:
     """Return a square of about that half side [px]; its edges fall between pixels."""
     half = math.floor(half) + 0.5
     x, y = pixels(half)
-    edge = max(1, round(0.2 * half))
-    inner = half - edge
-    return painted(
-        (box(x, y, half, half), palette.INK if is_requested else palette.ITEM_EDGE, 1.0),
-        (box(x, y, inner, inner), palette.REQUESTED if is_requested else palette.ITEM, 1.0),
-    )
+    inner = half - max(1, round(0.2 * half))
+    edge, colour = palette.ITEM_EDGE, palette.ITEM
+    if is_requested:
+        edge, colour = palette.INK, palette.REQUESTED
+    return painted((box(x, y, half, half), edge, 1.0), (box(x, y, inner, inner), colour, 1.0))
 
 
 @_sprite
-def target(radius: float) -> NDArray[np.uint8]:
+def target(radius: float) -> Pixels:
     """Return the ring with four ticks about the requested item, `radius` [px] inside."""
     width = 0.8 + 0.1 * radius
     reach = radius + 4.0 * width
     x, y = pixels(reach)
     middle = (radius + reach) / 2
     arm = reach - middle
-    ticks = [
-        box(x - side_x * middle, y - side_y * middle, *half)
-        for side_x, side_y, half in (
-            (1, 0, (arm, width / 2)),
-            (-1, 0, (arm, width / 2)),
-            (0, 1, (width / 2, arm)),
-            (0, -1, (width / 2, arm)),
-        )
-    ]
-    shape = np.minimum.reduce([ring(x, y, radius + width / 2, width), *ticks])
+    # The distance to one tick on each axis is that to both.
+    beside = box(np.abs(x) - middle, y, arm, width / 2)
+    above = box(x, np.abs(y) - middle, width / 2, arm)
+    shape = np.minimum.reduce([ring(x, y, radius + width / 2, width), beside, above])
     # A white edge keeps it apart from whatever lies below.
     return painted((shape - 1.0, palette.FLOOR, 0.8), (shape, palette.REQUESTED, 1.0))
 
 
 @_sprite
-def obstacle(radius: float) -> NDArray[np.uint8]:
+def obstacle(radius: float) -> Pixels:
     """Return a solid disc of that radius [px]."""
     x, y = pixels(radius)
     return painted(
@@ -220,7 +216,7 @@ def obstacle(radius: float) -> NDArray[np.uint8]:
 
 
 @_sprite
-def arrowhead(length: float, heading: int) -> NDArray[np.uint8]:
+def arrowhead(length: float, heading: int) -> Pixels:
     """Return a triangle of that length [px] with its tip in the middle of the picture."""
     x, y = pixels(1.2 * length)
     turned = -2.0 * math.pi * heading / HEADINGS
@@ -255,11 +251,11 @@ def badge(mark: str, height: int) -> pygame.Surface:
     half_width = max(radius, text.get_width() / 2 + 0.3 * height)
     x, y = pixels(half_width)
     y = y[np.abs(y[:, 0]) <= radius + 2.0]
-    rgba = painted(
-        (pill(x, y, half_width + 1.0, radius + 1.0), palette.FLOOR, 0.9),
-        (pill(x, y, half_width, radius), palette.INK, 1.0),
+    surface = _surface(
+        painted(
+            (pill(x, y, half_width + 1.0, radius + 1.0), palette.FLOOR, 0.9),
+            (pill(x, y, half_width, radius), palette.INK, 1.0),
+        )
     )
-    size = (rgba.shape[1], rgba.shape[0])
-    surface = pygame.image.frombytes(rgba.tobytes(), size, "RGBA")
     surface.blit(text, text.get_rect(center=surface.get_rect().center))
     return surface

@@ -6,15 +6,13 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import pygame
-from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering.palette import SURROUNDINGS
 from swarm_logistics_env.rendering.picture import Picture
-from swarm_logistics_env.rendering.sprites import new_canvas, to_array, words
+from swarm_logistics_env.rendering.sprites import Pixels, new_canvas, to_array, words
 
 MOST_TAKES = 4
 LAST_FRAME = 2.0  # [s] it stays so long, so that a looping film can be read
@@ -75,7 +73,7 @@ class Film:
         self._n_last = round(LAST_FRAME * frame_rate)
         self.n_frames = math.ceil(self._until / self._period) + 1 + self._n_last
 
-    def frames(self) -> Iterator[NDArray[np.uint8]]:
+    def frames(self) -> Iterator[Pixels]:
         """Play the runs and return their pictures: (H, W, 3), red, green, blue, even sides.
 
         Raises:
@@ -94,7 +92,7 @@ class Film:
         for _ in range(self._n_last):
             yield frame
 
-    def _draw(self) -> NDArray[np.uint8]:
+    def _draw(self) -> Pixels:
         canvas = new_canvas(self._width, self._head + self._tall)
         canvas.fill(SURROUNDINGS)
         x = 0

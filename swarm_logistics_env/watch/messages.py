@@ -5,10 +5,11 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 import zlib
 from collections.abc import Callable
 from importlib import resources
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
 from swarm_logistics_env.watch.session import SPEEDS, Session
 
+Message: TypeAlias = dict[str, Any]
+
 _TOLD = ("seed", "speed", "paused", "mode", "note", "policy", "against", "names")
 _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
@@ -33,7 +36,7 @@ _BLOCKS = ("item", "neighbour", "lowest_timer")
 _TIMER_STEPS = 8  # shades of the timer's halo
 
 
-def fixed_data(session: Session) -> dict[str, Any]:
+def fixed_data(session: Session) -> Message:
     """Return what never changes: colours, failure modes, speeds, policies to choose from."""
     return {
         "colours": {
@@ -50,7 +53,7 @@ def fixed_data(session: Session) -> dict[str, Any]:
     }
 
 
-def frame(session: Session) -> dict[str, Any]:
+def frame(session: Session) -> Message:
     """Return what is true now. Lengths in mm, times in s, angles in mrad; x right, y up.
 
     `arenas` has for each of the two runs: `poses` (3 N numbers: x, y, heading of each robot, or
@@ -58,7 +61,7 @@ def frame(session: Session) -> dict[str, Any]:
     mark, robot it follows] of each), `items` (x, y of each that is stored), `requested` ([x, y,
     carrier] of the item asked for, or None) and `deliveries` (their times).
     """
-    frame: dict[str, Any] = {
+    frame: Message = {
         **{name: getattr(session, name) for name in _TOLD},
         "time": round(session.run.world.state.time, 3),
         "over": session.is_over,
@@ -72,12 +75,12 @@ def frame(session: Session) -> dict[str, Any]:
     return frame
 
 
-def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
+def changes(before: Message, after: Message) -> Message:
     """Return the entries of `after` that are not the same in `before`."""
     return {name: value for name, value in after.items() if before.get(name, ...) != value}
 
 
-def encode(message: dict[str, Any]) -> str:
+def encode(message: Message) -> str:
     """Return a message as JSON."""
     return json.dumps(message, separators=(",", ":"), allow_nan=False)
 
@@ -142,7 +145,7 @@ def observation_parts(
     return found
 
 
-def _arena(play: Play) -> dict[str, Any]:
+def _arena(play: Play) -> Message:
     state, scenario = play.world.state, play.world.scenario
     poses: list[int | None] = []
     robots: list[list[Any] | None] = []
@@ -159,12 +162,10 @@ def _arena(play: Play) -> dict[str, Any]:
         robots.append(
             [palette.activity(state, robot), age, mark, palette.followed(state, scenario, robot)]
         )
-    requested = None
+    requested, stored = None, state.item_status == STORED
     if state.requested != NOBODY:
-        place = _millimetres(state.item_position[state.requested][np.newaxis])[0]
+        (place,) = _millimetres(state.item_position[[state.requested]])
         requested = [*place, state.carrier]
-    stored = state.item_status == STORED
-    if requested:
         stored[state.requested] = False
     return {
         "poses": poses,
@@ -175,7 +176,7 @@ def _arena(play: Play) -> dict[str, Any]:
     }
 
 
-def _selected(session: Session) -> dict[str, Any] | None:
+def _selected(session: Session) -> Message | None:
     robot = session.selected
     if robot is None:
         return None
@@ -215,7 +216,7 @@ class Recording:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._play: object = None
-        self._last: dict[str, Any] = {}
+        self._last: Message = {}
         self._messages: list[str] = []
 
     def note(self) -> None:
@@ -262,8 +263,7 @@ def _page_around(text: str) -> str:
         f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
         "img-src data:; base-uri 'none'; form-action 'none'"
     )
-    head, tail = page.split("<!-- files -->")[0], page.split("<!-- /files -->")[1]
-    body, end = tail.split("<!-- scripts -->")[0], tail.split("<!-- /scripts -->")[1]
+    head, _, body, _, end = re.split("<!-- /?(?:files|scripts) -->", page)
     return (
         f'{head}<meta http-equiv="Content-Security-Policy" content="{policy}">'
         f"<style>{css}</style>{body}"
