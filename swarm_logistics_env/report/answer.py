@@ -121,17 +121,17 @@ class Answer:
     last: str
 
     @property
+    def questions(self) -> list[str]:
+        """The question of each line, with its policy where there are several."""
+        several = len({line.policy for line in self.lines}) > 1
+        return [f"{one.policy}: {one.question}" if several else one.question for one in self.lines]
+
+    @property
     def section(self) -> Section:
         """The lines as a table."""
-        several = len({line.policy for line in self.lines}) > 1
         rows = tuple(
-            (
-                f"{line.policy}: {line.question}" if several else line.question,
-                line.value,
-                line.interval,
-                line.verdict,
-            )
-            for line in self.lines
+            (question, line.value, line.interval, line.verdict)
+            for question, line in zip(self.questions, self.lines)
         )
         return Section("Answer", _COLUMNS, rows, (self.performance, self.last))
 
@@ -142,20 +142,16 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     Args:
         most: lines at most, as far as what is alike can share one; None: a line a question.
     """
-    numbered = [(number, test) for number, test in enumerate(results.verdicts)]
     lines: list[Line] = []
     for shared in range(4):
-        lines = [
-            _line([test for _, test in here], tuple(n for n, _ in here))
-            for here in grouped(numbered, partial(_alike, shared)).values()
-        ]
+        alike = grouped(enumerate(results.verdicts), partial(_alike, shared))
+        lines = [_line(here) for here in alike.values()]
         if most is None or len(lines) <= most:
             break
-    order = list(DEFINITIONS)
-    policies = results.policies
+    order, policies = list(DEFINITIONS), results.policies
     lines.sort(key=lambda line: (policies.index(line.policy), order.index(line.indicator)))
-    lines = list(_undefined_together(lines)) if most is not None else lines
-    return Answer(_asked(results), _performance(results), tuple(lines), _last(results))
+    shown = lines if most is None else _undefined_together(lines)
+    return Answer(_asked(results), _performance(results), tuple(shown), _last(results))
 
 
 def _undefined_together(lines: Sequence[Line]) -> Iterator[Line]:
@@ -165,10 +161,10 @@ def _undefined_together(lines: Sequence[Line]) -> Iterator[Line]:
         if len(here) < 2:
             yield from here
             continue
-        tests = [test for line in here for test in line.tests]
+        tests = tuple(test for line in here for test in line.tests)
         symbols = ", ".join(dict.fromkeys(line.indicator for line in here))
         numbers = tuple(number for line in here for number in line.numbers)
-        yield Line(policy, symbols, f"({len(tests)} questions)", tuple(tests), numbers)
+        yield Line(policy, symbols, f"({len(tests)} questions)", tests, numbers)
     yield from (line for line in lines if line not in undefined)
 
 
@@ -188,19 +184,20 @@ def _alike(shared: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
     return indicator if shared == 3 else (*indicator, after.name, after.onset, compared.threshold)
 
 
-def _line(tests: Sequence[Verdict], numbers: tuple[int, ...]) -> Line:
+def _line(numbered: Sequence[tuple[int, Verdict]]) -> Line:
+    numbers, tests = zip(*numbered)
     compared = tests[0].compared
-    return Line(compared.policy, compared.indicator, _about(tests), tuple(tests), numbers)
+    return Line(compared.policy, compared.indicator, _about(tests), tests, numbers)
 
 
 def _about(tests: Sequence[Verdict]) -> str:
-    compared = tests[0].compared
-    before, after = compared.original.setting, compared.changed.setting
+    compared, after = tests[0].compared, tests[0].after
+    before = compared.original.setting
     usual = compared.definition.adjectives.get(0.0)
     asked = "" if tests[0].asked == usual else f", {tests[0].asked}"
-    names = dict.fromkeys(test.compared.changed.setting.name for test in tests)
+    names = {test.after.name for test in tests}
     start = f" from {after.onset:g} s" if after.onset else ""
-    values = [f"{test.compared.changed.setting.value:g}" for test in tests]
+    values = [f"{test.after.value:g}" for test in tests]
     if after.kind == "size":
         chain = [f"{before.value:g}", *values]
         return f"N {'→'.join(chain if len(chain) <= 4 else [chain[0], '…', chain[-1]])}{asked}"
@@ -238,24 +235,20 @@ def _performance(results: StudyResults) -> str:
     here = {c.policy: c for c in reversed(base) if c.arm.setting == base[0].arm.setting}
     if not here:
         return "P: no run has succeeded."
-    cell = base[0]
-    where = f"N = {cell.arm.case.scenario.n_robots}"
+    cell, scenario = base[0], base[0].arm.case.scenario
+    where = f"N = {scenario.n_robots}"
     where += "" if cell.arm.setting.kind == "size" else f", {cell.arm.setting}"
     several = len(results.policies) > 1
     baseline = here.get(results.policies[0])
     told = (
-        (f"{one.policy} " if several else "")
+        f"{one.policy} " * several
         + _mean(one)
         + (_multiple(one, baseline) if baseline and results.plan.paired else "")
         for one in reversed(here.values())
     )
-    return f"{_measured(cell)} at {where}: {', '.join(told)}."
-
-
-def _measured(cell: Cell) -> str:
-    case = cell.arm.case
-    is_usual = case.task.name == DEFAULT and hasattr(case.scenario, "duration")
-    return f"P, items in {case.scenario.duration:g} s," if is_usual else "P"
+    is_usual = cell.arm.case.task.name == DEFAULT
+    measured = f"P, items in {scenario.duration:g} s," if is_usual else "P"
+    return f"{measured} at {where}: {', '.join(told)}."
 
 
 def _multiple(cell: Cell, baseline: Cell) -> str:
@@ -284,10 +277,11 @@ def _last(results: StudyResults) -> str:
     named = [one.heading for symbol, one in DEFINITIONS.items() if symbol in asked]
     parts = [f"{', '.join(named)}: good above 0"] if named else []
     parts.append("verdicts are Holm-adjusted")
-    if any("assumes_normal" in test.flags for test in tests):
+    flags = {flag for test in tests for flag in test.flags}
+    if "assumes_normal" in flags:
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normality)")
-    if any("too_few_seeds" in test.flags for test in tests):
+    if "too_few_seeds" in flags:
         parts.append("two seeds give no verdict")
     if results.exploratory:
         parts.append("exploratory: other seeds than were declared, whose report this replaces")
@@ -298,7 +292,7 @@ def _last(results: StudyResults) -> str:
     if any(test.conclusion == "inconclusive" for test in tests):
         parts.append(f"so many more {runs} find such a value in 4 of 5 studies")
     claims = [test for test in tests if test.claim]
-    told = {asked for one in reference.sentences.values() for asked in one} if reference else set()
+    told = reference.claims if reference else {}
     of_text = [test for test in claims if test.compared.question in told]
     of_others = [test for test in claims if test not in of_text]
     for where, here in ((" in the paper's text", of_text), (" beside it" * bool(told), of_others)):
@@ -319,7 +313,7 @@ def in_a_sentence(results: StudyResults) -> str:
     told += f"; of {asked} {words} (Holm)"
     if known:
         worst = min(known, key=lambda test: test.value or 0.0)
-        line = _line([worst], (0,))
+        line = _line([(0, worst)])
         told += f"; the lowest is {line.question} = {line.value} {line.interval}".rstrip()
     whose = results.policies
     if results.plan.imported_from and len(whose) == 1:  # nobody named it

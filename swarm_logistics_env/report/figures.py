@@ -28,17 +28,14 @@ _MARKS = (
 
 def forest_figure(results: StudyResults, found: Answer) -> Figure:
     """Return the lines of the answer as a forest of intervals."""
-    several = len(results.policies) > 1
-    rows = [
-        (
-            f"{line.policy}: {line.question}" if several else line.question,
-            [
-                _point(test, results.policies.index(line.policy), "", test.compared.threshold)
-                for test in line.tests
-            ],
-        )
+    points = (
+        [
+            _point(test, results.policies.index(line.policy), "", test.compared.threshold)
+            for test in line.tests
+        ]
         for line in found.lines
-    ]
+    )
+    rows = list(zip(found.questions, points))
     tests = [test for line in found.lines for test in line.tests]
     return Figure(
         "answer",
