@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +84,7 @@ def _covariance(faults: Sequence[Fault]) -> Matrix:
 
     def near(values: list[float]) -> Matrix:
         steps = np.searchsorted(np.unique(values), values)
-        alike: Matrix = np.exp(-0.5 * (steps[:, None] - steps) ** 2)
-        return alike
+        return np.asarray(np.exp(-0.5 * (steps[:, None] - steps) ** 2))
 
     mode, role = (np.array([str(getattr(f, name)) for f in faults]) for name in ("mode", "role"))
     lasting = near([np.inf if fault.duration is None else fault.duration for fault in faults])
@@ -181,8 +180,7 @@ class Attack:
         ]
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """A fault, how it was found, and its robustness on fresh seeds.
 
     Attributes:
@@ -196,8 +194,7 @@ class Found:
     runs: int
 
 
-@dataclass(frozen=True)
-class AttackResult:
+class AttackResult(NamedTuple):
     """The worst faults found, the search's first.
 
     Attributes:

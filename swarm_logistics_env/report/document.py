@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.metadata import version
+from typing import NamedTuple
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
@@ -18,8 +19,7 @@ from .section import Figure, Section, listed, seeds_text, sentence
 from .tables import fault_sections, tables, warnings
 
 
-@dataclass(frozen=True)
-class Chapter:
+class Chapter(NamedTuple):
     """A part of the report; `text` explains what it shows and how to read it."""
 
     title: str

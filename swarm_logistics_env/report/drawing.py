@@ -9,8 +9,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -60,8 +59,7 @@ def images(draw: Draw, height: float) -> tuple[str, bytes]:
     return svg.getvalue(), png.getvalue()
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(NamedTuple):
     """One value with its interval.
 
     Attributes:
@@ -85,8 +83,7 @@ class Point:
     saturated: bool = False
 
 
-@dataclass(frozen=True)
-class Panel:
+class Panel(NamedTuple):
     """One pair of axes: series over shared categories, and thresholds.
 
     Attributes:

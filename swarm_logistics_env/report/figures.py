@@ -78,13 +78,14 @@ def _by_figure(results: StudyResults) -> dict[tuple[str, Factor, float, int], li
         after, by_fault = test.after, test.after.kind == "fault"
         return test.compared.table, after.kind, after.onset, test.compared.n_robots * by_fault
 
-    def same(test: Verdict) -> tuple[str, str, str, str]:
-        compared = test.compared
-        return compared.policy, compared.table, compared.indicator, compared.label
-
+    alike = grouped(
+        results.verdicts,
+        lambda test: (*test.compared.family, test.compared.table, test.compared.label),
+    )
     # That against the lowest threshold shows them all.
-    alike = grouped(results.verdicts, same).values()
-    return grouped((min(tests, key=lambda t: t.compared.threshold) for tests in alike), place)
+    return grouped(
+        (min(same, key=lambda t: t.compared.threshold) for same in alike.values()), place
+    )
 
 
 def _where(table: str, onset: float, swarm: int) -> str:
@@ -145,11 +146,9 @@ def _point(
     )
 
 
-_CAPPED = " †: P is capped, every item was delivered in a run."
-
-
 def _capped(tests: Sequence[Verdict]) -> str:
-    return _CAPPED if any(test.saturated for test in tests) else ""
+    is_capped = any(test.saturated for test in tests)
+    return " †: P is capped, every item was delivered in a run." * is_capped
 
 
 def _definitions(tests: Sequence[Verdict]) -> list[Definition]:
@@ -172,7 +171,7 @@ def rate_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
     import pandas as pd
 
-    def place(one: Comparison) -> tuple[str, str, int, str, float]:
+    def place(one: Comparison) -> tuple[str | float, ...]:
         setting = one.changed.setting
         return one.policy, one.table, one.n_robots, setting.name, setting.onset
 

@@ -38,7 +38,7 @@ def axis(found: Answer) -> tuple[float, float]:
     return min(values) - span, max(values) + span
 
 
-def page_data(results: StudyResults) -> dict[str, JsonValue]:
+def page_data(results: StudyResults) -> Json:
     """Return all that the page's script needs, as JSON holds it."""
     arms = {arm.case.key: arm for _, _, arm in results.plan.cells}
     places = {key: place for place, key in enumerate(arms)}

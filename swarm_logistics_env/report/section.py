@@ -7,12 +7,12 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.estimate import SIGNS, Estimate
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.specification import seeds_in_words
@@ -26,16 +26,9 @@ if TYPE_CHECKING:
 SATURATED = "†"
 NOTHING = "–"
 DECIDED = ("supported", "refuted", "equivalent")
-UNAFFECTED = "same runs"
+UNAFFECTED = SIGNS["unaffected"].word
 # The words for verdicts, in the order in which they are counted.
-WORDS = {
-    "supported": "supported",
-    "refuted": "refuted",
-    "equivalent": "equivalent",
-    "inconclusive": "open",
-    "unaffected": UNAFFECTED,
-    "blocked": "undefined",
-}
+WORDS = {**{verdict: sign.word for verdict, sign in SIGNS.items()}, "blocked": "undefined"}
 FLAGS = {
     "single_seed": "One seed gives a value, but no interval and no verdict",
     "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
@@ -74,8 +67,7 @@ class Figure:
     draw: Draw
 
 
-@dataclass(frozen=True)
-class Sentence:
+class Sentence(NamedTuple):
     """One verdict in words; `verdict`: the conclusion, a name in `WORDS`."""
 
     head: str

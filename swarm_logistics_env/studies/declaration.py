@@ -205,14 +205,9 @@ def note(
     imported: Origin | None = None,
 ) -> None:
     """Note a study in its store, for `StoredStudy.of`."""
-    fields = {
-        "specification": specification,
-        "code": code,
-        "identities": dict(identities),
-        "declared": declared,
-        "imported": imported,
-    }
-    runs.note({NOTE: to_json(fields).decode()})
+    fields = {"specification": specification, "code": code, "identities": identities}
+    told = to_json({**fields, "declared": declared, "imported": imported})
+    runs.note({NOTE: told.decode()})
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:

@@ -20,7 +20,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
@@ -37,8 +37,7 @@ _Content = tuple[TaskScenario, tuple[TaskFault, ...], int, str]
 _Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
-@dataclass(frozen=True)
-class Matching:
+class Matching(NamedTuple):
     """The conditions that two studies share, and the judged policies and conditions of one alone.
 
     A condition is named by policy, "change" and the condition in words.
@@ -191,8 +190,7 @@ class Gate:
 _Found = Estimate | float | str
 
 
-@dataclass(frozen=True)
-class GateAnswer:
+class GateAnswer(NamedTuple):
     """The answer of one comparison or condition to a gate.
 
     Attributes:

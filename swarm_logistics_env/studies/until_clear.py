@@ -12,7 +12,8 @@ Everything follows from the outcomes, so a study that was killed goes on as if i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.equivalence import ALPHA
@@ -28,8 +29,7 @@ MOST_SEEDS = 200
 SPENDING: spi.Spending = "linear"
 
 
-@dataclass(frozen=True)
-class Standing:
+class Standing(NamedTuple):
     """The state of the comparisons of a study at its latest look.
 
     Attributes:

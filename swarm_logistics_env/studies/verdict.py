@@ -308,15 +308,12 @@ def judge_one(
     ]
     if not problems:
         digests = (cells[arm].digests for arm in (comparison.original, comparison.changed))
+        # The removed robots make the third condition another one by construction.
         identical = comparison.removed is None and same_runs(*digests)
         samples = {arm: cells[arm].by_seed for arm in comparison.arms}
         try:
             estimate = comparison.estimate(
-                samples,
-                paired=paired,
-                saturated=saturated,
-                identical=identical,
-                confidence=confidence,
+                samples, capped=saturated, paired=paired, identical=identical, confidence=confidence
             )
             if comparison.definition.unchanged(margin) is not None:  # S has no such question
                 named = dict(zip(("p_o", "p_new", "p_s"), comparison.arguments.values()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import pygame
 
@@ -18,8 +18,7 @@ MOST_TAKES = 4
 LAST_FRAME = 2.0  # [s] it stays so long, so that a looping film can be read
 
 
-@dataclass(frozen=True)
-class Take:
+class Take(NamedTuple):
     """One of the runs that a film shows.
 
     Attributes:
