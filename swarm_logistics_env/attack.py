@@ -224,10 +224,6 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
     faults = asked.faults()
     policy = PolicySpec.of(asked.policy)
     base = Case(policy, policy.identity(), asked.scenario, task=WAREHOUSE)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StudyError(f"cannot write to {out}: {error.strerror}") from error
     with Runs(out / STORE) as store:
 
         def delivered(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:

@@ -12,8 +12,7 @@ import numpy as np
 import typer
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.policies import SUFFIXES, called, load
-from swarm_logistics_env.policies.spec import PolicySpec
+from swarm_logistics_env.policies import SUFFIXES, PolicySpec, called, load
 from swarm_logistics_env.records import plain, read_table
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document

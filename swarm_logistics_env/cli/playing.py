@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -29,10 +30,6 @@ from .app import (
     faults_of,
     scenario_of,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
 
 FRAME_RATE = 25.0  # frames a second
 FILM_SIZE = 480  # longer side of each warehouse [px]

@@ -13,7 +13,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
 from swarm_logistics_env.records import plain
-from swarm_logistics_env.report.section import bracketed, said, slug
+from swarm_logistics_env.report.section import NOTHING, bracketed, said, slug
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
@@ -33,6 +33,7 @@ StudyArgument = Annotated[
         help="TOML file of a study, or a preset: benchmark, paper, quick, resilience, scorecard.",
     ),
 ]
+DirectoryArgument = Annotated[Path, typer.Argument(help="Directory of a study.")]
 SeedsOption = Annotated[
     int | None,
     typer.Option(min=1, help="Number of seeds of every condition; the study's if not given."),
@@ -220,7 +221,7 @@ def plan_command(
 
 @study.command("report")
 def report_command(
-    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
+    directory: DirectoryArgument,
     full: FullOption = False,
     trust_code: TrustCodeOption = False,
 ) -> None:
@@ -272,8 +273,7 @@ def compare_command(
 def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str, ...]) -> None:
     rows = []
     for answer in found:
-        estimate = answer.estimate
-        value, says = "–", answer.problem or ""
+        estimate, value, says = answer.estimate, NOTHING, answer.problem or ""
         if answer.exact is not None:
             value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
         if estimate is not None:
@@ -295,7 +295,7 @@ def merge_command(
 
 @study.command("export")
 def export_command(
-    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
+    directory: DirectoryArgument,
     to: Annotated[Path, typer.Option(help="File to write, .csv.")],
 ) -> None:
     """Write every stored run as one row, sorted by key, without wall times."""

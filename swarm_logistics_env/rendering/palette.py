@@ -8,7 +8,7 @@ differs in lightness or shape as well: grey levels of the three robot states are
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -109,8 +109,7 @@ def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
     return first if heard[first] else NOBODY
 
 
-@dataclass(frozen=True)
-class Event:
+class Event(NamedTuple):
     """A robot that failed, or was repaired: a mark on the time axis."""
 
     time: float  # [s]

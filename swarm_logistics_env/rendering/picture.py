@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 import pygame
@@ -22,8 +22,7 @@ from .sprites import Pixels, Point, badge, blank, draw_line, new_canvas, stamp, 
 _MARGIN = 0.025  # a part of the picture's size, on each side
 
 
-@dataclass(frozen=True)
-class Projection:
+class Projection(NamedTuple):
     """The warehouse's place on a picture, x to the right and y up, as on paper.
 
     Attributes:
@@ -144,13 +143,12 @@ class Picture:
         radius, stamps = self._robot_radius, []
         load = sprites.item(max(1.5, 0.45 * radius), False)
         faulty, headings = state.failed.tolist(), state.robot_heading.tolist()
-        carried = state.robot_item.tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
-            colour = palette.ACTIVITIES[palette.activity(state, robot)]
+            activity = palette.activity(state, robot)
             step = sprites.heading_step(headings[robot])
-            body = sprites.robot(radius, colour, step, faulty[robot])
+            body = sprites.robot(radius, palette.ACTIVITIES[activity], step, faulty[robot])
             stamps.append((body, robots[robot]))
-            if carried[robot] not in (NOBODY, state.requested):
+            if activity == "shuffling":
                 stamps.append((load, robots[robot]))
         stamp(self._canvas, stamps)
 
@@ -213,18 +211,19 @@ def _hatched(height: int, width: int, period: float) -> Pixels:
 
 def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float) -> None:
     width = max(2.0, radius / 3.5)
-    length = math.hypot(end[0] - start[0], end[1] - start[1])
+    way = np.subtract(end, start)
+    length = math.hypot(*way)
     head = 4.0 + 2.5 * width
     # The tip stops short of the robot; robots that touch leave no room for an arrow.
     gap = radius + 2.0
     if length <= 2.0 * gap + head:
         return
-    x_part, y_part = (end[0] - start[0]) / length, (end[1] - start[1]) / length
-    tip = (end[0] - gap * x_part, end[1] - gap * y_part)
-    base = (tip[0] - 0.8 * head * x_part, tip[1] - 0.8 * head * y_part)
-    draw_line(canvas, start, base, width)
+    along = way / length
+    tip = end - gap * along
+    draw_line(canvas, np.array(start), tip - 0.8 * head * along, width)
+    x_part, y_part = along.tolist()
     step = sprites.heading_step(math.atan2(-y_part, x_part))
-    stamp(canvas, [(sprites.arrowhead(head, step), tip)])
+    stamp(canvas, [(sprites.arrowhead(head, step), (tip[0], tip[1]))])
 
 
 # The widest texts there may be, so that a picture's size does not change with what happens.

@@ -42,20 +42,16 @@ def stamp(canvas: pygame.Surface, stamps: Iterable[tuple[pygame.Surface, Point]]
     canvas.blits(placed, False)
 
 
-def draw_line(canvas: pygame.Surface, start: Point, end: Point, width: float) -> None:
+def draw_line(
+    canvas: pygame.Surface, start: NDArray[np.float64], end: NDArray[np.float64], width: float
+) -> None:
     """Draw a line of that width [px] as several thin ones, because pygame smooths only those."""
-    length = math.hypot(end[0] - start[0], end[1] - start[1])
-    if length == 0.0:
-        return
-    x_part, y_part = (end[1] - start[1]) / length, (start[0] - end[0]) / length
+    x_part, y_part = end - start
+    across = np.array([y_part, -x_part]) / math.hypot(x_part, y_part)
     half = (width - 1.0) / 2
-    for offset in np.linspace(-half, half, 1 + math.ceil(4.0 * half)).tolist():
-        pygame.draw.aaline(
-            canvas,
-            palette.LINK,
-            (start[0] + offset * x_part, start[1] + offset * y_part),
-            (end[0] + offset * x_part, end[1] + offset * y_part),
-        )
+    for offset in np.linspace(-half, half, 1 + math.ceil(4.0 * half)):
+        ends = np.array([start, end]) + offset * across
+        pygame.draw.aaline(canvas, palette.LINK, *ends.tolist())
 
 
 def to_array(canvas: pygame.Surface) -> Pixels:

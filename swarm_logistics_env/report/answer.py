@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import zip_longest
+from typing import NamedTuple
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT
@@ -24,8 +23,7 @@ _EFFECT = 0.1  # of an indicator, for which seeds are counted
 _COLUMNS = ("question", "value", "95 % interval", "verdict")
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """One line of the answer: a question, or several that are alike.
 
     Attributes:
@@ -92,11 +90,16 @@ class Line:
             return f"no verdict: other questions on {self.indicator} lack runs"
         if "unbounded" in test.flags and test.conclusion in section.DECIDED:
             return f"{words[0]} by its test; P_o is too near 0 for an interval"
-        tells, more = _seeds_more(test.estimate)
-        if test.conclusion != "inconclusive" or more is None:
+        if test.conclusion != "inconclusive":
             return words[0]
-        runs = "seeds" if test.estimate.paired else "trials"
-        return f"open: {more} more {runs} tell {tells:g}"
+        # An effect on the side of the value, which 80 % power finds.
+        estimate, threshold = test.estimate, test.estimate.threshold
+        effect = threshold + math.copysign(_EFFECT, estimate.value - threshold)
+        needed = spi.seeds_for_power(estimate, effect, POWER)
+        if needed is None or needed <= estimate.n_seeds:
+            return words[0]
+        runs = "seeds" if estimate.paired else "trials"
+        return f"open: {needed - estimate.n_seeds} more {runs} tell {effect:g}"
 
     @property
     def contradicts(self) -> bool:
@@ -104,8 +107,7 @@ class Line:
         return any(test.claim_verdict_holm == "refuted" for test in self.tests)
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What a study found.
 
     Attributes:
@@ -208,14 +210,6 @@ def _about(tests: Sequence[Verdict]) -> str:
     if after.kind == "policy":
         return f"with {after.name}{asked}"
     return f"{after.name} {before.value:g}→{', '.join(values)}{asked}"
-
-
-def _seeds_more(estimate: Estimate) -> tuple[float, int | None]:
-    """Return an effect on the side of the value, and the seeds that 80 % power needs beside."""
-    effect = estimate.threshold + math.copysign(_EFFECT, estimate.value - estimate.threshold)
-    needed = spi.seeds_for_power(estimate, effect, POWER)
-    more = None if needed is None or needed <= estimate.n_seeds else needed - estimate.n_seeds
-    return effect, more
 
 
 def _asked(results: StudyResults) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
 from typing import NamedTuple
 
@@ -27,8 +27,7 @@ class Chapter(NamedTuple):
     sections: tuple[Section, ...]
 
 
-@dataclass(frozen=True)
-class Document:
+class Document(NamedTuple):
     """The whole report.
 
     Attributes:

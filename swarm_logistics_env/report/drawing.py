@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -83,7 +84,8 @@ class Point(NamedTuple):
     saturated: bool = False
 
 
-class Panel(NamedTuple):
+@dataclass(frozen=True)
+class Panel:
     """One pair of axes: series over shared categories, and thresholds.
 
     Attributes:
@@ -176,11 +178,10 @@ def _bar(
     ends = max(point.low, bottom), min(point.high, top)
     lines = axes.hlines if level else axes.vlines
     lines(at, *ends, color=colour, linewidth=1.4, zorder=2)
-    for limit, end, arrow in zip((point.low, point.high), within, "<>" if level else "v^"):
-        leaves = not bottom <= limit <= top
-        place = (end if leaves else limit, at) if level else (at, end if leaves else limit)
-        sign = arrow if leaves else "|" if level else "_"
-        axes.plot(*place, sign, color=colour, markersize=5, clip_on=not leaves)
+    for limit, end, arrow in zip((point.low, point.high), ends, "<>" if level else "v^"):
+        sign = arrow if limit != end else "|" if level else "_"
+        place = (end, at) if level else (at, end)
+        axes.plot(*place, sign, color=colour, markersize=5, clip_on=limit == end)
 
 
 def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:

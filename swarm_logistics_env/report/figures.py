@@ -29,10 +29,7 @@ _MARKS = (
 def forest_figure(results: StudyResults, found: Answer) -> Figure:
     """Return the lines of the answer as a forest of intervals."""
     points = (
-        [
-            _point(test, results.policies.index(line.policy), "", test.compared.threshold)
-            for test in line.tests
-        ]
+        [_point(results, test, "", test.compared.threshold) for test in line.tests]
         for line in found.lines
     )
     rows = list(zip(found.questions, points))
@@ -98,13 +95,12 @@ def _panel(results: StudyResults, tests: Sequence[Verdict], definition: Definiti
     here = [test for test in tests if test.compared.indicator == definition.symbol]
     after, first = here[0].after, here[0].compared.policy
     points = tuple(
+        # The published values stand beside the first policy.
         _point(
+            results,
             test,
-            results.policies.index(policy := test.compared.policy),
             _category(test),
-            # The published values stand beside the first policy.
-            test.published if policy == first else None,
-            policy,
+            test.published if test.compared.policy == first else None,
         )
         for test in here
     )
@@ -129,17 +125,13 @@ def _category(test: Verdict) -> str:
     return test.compared.label if after.kind == "policy" else f"{before.value:g}→{after.value:g}"
 
 
-def _point(
-    test: Verdict, style: int, category: str, published: float | None, series: str = ""
-) -> Point:
-    value, low, high = test.interval or (None, None, None)
+def _point(results: StudyResults, test: Verdict, category: str, published: float | None) -> Point:
+    policy = test.compared.policy
     return Point(
-        series,
-        style,
+        policy,
+        results.policies.index(policy),
         category,
-        value,
-        low,
-        high,
+        *(test.interval or (None, None, None)),
         published,
         decided=test.holm in DECIDED,
         saturated=test.saturated,

@@ -18,8 +18,7 @@ from swarm_logistics_env.studies.comparison import Arm, Comparison
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT, Outcome
-from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.warehouse.faults import text_of
+from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from .answer import Answer
 from .figures import X_LABELS, indicator_panels
@@ -122,12 +121,12 @@ def _question(results: StudyResults, test: Verdict, places: dict[str, int]) -> J
 
 def _first(tests: Sequence[Verdict]) -> int:
     """Return the question that the page opens with: the lowest value that is refuted, or any."""
-    refuted = {
-        number: test.value
+    refuted = (
+        (test.value, number)
         for number, test in enumerate(tests)
         if test.answer_holm == "refuted" and test.value is not None
-    }
-    return min(refuted, key=lambda number: refuted[number], default=0)
+    )
+    return min(refuted, default=(0.0, 0))[1]
 
 
 def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterator[Json]:

@@ -13,7 +13,6 @@ import numpy as np
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import SIGNS, Estimate
-from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.specification import seeds_in_words
 from swarm_logistics_env.studies.verdict import Cell, Verdict
@@ -121,14 +120,14 @@ def fixed(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def limits(interval: Interval | Estimate | None, digits: int) -> str:
+def limits(interval: spi.Interval | Estimate | None, digits: int) -> str:
     """Return the limits of an interval to so many digits, e.g. "[101.2, ∞]"; empty: none."""
     if interval is None or interval.low is None or interval.high is None:
         return ""
     return f"[{fixed(interval.low, digits)}, {fixed(interval.high, digits)}]"
 
 
-def bracketed(interval: Interval | Estimate | None, digits: int) -> str:
+def bracketed(interval: spi.Interval | Estimate | None, digits: int) -> str:
     """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
     if interval is None:
         return NOTHING

@@ -265,18 +265,19 @@ def ratio_of_samples(
         p_value = 2.0 * float(stdtr(df, -abs(mean) / math.sqrt(variance)))
         low, high = _limits(terms, difference, value, mean_den, 0.5 + confidence / 2)
     n = min(term.sample.size for term in terms)
-    return RatioTest(
-        value=np.asarray(value + offset),
-        low=np.asarray(low + offset),
-        high=np.asarray(high + offset),
-        probability=probability_of(np.asarray(p_value), np.asarray(mean)),
-        p_value=np.asarray(p_value),
-        difference_sd=np.asarray(0.0 if degenerate else math.sqrt(variance * n)),
-        degrees_of_freedom=df,
-        degenerate=np.asarray(degenerate),
-        unbounded=np.asarray(math.isinf(low) and not degenerate),
-        p_seen=np.asarray(p_value),
-    )
+    found = {
+        "value": value + offset,
+        "low": low + offset,
+        "high": high + offset,
+        "probability": probability_of(np.asarray(p_value), np.asarray(mean)),
+        "p_value": p_value,
+        "difference_sd": 0.0 if degenerate else math.sqrt(variance * n),
+        "degenerate": degenerate,
+        "unbounded": math.isinf(low) and not degenerate,
+        "p_seen": p_value,
+    }
+    arrays = {name: np.asarray(one) for name, one in found.items()}
+    return RatioTest(**arrays, degrees_of_freedom=df)
 
 
 def welch(terms: Sequence[Term], theta: float) -> tuple[float, float, float]:

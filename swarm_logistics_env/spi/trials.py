@@ -164,7 +164,7 @@ def _trial(
     fault, faulty = row.text("fault"), row.whole_or_none("faulty", 0) or 0
     fault = _FAULT_NAMES.get(fault.lower(), spelled[fault.casefold()])
     is_fault = fault not in (NO_FAULT, REPEATED)
-    onset = row.number_or_none("onset", 0.0) or 0.0
+    onset = row.number_or_none("onset") or 0.0
     if row.text("duration"):
         duration = row.number("duration", 0.0)
     if is_fault and not faulty:
@@ -221,7 +221,7 @@ def _events(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
         )
     runs: dict[object, tuple[Trial, list[float]]] = {}
     for trial, row in rows:
-        time = row.number_or_none("time", 0.0)
+        time = row.number_or_none("time")
         if time is not None and trial.duration is not None and time > trial.duration:
             raise row.error("time", f"should not be after its duration {trial.duration:g}")
         if trial.onset and trial.duration is None:

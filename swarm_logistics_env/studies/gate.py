@@ -19,7 +19,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, Self
 
 from swarm_logistics_env import spi
@@ -135,8 +135,7 @@ _GATE = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class Gate:
+class Gate(NamedTuple):
     """One condition to fail on; see the grammar above.
 
     Attributes:
@@ -220,8 +219,8 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswe
     Raises:
         StudyError: the gate is about nothing that the studies hold.
     """
-    found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
-    asked = list(found)
+    is_change = gate.subject == "change"
+    asked = list(_changes(gate, old, new) if is_change else _indicators(gate, new))
     if not asked:
         where = f" at {gate.at!r}" if gate.at else ""
         raise StudyError(
@@ -254,10 +253,8 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
             name += f" ({comparison.table})"
         if gate.at not in name:
             continue
-        margin = new.plan.specification.margin
-        found = judge_one(
-            comparison, new.cells_of(comparison), paired=new.plan.paired, margin=margin
-        )
+        cells, margin = new.cells_of(comparison), new.plan.specification.margin
+        found = judge_one(comparison, cells, paired=new.plan.paired, margin=margin)
         estimate = found.estimate
         if estimate is None:
             yield name, str(found.problem)

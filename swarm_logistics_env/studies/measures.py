@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.spi.inputs import Numbers
-from swarm_logistics_env.spi.resilience import SurvivalCurve
 
 from .comparison import Arm, Comparison
 from .results import StudyResults, Times
@@ -27,7 +25,7 @@ class RepairCurve(NamedTuple):
         back: which runs came back by the end, (n_runs,).
     """
 
-    curve: SurvivalCurve
+    curve: spi.SurvivalCurve
     back: NDArray[np.bool_]
 
 
@@ -45,8 +43,8 @@ class Resilience(NamedTuple):
     """
 
     compared: Comparison
-    against_removed: Estimate | None
-    against_whole: Estimate | None
+    against_removed: spi.Estimate | None
+    against_whole: spi.Estimate | None
     single: tuple[RepairCurve, ...] = ()
     problem: str | None = None
 
@@ -84,7 +82,9 @@ def mid_run_faults(results: StudyResults) -> list[Comparison]:
     ]
 
 
-def _index(results: StudyResults, faulty: Arm, reference: Arm, threshold: float) -> Estimate | None:
+def _index(
+    results: StudyResults, faulty: Arm, reference: Arm, threshold: float
+) -> spi.Estimate | None:
     named = {"faulty": results.outcomes_of(faulty), "reference": results.outcomes_of(reference)}
     try:
         return spi.resilience_index(

@@ -59,18 +59,24 @@ class Runs:
     Every error of SQLite becomes a StudyError that names the file.
 
     Args:
-        path: the file, made where it is missing; None: kept in memory only.
+        path: the file, made with its folder where it is missing; None: kept in memory only.
         read_only: write nothing, neither into the file nor beside it, for a file that nobody else
             writes.
 
     Raises:
-        StudyError: the file is not a store, or its schema is not this version's.
+        StudyError: the file is not a store, its schema is not this version's, or its folder cannot
+            be made.
     """
 
     def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
         self.path = path
         self._read_only = read_only
         place = str(path or ":memory:")
+        if path is not None and not read_only:
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise StudyError(f"cannot write to {path.parent}: {error.strerror}") from error
         if path is not None and read_only:
             # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
             place = f"{path.absolute().as_uri()}?immutable=1"
@@ -119,7 +125,6 @@ class Runs:
             raise StudyError(f"{out} holds a study already: {way} into a new directory")
         unfinished = out / f"{FILE_NAME}.unfinished"
         try:
-            out.mkdir(parents=True, exist_ok=True)
             unfinished.unlink(missing_ok=True)
         except OSError as error:
             raise StudyError(f"cannot write to {out}: {error.strerror}") from error

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi import estimate as words
-from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence, equivalence
-from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.spi import Equivalence, Estimate, Interval, equivalence
+from swarm_logistics_env.spi.equivalence import ALPHA
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparison import CONFIDENCE, Arm, Comparison, Setting
@@ -176,8 +174,8 @@ class Verdict:
     saturated: bool
     margin: float
     p_holm: float | None = None
-    verdict_holm: words.Verdict | None = None
-    equivalence_holm: words.Verdict | None = None
+    verdict_holm: spi.Verdict | None = None
+    equivalence_holm: spi.Verdict | None = None
     stopped_at: int | None = None
     published: float | None = None
     claimed: bool | None = None

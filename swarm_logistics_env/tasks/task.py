@@ -84,7 +84,12 @@ class Outcome:
         return self.ended_at if self.all_delivered else math.inf
 
 
-class TaskScenario(Protocol):
+class _Fields(Protocol):
+    def model_dump(self, *, mode: str = "python") -> Fields:
+        """Return the fields."""
+
+
+class TaskScenario(_Fields, Protocol):
     """A scenario of a task: a record (`records.Record`) that says how many robots, and how long."""
 
     @property
@@ -95,14 +100,11 @@ class TaskScenario(Protocol):
     def duration(self) -> float:
         """Time at which a run ends at the latest [s]."""
 
-    def model_dump(self, *, mode: str = "python") -> Fields:
-        """Return its fields."""
-
     def conditions(self) -> list[tuple[str, str, str]]:
         """Return rows of name, value, and unit with meaning, for the report."""
 
 
-class TaskFault(Protocol):
+class TaskFault(_Fields, Protocol):
     """A fault of a task: a record that says which robots fail, how, and from when on."""
 
     @property
@@ -112,9 +114,6 @@ class TaskFault(Protocol):
     @property
     def onset(self) -> float:
         """When it begins [s]."""
-
-    def model_dump(self, *, mode: str = "python") -> Fields:
-        """Return its fields."""
 
 
 @runtime_checkable

@@ -22,7 +22,8 @@ from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
-from swarm_logistics_env.watch.session import SPEEDS, Session
+
+from .session import SPEEDS, Session
 
 Message: TypeAlias = dict[str, Any]
 

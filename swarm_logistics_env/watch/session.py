@@ -9,12 +9,10 @@ from collections.abc import Callable, Sequence
 from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError, suggest
-from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.faults import FaultLike, checked_faults, failed_robots
+from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES, failure_mode
+from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults, failed_robots
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 
@@ -57,10 +55,10 @@ class Session:
         seed: int = 0,
         faults: Sequence[FaultLike] = (),
         speed: float = 1.0,
-        load: Callable[[str], Policy] = policies.load,
+        load: Callable[[str], policies.Policy] = policies.load,
     ) -> None:
         self.load, self._planned = load, checked_faults("faults", faults)
-        named = [name for name in (policy, against) if name is not None]
+        named = filter(None, (policy, against))
         self.choices = tuple(dict.fromkeys([*named, *policies.NAMES]))
         self.paused, self.mode = False, "FM4"
         self.set_speed(speed)
@@ -82,9 +80,7 @@ class Session:
     @property
     def names(self) -> tuple[str, str]:
         """The titles of the two runs."""
-        if self.against is None:
-            return self.policy, f"{self.policy} without faults"
-        return self.policy, self.against
+        return self.policy, self.against or f"{self.policy} without faults"
 
     # Time
 
