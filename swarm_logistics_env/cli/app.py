@@ -17,6 +17,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
+from typer import Exit, Option, echo
 
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
 from swarm_logistics_env.records import plain, read_table
@@ -106,16 +107,13 @@ def _print_version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
 
-        typer.echo(version("swarm-logistics-env"))
-        raise typer.Exit
+        echo(version("swarm-logistics-env"))
+        raise Exit
 
 
 def _options(
     version: Annotated[
-        bool,
-        typer.Option(
-            "--version", help="Print the version.", is_eager=True, callback=_print_version
-        ),
+        bool, Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
     ] = False,
 ) -> None:
     """Take the options that stand before a command."""
@@ -177,11 +175,11 @@ def _complain(sentence: str, code: int) -> int:
 
 
 PresetOption = Annotated[
-    str, typer.Option(help=f"Scenario to start from: {', '.join(SCENARIO_PRESETS)}.")
+    str, Option(help=f"Scenario to start from: {', '.join(SCENARIO_PRESETS)}.")
 ]
 ScenarioOption = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "--scenario",
         metavar="FILE",
         help="TOML or JSON file of fields to change, as `list scenario --json` writes it.",
@@ -189,22 +187,22 @@ ScenarioOption = Annotated[
 ]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
+    Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
 ]
 FaultOption = Annotated[
     list[str] | None,
-    typer.Option(
+    Option(
         "--fault",
         metavar="FAULT",
         help="Such as FM1:2@200: two robots from 200 s on (`list faults`); may be repeated.",
     ),
 ]
 PolicyOption = Annotated[
-    str, typer.Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
+    str, Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
 ]
-SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
+SeedOption = Annotated[int, Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[
-    bool, typer.Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
+    bool, Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
 ]
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import zip_longest
+from textwrap import wrap
 from typing import NamedTuple
 
 from swarm_logistics_env import spi
@@ -346,9 +346,9 @@ def _in_columns(found: Answer, widths: Sequence[int], width: int) -> Iterator[st
         if len({line.policy for line in found.lines}) > 1:
             yield f"{policy}:"
         for line in lines:
-            question, *more = textwrap.wrap(line.question, widths[0], subsequent_indent="  ")
+            question, *more = wrap(line.question, widths[0], subsequent_indent="  ")
             left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {line.interval:{widths[2]}}"
-            verdict = textwrap.wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
+            verdict = wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
             yield f"{left}  {verdict[0]}".rstrip()
             for first, second in zip_longest(more, verdict[1:], fillvalue=""):
                 yield f"{first:{len(left)}}  {second}".rstrip()
@@ -356,4 +356,4 @@ def _in_columns(found: Answer, widths: Sequence[int], width: int) -> Iterator[st
 
 def _fold(text: str, width: int) -> list[str]:
     # Paths and names are longer than a line sometimes: they are broken, never cut.
-    return textwrap.wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)
+    return wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)

@@ -127,11 +127,14 @@ def _category(test: Verdict) -> str:
 
 def _point(results: StudyResults, test: Verdict, category: str, published: float | None) -> Point:
     policy = test.compared.policy
+    value, low, high = test.interval or (None, None, None)
     return Point(
         policy,
         results.policies.index(policy),
         category,
-        *(test.interval or (None, None, None)),
+        value,
+        low,
+        high,
         published,
         decided=test.holm in DECIDED,
         saturated=test.saturated,
