@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 from numpy.typing import NDArray
+from pygame import Surface
 
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
@@ -83,7 +84,7 @@ class Picture:
         self._size = size
         self._lay_out(scenario)
 
-    def draw(self, state: WarehouseState, scenario: Scenario) -> pygame.Surface:
+    def draw(self, state: WarehouseState, scenario: Scenario) -> Surface:
         """Return the picture of `state`, which stays as it is until the next call."""
         if self._shape != _shape(scenario):
             self._lay_out(scenario)
@@ -173,7 +174,7 @@ class Picture:
 
 def background(
     projection: Projection, scenario: Scenario, height: int, text_height: int
-) -> pygame.Surface:
+) -> Surface:
     """Return the empty warehouse on a picture of that height [px]."""
     picture = np.full((height, projection.width, 3), palette.SURROUNDINGS, np.uint8)
     left, right = projection.left, projection.right
@@ -204,12 +205,12 @@ def background(
 def _hatched(height: int, width: int, period: float) -> Pixels:
     y, x = np.ogrid[:height, :width]
     across = np.abs((x + y) / math.sqrt(2.0) % period - period / 2) - 0.06 * period
-    cover = np.clip(0.5 - across, 0.0, 1.0)[..., np.newaxis]
+    cover = np.clip(0.5 - across, 0.0, 1.0)[..., None]
     colour = cover * palette.DELIVERY_HATCH + (1.0 - cover) * palette.DELIVERY_AREA
     return np.asarray(np.rint(colour), np.uint8)
 
 
-def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float) -> None:
+def _draw_arrow(canvas: Surface, start: Point, end: Point, radius: float) -> None:
     width = max(2.0, radius / 3.5)
     way = np.subtract(end, start)
     length = math.hypot(*way)
@@ -255,18 +256,18 @@ class Caption:
         """Return the width [px] below which words would be cut."""
         return max(words(text, text_height).get_width() for text in _WIDEST)
 
-    def draw_legend(self, canvas: pygame.Surface) -> None:
+    def draw_legend(self, canvas: Surface) -> None:
         """Draw what the colours mean, which never changes."""
         for entry, (x, line) in zip(self._legend, self._legend_places):
             self._put(canvas, entry, x, self._legend_line + line)
 
-    def draw(self, canvas: pygame.Surface, state: WarehouseState, scenario: Scenario) -> None:
+    def draw(self, canvas: Surface, state: WarehouseState, scenario: Scenario) -> None:
         """Write the scores and the failures of `state`."""
         for text, (x, line) in zip(_scores(state, scenario), self._places, strict=True):
             self._put(canvas, words(text, self._text_height), x, line)
         self._draw_failures(canvas, state)
 
-    def _draw_failures(self, canvas: pygame.Surface, state: WarehouseState) -> None:
+    def _draw_failures(self, canvas: Surface, state: WarehouseState) -> None:
         failed, text_height = int(state.failed.sum()), self._text_height
         chips = [words(f"failed: {failed}" if failed else "no failures", text_height)]
         counts = Counter(mode for modes in state.failure_modes for mode in modes)
@@ -281,11 +282,11 @@ class Caption:
             self._put(canvas, chip, x, self._failures_line)
             x += chip.get_width() + gap
 
-    def _put(self, canvas: pygame.Surface, chip: pygame.Surface, x: int, line: int) -> None:
+    def _put(self, canvas: Surface, chip: Surface, x: int, line: int) -> None:
         middle = self._top + line * self._line + self._text_height // 2
         canvas.blit(chip, (self._left + x, middle - chip.get_height() // 2))
 
-    def _flow(self, chips: Sequence[pygame.Surface]) -> list[tuple[int, int]]:
+    def _flow(self, chips: Sequence[Surface]) -> list[tuple[int, int]]:
         """Return where these go: x [px] and number of the line."""
         places, x, line = [], 0, 0
         for chip in chips:
@@ -298,7 +299,7 @@ class Caption:
 
 
 @lru_cache(maxsize=128)
-def _failure(mode: str, count: int, text_height: int) -> pygame.Surface:
+def _failure(mode: str, count: int, text_height: int) -> Surface:
     name = words(f"{mode} ×{count}", text_height)
     if mode not in palette.MARKS:
         return name
@@ -306,7 +307,7 @@ def _failure(mode: str, count: int, text_height: int) -> pygame.Surface:
     return _row([(mark,), (name,)], text_height // 5)
 
 
-def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
+def _legend(text_height: int) -> tuple[Surface, ...]:
     radius = 0.42 * text_height
     load, asked_for = sprites.item(0.45 * radius, False), sprites.item(0.5 * radius, True)
     entries = {
@@ -325,7 +326,7 @@ def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
     )
 
 
-def _row(stacks: Sequence[tuple[pygame.Surface, ...]], gap: int) -> pygame.Surface:
+def _row(stacks: Sequence[tuple[Surface, ...]], gap: int) -> Surface:
     """Return stacks of pictures side by side, each centred on the one it lies on."""
     width = sum(stack[0].get_width() for stack in stacks) + gap * (len(stacks) - 1)
     height = max(stack[0].get_height() for stack in stacks)

@@ -17,9 +17,9 @@ from typing import ParamSpec
 import numpy as np
 import pygame
 from numpy.typing import NDArray
+from pygame import Surface
 
-from . import palette
-from .palette import RGB
+from .palette import FLOOR, INK, ITEM, ITEM_EDGE, LINK, OBSTACLE, REQUESTED, RGB, TIMER
 
 Point = tuple[float, float]  # [px]
 Pixels = NDArray[np.uint8]  # (H, W, 3), red, green, blue; or (H, W, 4), with opacity
@@ -28,12 +28,12 @@ Pixels = NDArray[np.uint8]  # (H, W, 3), red, green, blue; or (H, W, 4), with op
 _MASKS = (0xFF, 0xFF00, 0xFF0000, 0)
 
 
-def new_canvas(width: int, height: int) -> pygame.Surface:
+def new_canvas(width: int, height: int) -> Surface:
     """Return an opaque surface of that size [px]."""
-    return pygame.Surface((width, height), 0, 32, _MASKS)
+    return Surface((width, height), 0, 32, _MASKS)
 
 
-def stamp(canvas: pygame.Surface, stamps: Iterable[tuple[pygame.Surface, Point]]) -> None:
+def stamp(canvas: Surface, stamps: Iterable[tuple[Surface, Point]]) -> None:
     """Draw sprites, each with its middle at the pixel nearest to its point."""
     placed = []
     for sprite, (x, y) in stamps:
@@ -43,7 +43,7 @@ def stamp(canvas: pygame.Surface, stamps: Iterable[tuple[pygame.Surface, Point]]
 
 
 def draw_line(
-    canvas: pygame.Surface, start: NDArray[np.float64], end: NDArray[np.float64], width: float
+    canvas: Surface, start: NDArray[np.float64], end: NDArray[np.float64], width: float
 ) -> None:
     """Draw a line of that width [px] as several thin ones, because pygame smooths only those."""
     x_part, y_part = end - start
@@ -51,10 +51,10 @@ def draw_line(
     half = (width - 1.0) / 2
     for offset in np.linspace(-half, half, 1 + math.ceil(4.0 * half)):
         ends = np.array([start, end]) + offset * across
-        pygame.draw.aaline(canvas, palette.LINK, *ends.tolist())
+        pygame.draw.aaline(canvas, LINK, *ends.tolist())
 
 
-def to_array(canvas: pygame.Surface) -> Pixels:
+def to_array(canvas: Surface) -> Pixels:
     """Return the pixels of a surface as an array of its own: (H, W, 3)."""
     width, height = canvas.get_size()
     pixels = np.empty((height, width, 3), np.uint8)
@@ -75,7 +75,7 @@ def pixels(reach: float) -> tuple[Distance, Distance]:
     """Return x (1, W) and y (H, 1) [px] of a square that reaches so far around its middle pixel."""
     half = math.ceil(reach) + 1
     axis = np.arange(-half, half + 1, dtype=np.float64)
-    return axis[np.newaxis, :], axis[:, np.newaxis]
+    return axis[None, :], axis[:, None]
 
 
 def disc(x: Distance, y: Distance, radius: float) -> Distance:
@@ -118,27 +118,27 @@ def painted(*layers: Layer) -> Pixels:
     shape = np.broadcast_shapes(*(distance.shape for distance, _, _ in layers))
     colour, alpha = np.zeros((*shape, 3)), np.zeros((*shape, 1))
     for distance, rgb, opacity in layers:
-        cover = (np.clip(0.5 - distance, 0.0, 1.0) * opacity)[..., np.newaxis]
+        cover = (np.clip(0.5 - distance, 0.0, 1.0) * opacity)[..., None]
         colour = np.array(rgb) * cover + colour * (1.0 - cover)
         alpha = cover + alpha * (1.0 - cover)
     straight = np.divide(colour, alpha, out=np.zeros_like(colour), where=alpha > 0.0)
     return np.asarray(np.rint(np.dstack([straight, 255.0 * alpha])), np.uint8)
 
 
-def _sprite(paint: Callable[P, Pixels]) -> Callable[P, pygame.Surface]:
+def _sprite(paint: Callable[P, Pixels]) -> Callable[P, Surface]:
     @lru_cache(maxsize=2048)
-    def surface(*args: P.args, **kwargs: P.kwargs) -> pygame.Surface:
+    def surface(*args: P.args, **kwargs: P.kwargs) -> Surface:
         return _surface(paint(*args, **kwargs))
 
     # The cache's type forgets the parameters.
     return surface  # type: ignore[return-value]
 
 
-def _surface(rgba: Pixels) -> pygame.Surface:
+def _surface(rgba: Pixels) -> Surface:
     return pygame.image.frombytes(rgba.tobytes(), rgba.shape[1::-1], "RGBA")
 
 
-def blank(width: int, height: int) -> pygame.Surface:
+def blank(width: int, height: int) -> Surface:
     """Return a picture of that size [px] with nothing on it."""
     return _surface(np.zeros((height, width, 4), np.uint8))
 
@@ -156,8 +156,8 @@ def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> Pixels:
     x, y = pixels(nose)
     turned = -2.0 * math.pi * heading / HEADINGS
     return painted(
-        (wedge(x, y, turned, nose, radius * 0.5, radius * 0.6 + 0.5), palette.INK, 1.0),
-        (disc(x, y, radius), palette.INK, 1.0),
+        (wedge(x, y, turned, nose, radius * 0.5, radius * 0.6 + 0.5), INK, 1.0),
+        (disc(x, y, radius), INK, 1.0),
         (disc(x, y, radius - edge), colour, 1.0),
     )
 
@@ -169,7 +169,7 @@ def halo(radius: float, age: int) -> Pixels:
     reach = radius * (1.5 + 1.0 * strength)
     x, y = pixels(reach)
     fading = np.clip((reach - np.hypot(x, y)) / (reach - radius), 0.0, 1.0)
-    glow = painted((disc(x, y, reach), palette.TIMER, 0.25 + 0.4 * strength))
+    glow = painted((disc(x, y, reach), TIMER, 0.25 + 0.4 * strength))
     glow[..., 3] = np.rint(glow[..., 3] * fading**0.7)
     return glow
 
@@ -180,9 +180,9 @@ def item(half: float, is_requested: bool) -> Pixels:
     half = math.floor(half) + 0.5
     x, y = pixels(half)
     inner = half - max(1, round(0.2 * half))
-    edge, colour = palette.ITEM_EDGE, palette.ITEM
+    edge, colour = ITEM_EDGE, ITEM
     if is_requested:
-        edge, colour = palette.INK, palette.REQUESTED
+        edge, colour = INK, REQUESTED
     return painted((box(x, y, half, half), edge, 1.0), (box(x, y, inner, inner), colour, 1.0))
 
 
@@ -199,16 +199,14 @@ def target(radius: float) -> Pixels:
     above = box(x, np.abs(y) - middle, width / 2, arm)
     shape = np.minimum.reduce([ring(x, y, radius + width / 2, width), beside, above])
     # A white edge keeps it apart from whatever lies below.
-    return painted((shape - 1.0, palette.FLOOR, 0.8), (shape, palette.REQUESTED, 1.0))
+    return painted((shape - 1.0, FLOOR, 0.8), (shape, REQUESTED, 1.0))
 
 
 @_sprite
 def obstacle(radius: float) -> Pixels:
     """Return a solid disc of that radius [px]."""
     x, y = pixels(radius)
-    return painted(
-        (disc(x, y, radius), palette.INK, 1.0), (disc(x, y, radius - 2.0), palette.OBSTACLE, 1.0)
-    )
+    return painted((disc(x, y, radius), INK, 1.0), (disc(x, y, radius - 2.0), OBSTACLE, 1.0))
 
 
 @_sprite
@@ -216,7 +214,7 @@ def arrowhead(length: float, heading: int) -> Pixels:
     """Return a triangle of that length [px] with its tip in the middle of the picture."""
     x, y = pixels(1.2 * length)
     turned = -2.0 * math.pi * heading / HEADINGS
-    return painted((wedge(x, y, turned, 0.0, -length, 0.45 * length), palette.LINK, 1.0))
+    return painted((wedge(x, y, turned, 0.0, -length, 0.45 * length), LINK, 1.0))
 
 
 def heading_step(angle: float) -> int:
@@ -225,7 +223,7 @@ def heading_step(angle: float) -> int:
 
 
 @lru_cache(maxsize=512)
-def words(text: str, height: int, colour: RGB = palette.INK) -> pygame.Surface:
+def words(text: str, height: int, colour: RGB = INK) -> Surface:
     """Return a line of text of that height [px], in the font that pygame brings along."""
     # A font is not kept, because a pygame.quit() elsewhere would make it unusable.
     pygame.font.init()
@@ -239,9 +237,9 @@ def words(text: str, height: int, colour: RGB = palette.INK) -> pygame.Surface:
 
 
 @lru_cache(maxsize=256)
-def badge(mark: str, height: int) -> pygame.Surface:
+def badge(mark: str, height: int) -> Surface:
     """Return a mark in white on a black pill of that height [px]."""
-    text = words(mark, round(1.25 * height), palette.FLOOR)
+    text = words(mark, round(1.25 * height), FLOOR)
     text = text.subsurface(text.get_bounding_rect())
     radius = height / 2
     half_width = max(radius, text.get_width() / 2 + 0.3 * height)
@@ -249,8 +247,8 @@ def badge(mark: str, height: int) -> pygame.Surface:
     y = y[np.abs(y[:, 0]) <= radius + 2.0]
     surface = _surface(
         painted(
-            (pill(x, y, half_width + 1.0, radius + 1.0), palette.FLOOR, 0.9),
-            (pill(x, y, half_width, radius), palette.INK, 1.0),
+            (pill(x, y, half_width + 1.0, radius + 1.0), FLOOR, 0.9),
+            (pill(x, y, half_width, radius), INK, 1.0),
         )
     )
     surface.blit(text, text.get_rect(center=surface.get_rect().center))

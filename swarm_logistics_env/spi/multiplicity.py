@@ -128,7 +128,7 @@ def _boundaries(seeds: tuple[int, ...], alpha: float, spending: Spending) -> tup
         alphas.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
         start, mass = points, weights * density
         points = np.linspace(-boundary, boundary, _GRID)
-        steps = (points[:, np.newaxis] - start) / step
+        steps = (points[:, None] - start) / step
         density = np.exp(-0.5 * steps**2) @ mass / (step * math.sqrt(2.0 * math.pi))
         weights = _simpson(points)
         information, spent = now, spent + to_spend

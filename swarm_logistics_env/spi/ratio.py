@@ -86,7 +86,7 @@ def paired_ratio(
     above, below = hidden_above, hidden_below = stdtr(df, -statistic), stdtr(df, statistic)
     t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + confidence / 2)))
     if n >= MIN_SEEDS:
-        pivots = resampled_pivots(num - value[..., np.newaxis] * den)
+        pivots = resampled_pivots(num - value[..., None] * den)
         mirrored = -pivots[::-1]
 
         def larger_p(statistic: Numbers, pivots: Numbers) -> Numbers:
@@ -138,8 +138,8 @@ def fieller_limits(
     value = num.mean(axis=-1) / mean_den
     # Fieller's quadratic around the estimate: with num replaced by num - value den its mean is 0,
     # so the discriminant is a sum of squares and nothing cancels.
-    residual = num - value[..., np.newaxis] * den
-    den_centred = den - mean_den[..., np.newaxis]
+    residual = num - value[..., None] * den
+    den_centred = den - mean_den[..., None]
     scale = n * (n - 1)
     s_rr = np.square(residual).sum(axis=-1) / scale
     s_rd = (residual * den_centred).sum(axis=-1) / scale
