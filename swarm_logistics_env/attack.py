@@ -259,7 +259,7 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
     return AttackResult(
         found=tuple(
             Found(by, fault, _robustness(asked, sound, with_fault), runs)
-            for (by, fault, runs), with_fault in zip(chosen, failed, strict=True)
+            for (by, fault, runs), with_fault in zip(chosen, failed)
         ),
         tried=len(set(tried)),
         searched=len(faults),

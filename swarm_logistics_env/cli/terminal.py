@@ -18,7 +18,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import NOTHING, WORDS, Section, number
+from swarm_logistics_env.report.section import NOTHING, WORDS, Section, Texts, number
 from swarm_logistics_env.report.write import (
     how_to_get_figures,
     missing_packages,
@@ -82,9 +82,7 @@ def say(text: str, command: str = "") -> None:
         echo(f"{text} {command}".rstrip())
 
 
-def show_table(
-    title: str, columns: Sequence[str], rows: Iterable[tuple[str, ...]], *lines: str
-) -> None:
+def show_table(title: str, columns: Sequence[str], rows: Iterable[Texts], *lines: str) -> None:
     """Print a table, and lines of text below it."""
     show(Section(title, tuple(columns), tuple(rows), lines))
 
@@ -138,7 +136,7 @@ def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
     show_table(f"Power, from {n_seeds} {runs}", columns, rows, hint)
 
 
-def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:
+def _power(test: Verdict, effect: float | None) -> Texts:
     # Only the spread is taken from the runs, never the effect that they happened to show.
     compared, estimate, same = test.compared, test.estimate, test.equivalence
     seeds = test.problem or "no effect is named"

@@ -263,7 +263,7 @@ class Caption:
 
     def draw(self, canvas: Surface, state: WarehouseState, scenario: Scenario) -> None:
         """Write the scores and the failures of `state`."""
-        for text, (x, line) in zip(_scores(state, scenario), self._places, strict=True):
+        for text, (x, line) in zip(_scores(state, scenario), self._places):
             self._put(canvas, words(text, self._text_height), x, line)
         self._draw_failures(canvas, state)
 

@@ -13,7 +13,7 @@ from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
-from .section import NOTHING, Section, bracketed, mean_p, ratio
+from .section import NOTHING, Section, Texts, bracketed, mean_p, ratio
 
 STUDY = "benchmark"
 HELD_OUT = "Held out"  # how the titles of its tables begin that give the score
@@ -22,7 +22,7 @@ RESAMPLES = 2_000
 
 def table(results: StudyResults) -> Section:
     """Return P, S, R or A, and FT of every condition, those of a title together."""
-    rows: list[tuple[str, ...]] = []
+    rows: list[Texts] = []
     shown: set[str] = set()  # the sound swarm is the original condition of most titles
     for title, tests in grouped(results.verdicts, lambda one: one.compared.table).items():
         rows.append((title, "", "", ""))

@@ -45,6 +45,7 @@ FLAGS = {
 }
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 Row = TypeVar("Row")
+Texts = tuple[str, ...]
 
 
 @dataclass
@@ -79,9 +80,9 @@ class Section:
     """A heading with a figure, sentences, a table, lines of text, or several of them."""
 
     title: str
-    columns: tuple[str, ...] = ()
-    rows: tuple[tuple[str, ...], ...] = ()
-    lines: tuple[str, ...] = ()
+    columns: Texts = ()
+    rows: tuple[Texts, ...] = ()
+    lines: Texts = ()
     sentences: tuple[Sentence, ...] = ()
     figures: tuple[Figure, ...] = ()
 

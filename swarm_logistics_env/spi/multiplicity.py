@@ -53,8 +53,7 @@ def adjust(estimates: Sequence[Estimate | Equivalence]) -> tuple[Verdict, ...]:
     if len(confidences) > 1:
         raise IndicatorError(f"confidence = {confidences} in one family: should be one number")
     return tuple(
-        estimate.verdict_for(p)
-        for estimate, p in zip(estimates, adjusted_p_values(estimates), strict=True)
+        estimate.verdict_for(p) for estimate, p in zip(estimates, adjusted_p_values(estimates))
     )
 
 

@@ -95,7 +95,7 @@ class Film:
         canvas = new_canvas(self._width, self._head + self._tall)
         canvas.fill(SURROUNDINGS)
         x = 0
-        for take, picture in zip(self._takes, self._pictures, strict=True):
+        for take, picture in zip(self._takes, self._pictures):
             world = take.play.world
             room = pygame.Rect(x, 0, picture.width, self._head).inflate(-self._text_height, 0)
             # Large, so that it can be read where the film is small.
