@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import typer
 from rich.markup import escape
@@ -54,7 +54,7 @@ class Application:
         gc.freeze()  # the process ends: nobody needs to look for garbage
         sys.exit(code)
 
-    def run(self, arguments: list[str] | None = None) -> int:
+    def run(self, arguments: Repeated = None) -> int:
         """Run a command line and return the exit code."""
         # A user's own policy lies in the folder in which the command is run. The folder comes last,
         # so that its modules hide no installed ones.
@@ -174,6 +174,7 @@ def _complain(sentence: str, code: int) -> int:
     return code
 
 
+Repeated: TypeAlias = list[str] | None  # the texts of an option that may be given several times
 PresetOption = Annotated[
     str, Option(help=f"Scenario to start from: {', '.join(SCENARIO_PRESETS)}.")
 ]
@@ -186,11 +187,10 @@ ScenarioOption = Annotated[
     ),
 ]
 SetOption = Annotated[
-    list[str] | None,
-    Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
+    Repeated, Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated.")
 ]
 FaultOption = Annotated[
-    list[str] | None,
+    Repeated,
     Option(
         "--fault",
         metavar="FAULT",
@@ -206,7 +206,7 @@ TrustPolicyOption = Annotated[
 ]
 
 
-def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
+def scenario_of(preset: str, file: Path | None, changes: Repeated) -> Scenario:
     """Return the scenario that `--preset`, `--scenario` and `--set` describe.
 
     A file changes fields of the preset, and `--set` those of both.
@@ -227,7 +227,7 @@ def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Sc
     return Scenario.preset(preset).replace(**fields)
 
 
-def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
+def faults_of(texts: Repeated, scenario: Scenario) -> list[Fault]:
     """Return the faults that `--fault` describes, see `faults.fault_of`.
 
     Raises:

@@ -30,7 +30,7 @@ from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.warehouse.faults import Fault, text_of
 
-from .app import PresetOption, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
+from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
 from .study_commands import (
     ClearingOption,
     FullOption,
@@ -83,7 +83,7 @@ def judge_command(
         ),
     ] = False,
     columns: Annotated[
-        list[str] | None,
+        Repeated,
         Option(
             "--column",
             metavar="WHAT=NAME",
@@ -91,7 +91,7 @@ def judge_command(
         ),
     ] = None,
     ignore: Annotated[
-        list[str] | None, Option(metavar="NAME", help="Column to leave out; may be repeated.")
+        Repeated, Option(metavar="NAME", help="Column to leave out; may be repeated.")
     ] = None,
     duration: Annotated[
         float | None, Option(help="Length of every trial in seconds, where no column says it.")
@@ -100,7 +100,7 @@ def judge_command(
         str | None, Option(metavar=".|,", help="Sign before decimals; . if not given.")
     ] = None,
     setup: Annotated[
-        list[str] | None,
+        Repeated,
         Option(
             metavar="NAME=VALUE|FILE",
             help="A condition for the report to state, or a TOML file of some; may be repeated.",
@@ -311,9 +311,7 @@ def attack_command(
         str, Argument(metavar="POLICY", help="Name, path of a file, module:Class or my.py:Class.")
     ],
     robots: Annotated[int, Option(min=1, help="How many robots fail.")] = 2,
-    modes: Annotated[
-        list[str] | None, Option("--mode", help="Mode to search; may be repeated.")
-    ] = None,
+    modes: Annotated[Repeated, Option("--mode", help="Mode to search; may be repeated.")] = None,
     budget: Annotated[int, Option(min=10, help="Runs of faults in the search.")] = 200,
     fresh: Annotated[int, Option(min=3, help="Other seeds, for the estimates.")] = 30,
     seed: Annotated[int, Option(help="Of the search's own choices.")] = 0,

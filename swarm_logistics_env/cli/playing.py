@@ -23,6 +23,7 @@ from .app import (
     FaultOption,
     PolicyOption,
     PresetOption,
+    Repeated,
     ScenarioOption,
     SeedOption,
     SetOption,
@@ -37,7 +38,7 @@ FILM_SIZE = 480  # longer side of each warehouse [px]
 
 def run_command(
     policies: Annotated[
-        list[str] | None,
+        Repeated,
         Option(
             "--policy",
             help="Name (`list policies`), path of a policy file, module:Class or my.py:Class; "
@@ -156,7 +157,7 @@ def watch_command(
     page = recorded_page(session, session.scenario.duration if until is None else until)
     with becoming(save, SetupError) as part:
         part.write_text(page, encoding="utf-8")
-    echo(f"{save}: {session.run.world.state.time:g} s, {len(page) / 1e6:.2f} MB")
+    echo(f"{save}: {session.state.time:g} s, {len(page) / 1e6:.2f} MB")
 
 
 def _has_screen() -> bool:

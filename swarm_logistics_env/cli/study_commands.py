@@ -24,6 +24,7 @@ from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
+from .app import Repeated
 from .terminal import say, say_what_was_played, show_power, show_report, show_table
 
 StudyArgument = Annotated[
@@ -42,7 +43,7 @@ FirstSeedOption = Annotated[
     int | None, Option(min=0, help="Smallest seed, the others follow it; the study's if not given.")
 ]
 PolicyOption = Annotated[
-    list[str] | None, Option("--policy", help="Policy to judge (`list policies`); may be repeated.")
+    Repeated, Option("--policy", help="Policy to judge (`list policies`); may be repeated.")
 ]
 TrustCodeOption = Annotated[
     bool, Option("--trust-code", help="Let a study name its task and policies as package.mod:NAME.")
@@ -222,7 +223,7 @@ def compare_command(
     old: Annotated[Path, Argument(metavar="OLD", help="Directory of the study to compare with.")],
     new: Annotated[Path, Argument(metavar="NEW", help="Directory of the study that is judged.")],
     fail_if: Annotated[
-        list[str] | None,
+        Repeated,
         Option(
             metavar="GATE",
             help=f"[possibly] {SUBJECTS} <|> NUMBER [at TEXT]; may be "
@@ -288,7 +289,7 @@ def study_of(
     asked: str,
     out: Path | None,
     seeds: int | None,
-    policies: list[str] | None,
+    policies: Repeated,
     trust_code: bool = False,
     *,
     first_seed: int | None = None,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
@@ -79,7 +80,7 @@ def worst(results: StudyResults) -> tuple[Verdict, float]:
     return min(shares, key=lambda one: one[1])
 
 
-def score(results: StudyResults) -> NDArray[np.float64]:
+def score(results: StudyResults) -> Numbers:
     """Return mean P over the held-out conditions, of every training and seed, (K, n) or (n,).
 
     Raises:
@@ -100,7 +101,7 @@ def _held_out(results: StudyResults) -> dict[Arm, Cell]:
     }
 
 
-def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
+def leaderboard(entries: Mapping[str, Numbers]) -> Section:
     """Return the table of entries by score, and how stable that order is.
 
     Seeds are resampled for all entries together, as they are played over the same ones, trainings
@@ -142,6 +143,6 @@ def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
     )
 
 
-def _ranks(scores: NDArray[np.float64]) -> NDArray[np.int64]:
+def _ranks(scores: Numbers) -> NDArray[np.int64]:
     """Return 1 + how many entries score higher, of every row."""
     return np.asarray(1 + (scores[:, None, :] > scores[:, :, None]).sum(axis=2))

@@ -6,11 +6,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Unpack
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor, comparing
 from swarm_logistics_env.spi.estimate import Estimate, Options
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.tasks.task import Case
 
 CONFIDENCE = 0.95  # of intervals and verdicts, unless a look of a study makes it larger
@@ -131,7 +129,7 @@ class Comparison:
 
     def estimate(
         self,
-        performance: Mapping[Arm, NDArray[np.float64]],
+        performance: Mapping[Arm, Numbers],
         *,
         capped: Collection[Arm] = (),
         **options: Unpack[Options],

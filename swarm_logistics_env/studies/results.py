@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparison import Arm, Comparison
@@ -23,7 +21,7 @@ from .verdict import Cell, Verdict, judge_one, under_holm
 if TYPE_CHECKING:
     import pandas as pd
 
-Times = tuple[NDArray[np.float64], ...]
+Times = tuple[Numbers, ...]
 Place = tuple[str, str, Arm]  # of a cell: policy, table, arm
 
 

@@ -24,17 +24,18 @@ from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.records import canonical_json
 
+Seconds: TypeAlias = NDArray[np.float64]
 Fields: TypeAlias = Mapping[str, object]  # of a record, by name
 
 
-def _ascending(times: NDArray[np.float64]) -> NDArray[np.float64]:
+def _ascending(times: Seconds) -> Seconds:
     if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
         raise ValueError("should ascend")
     return times
 
 
 Times = Annotated[
-    NDArray[np.float64],
+    Seconds,
     BeforeValidator(lambda times: np.asarray(times, dtype=np.float64)),
     AfterValidator(_ascending),
     PlainSerializer(lambda times: times.tolist()),

@@ -64,10 +64,10 @@ def frame(session: Session) -> Message:
     """
     frame: Message = {
         **{name: getattr(session, name) for name in _TOLD},
-        "time": round(session.run.world.state.time, 3),
+        "time": round(session.state.time, 3),
         "over": session.is_over,
         "scenario": {name: getattr(session.scenario, name) for name in _SHAPE},
-        "obstacles": _millimetres(session.run.world.state.obstacle_position),
+        "obstacles": _millimetres(session.state.obstacle_position),
         "events": [[round(e.time, 1), e.robot, e.label] for e in session.events],
         "selected": _selected(session),
     }
@@ -181,7 +181,7 @@ def _selected(session: Session) -> Message | None:
     robot = session.selected
     if robot is None:
         return None
-    state, row = session.run.world.state, session.run.world.observe()[robot]
+    state, row = session.state, session.run.world.observe()[robot]
     seen = unflatten(row, session.scenario)
     beams = np.min([seen[f"range_{what}"] for what in ("robots", "walls", "items")], axis=0)
     return {
@@ -225,7 +225,7 @@ class Recording:
         session = self._session
         if session.run is not self._play:  # another episode
             self._play, self._last, self._messages = session.run, {}, []
-        time = session.run.world.state.time
+        time = session.state.time
         if self._last and time < self._last["time"] + _SPACING - 1e-9 and not session.is_over:
             return
         now = {**frame(session), "selected": None, "note": "", "paused": False}
@@ -246,7 +246,7 @@ def recorded_page(session: Session, until: float) -> str:
     """Play a session up to a time [s], or to its end; return the page that replays it."""
     recording = Recording(session)
     recording.note()
-    while not session.is_over and session.run.world.state.time < until - 1e-9:
+    while not session.is_over and session.state.time < until - 1e-9:
         session.advance()
         recording.note()
     return recording.page()

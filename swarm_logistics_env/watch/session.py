@@ -13,6 +13,7 @@ from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES, failure_mode
 from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults, failed_robots
+from swarm_logistics_env.warehouse.state import WarehouseState
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 
@@ -71,6 +72,11 @@ class Session:
     def scenario(self) -> Scenario:
         """The conditions that hold now."""
         return self.run.world.scenario
+
+    @property
+    def state(self) -> WarehouseState:
+        """The state of the run, beside which the other one plays."""
+        return self.run.world.state
 
     @property
     def is_over(self) -> bool:
@@ -160,10 +166,10 @@ class Session:
     def break_robot(self, robot: int | None = None) -> None:
         """Let `robot` fail from now on in the chosen mode; None means the selected robot."""
         robot = self._meant(robot)
-        if self.mode in self.run.world.state.failure_modes[robot]:
+        if self.mode in self.state.failure_modes[robot]:
             self.note = f"robot {robot} already fails in mode {self.mode}"
             return
-        now = round(self.run.world.state.time, 9)
+        now = round(self.state.time, 9)
         fault = Fault(self.mode, [robot], onset=now)
         self._set_faults([*self.run.world.faults, fault])
         self._look_after_selection()
@@ -191,7 +197,7 @@ class Session:
     def toggle_robot(self, robot: int) -> None:
         """Select a robot, and break it, or repair it if it fails."""
         self.select(robot)
-        if self.run.world.state.failed[robot]:
+        if self.state.failed[robot]:
             self.repair_robot(robot)
         else:
             self.break_robot(robot)
@@ -239,12 +245,12 @@ class Session:
             self.beside.world.set_faults(faults)
 
     def _look_after_selection(self) -> None:
-        robot, present = self.selected, self.run.world.state.robot_present
+        robot, present = self.selected, self.state.robot_present
         if robot is not None and not (robot < len(present) and present[robot]):
             self.selected = None
 
     def _log(self, robot: int, mode: str | None) -> None:
-        self.events.append(Event(self.run.world.state.time, robot, mode))
+        self.events.append(Event(self.state.time, robot, mode))
 
     def _meant(self, robot: int | None) -> int:
         if robot is None:
@@ -257,6 +263,6 @@ class Session:
         return robot
 
     def _check_there(self, robot: int) -> None:
-        state = self.run.world.state
+        state = self.state
         if not (0 <= robot < state.n_robots and state.robot_present[robot]):
             raise SetupError(f"robot = {robot}: should be one that is in the warehouse")
