@@ -263,7 +263,13 @@ class Caption:
 
     def draw(self, canvas: Surface, state: WarehouseState, scenario: Scenario) -> None:
         """Write the scores and the failures of `state`."""
-        for text, (x, line) in zip(_scores(state, scenario), self._places):
+        total = "" if scenario.restock else f" of {scenario.n_items}"
+        scores = (
+            f"time {state.time:.1f} s",
+            f"N = {state.n_robots}",
+            f"P = {state.delivered}{total}",
+        )
+        for text, (x, line) in zip(scores, self._places):
             self._put(canvas, words(text, self._text_height), x, line)
         self._draw_failures(canvas, state)
 
@@ -338,8 +344,3 @@ def _row(stacks: Sequence[tuple[Surface, ...]], gap: int) -> Surface:
             row.blit(picture, picture.get_rect(center=middle))
         x += stack[0].get_width() + gap
     return row
-
-
-def _scores(state: WarehouseState, scenario: Scenario) -> tuple[str, ...]:
-    total = "" if scenario.restock else f" of {scenario.n_items}"
-    return f"time {state.time:.1f} s", f"N = {state.n_robots}", f"P = {state.delivered}{total}"

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
 from swarm_logistics_env import spi
@@ -80,9 +80,8 @@ def _mean_p(outcomes: Sequence[Outcome | None]) -> float | None:
     return round(float(np.mean(found)), 4) if len(found) == len(outcomes) else None
 
 
-def _steps(times: NDArray[np.float64]) -> list[JsonValue]:
-    gaps: list[JsonValue] = np.diff(np.rint(times).astype(int), prepend=0).tolist()
-    return gaps
+def _steps(times: ArrayLike) -> list[JsonValue]:
+    return [*np.diff(np.rint(times).astype(int), prepend=0).tolist()]
 
 
 def watch_command(arm: Arm) -> str | None:

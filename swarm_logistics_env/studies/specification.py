@@ -100,6 +100,12 @@ class Factor(_Part):
     scenario: Fields = Field(default_factory=dict)
 
 
+def _ascending(values: tuple[int, ...]) -> tuple[int, ...]:
+    if list(values) != sorted(set(values)):
+        raise ValueError("should be ascending, each size once")
+    return values
+
+
 class Sizes(Factor):
     """Swarm sizes N, ascending; every step from one to the next gives a scalability S.
 
@@ -108,15 +114,8 @@ class Sizes(Factor):
         superlinear: steps (N, N + m) that are also tested for S > 1.
     """
 
-    values: Annotated[tuple[PositiveInt, ...], Field(min_length=2)]
+    values: Annotated[tuple[PositiveInt, ...], Field(min_length=2), AfterValidator(_ascending)]
     superlinear: tuple[tuple[PositiveInt, PositiveInt], ...] = ()
-
-    @field_validator("values")
-    @classmethod
-    def _ascending(cls, values: tuple[int, ...]) -> tuple[int, ...]:
-        if list(values) != sorted(set(values)):
-            raise ValueError("should be ascending, each size once")
-        return values
 
 
 class Faults(Factor):
@@ -160,6 +159,12 @@ class Faults(Factor):
         return ", ".join(said)
 
 
+def _from_above_0(values: tuple[float, ...]) -> tuple[float, ...]:
+    if values[0] == 0.0:
+        raise ValueError("should start with x_o above 0: A is relative to it")
+    return values
+
+
 class Parameter(Factor):
     """Values of one field of the scenario; the change from the first to each other gives an A.
 
@@ -169,14 +174,9 @@ class Parameter(Factor):
     """
 
     name: str
-    values: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=2), _ONCE]
-
-    @field_validator("values")
-    @classmethod
-    def _relative(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        if values[0] == 0.0:
-            raise ValueError("should start with x_o above 0: A is relative to it")
-        return values
+    values: Annotated[
+        tuple[NonNegativeFloat, ...], Field(min_length=2), _ONCE, AfterValidator(_from_above_0)
+    ]
 
 
 class Ablation(Factor):

@@ -117,9 +117,8 @@ class Cell:
     @cached_property
     def one_run(self) -> Interval:
         """Mean P with the 95 % interval of one further run."""
-        if not self.n_seeds:
-            return _UNKNOWN
-        return self._possible(spi.prediction_interval(self.by_seed.ravel()))
+        p = self.by_seed.ravel()
+        return self._possible(spi.prediction_interval(p)) if p.size else _UNKNOWN
 
     def _possible(self, interval: Interval) -> Interval:
         """Return an interval that ends at the number of items where none comes back."""
@@ -142,10 +141,8 @@ class Cell:
     @property
     def published_inside(self) -> bool | None:
         """Whether the published P lies in the interval of one run; None: unknown."""
-        _, low, high = self.one_run
-        if self.published is None or low is None or high is None:
-            return None
-        return low <= self.published <= high
+        p, (_, low, high) = self.published, self.one_run
+        return None if p is None or low is None or high is None else low <= p <= high
 
 
 @dataclass(frozen=True, eq=False)
