@@ -159,6 +159,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         document: the report.
         drawings: inline SVG of every figure, by name.
     """
+    data = page_data(results)
     return template("page.html.jinja").render(
         document=document,
         paired=results.plan.paired,
@@ -169,7 +170,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         drawings=drawings,
         latex=latex_tables((document.answer.section, *document.summary)),
         # A text must not end the script that it stands in.
-        data=json.dumps(page_data(results), separators=(",", ":")).replace("<", "\\u003c"),
+        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
     )
 
