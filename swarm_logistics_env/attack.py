@@ -256,15 +256,11 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
         outcomes = iter(_outcomes(base, engine, store, [*product(judged, fresh)]))
         arm = Arm(NO_FAULT, base)
         sound, *failed = (Cell.of("", "", arm, [*islice(outcomes, len(fresh))]) for _ in judged)
-    return AttackResult(
-        found=tuple(
-            Found(by, fault, _robustness(asked, sound, with_fault), runs)
-            for (by, fault, runs), with_fault in zip(chosen, failed)
-        ),
-        tried=len(set(tried)),
-        searched=len(faults),
-        is_capped=sound.saturated,
+    found = tuple(
+        Found(by, fault, _robustness(asked, sound, with_fault), runs)
+        for (by, fault, runs), with_fault in zip(chosen, failed)
     )
+    return AttackResult(found, len(set(tried)), len(faults), sound.saturated)
 
 
 def _robustness(asked: Attack, sound: Cell, failed: Cell) -> Estimate:

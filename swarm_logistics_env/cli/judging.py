@@ -137,10 +137,9 @@ def judge_command(
         raise StudyError(
             f"--seeds {seeds}: should be {LEAST_SEEDS} or more, as fewer runs are alike by chance"
         )
-    if plays_benchmark:
-        for option, given in {"--seeds": seeds, "--clearing": clearing}.items():
-            if given:
-                raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
+    if plays_benchmark and (seeds or clearing):
+        option = "--seeds" if seeds else "--clearing"
+        raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
     if is_policy:
         count = processes or os.cpu_count() or 1
         engine = engine_named("process" if count > 1 else "local", count)

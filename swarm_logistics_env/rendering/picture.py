@@ -264,11 +264,8 @@ class Caption:
     def draw(self, canvas: Surface, state: WarehouseState, scenario: Scenario) -> None:
         """Write the scores and the failures of `state`."""
         total = "" if scenario.restock else f" of {scenario.n_items}"
-        scores = (
-            f"time {state.time:.1f} s",
-            f"N = {state.n_robots}",
-            f"P = {state.delivered}{total}",
-        )
+        performance = f"P = {state.delivered}{total}"
+        scores = f"time {state.time:.1f} s", f"N = {state.n_robots}", performance
         for text, (x, line) in zip(scores, self._places):
             self._put(canvas, words(text, self._text_height), x, line)
         self._draw_failures(canvas, state)

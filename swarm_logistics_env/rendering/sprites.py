@@ -245,11 +245,7 @@ def badge(mark: str, height: int) -> Surface:
     half_width = max(radius, text.get_width() / 2 + 0.3 * height)
     x, y = pixels(half_width)
     y = y[np.abs(y[:, 0]) <= radius + 2.0]
-    surface = _surface(
-        painted(
-            (pill(x, y, half_width + 1.0, radius + 1.0), FLOOR, 0.9),
-            (pill(x, y, half_width, radius), INK, 1.0),
-        )
-    )
+    edge, inside = pill(x, y, half_width + 1.0, radius + 1.0), pill(x, y, half_width, radius)
+    surface = _surface(painted((edge, FLOOR, 0.9), (inside, INK, 1.0)))
     surface.blit(text, text.get_rect(center=surface.get_rect().center))
     return surface

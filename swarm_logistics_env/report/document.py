@@ -96,12 +96,8 @@ def document(results: StudyResults) -> Document:
         Chapter("Set-up", "", setup_sheet(plan)),
         Chapter("Methods", "", (Section("", lines=(methods(plan),)),)),
     ]
-    whole = Document(
-        f"Study {plan.specification.name!r}",
-        tuple(text),
-        found,
-        tuple(chapter for chapter in chapters if chapter.sections),
-    )
+    shown = tuple(chapter for chapter in chapters if chapter.sections)
+    whole = Document(f"Study {plan.specification.name!r}", tuple(text), found, shown)
     # Policies and tables that differ in punctuation or case alone would give equal files.
     taken: set[str] = set()
     for figure in whole.figures():

@@ -246,10 +246,5 @@ def rates(
 def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
     """Put the legend of one pair of axes above all of them."""
     handles, labels = axes.get_legend_handles_labels()
-    canvas.legend(
-        handles,
-        labels,
-        loc="outside upper left",
-        ncols=min(len(labels), 3),
-        handlelength=2.6 if lines else 1.0,
-    )
+    columns, length = min(len(labels), 3), 2.6 if lines else 1.0
+    canvas.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=length)

@@ -128,17 +128,8 @@ def _category(test: Verdict) -> str:
 def _point(results: StudyResults, test: Verdict, category: str, published: float | None) -> Point:
     policy = test.compared.policy
     value, low, high = test.interval or (None, None, None)
-    return Point(
-        policy,
-        results.policies.index(policy),
-        category,
-        value,
-        low,
-        high,
-        published,
-        decided=test.holm in DECIDED,
-        saturated=test.saturated,
-    )
+    style, decided = results.policies.index(policy), test.holm in DECIDED
+    return Point(policy, style, category, value, low, high, published, decided, test.saturated)
 
 
 def _capped(tests: Sequence[Verdict]) -> str:

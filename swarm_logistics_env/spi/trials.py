@@ -140,10 +140,9 @@ def read_trials(
     path = Path(path)
     rows, others, digest = read_rows(path, columns or {}, ignore, decimal)
     varying = [name for name in others if len({row.cells[name] for row in rows}) > 1]
-    spelled: dict[str, str] = {}  # each fault in small letters to how its first row has it
     faults = dict.fromkeys(row.text("fault") for row in rows)
-    for name in faults:
-        spelled.setdefault(name.casefold(), name)
+    # Each fault in small letters to how its first row has it.
+    spelled = {name.casefold(): name for name in reversed(faults)}
     trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
     found = _events(path, trials) if "time" in rows[0].names else _runs(path, trials)
     _check_pairing(path, found)

@@ -166,14 +166,9 @@ class Gate(NamedTuple):
                 f"gate {text!r}: should be [possibly] {SUBJECTS} <|> NUMBER [at TEXT], "
                 'e.g. "R < 0" or "possibly change < -0.1 at N = 25"'
             )
-        return cls(
-            text.strip(),
-            match["possibly"] is not None,
-            match["subject"],
-            match["sign"] == "<",
-            float(match["number"]),
-            match["at"] or "",
-        )
+        possibly, below = match["possibly"] is not None, match["sign"] == "<"
+        number, at = float(match["number"]), match["at"] or ""
+        return cls(text.strip(), possibly, match["subject"], below, number, at)
 
     def holds_for(self, value: float) -> bool:
         """Return whether an exact value, which leaves nothing to chance, makes the gate fail."""

@@ -54,11 +54,8 @@ def standing(plan: Plan, outcomes: Outcomes) -> Standing:
         wanted |= family.wanted
     shared = [n for n in runs.looks if not any(runs.missing(case, n) for case in plan.cases)]
     verdicts = {comparison: one for family in found for comparison, one in family.judged().items()}
-    return Standing(
-        tuple(verdicts[comparison] for comparison in plan.comparisons),
-        tuple(wanted.values()),
-        max(shared, default=first),
-    )
+    in_order = tuple(verdicts[comparison] for comparison in plan.comparisons)
+    return Standing(in_order, tuple(wanted.values()), max(shared, default=first))
 
 
 class _Looks:

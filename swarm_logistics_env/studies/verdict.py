@@ -77,15 +77,12 @@ class Cell:
             for count, what in ((failed, "failed"), (missing, "missing"))
             if count
         ]
-        return cls(
-            policy,
-            table,
-            arm,
-            tuple(one for one in found if one is not None and one.error is None),
-            ", ".join(problems) or None,
-            reference.performance.get(arm.setting) if reference else None,
-            reference is not None and arm.setting in reference.cells,
-        )
+        kept = tuple(one for one in found if one is not None and one.error is None)
+        problem = ", ".join(problems) or None
+        if reference is None:
+            return cls(policy, table, arm, kept, problem)
+        published, counted = reference.performance.get(arm.setting), arm.setting in reference.cells
+        return cls(policy, table, arm, kept, problem, published, counted)
 
     @cached_property
     def by_seed(self) -> NDArray[np.float64]:
