@@ -111,8 +111,10 @@ def run_command(
             raise StudyError(
                 f"--most {seeds}: should be more than {FIRST_LOOK} seeds, where the first look is"
             )
-    looks = {"until_clear": True} if until_clear else {}
-    chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed, **looks)
+    looks = until_clear or None
+    chosen = study_of(
+        asked, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
+    )
     if clearing:
         until_cleared(chosen)
     if restock:
@@ -291,19 +293,15 @@ def study_of(
     seeds: int | None,
     policies: Repeated,
     trust_code: bool = False,
-    *,
-    first_seed: int | None = None,
     **fields: object,
 ) -> Study:
-    """Return the study of a file or a preset with the options and fields that are given.
+    """Return the study of a file or a preset with the options and fields that are given, not None.
 
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
-    if seeds is not None:
-        fields["seeds"] = seeds
-    if first_seed is not None:
-        fields["first_seed"] = first_seed
+    given = {"seeds": seeds, **fields}
+    fields = {name: value for name, value in given.items() if value is not None}
     if policies:
         named = [PolicySpec.of(name) for name in policies]
         fields["policies"] = tuple(policy.replace(trusted=trust_code) for policy in named)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from importlib.metadata import version
 from typing import NamedTuple
 
@@ -46,7 +45,7 @@ class Document(NamedTuple):
         """Warnings, tables and measures of faults alone, for a terminal."""
         shown = ("Warnings", "Results", "Beyond the paper")
         sections = [one for each in self.chapters if each.title in shown for one in each.sections]
-        return tuple(replace(one, figures=()) for one in sections if one.columns or one.lines)
+        return tuple(one._replace(figures=()) for one in sections if one.columns or one.lines)
 
     def figures(self) -> Iterator[Figure]:
         """Yield every figure, in the order of the report."""

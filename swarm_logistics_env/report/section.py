@@ -75,8 +75,7 @@ class Sentence(NamedTuple):
     verdict: str
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """A heading with a figure, sentences, a table, lines of text, or several of them."""
 
     title: str

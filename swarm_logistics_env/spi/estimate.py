@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, NamedTuple, TypedDict
+from typing import Literal, NamedTuple, TypeAlias, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,8 @@ from .inputs import (
 from .ratio import MIN_SEEDS, Term, over_trainings, paired_ratio, ratio_of_samples, welch
 from .summaries import at_stake, pairing_correlation
 
+# Performances by name, with their weights in numerator and denominator.
+Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float, float]]
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
 
@@ -190,7 +192,7 @@ class Options(TypedDict, total=False):
 
 def judge(
     indicator: str,
-    terms: Mapping[str, tuple[ArrayLike, float, float]],
+    terms: Weighted,
     *,
     offset: float = 0.0,
     threshold: float = 0.0,
@@ -298,7 +300,7 @@ def _tested(
 
 
 def _checked(
-    terms: Mapping[str, tuple[ArrayLike, float, float]],
+    terms: Weighted,
     saturated: Collection[str],
     *,
     paired: bool,

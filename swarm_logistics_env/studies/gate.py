@@ -34,6 +34,7 @@ from .verdict import Cell, judge_one, same_runs
 
 # All about a condition but its policy: scenario, faults, behaviour and table.
 _Content = tuple[TaskScenario, tuple[TaskFault, ...], int, str]
+_Unmatched = tuple[str, str, tuple[str, ...]]
 _Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
@@ -51,7 +52,7 @@ class Matching(NamedTuple):
     """
 
     matches: tuple[tuple[str, Cell, Cell], ...]
-    unmatched: tuple[tuple[str, str, tuple[str, ...]], ...]
+    unmatched: tuple[_Unmatched, ...]
     seeds: tuple[int, ...] | None
     notes: tuple[str, ...]
 
@@ -67,7 +68,7 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     if len(before) == len(after) == 1:
         partners = dict(zip(after, before))
     matches = list[tuple[str, Cell, Cell]]()
-    unmatched, notes = list[tuple[str, str, tuple[str, ...]]](), list[str]()
+    unmatched, notes = list[_Unmatched](), list[str]()
     for study, judged, other, others, known in (
         ("old", before, "new", after, partners.values()),
         ("new", after, "old", before, partners.keys()),
