@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +84,7 @@ def _covariance(faults: Sequence[Fault]) -> Matrix:
 
     def near(values: list[float]) -> Matrix:
         steps = np.searchsorted(np.unique(values), values)
-        alike: Matrix = np.exp(-0.5 * (steps[:, None] - steps) ** 2)
-        return alike
+        return np.asarray(np.exp(-0.5 * (steps[:, None] - steps) ** 2))
 
     mode, role = (np.array([str(getattr(f, name)) for f in faults]) for name in ("mode", "role"))
     lasting = near([np.inf if fault.duration is None else fault.duration for fault in faults])
@@ -181,8 +180,7 @@ class Attack:
         ]
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """A fault, how it was found, and its robustness on fresh seeds.
 
     Attributes:
@@ -196,8 +194,7 @@ class Found:
     runs: int
 
 
-@dataclass(frozen=True)
-class AttackResult:
+class AttackResult(NamedTuple):
     """The worst faults found, the search's first.
 
     Attributes:
@@ -227,10 +224,6 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
     faults = asked.faults()
     policy = PolicySpec.of(asked.policy)
     base = Case(policy, policy.identity(), asked.scenario, task=WAREHOUSE)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StudyError(f"cannot write to {out}: {error.strerror}") from error
     with Runs(out / STORE) as store:
 
         def delivered(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:
@@ -263,15 +256,11 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
         outcomes = iter(_outcomes(base, engine, store, [*product(judged, fresh)]))
         arm = Arm(NO_FAULT, base)
         sound, *failed = (Cell.of("", "", arm, [*islice(outcomes, len(fresh))]) for _ in judged)
-    return AttackResult(
-        found=tuple(
-            Found(by, fault, _robustness(asked, sound, with_fault), runs)
-            for (by, fault, runs), with_fault in zip(chosen, failed, strict=True)
-        ),
-        tried=len(set(tried)),
-        searched=len(faults),
-        is_capped=sound.saturated,
+    found = tuple(
+        Found(by, fault, _robustness(asked, sound, with_fault), runs)
+        for (by, fault, runs), with_fault in zip(chosen, failed)
     )
+    return AttackResult(found, len(set(tried)), len(faults), sound.saturated)
 
 
 def _robustness(asked: Attack, sound: Cell, failed: Cell) -> Estimate:

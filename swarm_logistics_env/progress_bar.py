@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
+from time import monotonic
 from typing import Self
 
 from rich.console import Console, Group, RenderableType
@@ -46,11 +46,11 @@ class ProgressBar:
         self._note = ""
         self._console = console or Console(stderr=True, highlight=False)
         self._live: Live | None = None
-        self._start = self._last_line = time.monotonic()
+        self._start = self._last_line = monotonic()
         self._stopped_at: float | None = None
 
     def __enter__(self) -> Self:
-        self._start = self._last_line = time.monotonic()
+        self._start = self._last_line = monotonic()
         if self._total and self._console.is_terminal:
             # It draws itself anew twice a second, also while one piece of the work takes long.
             self._live = Live(self, console=self._console, refresh_per_second=2)
@@ -58,14 +58,14 @@ class ProgressBar:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stopped_at = time.monotonic()
+        self._stopped_at = monotonic()
         if self._live:
             self._live.stop()
 
     @property
     def seconds(self) -> float:
         """Time since it was entered, or until it was left [s]."""
-        return (self._stopped_at or time.monotonic()) - self._start
+        return (self._stopped_at or monotonic()) - self._start
 
     def reach(self, done: int, note: str = "", parts: Mapping[str, int] = _NOTHING) -> None:
         """Show that so much is done.
@@ -75,12 +75,12 @@ class ProgressBar:
             parts: how much is done of each part.
         """
         self._done, self._note, self._parts_done = done, note, parts
-        if not self._live and time.monotonic() - self._last_line >= LINE_EVERY:
+        if not self._live and monotonic() - self._last_line >= LINE_EVERY:
             self.say()
 
     def say(self, what: str = "") -> None:
         """Print a line: how much is done, and `what`."""
-        self._last_line = time.monotonic()
+        self._last_line = monotonic()
         _, *parts = self._shown()
         reached = f"{self._done:,} of {self._total:,} {self._unit}"
         if parts:

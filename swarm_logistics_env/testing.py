@@ -109,7 +109,7 @@ def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[
         yield {agent: repr(reward) for agent, reward in rewards.items()}
 
 
-def _checked(env: Any, step: int, observations: dict[str, Any]) -> Moment:
+def _checked(env: Any, step: int, observations: Moment) -> Moment:
     for agent in env.agents:
         space: Box = env.observation_space(agent)
         seen = observations.get(agent)

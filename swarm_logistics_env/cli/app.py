@@ -13,10 +13,11 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import typer
 from rich.markup import escape
+from typer import Exit, Option, echo
 
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
 from swarm_logistics_env.records import plain, read_table
@@ -53,7 +54,7 @@ class Application:
         gc.freeze()  # the process ends: nobody needs to look for garbage
         sys.exit(code)
 
-    def run(self, arguments: list[str] | None = None) -> int:
+    def run(self, arguments: Repeated = None) -> int:
         """Run a command line and return the exit code."""
         # A user's own policy lies in the folder in which the command is run. The folder comes last,
         # so that its modules hide no installed ones.
@@ -106,16 +107,13 @@ def _print_version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
 
-        typer.echo(version("swarm-logistics-env"))
-        raise typer.Exit
+        echo(version("swarm-logistics-env"))
+        raise Exit
 
 
 def _options(
     version: Annotated[
-        bool,
-        typer.Option(
-            "--version", help="Print the version.", is_eager=True, callback=_print_version
-        ),
+        bool, Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
     ] = False,
 ) -> None:
     """Take the options that stand before a command."""
@@ -176,40 +174,39 @@ def _complain(sentence: str, code: int) -> int:
     return code
 
 
+Repeated: TypeAlias = list[str] | None  # the texts of an option that may be given several times
 PresetOption = Annotated[
-    str, typer.Option(help=f"Scenario to start from: {', '.join(SCENARIO_PRESETS)}.")
+    str, Option(help=f"Scenario to start from: {', '.join(SCENARIO_PRESETS)}.")
 ]
 ScenarioOption = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         "--scenario",
         metavar="FILE",
         help="TOML or JSON file of fields to change, as `list scenario --json` writes it.",
     ),
 ]
 SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated."),
+    Repeated, Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated.")
 ]
 FaultOption = Annotated[
-    list[str] | None,
-    typer.Option(
+    Repeated,
+    Option(
         "--fault",
         metavar="FAULT",
         help="Such as FM1:2@200: two robots from 200 s on (`list faults`); may be repeated.",
     ),
 ]
 PolicyOption = Annotated[
-    str,
-    typer.Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class."),
+    str, Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
 ]
-SeedOption = Annotated[int, typer.Option(help="Decides everything random.")]
+SeedOption = Annotated[int, Option(help="Decides everything random.")]
 TrustPolicyOption = Annotated[
-    bool, typer.Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
+    bool, Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
 ]
 
 
-def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Scenario:
+def scenario_of(preset: str, file: Path | None, changes: Repeated) -> Scenario:
     """Return the scenario that `--preset`, `--scenario` and `--set` describe.
 
     A file changes fields of the preset, and `--set` those of both.
@@ -230,7 +227,7 @@ def scenario_of(preset: str, file: Path | None, changes: list[str] | None) -> Sc
     return Scenario.preset(preset).replace(**fields)
 
 
-def faults_of(texts: list[str] | None, scenario: Scenario) -> list[Fault]:
+def faults_of(texts: Repeated, scenario: Scenario) -> list[Fault]:
     """Return the faults that `--fault` describes, see `faults.fault_of`.
 
     Raises:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-import shlex
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
+from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.policies import SUFFIXES, called, load
-from swarm_logistics_env.policies.spec import PolicySpec
+from swarm_logistics_env.policies import SUFFIXES, PolicySpec, called, load
 from swarm_logistics_env.records import plain, read_table
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
@@ -30,7 +30,7 @@ from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.warehouse.faults import Fault, text_of
 
-from .app import PresetOption, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
+from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
 from .study_commands import (
     ClearingOption,
     FullOption,
@@ -53,7 +53,7 @@ def judge_command(
     context: typer.Context,
     asked: Annotated[
         str,
-        typer.Argument(
+        Argument(
             metavar="TRIALS.csv|POLICY",
             help="CSV file, one trial or delivery a row; or a policy: name, path of a policy file, "
             "module:Class or my.py:Class.",
@@ -61,53 +61,47 @@ def judge_command(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="Directory of the study and its report; results/judged/NAME if not given."
-        ),
+        Option(help="Directory of the study and its report; results/judged/NAME if not given."),
     ] = None,
     seeds: Annotated[
         int | None,
-        typer.Option(help=f"Seeds of a policy at most, 3 or more; {JUDGE_SEEDS} if not given."),
+        Option(help=f"Seeds of a policy at most, 3 or more; {JUDGE_SEEDS} if not given."),
     ] = None,
     until_clear: Annotated[
         bool,
-        typer.Option(
-            "--until-clear/--all-seeds", help="Stop each question where its verdict is clear."
-        ),
+        Option("--until-clear/--all-seeds", help="Stop each question where its verdict is clear."),
     ] = True,
     minutes: Annotated[
-        float | None, typer.Option(help="Play for so long; the same command goes on.")
+        float | None, Option(help="Play for so long; the same command goes on.")
     ] = None,
     clearing: ClearingOption = False,
     plays_benchmark: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--benchmark",
             help="Play the benchmark of robustness, in which some failures are new to all.",
         ),
     ] = False,
     columns: Annotated[
-        list[str] | None,
-        typer.Option(
+        Repeated,
+        Option(
             "--column",
             metavar="WHAT=NAME",
             help="What a column of another name is, e.g. performance=boxes; may be repeated.",
         ),
     ] = None,
     ignore: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="Column to leave out; may be repeated."),
+        Repeated, Option(metavar="NAME", help="Column to leave out; may be repeated.")
     ] = None,
     duration: Annotated[
-        float | None,
-        typer.Option(help="Length of every trial in seconds, where no column says it."),
+        float | None, Option(help="Length of every trial in seconds, where no column says it.")
     ] = None,
     decimal: Annotated[
-        str | None, typer.Option(metavar=".|,", help="Sign before decimals; . if not given.")
+        str | None, Option(metavar=".|,", help="Sign before decimals; . if not given.")
     ] = None,
     setup: Annotated[
-        list[str] | None,
-        typer.Option(
+        Repeated,
+        Option(
             metavar="NAME=VALUE|FILE",
             help="A condition for the report to state, or a TOML file of some; may be repeated.",
         ),
@@ -143,10 +137,9 @@ def judge_command(
         raise StudyError(
             f"--seeds {seeds}: should be {LEAST_SEEDS} or more, as fewer runs are alike by chance"
         )
-    if plays_benchmark:
-        for option, given in {"--seeds": seeds, "--clearing": clearing}.items():
-            if given:
-                raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
+    if plays_benchmark and (seeds or clearing):
+        option = "--seeds" if seeds else "--clearing"
+        raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
     if is_policy:
         count = processes or os.cpu_count() or 1
         engine = engine_named("process" if count > 1 else "local", count)
@@ -158,12 +151,12 @@ def judge_command(
                 until_clear=until_clear, clearing=clearing, full=full, command=str(context.obj),
             )  # fmt: skip
         say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", place)
-        raise typer.Exit(1 if tally.failed else 0)
+        raise Exit(1 if tally.failed else 0)
 
     usual = Path("results", "judged", Path(asked).stem)
     directory = out or _free(usual)
     if directory not in (out, usual):
-        typer.echo(f"{usual} holds an earlier judgement, so this one goes into {directory}")
+        echo(f"{usual} holds an earlier judgement, so this one goes into {directory}")
     count = import_results(
         Path(asked),
         directory,
@@ -174,7 +167,7 @@ def judge_command(
         setup=_stated(setup or []),
     )
     imported = StoredStudy.existing(directory).imported
-    typer.echo("\n".join([f"{count} runs in {asked}", *(imported.notes if imported else ()), ""]))
+    echo("\n".join([f"{count} runs in {asked}", *(imported.notes if imported else ()), ""]))
     show_report(Study.stored(directory).findings(), directory, full=full)
 
 
@@ -242,7 +235,7 @@ def _judge_policy(
     if clearing:
         until_cleared(study)
     say(f"{study.plan()}, kept in {out}")
-    typer.echo()
+    echo()
     tell_what_a_pilot_shows(study)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
@@ -258,8 +251,8 @@ def _judge_policy(
         more = max(JUDGE_SEEDS, 2 * seeds)
         say(
             "What is open needs more seeds, from the start:",
-            f"swarm-logistics judge {shlex.quote(asked)}{' --clearing' * clearing} --seeds {more} "
-            f"--out {shlex.quote(f'{out}-{more}')}",
+            f"swarm-logistics judge {quote(asked)}{' --clearing' * clearing} --seeds {more} "
+            f"--out {quote(f'{out}-{more}')}",
         )
     return tally, out
 
@@ -278,7 +271,7 @@ def _play_benchmark(
     out = out or Path("results", "benchmark", slug(policy.title))
     study = study_of(benchmark.STUDY, out, None, [asked], trust_code)
     say(f"{study.plan()}, kept in {out}")
-    typer.echo()
+    echo()
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
     if tally.left or tally.failed:
@@ -288,7 +281,7 @@ def _play_benchmark(
     entries = {name: np.array(one) for name, one in json.loads(ENTRIES.read_text()).items()}
     entries[policy.title] = benchmark.score(results)
     show(benchmark.leaderboard(entries))
-    typer.echo(f"Report: {write_report(results, out, document(results))[0]}")
+    echo(f"Report: {write_report(results, out, document(results))[0]}")
     return tally, out
 
 
@@ -314,22 +307,18 @@ def _rank(results: StudyResults) -> str | None:
 
 def attack_command(
     policy: Annotated[
-        str,
-        typer.Argument(metavar="POLICY", help="Name, path of a file, module:Class or my.py:Class."),
+        str, Argument(metavar="POLICY", help="Name, path of a file, module:Class or my.py:Class.")
     ],
-    robots: Annotated[int, typer.Option(min=1, help="How many robots fail.")] = 2,
-    modes: Annotated[
-        list[str] | None,
-        typer.Option("--mode", help="Mode to search; may be repeated."),
-    ] = None,
-    budget: Annotated[int, typer.Option(min=10, help="Runs of faults in the search.")] = 200,
-    fresh: Annotated[int, typer.Option(min=3, help="Other seeds, for the estimates.")] = 30,
-    seed: Annotated[int, typer.Option(help="Of the search's own choices.")] = 0,
+    robots: Annotated[int, Option(min=1, help="How many robots fail.")] = 2,
+    modes: Annotated[Repeated, Option("--mode", help="Mode to search; may be repeated.")] = None,
+    budget: Annotated[int, Option(min=10, help="Runs of faults in the search.")] = 200,
+    fresh: Annotated[int, Option(min=3, help="Other seeds, for the estimates.")] = 30,
+    seed: Annotated[int, Option(help="Of the search's own choices.")] = 0,
     preset: PresetOption = "paper",
     file: ScenarioOption = None,
     changes: SetOption = None,
     out: Annotated[
-        Path | None, typer.Option(help="Directory; results/attack-POLICY if not given.")
+        Path | None, Option(help="Directory; results/attack-POLICY if not given.")
     ] = None,
     processes: ProcessesOption = None,
 ) -> None:
@@ -353,10 +342,8 @@ def attack_command(
     try:
         found = attack(asked, engine, place)
     except KeyboardInterrupt:
-        typer.echo(
-            f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True
-        )
-        raise typer.Exit(130) from None
+        echo(f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True)
+        raise Exit(130) from None
     _show_attack(found, policy, robots, fresh)
 
 
@@ -367,7 +354,7 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
     ]
     worst = min(result.found, key=lambda found: found.robustness.value)
     text = text_of(worst.fault)
-    played = f" `run` and `watch` play it with --fault {shlex.quote(text)}." if text else ""
+    played = f" `run` and `watch` play it with --fault {quote(text)}." if text else ""
     capped = (
         "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
         "shown. --set restock=true has no cap."

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import typer
+from typer import Argument, Option, echo
 
 from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.errors import SetupError
@@ -22,6 +23,7 @@ from .app import (
     FaultOption,
     PolicyOption,
     PresetOption,
+    Repeated,
     ScenarioOption,
     SeedOption,
     SetOption,
@@ -30,18 +32,14 @@ from .app import (
     scenario_of,
 )
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-
 FRAME_RATE = 25.0  # frames a second
 FILM_SIZE = 480  # longer side of each warehouse [px]
 
 
 def run_command(
     policies: Annotated[
-        list[str] | None,
-        typer.Option(
+        Repeated,
+        Option(
             "--policy",
             help="Name (`list policies`), path of a policy file, module:Class or my.py:Class; "
             "swarm-dt if not given. With --film it may be repeated.",
@@ -54,19 +52,18 @@ def run_command(
     faults: FaultOption = None,
     film: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             metavar="FILE.mp4|FILE.gif",
             help="Write the episode as a film; several policies stand side by side.",
         ),
     ] = None,
     twin: Annotated[
-        bool,
-        typer.Option("--twin", help="In the film beside the same seed without its faults."),
+        bool, Option("--twin", help="In the film beside the same seed without its faults.")
     ] = False,
     until: Annotated[
-        float | None, typer.Option(help="Where the film ends [s]; with the episode if not given.")
+        float | None, Option(help="Where the film ends [s]; with the episode if not given.")
     ] = None,
-    speed: Annotated[float, typer.Option(help="How many times real time the film plays.")] = 4.0,
+    speed: Annotated[float, Option(help="How many times real time the film plays.")] = 4.0,
     trust_code: TrustPolicyOption = False,
 ) -> None:
     """Play one episode and print what it delivered, or write it as a film."""
@@ -89,47 +86,42 @@ def run_command(
     wall = time.perf_counter() - start
     times = episode.delivery_times
     of = "" if scenario.restock else f" of {scenario.n_items}"
-    typer.echo(
+    echo(
         f"P = {episode.delivered} items delivered{of} in {episode.ended_at:g} s "
         f"by {scenario.n_robots} robots with {called(names[0])}, seed {seed}"
     )
     if len(times):
         wait = max(after - before for before, after in zip([0.0, *times], times))
-        typer.echo(
-            f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, longest wait {wait:.1f} s"
-        )
+        echo(f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, longest wait {wait:.1f} s")
     if episode.failed_robots:
-        typer.echo(
+        echo(
             f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "
             f"them for {episode.anchoring_seconds:.1f} robot-seconds"
         )
-    typer.echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")
+    echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")
 
 
 def watch_command(
     policy: PolicyOption = "ppo-delivery",
     against: Annotated[
-        str | None,
-        typer.Option(help="Policy of the run beside it; left out: the same without faults."),
+        str | None, Option(help="Policy of the run beside it; left out: the same without faults.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
+    seed: Annotated[int, Option(help="Seed of the first episode.")] = 0,
     preset: PresetOption = "paper",
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     faults: FaultOption = None,
-    speed: Annotated[float, typer.Option(help="How many times real time it plays.")] = 8.0,
+    speed: Annotated[float, Option(help="How many times real time it plays.")] = 8.0,
     port: Annotated[
-        int,
-        typer.Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free."),
+        int, Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free.")
     ] = 8765,
-    host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0: all.")] = "127.0.0.1",
-    no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser.")] = False,
+    host: Annotated[str, Option(help="Address to listen on; 0.0.0.0: all.")] = "127.0.0.1",
+    no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
     save: Annotated[
-        Path | None,
-        typer.Option(help="Play to the end and write a page that replays it; serve nothing."),
+        Path | None, Option(help="Play to the end and write a page that replays it; serve nothing.")
     ] = None,
     until: Annotated[
-        float | None, typer.Option(help="With --save: time at which the replay ends [s].")
+        float | None, Option(help="With --save: time at which the replay ends [s].")
     ] = None,
     trust_code: TrustPolicyOption = False,
 ) -> None:
@@ -158,14 +150,14 @@ def watch_command(
     if save is None:
         if not is_loopback(host):
             told = "whoever learns the address can watch and steer; nothing is encrypted"
-            typer.echo(f"Warning: --host {host}: {told}.", err=True)
+            echo(f"Warning: --host {host}: {told}.", err=True)
         shows = not no_open and sys.stdout.isatty() and _has_screen()
-        serve(session, port, typer.echo, host, webbrowser.open if shows else None)
+        serve(session, port, echo, host, webbrowser.open if shows else None)
         return
     page = recorded_page(session, session.scenario.duration if until is None else until)
     with becoming(save, SetupError) as part:
         part.write_text(page, encoding="utf-8")
-    typer.echo(f"{save}: {session.run.world.state.time:g} s, {len(page) / 1e6:.2f} MB")
+    echo(f"{save}: {session.state.time:g} s, {len(page) / 1e6:.2f} MB")
 
 
 def _has_screen() -> bool:
@@ -214,7 +206,7 @@ def write_film_of(
         frames = progress.track(film.frames(), total=film.n_frames, description=out.name)
         count = write_film(out, frames, FRAME_RATE)
     size = out.stat().st_size / 1e6
-    typer.echo(f"{out}: {count} frames, {count / FRAME_RATE:.1f} s, {size:.2f} MB")
+    echo(f"{out}: {count} frames, {count / FRAME_RATE:.1f} s, {size:.2f} MB")
 
 
 def _short(policy: str) -> str:
@@ -235,12 +227,12 @@ LISTED = ("policies", "trainings", "faults", "studies", "scenario")
 
 
 def list_command(
-    what: Annotated[str, typer.Argument(metavar="|".join(LISTED), help="What to list.")],
+    what: Annotated[str, Argument(metavar="|".join(LISTED), help="What to list.")],
     preset: PresetOption = "paper",
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Of a scenario: JSON, which --scenario reads.")
+        bool, Option("--json", help="Of a scenario: JSON, which --scenario reads.")
     ] = False,
 ) -> None:
     """List policies, trainings, failure modes, studies, or the conditions of a scenario."""
@@ -254,7 +246,7 @@ def list_command(
     if what == "scenario":
         chosen = scenario_of(preset, scenario_file, changes)
         if as_json:
-            typer.echo(chosen.to_json())
+            echo(chosen.to_json())
             return
         marks = (
             "fitted: chosen to bring the paper's tables closest. chosen: without a source. "

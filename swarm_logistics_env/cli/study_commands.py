@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
 from swarm_logistics_env.records import plain
-from swarm_logistics_env.report.section import bracketed, said, slug
+from swarm_logistics_env.report.section import NOTHING, bracketed, said, slug
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
@@ -23,43 +24,37 @@ from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
+from .app import Repeated
 from .terminal import say, say_what_was_played, show_power, show_report, show_table
 
 StudyArgument = Annotated[
     str,
-    typer.Argument(
+    Argument(
         metavar="FILE|PRESET",
         # Literal, as to import the presets would slow every command.
         help="TOML file of a study, or a preset: benchmark, paper, quick, resilience, scorecard.",
     ),
 ]
+DirectoryArgument = Annotated[Path, Argument(help="Directory of a study.")]
 SeedsOption = Annotated[
-    int | None,
-    typer.Option(min=1, help="Number of seeds of every condition; the study's if not given."),
+    int | None, Option(min=1, help="Number of seeds of every condition; the study's if not given.")
 ]
 FirstSeedOption = Annotated[
-    int | None,
-    typer.Option(min=0, help="Smallest seed, the others follow it; the study's if not given."),
+    int | None, Option(min=0, help="Smallest seed, the others follow it; the study's if not given.")
 ]
 PolicyOption = Annotated[
-    list[str] | None,
-    typer.Option("--policy", help="Policy to judge (`list policies`); may be repeated."),
+    Repeated, Option("--policy", help="Policy to judge (`list policies`); may be repeated.")
 ]
 TrustCodeOption = Annotated[
-    bool,
-    typer.Option(
-        "--trust-code", help="Let a study name its task and policies as package.mod:NAME."
-    ),
+    bool, Option("--trust-code", help="Let a study name its task and policies as package.mod:NAME.")
 ]
 ProcessesOption = Annotated[
-    int | None, typer.Option(min=1, help="Worker processes; all cores if not given.")
+    int | None, Option(min=1, help="Worker processes; all cores if not given.")
 ]
-FullOption = Annotated[
-    bool, typer.Option("--full", help="Print every table, not the answer alone.")
-]
+FullOption = Annotated[bool, Option("--full", help="Print every table, not the answer alone.")]
 ClearingOption = Annotated[
     bool,
-    typer.Option(
+    Option(
         "--clearing", help="P is the rate until all items are delivered, so that it has no cap."
     ),
 ]
@@ -71,13 +66,12 @@ study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_ar
 def run_command(
     asked: StudyArgument,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Directory of its store and report; results/NAME if not given."),
+        Path | None, Option(help="Directory of its store and report; results/NAME if not given.")
     ] = None,
     policies: PolicyOption = None,
     seeds: Annotated[
         int | None,
-        typer.Option(
+        Option(
             "--seeds",
             "--most",
             min=1,
@@ -86,28 +80,25 @@ def run_command(
     ] = None,
     until_clear: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--until-clear",
             help="Look at 20, 30, .. seeds, and play on only what is not decided yet.",
         ),
     ] = False,
     first_seed: FirstSeedOption = None,
     restock: Annotated[
-        bool, typer.Option("--restock", help="Delivered items come back, so that P has no cap.")
+        bool, Option("--restock", help="Delivered items come back, so that P has no cap.")
     ] = False,
     clearing: ClearingOption = False,
     processes: ProcessesOption = None,
     engine: Annotated[
-        str | None,
-        typer.Option(help="local (this process), process, or ray; process if not given."),
+        str | None, Option(help="local (this process), process, or ray; process if not given.")
     ] = None,
     address: Annotated[
-        str | None,
-        typer.Option(help="Of a Ray cluster, e.g. auto; one is started here if not given."),
+        str | None, Option(help="Of a Ray cluster, e.g. auto; one is started here if not given.")
     ] = None,
     shard: Annotated[
-        str | None,
-        typer.Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N."),
+        str | None, Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N.")
     ] = None,
     full: FullOption = False,
     trust_code: TrustCodeOption = False,
@@ -120,8 +111,10 @@ def run_command(
             raise StudyError(
                 f"--most {seeds}: should be more than {FIRST_LOOK} seeds, where the first look is"
             )
-    looks = {"until_clear": True} if until_clear else {}
-    chosen = study_of(asked, out, seeds, policies, trust_code, first_seed=first_seed, **looks)
+    looks = until_clear or None
+    chosen = study_of(
+        asked, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
+    )
     if clearing:
         until_cleared(chosen)
     if restock:
@@ -137,7 +130,7 @@ def run_command(
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
     say(str(chosen.plan()))
-    typer.echo()
+    echo()
     if warning := chosen.exploratory_because():
         say(f"{warning}\n")
     if policies:
@@ -155,7 +148,7 @@ def run_command(
     players = {"local": "1 process", "ray": "Ray"}.get(engine, count)
     # The last line: where it is looked for after a report of many pages.
     say_what_was_played(tally, players, chosen.out)
-    raise typer.Exit(1 if tally.failed else 0)
+    raise Exit(1 if tally.failed else 0)
 
 
 def tell_what_a_pilot_shows(asked: Study) -> None:
@@ -187,16 +180,14 @@ def tell_what_a_pilot_shows(asked: Study) -> None:
 def plan_command(
     asked: Annotated[
         str,
-        typer.Argument(
-            metavar="FILE|PRESET|DIR", help="A study; or the directory of one that was run."
-        ),
+        Argument(metavar="FILE|PRESET|DIR", help="A study; or the directory of one that was run."),
     ],
     policies: PolicyOption = None,
     seeds: SeedsOption = None,
     first_seed: FirstSeedOption = None,
     effect: Annotated[
         float | None,
-        typer.Option(help="Of a study that was run: assumed indicator; the paper's if not given."),
+        Option(help="Of a study that was run: assumed indicator; the paper's if not given."),
     ] = None,
     trust_code: TrustCodeOption = False,
 ) -> None:
@@ -215,33 +206,27 @@ def plan_command(
         for case in plan.cases
     )
     show_table("Conditions", ("policy", "N", "stands in"), rows)
-    typer.echo(plan)
+    echo(plan)
 
 
 @study.command("report")
 def report_command(
-    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
-    full: FullOption = False,
-    trust_code: TrustCodeOption = False,
+    directory: DirectoryArgument, full: FullOption = False, trust_code: TrustCodeOption = False
 ) -> None:
     """Print the answer and write the report of a study again, from its store alone."""
     stored = Study.stored(directory, trust_code=trust_code)
     say(str(stored.plan()))
-    typer.echo()
+    echo()
     show_report(stored.findings(), stored.out, full=full)
 
 
 @study.command("compare")
 def compare_command(
-    old: Annotated[
-        Path, typer.Argument(metavar="OLD", help="Directory of the study to compare with.")
-    ],
-    new: Annotated[
-        Path, typer.Argument(metavar="NEW", help="Directory of the study that is judged.")
-    ],
+    old: Annotated[Path, Argument(metavar="OLD", help="Directory of the study to compare with.")],
+    new: Annotated[Path, Argument(metavar="NEW", help="Directory of the study that is judged.")],
     fail_if: Annotated[
-        list[str] | None,
-        typer.Option(
+        Repeated,
+        Option(
             metavar="GATE",
             help=f"[possibly] {SUBJECTS} <|> NUMBER [at TEXT]; may be "
             "repeated. change is "
@@ -266,14 +251,13 @@ def compare_command(
         result = "fails" if fails else "passes"
         title = f"Gate {result} (fails if {gate.text})" if gates else "Change of P"
         _show_answers(title, said, left_out if gate.subject == "change" else ())
-    raise typer.Exit(1 if failed else 0)
+    raise Exit(1 if failed else 0)
 
 
 def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str, ...]) -> None:
     rows = []
     for answer in found:
-        estimate = answer.estimate
-        value, says = "–", answer.problem or ""
+        estimate, value, says = answer.estimate, NOTHING, answer.problem or ""
         if answer.exact is not None:
             value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
         if estimate is not None:
@@ -285,44 +269,39 @@ def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str
 
 @study.command("merge")
 def merge_command(
-    directories: Annotated[list[Path], typer.Argument(help="Directories of shards of a study.")],
-    out: Annotated[Path, typer.Option(help="Directory of the merged study.")],
+    directories: Annotated[list[Path], Argument(help="Directories of shards of a study.")],
+    out: Annotated[Path, Option(help="Directory of the merged study.")],
 ) -> None:
     """Make one store of those that shards or machines have filled."""
-    typer.echo(f"{merge(directories, out)} runs in {out}")
-    typer.echo(f"Its report: swarm-logistics study report {shlex.quote(str(out))}")
+    echo(f"{merge(directories, out)} runs in {out}")
+    echo(f"Its report: swarm-logistics study report {shlex.quote(str(out))}")
 
 
 @study.command("export")
 def export_command(
-    directory: Annotated[Path, typer.Argument(help="Directory of a study.")],
-    to: Annotated[Path, typer.Option(help="File to write, .csv.")],
+    directory: DirectoryArgument, to: Annotated[Path, Option(help="File to write, .csv.")]
 ) -> None:
     """Write every stored run as one row, sorted by key, without wall times."""
     with Runs.existing(directory) as runs:
         count, digest = export(runs, to)
-    typer.echo(f"{count} runs in {to}, SHA-256 {digest}")
+    echo(f"{count} runs in {to}, SHA-256 {digest}")
 
 
 def study_of(
     asked: str,
     out: Path | None,
     seeds: int | None,
-    policies: list[str] | None,
+    policies: Repeated,
     trust_code: bool = False,
-    *,
-    first_seed: int | None = None,
     **fields: object,
 ) -> Study:
-    """Return the study of a file or a preset with the options and fields that are given.
+    """Return the study of a file or a preset with the options and fields that are given, not None.
 
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
-    if seeds is not None:
-        fields["seeds"] = seeds
-    if first_seed is not None:
-        fields["first_seed"] = first_seed
+    given = {"seeds": seeds, **fields}
+    fields = {name: value for name, value in given.items() if value is not None}
     if policies:
         named = [PolicySpec.of(name) for name in policies]
         fields["policies"] = tuple(policy.replace(trusted=trust_code) for policy in named)
@@ -366,9 +345,9 @@ def run_study(
         left = f"the other {total - done}"
         if asked.specification.until_clear:
             left += ", and with what later looks need"
-        typer.echo(
+        echo(
             f"\nStopped. {done} of {total} runs are finished and kept in {asked.out}; the same "
             f"command goes on with {left}.",
             err=True,
         )
-        raise typer.Exit(130) from None
+        raise Exit(130) from None

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import re
-import shlex
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from shlex import quote
 
-import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
+from typer import echo
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import NOTHING, WORDS, Section, number
+from swarm_logistics_env.report.section import NOTHING, WORDS, Section, Texts, number
 from swarm_logistics_env.report.write import (
     how_to_get_figures,
     missing_packages,
@@ -77,14 +77,12 @@ def say(text: str, command: str = "") -> None:
     console = Console()
     if console.is_terminal:
         text = textwrap.fill(text, console.width, break_long_words=False, break_on_hyphens=False)
-        typer.echo(f"{text}\n{command}" if command else text)
+        echo(f"{text}\n{command}" if command else text)
     else:
-        typer.echo(f"{text} {command}".rstrip())
+        echo(f"{text} {command}".rstrip())
 
 
-def show_table(
-    title: str, columns: Sequence[str], rows: Iterable[tuple[str, ...]], *lines: str
-) -> None:
+def show_table(title: str, columns: Sequence[str], rows: Iterable[Texts], *lines: str) -> None:
     """Print a table, and lines of text below it."""
     show(Section(title, tuple(columns), tuple(rows), lines))
 
@@ -112,14 +110,14 @@ def show_report(
         shown.stylize(_COLOURS[word[1]], *word.span())
     console.print(shown, soft_wrap=True)
     if out:
-        typer.echo(f"Report: {write_report(results, out, whole)[0]}")
+        echo(f"Report: {write_report(results, out, whole)[0]}")
         if missing := missing_packages():
-            typer.echo(how_to_get_figures(missing))
+            echo(how_to_get_figures(missing))
         else:
-            typer.echo(f"Figure: {out / 'figures' / 'answer.svg'}")
-            typer.echo(f"Tables: {out / 'tables.tex'}")
+            echo(f"Figure: {out / 'figures' / 'answer.svg'}")
+            echo(f"Tables: {out / 'tables.tex'}")
         if not full and any(len(line.tests) > 1 for line in whole.answer.lines):
-            again = f"swarm-logistics study report {shlex.quote(str(out))} --full"
+            again = f"swarm-logistics study report {quote(str(out))} --full"
             say("Each question on a line of its own:", again)
     if any(test.estimate for test in results.verdicts) and not unfinished:
         say(f"For a paper: {plain(in_a_sentence(results))}")
@@ -133,12 +131,12 @@ def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
         "policy", "verdict on", "assumed effect", f"{runs} for {POWER:.0%} power",
         f"distance that {n_seeds} {runs} find", f"{runs} for equivalent at {margin:.0%}",
     )  # fmt: skip
-    hint = f"For another effect: swarm-logistics study plan {shlex.quote(asked)} --effect 0.2"
+    hint = f"For another effect: swarm-logistics study plan {quote(asked)} --effect 0.2"
     rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
     show_table(f"Power, from {n_seeds} {runs}", columns, rows, hint)
 
 
-def _power(test: Verdict, effect: float | None) -> tuple[str, ...]:
+def _power(test: Verdict, effect: float | None) -> Texts:
     # Only the spread is taken from the runs, never the effect that they happened to show.
     compared, estimate, same = test.compared, test.estimate, test.equivalence
     seeds = test.problem or "no effect is named"
@@ -160,7 +158,7 @@ def say_what_was_played(tally: Tally, players: str, out: Path) -> None:
     """Print how many runs `players` have played, in which time; they are kept in `out`."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
     error = plain(tally.error or "")
-    place, to = shlex.quote(str(out)), shlex.quote(str(out / "runs.csv"))
+    place, to = quote(str(out)), quote(str(out / "runs.csv"))
     export = f"swarm-logistics study export {place} --to {to}"
     why = f", the first with {error}. Each traceback, column error:" if error else ""
     say(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from importlib import import_module
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
+from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import TrainingError, how_to_install
 from swarm_logistics_env.policies import read_card
@@ -20,18 +21,16 @@ def train_command(
     context: typer.Context,
     preset: Annotated[
         str,
-        typer.Argument(
+        Argument(
             metavar="PRESET|FILE",
             help=f"Training preset ({', '.join(preset_names())}), or TOML file of one.",
         ),
     ],
-    out: Annotated[
-        Path | None, typer.Option(help="Directory; results/train/NAME if not given.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of everything random.")] = None,
-    steps: Annotated[int | None, typer.Option(min=1, help="Agent-steps to learn from.")] = None,
+    out: Annotated[Path | None, Option(help="Directory; results/train/NAME if not given.")] = None,
+    seed: Annotated[int | None, Option(help="Of everything random.")] = None,
+    steps: Annotated[int | None, Option(min=1, help="Agent-steps to learn from.")] = None,
     device: Annotated[
-        str | None, typer.Option(help="cpu or cuda; the GPU where there is one if not given.")
+        str | None, Option(help="cpu or cuda; the GPU where there is one if not given.")
     ] = None,
 ) -> None:
     """Train a policy; the same command goes on where it was stopped."""
@@ -44,16 +43,16 @@ def train_command(
     except ModuleNotFoundError as error:
         raise TrainingError(f"training needs more ({error}): {how_to_install('train')}") from error
     out = out or Path("results/train", training.name)
-    typer.echo(f"To follow it: tensorboard --logdir {shlex.quote(str(out / 'tensorboard'))}")
+    echo(f"To follow it: tensorboard --logdir {quote(str(out / 'tensorboard'))}")
     try:
         path = train(training, out, command=str(context.obj), device=device)
     except KeyboardInterrupt:
-        typer.echo("\nStopped. The same command goes on.", err=True)
-        raise typer.Exit(130) from None
+        echo("\nStopped. The same command goes on.", err=True)
+        raise Exit(130) from None
     _show_training(path)
-    typer.echo(f"Written: {path}")
-    typer.echo(f"Watch it: swarm-logistics watch --policy {shlex.quote(str(path))}")
-    typer.echo(f"Judge it: swarm-logistics judge {shlex.quote(str(path))}")
+    echo(f"Written: {path}")
+    echo(f"Watch it: swarm-logistics watch --policy {quote(str(path))}")
+    echo(f"Judge it: swarm-logistics judge {quote(str(path))}")
 
 
 def _show_training(path: Path) -> None:
@@ -77,5 +76,5 @@ def _show_training(path: Path) -> None:
             rows,
             "low, high: limits of the 95 % interval",
         )
-    typer.echo(f"Curve: {path.parent / PICTURE}")
-    typer.echo(f"Best on the evaluation's seeds: {path.parent / BEST}")
+    echo(f"Curve: {path.parent / PICTURE}")
+    echo(f"Best on the evaluation's seeds: {path.parent / BEST}")

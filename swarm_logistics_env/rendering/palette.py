@@ -8,7 +8,7 @@ differs in lightness or shape as well: grey levels of the three robot states are
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -105,15 +105,11 @@ def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
     heard = state.robot_present & state.sends & (square <= scenario.radio_range**2)
     heard &= ~np.isnan(state.robot_told)
     heard[robot] = False
-    candidates = np.flatnonzero(heard)
-    if not candidates.size:
-        return NOBODY
-    order = np.lexsort((square[candidates], state.robot_told[candidates]))
-    return int(candidates[order[0]])
+    first = int(np.lexsort((square, state.robot_told, ~heard))[0])
+    return first if heard[first] else NOBODY
 
 
-@dataclass(frozen=True)
-class Event:
+class Event(NamedTuple):
     """A robot that failed, or was repaired: a mark on the time axis."""
 
     time: float  # [s]

@@ -5,25 +5,25 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 import pygame
 from numpy.typing import NDArray
+from pygame import Surface
 
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
-from .sprites import Point, badge, blank, draw_line, new_canvas, stamp, words
+from .sprites import Pixels, Point, badge, blank, draw_line, new_canvas, stamp, words
 
 _MARGIN = 0.025  # a part of the picture's size, on each side
 
 
-@dataclass(frozen=True)
-class Projection:
+class Projection(NamedTuple):
     """The warehouse's place on a picture, x to the right and y up, as on paper.
 
     Attributes:
@@ -84,7 +84,7 @@ class Picture:
         self._size = size
         self._lay_out(scenario)
 
-    def draw(self, state: WarehouseState, scenario: Scenario) -> pygame.Surface:
+    def draw(self, state: WarehouseState, scenario: Scenario) -> Surface:
         """Return the picture of `state`, which stays as it is until the next call."""
         if self._shape != _shape(scenario):
             self._lay_out(scenario)
@@ -136,41 +136,30 @@ class Picture:
     def _draw_halos(self, state: WarehouseState, scenario: Scenario, robots: list[Point]) -> None:
         age = state.robot_timer / scenario.timer_limit
         glowing = np.flatnonzero(state.robot_present & (age < 1.0)).tolist()
-        stamp(
-            self._canvas,
-            (
-                (sprites.halo(self._robot_radius, int(age[robot] * sprites.HALOS)), robots[robot])
-                for robot in glowing
-            ),
-        )
+        ages = (int(age[robot] * sprites.HALOS) for robot in glowing)
+        halos = (sprites.halo(self._robot_radius, one) for one in ages)
+        stamp(self._canvas, zip(halos, [robots[robot] for robot in glowing]))
 
     def _draw_robots(self, state: WarehouseState, robots: list[Point]) -> None:
         radius, stamps = self._robot_radius, []
         load = sprites.item(max(1.5, 0.45 * radius), False)
         faulty, headings = state.failed.tolist(), state.robot_heading.tolist()
-        carried = state.robot_item.tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
-            colour = palette.ACTIVITIES[palette.activity(state, robot)]
+            activity = palette.activity(state, robot)
             step = sprites.heading_step(headings[robot])
-            body = sprites.robot(radius, colour, step, faulty[robot])
+            body = sprites.robot(radius, palette.ACTIVITIES[activity], step, faulty[robot])
             stamps.append((body, robots[robot]))
-            if carried[robot] not in (NOBODY, state.requested):
+            if activity == "shuffling":
                 stamps.append((load, robots[robot]))
         stamp(self._canvas, stamps)
 
     def _draw_requested(self, state: WarehouseState, items: list[Point]) -> None:
         if state.requested == NOBODY:
             return
-        at = items[state.requested]
-        is_carried = state.carrier != NOBODY
-        half = 0.5 * self._robot_radius if is_carried else 1.4 * self._item_half
-        stamp(
-            self._canvas,
-            [
-                (sprites.target(1.9 * self._robot_radius + 1.0), at),
-                (sprites.item(max(1.5, half), True), at),
-            ],
-        )
+        at, radius = items[state.requested], self._robot_radius
+        half = 1.4 * self._item_half if state.carrier == NOBODY else 0.5 * radius
+        shown = sprites.target(1.9 * radius + 1.0), sprites.item(max(1.5, half), True)
+        stamp(self._canvas, [(sprite, at) for sprite in shown])
 
     def _draw_badges(self, state: WarehouseState, robots: list[Point]) -> None:
         height = max(11, round(1.2 * self._robot_radius))
@@ -185,10 +174,9 @@ class Picture:
 
 def background(
     projection: Projection, scenario: Scenario, height: int, text_height: int
-) -> pygame.Surface:
+) -> Surface:
     """Return the empty warehouse on a picture of that height [px]."""
-    picture = np.empty((height, projection.width, 3), np.uint8)
-    picture[:] = palette.SURROUNDINGS
+    picture = np.full((height, projection.width, 3), palette.SURROUNDINGS, np.uint8)
     left, right = projection.left, projection.right
     top, bottom = projection.top, projection.bottom
     wall = max(2, projection.margin // 5)
@@ -208,35 +196,35 @@ def background(
     name = pygame.transform.rotate(words("DELIVERY", text_height, palette.DELIVERY_WORD), 90)
     if area.shape[1] > 1.5 * name.get_width() and area.shape[0] > name.get_height():
         middle = (left + edge + area.shape[1] // 2, (top + bottom) // 2)
-        surface.fill(palette.DELIVERY_AREA, name.get_rect(center=middle).inflate(6, 12))
-        surface.blit(name, name.get_rect(center=middle))
+        place = name.get_rect(center=middle)
+        surface.fill(palette.DELIVERY_AREA, place.inflate(6, 12))
+        surface.blit(name, place)
     return surface
 
 
-def _hatched(height: int, width: int, period: float) -> NDArray[np.uint8]:
-    x, y = np.arange(width)[np.newaxis, :], np.arange(height)[:, np.newaxis]
+def _hatched(height: int, width: int, period: float) -> Pixels:
+    y, x = np.ogrid[:height, :width]
     across = np.abs((x + y) / math.sqrt(2.0) % period - period / 2) - 0.06 * period
-    cover = np.clip(0.5 - across, 0.0, 1.0)[..., np.newaxis]
-    colour = np.array(palette.DELIVERY_HATCH) * cover + np.array(palette.DELIVERY_AREA) * (
-        1.0 - cover
-    )
-    return np.rint(colour).astype(np.uint8)
+    cover = np.clip(0.5 - across, 0.0, 1.0)[..., None]
+    colour = cover * palette.DELIVERY_HATCH + (1.0 - cover) * palette.DELIVERY_AREA
+    return np.asarray(np.rint(colour), np.uint8)
 
 
-def _draw_arrow(canvas: pygame.Surface, start: Point, end: Point, radius: float) -> None:
+def _draw_arrow(canvas: Surface, start: Point, end: Point, radius: float) -> None:
     width = max(2.0, radius / 3.5)
-    length = math.hypot(end[0] - start[0], end[1] - start[1])
+    way = np.subtract(end, start)
+    length = math.hypot(*way)
     head = 4.0 + 2.5 * width
     # The tip stops short of the robot; robots that touch leave no room for an arrow.
     gap = radius + 2.0
     if length <= 2.0 * gap + head:
         return
-    x_part, y_part = (end[0] - start[0]) / length, (end[1] - start[1]) / length
-    tip = (end[0] - gap * x_part, end[1] - gap * y_part)
-    base = (tip[0] - 0.8 * head * x_part, tip[1] - 0.8 * head * y_part)
-    draw_line(canvas, start, base, width)
+    along = way / length
+    tip = end - gap * along
+    draw_line(canvas, np.array(start), tip - 0.8 * head * along, width)
+    x_part, y_part = along.tolist()
     step = sprites.heading_step(math.atan2(-y_part, x_part))
-    stamp(canvas, [(sprites.arrowhead(head, step), tip)])
+    stamp(canvas, [(sprites.arrowhead(head, step), (tip[0], tip[1]))])
 
 
 # The widest texts there may be, so that a picture's size does not change with what happens.
@@ -268,18 +256,21 @@ class Caption:
         """Return the width [px] below which words would be cut."""
         return max(words(text, text_height).get_width() for text in _WIDEST)
 
-    def draw_legend(self, canvas: pygame.Surface) -> None:
+    def draw_legend(self, canvas: Surface) -> None:
         """Draw what the colours mean, which never changes."""
         for entry, (x, line) in zip(self._legend, self._legend_places):
             self._put(canvas, entry, x, self._legend_line + line)
 
-    def draw(self, canvas: pygame.Surface, state: WarehouseState, scenario: Scenario) -> None:
+    def draw(self, canvas: Surface, state: WarehouseState, scenario: Scenario) -> None:
         """Write the scores and the failures of `state`."""
-        for text, (x, line) in zip(_scores(state, scenario), self._places, strict=True):
+        total = "" if scenario.restock else f" of {scenario.n_items}"
+        performance = f"P = {state.delivered}{total}"
+        scores = f"time {state.time:.1f} s", f"N = {state.n_robots}", performance
+        for text, (x, line) in zip(scores, self._places):
             self._put(canvas, words(text, self._text_height), x, line)
         self._draw_failures(canvas, state)
 
-    def _draw_failures(self, canvas: pygame.Surface, state: WarehouseState) -> None:
+    def _draw_failures(self, canvas: Surface, state: WarehouseState) -> None:
         failed, text_height = int(state.failed.sum()), self._text_height
         chips = [words(f"failed: {failed}" if failed else "no failures", text_height)]
         counts = Counter(mode for modes in state.failure_modes for mode in modes)
@@ -294,14 +285,15 @@ class Caption:
             self._put(canvas, chip, x, self._failures_line)
             x += chip.get_width() + gap
 
-    def _put(self, canvas: pygame.Surface, chip: pygame.Surface, x: int, line: int) -> None:
+    def _put(self, canvas: Surface, chip: Surface, x: int, line: int) -> None:
         middle = self._top + line * self._line + self._text_height // 2
         canvas.blit(chip, (self._left + x, middle - chip.get_height() // 2))
 
-    def _flow(self, chips: Sequence[pygame.Surface]) -> list[tuple[int, int]]:
+    def _flow(self, chips: Sequence[Surface]) -> list[tuple[int, int]]:
         """Return where these go: x [px] and number of the line."""
         places, x, line = [], 0, 0
-        for width in [chip.get_width() for chip in chips]:
+        for chip in chips:
+            width = chip.get_width()
             if x and x + width > self._width:
                 x, line = 0, line + 1
             places.append((x, line))
@@ -310,7 +302,7 @@ class Caption:
 
 
 @lru_cache(maxsize=128)
-def _failure(mode: str, count: int, text_height: int) -> pygame.Surface:
+def _failure(mode: str, count: int, text_height: int) -> Surface:
     name = words(f"{mode} ×{count}", text_height)
     if mode not in palette.MARKS:
         return name
@@ -318,7 +310,7 @@ def _failure(mode: str, count: int, text_height: int) -> pygame.Surface:
     return _row([(mark,), (name,)], text_height // 5)
 
 
-def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
+def _legend(text_height: int) -> tuple[Surface, ...]:
     radius = 0.42 * text_height
     load, asked_for = sprites.item(0.45 * radius, False), sprites.item(0.5 * radius, True)
     entries = {
@@ -337,7 +329,7 @@ def _legend(text_height: int) -> tuple[pygame.Surface, ...]:
     )
 
 
-def _row(stacks: Sequence[tuple[pygame.Surface, ...]], gap: int) -> pygame.Surface:
+def _row(stacks: Sequence[tuple[Surface, ...]], gap: int) -> Surface:
     """Return stacks of pictures side by side, each centred on the one it lies on."""
     width = sum(stack[0].get_width() for stack in stacks) + gap * (len(stacks) - 1)
     height = max(stack[0].get_height() for stack in stacks)
@@ -349,8 +341,3 @@ def _row(stacks: Sequence[tuple[pygame.Surface, ...]], gap: int) -> pygame.Surfa
             row.blit(picture, picture.get_rect(center=middle))
         x += stack[0].get_width() + gap
     return row
-
-
-def _scores(state: WarehouseState, scenario: Scenario) -> tuple[str, ...]:
-    total = "" if scenario.restock else f" of {scenario.n_items}"
-    return f"time {state.time:.1f} s", f"N = {state.n_robots}", f"P = {state.delivered}{total}"

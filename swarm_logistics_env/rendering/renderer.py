@@ -71,7 +71,7 @@ class Renderer:
         self._clock: pygame.time.Clock | None = None  # of the window, while it is open
         self._was_closed_by_user = False
 
-    def frame(self, state: WarehouseState, scenario: Scenario) -> NDArray[np.uint8]:
+    def frame(self, state: WarehouseState, scenario: Scenario) -> Frame:
         """Return the picture of `state` in either mode: (H, W, 3), uint8, red, green and blue."""
         from .sprites import to_array
 

@@ -17,22 +17,23 @@ from typing import ParamSpec
 import numpy as np
 import pygame
 from numpy.typing import NDArray
+from pygame import Surface
 
-from . import palette
-from .palette import RGB
+from .palette import FLOOR, INK, ITEM, ITEM_EDGE, LINK, OBSTACLE, REQUESTED, RGB, TIMER
 
 Point = tuple[float, float]  # [px]
+Pixels = NDArray[np.uint8]  # (H, W, 3), red, green, blue; or (H, W, 4), with opacity
 
 # The bytes are in the order red, green, blue, as in sprites: drawing is ten times faster so.
 _MASKS = (0xFF, 0xFF00, 0xFF0000, 0)
 
 
-def new_canvas(width: int, height: int) -> pygame.Surface:
+def new_canvas(width: int, height: int) -> Surface:
     """Return an opaque surface of that size [px]."""
-    return pygame.Surface((width, height), 0, 32, _MASKS)
+    return Surface((width, height), 0, 32, _MASKS)
 
 
-def stamp(canvas: pygame.Surface, stamps: Iterable[tuple[pygame.Surface, Point]]) -> None:
+def stamp(canvas: Surface, stamps: Iterable[tuple[Surface, Point]]) -> None:
     """Draw sprites, each with its middle at the pixel nearest to its point."""
     placed = []
     for sprite, (x, y) in stamps:
@@ -41,23 +42,19 @@ def stamp(canvas: pygame.Surface, stamps: Iterable[tuple[pygame.Surface, Point]]
     canvas.blits(placed, False)
 
 
-def draw_line(canvas: pygame.Surface, start: Point, end: Point, width: float) -> None:
+def draw_line(
+    canvas: Surface, start: NDArray[np.float64], end: NDArray[np.float64], width: float
+) -> None:
     """Draw a line of that width [px] as several thin ones, because pygame smooths only those."""
-    length = math.hypot(end[0] - start[0], end[1] - start[1])
-    if length == 0.0:
-        return
-    x_part, y_part = (end[1] - start[1]) / length, (start[0] - end[0]) / length
+    x_part, y_part = end - start
+    across = np.array([y_part, -x_part]) / math.hypot(x_part, y_part)
     half = (width - 1.0) / 2
-    for offset in np.linspace(-half, half, 1 + math.ceil(4.0 * half)).tolist():
-        pygame.draw.aaline(
-            canvas,
-            palette.LINK,
-            (start[0] + offset * x_part, start[1] + offset * y_part),
-            (end[0] + offset * x_part, end[1] + offset * y_part),
-        )
+    for offset in np.linspace(-half, half, 1 + math.ceil(4.0 * half)):
+        ends = np.array([start, end]) + offset * across
+        pygame.draw.aaline(canvas, LINK, *ends.tolist())
 
 
-def to_array(canvas: pygame.Surface) -> NDArray[np.uint8]:
+def to_array(canvas: Surface) -> Pixels:
     """Return the pixels of a surface as an array of its own: (H, W, 3)."""
     width, height = canvas.get_size()
     pixels = np.empty((height, width, 3), np.uint8)
@@ -78,7 +75,7 @@ def pixels(reach: float) -> tuple[Distance, Distance]:
     """Return x (1, W) and y (H, 1) [px] of a square that reaches so far around its middle pixel."""
     half = math.ceil(reach) + 1
     axis = np.arange(-half, half + 1, dtype=np.float64)
-    return axis[np.newaxis, :], axis[:, np.newaxis]
+    return axis[None, :], axis[:, None]
 
 
 def disc(x: Distance, y: Distance, radius: float) -> Distance:
@@ -116,36 +113,38 @@ def wedge(
     return np.maximum(sides, base - along)
 
 
-def painted(*layers: Layer) -> NDArray[np.uint8]:
+def painted(*layers: Layer) -> Pixels:
     """Return the layers, the first lowest, as straight RGBA (H, W, 4)."""
     shape = np.broadcast_shapes(*(distance.shape for distance, _, _ in layers))
     colour, alpha = np.zeros((*shape, 3)), np.zeros((*shape, 1))
     for distance, rgb, opacity in layers:
-        cover = (np.clip(0.5 - distance, 0.0, 1.0) * opacity)[..., np.newaxis]
+        cover = (np.clip(0.5 - distance, 0.0, 1.0) * opacity)[..., None]
         colour = np.array(rgb) * cover + colour * (1.0 - cover)
         alpha = cover + alpha * (1.0 - cover)
     straight = np.divide(colour, alpha, out=np.zeros_like(colour), where=alpha > 0.0)
-    rgba: NDArray[np.uint8] = np.rint(np.dstack([straight, 255.0 * alpha])).astype(np.uint8)
-    return rgba
+    return np.asarray(np.rint(np.dstack([straight, 255.0 * alpha])), np.uint8)
 
 
-def _sprite(paint: Callable[P, NDArray[np.uint8]]) -> Callable[P, pygame.Surface]:
+def _sprite(paint: Callable[P, Pixels]) -> Callable[P, Surface]:
     @lru_cache(maxsize=2048)
-    def surface(*args: P.args, **kwargs: P.kwargs) -> pygame.Surface:
-        rgba = paint(*args, **kwargs)
-        return pygame.image.frombytes(rgba.tobytes(), (rgba.shape[1], rgba.shape[0]), "RGBA")
+    def surface(*args: P.args, **kwargs: P.kwargs) -> Surface:
+        return _surface(paint(*args, **kwargs))
 
     # The cache's type forgets the parameters.
     return surface  # type: ignore[return-value]
 
 
-def blank(width: int, height: int) -> pygame.Surface:
+def _surface(rgba: Pixels) -> Surface:
+    return pygame.image.frombytes(rgba.tobytes(), rgba.shape[1::-1], "RGBA")
+
+
+def blank(width: int, height: int) -> Surface:
     """Return a picture of that size [px] with nothing on it."""
-    return pygame.image.frombytes(bytes(4 * width * height), (width, height), "RGBA")
+    return _surface(np.zeros((height, width, 4), np.uint8))
 
 
 @_sprite
-def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> NDArray[np.uint8]:
+def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> Pixels:
     """Return a disc with a nose; a faulty robot's edge is thick.
 
     Args:
@@ -157,74 +156,65 @@ def robot(radius: float, colour: RGB, heading: int, is_faulty: bool) -> NDArray[
     x, y = pixels(nose)
     turned = -2.0 * math.pi * heading / HEADINGS
     return painted(
-        (wedge(x, y, turned, nose, radius * 0.5, radius * 0.6 + 0.5), palette.INK, 1.0),
-        (disc(x, y, radius), palette.INK, 1.0),
+        (wedge(x, y, turned, nose, radius * 0.5, radius * 0.6 + 0.5), INK, 1.0),
+        (disc(x, y, radius), INK, 1.0),
         (disc(x, y, radius - edge), colour, 1.0),
     )
 
 
 @_sprite
-def halo(radius: float, age: int) -> NDArray[np.uint8]:
+def halo(radius: float, age: int) -> Pixels:
     """Return the glow about a robot of that radius [px]; `age` in [0, HALOS), oldest last."""
     strength = 1.0 - age / HALOS
     reach = radius * (1.5 + 1.0 * strength)
     x, y = pixels(reach)
     fading = np.clip((reach - np.hypot(x, y)) / (reach - radius), 0.0, 1.0)
-    glow = painted((disc(x, y, reach), palette.TIMER, 0.25 + 0.4 * strength))
+    glow = painted((disc(x, y, reach), TIMER, 0.25 + 0.4 * strength))
     glow[..., 3] = np.rint(glow[..., 3] * fading**0.7)
     return glow
 
 
 @_sprite
-def item(half: float, is_requested: bool) -> NDArray[np.uint8]:
+def item(half: float, is_requested: bool) -> Pixels:
     """Return a square of about that half side [px]; its edges fall between pixels."""
     half = math.floor(half) + 0.5
     x, y = pixels(half)
-    edge = max(1, round(0.2 * half))
-    inner = half - edge
-    return painted(
-        (box(x, y, half, half), palette.INK if is_requested else palette.ITEM_EDGE, 1.0),
-        (box(x, y, inner, inner), palette.REQUESTED if is_requested else palette.ITEM, 1.0),
-    )
+    inner = half - max(1, round(0.2 * half))
+    edge, colour = ITEM_EDGE, ITEM
+    if is_requested:
+        edge, colour = INK, REQUESTED
+    return painted((box(x, y, half, half), edge, 1.0), (box(x, y, inner, inner), colour, 1.0))
 
 
 @_sprite
-def target(radius: float) -> NDArray[np.uint8]:
+def target(radius: float) -> Pixels:
     """Return the ring with four ticks about the requested item, `radius` [px] inside."""
     width = 0.8 + 0.1 * radius
     reach = radius + 4.0 * width
     x, y = pixels(reach)
     middle = (radius + reach) / 2
     arm = reach - middle
-    ticks = [
-        box(x - side_x * middle, y - side_y * middle, *half)
-        for side_x, side_y, half in (
-            (1, 0, (arm, width / 2)),
-            (-1, 0, (arm, width / 2)),
-            (0, 1, (width / 2, arm)),
-            (0, -1, (width / 2, arm)),
-        )
-    ]
-    shape = np.minimum.reduce([ring(x, y, radius + width / 2, width), *ticks])
+    # The distance to one tick on each axis is that to both.
+    beside = box(np.abs(x) - middle, y, arm, width / 2)
+    above = box(x, np.abs(y) - middle, width / 2, arm)
+    shape = np.minimum.reduce([ring(x, y, radius + width / 2, width), beside, above])
     # A white edge keeps it apart from whatever lies below.
-    return painted((shape - 1.0, palette.FLOOR, 0.8), (shape, palette.REQUESTED, 1.0))
+    return painted((shape - 1.0, FLOOR, 0.8), (shape, REQUESTED, 1.0))
 
 
 @_sprite
-def obstacle(radius: float) -> NDArray[np.uint8]:
+def obstacle(radius: float) -> Pixels:
     """Return a solid disc of that radius [px]."""
     x, y = pixels(radius)
-    return painted(
-        (disc(x, y, radius), palette.INK, 1.0), (disc(x, y, radius - 2.0), palette.OBSTACLE, 1.0)
-    )
+    return painted((disc(x, y, radius), INK, 1.0), (disc(x, y, radius - 2.0), OBSTACLE, 1.0))
 
 
 @_sprite
-def arrowhead(length: float, heading: int) -> NDArray[np.uint8]:
+def arrowhead(length: float, heading: int) -> Pixels:
     """Return a triangle of that length [px] with its tip in the middle of the picture."""
     x, y = pixels(1.2 * length)
     turned = -2.0 * math.pi * heading / HEADINGS
-    return painted((wedge(x, y, turned, 0.0, -length, 0.45 * length), palette.LINK, 1.0))
+    return painted((wedge(x, y, turned, 0.0, -length, 0.45 * length), LINK, 1.0))
 
 
 def heading_step(angle: float) -> int:
@@ -233,7 +223,7 @@ def heading_step(angle: float) -> int:
 
 
 @lru_cache(maxsize=512)
-def words(text: str, height: int, colour: RGB = palette.INK) -> pygame.Surface:
+def words(text: str, height: int, colour: RGB = INK) -> Surface:
     """Return a line of text of that height [px], in the font that pygame brings along."""
     # A font is not kept, because a pygame.quit() elsewhere would make it unusable.
     pygame.font.init()
@@ -247,19 +237,15 @@ def words(text: str, height: int, colour: RGB = palette.INK) -> pygame.Surface:
 
 
 @lru_cache(maxsize=256)
-def badge(mark: str, height: int) -> pygame.Surface:
+def badge(mark: str, height: int) -> Surface:
     """Return a mark in white on a black pill of that height [px]."""
-    text = words(mark, round(1.25 * height), palette.FLOOR)
+    text = words(mark, round(1.25 * height), FLOOR)
     text = text.subsurface(text.get_bounding_rect())
     radius = height / 2
     half_width = max(radius, text.get_width() / 2 + 0.3 * height)
     x, y = pixels(half_width)
     y = y[np.abs(y[:, 0]) <= radius + 2.0]
-    rgba = painted(
-        (pill(x, y, half_width + 1.0, radius + 1.0), palette.FLOOR, 0.9),
-        (pill(x, y, half_width, radius), palette.INK, 1.0),
-    )
-    size = (rgba.shape[1], rgba.shape[0])
-    surface = pygame.image.frombytes(rgba.tobytes(), size, "RGBA")
+    edge, inside = pill(x, y, half_width + 1.0, radius + 1.0), pill(x, y, half_width, radius)
+    surface = _surface(painted((edge, FLOOR, 0.9), (inside, INK, 1.0)))
     surface.blit(text, text.get_rect(center=surface.get_rect().center))
     return surface

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import zip_longest
+from textwrap import wrap
+from typing import NamedTuple
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT
@@ -24,8 +23,7 @@ _EFFECT = 0.1  # of an indicator, for which seeds are counted
 _COLUMNS = ("question", "value", "95 % interval", "verdict")
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """One line of the answer: a question, or several that are alike.
 
     Attributes:
@@ -92,11 +90,16 @@ class Line:
             return f"no verdict: other questions on {self.indicator} lack runs"
         if "unbounded" in test.flags and test.conclusion in section.DECIDED:
             return f"{words[0]} by its test; P_o is too near 0 for an interval"
-        tells, more = _seeds_more(test.estimate)
-        if test.conclusion != "inconclusive" or more is None:
+        if test.conclusion != "inconclusive":
             return words[0]
-        runs = "seeds" if test.estimate.paired else "trials"
-        return f"open: {more} more {runs} tell {tells:g}"
+        # An effect on the side of the value, which 80 % power finds.
+        estimate, threshold = test.estimate, test.estimate.threshold
+        effect = threshold + math.copysign(_EFFECT, estimate.value - threshold)
+        needed = spi.seeds_for_power(estimate, effect, POWER)
+        if needed is None or needed <= estimate.n_seeds:
+            return words[0]
+        runs = "seeds" if estimate.paired else "trials"
+        return f"open: {needed - estimate.n_seeds} more {runs} tell {effect:g}"
 
     @property
     def contradicts(self) -> bool:
@@ -104,8 +107,7 @@ class Line:
         return any(test.claim_verdict_holm == "refuted" for test in self.tests)
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What a study found.
 
     Attributes:
@@ -121,17 +123,17 @@ class Answer:
     last: str
 
     @property
+    def questions(self) -> list[str]:
+        """The question of each line, with its policy where there are several."""
+        several = len({line.policy for line in self.lines}) > 1
+        return [f"{one.policy}: {one.question}" if several else one.question for one in self.lines]
+
+    @property
     def section(self) -> Section:
         """The lines as a table."""
-        several = len({line.policy for line in self.lines}) > 1
         rows = tuple(
-            (
-                f"{line.policy}: {line.question}" if several else line.question,
-                line.value,
-                line.interval,
-                line.verdict,
-            )
-            for line in self.lines
+            (question, line.value, line.interval, line.verdict)
+            for question, line in zip(self.questions, self.lines)
         )
         return Section("Answer", _COLUMNS, rows, (self.performance, self.last))
 
@@ -142,20 +144,16 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     Args:
         most: lines at most, as far as what is alike can share one; None: a line a question.
     """
-    numbered = [(number, test) for number, test in enumerate(results.verdicts)]
     lines: list[Line] = []
     for shared in range(4):
-        lines = [
-            _line([test for _, test in here], tuple(n for n, _ in here))
-            for here in grouped(numbered, partial(_alike, shared)).values()
-        ]
+        alike = grouped(enumerate(results.verdicts), partial(_alike, shared))
+        lines = [_line(here) for here in alike.values()]
         if most is None or len(lines) <= most:
             break
-    order = list(DEFINITIONS)
-    policies = results.policies
+    order, policies = list(DEFINITIONS), results.policies
     lines.sort(key=lambda line: (policies.index(line.policy), order.index(line.indicator)))
-    lines = list(_undefined_together(lines)) if most is not None else lines
-    return Answer(_asked(results), _performance(results), tuple(lines), _last(results))
+    shown = lines if most is None else _undefined_together(lines)
+    return Answer(_asked(results), _performance(results), tuple(shown), _last(results))
 
 
 def _undefined_together(lines: Sequence[Line]) -> Iterator[Line]:
@@ -165,10 +163,10 @@ def _undefined_together(lines: Sequence[Line]) -> Iterator[Line]:
         if len(here) < 2:
             yield from here
             continue
-        tests = [test for line in here for test in line.tests]
+        tests = tuple(test for line in here for test in line.tests)
         symbols = ", ".join(dict.fromkeys(line.indicator for line in here))
         numbers = tuple(number for line in here for number in line.numbers)
-        yield Line(policy, symbols, f"({len(tests)} questions)", tuple(tests), numbers)
+        yield Line(policy, symbols, f"({len(tests)} questions)", tests, numbers)
     yield from (line for line in lines if line not in undefined)
 
 
@@ -188,19 +186,20 @@ def _alike(shared: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
     return indicator if shared == 3 else (*indicator, after.name, after.onset, compared.threshold)
 
 
-def _line(tests: Sequence[Verdict], numbers: tuple[int, ...]) -> Line:
+def _line(numbered: Sequence[tuple[int, Verdict]]) -> Line:
+    numbers, tests = zip(*numbered)
     compared = tests[0].compared
-    return Line(compared.policy, compared.indicator, _about(tests), tuple(tests), numbers)
+    return Line(compared.policy, compared.indicator, _about(tests), tests, numbers)
 
 
 def _about(tests: Sequence[Verdict]) -> str:
-    compared = tests[0].compared
-    before, after = compared.original.setting, compared.changed.setting
+    compared, after = tests[0].compared, tests[0].after
+    before = compared.original.setting
     usual = compared.definition.adjectives.get(0.0)
     asked = "" if tests[0].asked == usual else f", {tests[0].asked}"
-    names = dict.fromkeys(test.compared.changed.setting.name for test in tests)
+    names = {test.after.name for test in tests}
     start = f" from {after.onset:g} s" if after.onset else ""
-    values = [f"{test.compared.changed.setting.value:g}" for test in tests]
+    values = [f"{test.after.value:g}" for test in tests]
     if after.kind == "size":
         chain = [f"{before.value:g}", *values]
         return f"N {'→'.join(chain if len(chain) <= 4 else [chain[0], '…', chain[-1]])}{asked}"
@@ -211,14 +210,6 @@ def _about(tests: Sequence[Verdict]) -> str:
     if after.kind == "policy":
         return f"with {after.name}{asked}"
     return f"{after.name} {before.value:g}→{', '.join(values)}{asked}"
-
-
-def _seeds_more(estimate: Estimate) -> tuple[float, int | None]:
-    """Return an effect on the side of the value, and the seeds that 80 % power needs beside."""
-    effect = estimate.threshold + math.copysign(_EFFECT, estimate.value - estimate.threshold)
-    needed = spi.seeds_for_power(estimate, effect, POWER)
-    more = None if needed is None or needed <= estimate.n_seeds else needed - estimate.n_seeds
-    return effect, more
 
 
 def _asked(results: StudyResults) -> str:
@@ -238,24 +229,20 @@ def _performance(results: StudyResults) -> str:
     here = {c.policy: c for c in reversed(base) if c.arm.setting == base[0].arm.setting}
     if not here:
         return "P: no run has succeeded."
-    cell = base[0]
-    where = f"N = {cell.arm.case.scenario.n_robots}"
+    cell, scenario = base[0], base[0].arm.case.scenario
+    where = f"N = {scenario.n_robots}"
     where += "" if cell.arm.setting.kind == "size" else f", {cell.arm.setting}"
     several = len(results.policies) > 1
     baseline = here.get(results.policies[0])
     told = (
-        (f"{one.policy} " if several else "")
+        f"{one.policy} " * several
         + _mean(one)
         + (_multiple(one, baseline) if baseline and results.plan.paired else "")
         for one in reversed(here.values())
     )
-    return f"{_measured(cell)} at {where}: {', '.join(told)}."
-
-
-def _measured(cell: Cell) -> str:
-    case = cell.arm.case
-    is_usual = case.task.name == DEFAULT and hasattr(case.scenario, "duration")
-    return f"P, items in {case.scenario.duration:g} s," if is_usual else "P"
+    is_usual = cell.arm.case.task.name == DEFAULT
+    measured = f"P, items in {scenario.duration:g} s," if is_usual else "P"
+    return f"{measured} at {where}: {', '.join(told)}."
 
 
 def _multiple(cell: Cell, baseline: Cell) -> str:
@@ -284,10 +271,11 @@ def _last(results: StudyResults) -> str:
     named = [one.heading for symbol, one in DEFINITIONS.items() if symbol in asked]
     parts = [f"{', '.join(named)}: good above 0"] if named else []
     parts.append("verdicts are Holm-adjusted")
-    if any("assumes_normal" in test.flags for test in tests):
+    flags = {flag for test in tests for flag in test.flags}
+    if "assumes_normal" in flags:
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normality)")
-    if any("too_few_seeds" in test.flags for test in tests):
+    if "too_few_seeds" in flags:
         parts.append("two seeds give no verdict")
     if results.exploratory:
         parts.append("exploratory: other seeds than were declared, whose report this replaces")
@@ -298,7 +286,7 @@ def _last(results: StudyResults) -> str:
     if any(test.conclusion == "inconclusive" for test in tests):
         parts.append(f"so many more {runs} find such a value in 4 of 5 studies")
     claims = [test for test in tests if test.claim]
-    told = {asked for one in reference.sentences.values() for asked in one} if reference else set()
+    told = reference.claims if reference else {}
     of_text = [test for test in claims if test.compared.question in told]
     of_others = [test for test in claims if test not in of_text]
     for where, here in ((" in the paper's text", of_text), (" beside it" * bool(told), of_others)):
@@ -319,7 +307,7 @@ def in_a_sentence(results: StudyResults) -> str:
     told += f"; of {asked} {words} (Holm)"
     if known:
         worst = min(known, key=lambda test: test.value or 0.0)
-        line = _line([worst], (0,))
+        line = _line([(0, worst)])
         told += f"; the lowest is {line.question} = {line.value} {line.interval}".rstrip()
     whose = results.policies
     if results.plan.imported_from and len(whose) == 1:  # nobody named it
@@ -358,9 +346,9 @@ def _in_columns(found: Answer, widths: Sequence[int], width: int) -> Iterator[st
         if len({line.policy for line in found.lines}) > 1:
             yield f"{policy}:"
         for line in lines:
-            question, *more = textwrap.wrap(line.question, widths[0], subsequent_indent="  ")
+            question, *more = wrap(line.question, widths[0], subsequent_indent="  ")
             left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {line.interval:{widths[2]}}"
-            verdict = textwrap.wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
+            verdict = wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
             yield f"{left}  {verdict[0]}".rstrip()
             for first, second in zip_longest(more, verdict[1:], fillvalue=""):
                 yield f"{first:{len(left)}}  {second}".rstrip()
@@ -368,4 +356,4 @@ def _in_columns(found: Answer, widths: Sequence[int], width: int) -> Iterator[st
 
 def _fold(text: str, width: int) -> list[str]:
     # Paths and names are longer than a line sometimes: they are broken, never cut.
-    return textwrap.wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)
+    return wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
-from .section import NOTHING, Section, bracketed, mean_p, ratio
+from .section import NOTHING, Section, Texts, bracketed, mean_p, ratio
 
 STUDY = "benchmark"
 HELD_OUT = "Held out"  # how the titles of its tables begin that give the score
@@ -22,28 +23,24 @@ RESAMPLES = 2_000
 
 def table(results: StudyResults) -> Section:
     """Return P, S, R or A, and FT of every condition, those of a title together."""
-    rows: list[tuple[str, ...]] = []
+    rows: list[Texts] = []
     shown: set[str] = set()  # the sound swarm is the original condition of most titles
     for title, tests in grouped(results.verdicts, lambda one: one.compared.table).items():
         rows.append((title, "", "", ""))
-        cells = results.cells_of(tests[0].compared)
-        original = tests[0].compared.original
+        first = tests[0].compared
+        original = first.original
         if original.case.key not in shown:
             shown.add(original.case.key)
-            rows.append((f"  {original.setting}", mean_p(cells[original]), "", ""))
+            rows.append(
+                (f"  {original.setting}", mean_p(results.cells_of(first)[original]), "", "")
+            )
         for changed, found in grouped(tests, lambda one: one.compared.changed).items():
             by_symbol = {test.compared.indicator: test for test in found}
             tolerance = by_symbol.pop("FT", None)
             others = [f"{symbol} {ratio(test)}" for symbol, test in by_symbol.items()]
-            cell = results.cells_of(found[0].compared)[changed]
-            rows.append(
-                (
-                    f"  {changed.setting}",
-                    mean_p(cell),
-                    "; ".join(others),
-                    NOTHING if tolerance is None else ratio(tolerance),
-                )
-            )
+            p = mean_p(results.cells_of(found[0].compared)[changed])
+            ft = NOTHING if tolerance is None else ratio(tolerance)
+            rows.append((f"  {changed.setting}", p, "; ".join(others), ft))
     return Section(
         f"{results.policies[0]}: benchmark of robustness",
         ("condition", "P [95 %]", "S, R or A [95 %]", "FT [95 %]"),
@@ -83,7 +80,7 @@ def worst(results: StudyResults) -> tuple[Verdict, float]:
     return min(shares, key=lambda one: one[1])
 
 
-def score(results: StudyResults) -> NDArray[np.float64]:
+def score(results: StudyResults) -> Numbers:
     """Return mean P over the held-out conditions, of every training and seed, (K, n) or (n,).
 
     Raises:
@@ -104,7 +101,7 @@ def _held_out(results: StudyResults) -> dict[Arm, Cell]:
     }
 
 
-def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
+def leaderboard(entries: Mapping[str, Numbers]) -> Section:
     """Return the table of entries by score, and how stable that order is.
 
     Seeds are resampled for all entries together, as they are played over the same ones, trainings
@@ -113,23 +110,23 @@ def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
     Args:
         entries: name to scores, (K, n) or (n,), each over the same n seeds.
     """
-    scores = {name: np.atleast_2d(one) for name, one in entries.items()}
+    scores = [np.atleast_2d(one) for one in entries.values()]
     rng = np.random.Generator(np.random.Philox(key=len(entries)))
-    n_seeds = min(one.shape[1] for one in scores.values())
-    drawn = np.empty((RESAMPLES, len(scores)))
-    for number in range(RESAMPLES):
+    n_seeds = min(one.shape[1] for one in scores)
+    drawn = []
+    for _ in range(RESAMPLES):
         seeds = rng.integers(n_seeds, size=n_seeds)
-        for place, one in enumerate(scores.values()):
-            drawn[number, place] = one[rng.integers(len(one), size=len(one))][:, seeds].mean()
-    found = _ranks(np.array([[one.mean() for one in scores.values()]]))[0]
-    ranks = _ranks(drawn)
+        resampled = (one[rng.integers(len(one), size=len(one))][:, seeds] for one in scores)
+        drawn.append([one.mean() for one in resampled])
+    (found,) = _ranks(np.array([[one.mean() for one in scores]]))
+    ranks = _ranks(np.array(drawn))
     best, worst = np.percentile(ranks, (2.5, 97.5), axis=0, method="nearest").astype(int)
     same = (ranks == found).mean(axis=0)
-    names = list(entries)
+    named = list(entries.items())
     rows = tuple(
         (
-            names[one],
-            bracketed(spi.mean_interval(entries[names[one]]), 1),
+            named[one][0],
+            bracketed(spi.mean_interval(named[one][1]), 1),
             f"{found[one]} [{best[one]}, {worst[one]}]",
             f"{same[one]:.0%}",
         )
@@ -146,6 +143,6 @@ def leaderboard(entries: Mapping[str, NDArray[np.float64]]) -> Section:
     )
 
 
-def _ranks(scores: NDArray[np.float64]) -> NDArray[np.int64]:
+def _ranks(scores: Numbers) -> NDArray[np.int64]:
     """Return 1 + how many entries score higher, of every row."""
     return np.asarray(1 + (scores[:, None, :] > scores[:, :, None]).sum(axis=2))

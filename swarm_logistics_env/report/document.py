@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from importlib.metadata import version
+from typing import NamedTuple
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
@@ -18,8 +18,7 @@ from .section import Figure, Section, listed, seeds_text, sentence
 from .tables import fault_sections, tables, warnings
 
 
-@dataclass(frozen=True)
-class Chapter:
+class Chapter(NamedTuple):
     """A part of the report; `text` explains what it shows and how to read it."""
 
     title: str
@@ -27,8 +26,7 @@ class Chapter:
     sections: tuple[Section, ...]
 
 
-@dataclass(frozen=True)
-class Document:
+class Document(NamedTuple):
     """The whole report.
 
     Attributes:
@@ -47,7 +45,7 @@ class Document:
         """Warnings, tables and measures of faults alone, for a terminal."""
         shown = ("Warnings", "Results", "Beyond the paper")
         sections = [one for each in self.chapters if each.title in shown for one in each.sections]
-        return tuple(replace(one, figures=()) for one in sections if one.columns or one.lines)
+        return tuple(one._replace(figures=()) for one in sections if one.columns or one.lines)
 
     def figures(self) -> Iterator[Figure]:
         """Yield every figure, in the order of the report."""
@@ -97,12 +95,8 @@ def document(results: StudyResults) -> Document:
         Chapter("Set-up", "", setup_sheet(plan)),
         Chapter("Methods", "", (Section("", lines=(methods(plan),)),)),
     ]
-    whole = Document(
-        f"Study {plan.specification.name!r}",
-        tuple(text),
-        found,
-        tuple(chapter for chapter in chapters if chapter.sections),
-    )
+    shown = tuple(chapter for chapter in chapters if chapter.sections)
+    whole = Document(f"Study {plan.specification.name!r}", tuple(text), found, shown)
     # Policies and tables that differ in punctuation or case alone would give equal files.
     taken: set[str] = set()
     for figure in whole.figures():
@@ -130,11 +124,7 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
     policies = {case.policy.title: case.identity for case in plan.cases}
     return (
         Section("Study", lines=(f"{_version()}, code version {plan.code}.",)),
-        Section(
-            "Policies",
-            ("policy", "identity"),
-            tuple(sorted(policies.items())),
-        ),
+        Section("Policies", ("policy", "identity"), tuple(sorted(policies.items()))),
         *_failure_modes(plan),
         Section(
             "Base scenario",

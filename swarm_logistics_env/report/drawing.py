@@ -10,7 +10,7 @@ import io
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -60,8 +60,7 @@ def images(draw: Draw, height: float) -> tuple[str, bytes]:
     return svg.getvalue(), png.getvalue()
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(NamedTuple):
     """One value with its interval.
 
     Attributes:
@@ -179,11 +178,10 @@ def _bar(
     ends = max(point.low, bottom), min(point.high, top)
     lines = axes.hlines if level else axes.vlines
     lines(at, *ends, color=colour, linewidth=1.4, zorder=2)
-    for limit, end, arrow in zip((point.low, point.high), within, "<>" if level else "v^"):
-        leaves = not bottom <= limit <= top
-        place = (end if leaves else limit, at) if level else (at, end if leaves else limit)
-        sign = arrow if leaves else "|" if level else "_"
-        axes.plot(*place, sign, color=colour, markersize=5, clip_on=not leaves)
+    for limit, end, arrow in zip((point.low, point.high), ends, "<>" if level else "v^"):
+        sign = arrow if limit != end else "|" if level else "_"
+        place = (end, at) if level else (at, end)
+        axes.plot(*place, sign, color=colour, markersize=5, clip_on=limit == end)
 
 
 def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
@@ -248,10 +246,5 @@ def rates(
 def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
     """Put the legend of one pair of axes above all of them."""
     handles, labels = axes.get_legend_handles_labels()
-    canvas.legend(
-        handles,
-        labels,
-        loc="outside upper left",
-        ncols=min(len(labels), 3),
-        handlelength=2.6 if lines else 1.0,
-    )
+    columns, length = min(len(labels), 3), 2.6 if lines else 1.0
+    canvas.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=length)

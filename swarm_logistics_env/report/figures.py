@@ -28,17 +28,11 @@ _MARKS = (
 
 def forest_figure(results: StudyResults, found: Answer) -> Figure:
     """Return the lines of the answer as a forest of intervals."""
-    several = len(results.policies) > 1
-    rows = [
-        (
-            f"{line.policy}: {line.question}" if several else line.question,
-            [
-                _point(test, results.policies.index(line.policy), "", test.compared.threshold)
-                for test in line.tests
-            ],
-        )
+    points = (
+        [_point(results, test, "", test.compared.threshold) for test in line.tests]
         for line in found.lines
-    ]
+    )
+    rows = list(zip(found.questions, points))
     tests = [test for line in found.lines for test in line.tests]
     return Figure(
         "answer",
@@ -74,22 +68,21 @@ def indicator_panels(results: StudyResults) -> Iterator[tuple[str, Panel]]:
             yield _where(table, onset, swarm), _panel(results, tests, definition)
 
 
-def _by_figure(
-    results: StudyResults,
-) -> dict[tuple[str, Factor, float, int], list[Verdict]]:
+def _by_figure(results: StudyResults) -> dict[tuple[str, Factor, float, int], list[Verdict]]:
     """Return each value once, by table, kind, onset, and swarm size where robots fail."""
 
     def place(test: Verdict) -> tuple[str, Factor, float, int]:
         after, by_fault = test.after, test.after.kind == "fault"
         return test.compared.table, after.kind, after.onset, test.compared.n_robots * by_fault
 
-    def same(test: Verdict) -> tuple[str, str, str, str]:
-        compared = test.compared
-        return compared.policy, compared.table, compared.indicator, compared.label
-
+    alike = grouped(
+        results.verdicts,
+        lambda test: (*test.compared.family, test.compared.table, test.compared.label),
+    )
     # That against the lowest threshold shows them all.
-    alike = grouped(results.verdicts, same).values()
-    return grouped((min(tests, key=lambda t: t.compared.threshold) for tests in alike), place)
+    return grouped(
+        (min(same, key=lambda t: t.compared.threshold) for same in alike.values()), place
+    )
 
 
 def _where(table: str, onset: float, swarm: int) -> str:
@@ -102,13 +95,12 @@ def _panel(results: StudyResults, tests: Sequence[Verdict], definition: Definiti
     here = [test for test in tests if test.compared.indicator == definition.symbol]
     after, first = here[0].after, here[0].compared.policy
     points = tuple(
+        # The published values stand beside the first policy.
         _point(
+            results,
             test,
-            results.policies.index(policy := test.compared.policy),
             _category(test),
-            # The published values stand beside the first policy.
-            test.published if policy == first else None,
-            policy,
+            test.published if test.compared.policy == first else None,
         )
         for test in here
     )
@@ -133,28 +125,16 @@ def _category(test: Verdict) -> str:
     return test.compared.label if after.kind == "policy" else f"{before.value:g}→{after.value:g}"
 
 
-def _point(
-    test: Verdict, style: int, category: str, published: float | None, series: str = ""
-) -> Point:
+def _point(results: StudyResults, test: Verdict, category: str, published: float | None) -> Point:
+    policy = test.compared.policy
     value, low, high = test.interval or (None, None, None)
-    return Point(
-        series,
-        style,
-        category,
-        value,
-        low,
-        high,
-        published,
-        decided=test.holm in DECIDED,
-        saturated=test.saturated,
-    )
-
-
-_CAPPED = " †: P is capped, every item was delivered in a run."
+    style, decided = results.policies.index(policy), test.holm in DECIDED
+    return Point(policy, style, category, value, low, high, published, decided, test.saturated)
 
 
 def _capped(tests: Sequence[Verdict]) -> str:
-    return _CAPPED if any(test.saturated for test in tests) else ""
+    is_capped = any(test.saturated for test in tests)
+    return " †: P is capped, every item was delivered in a run." * is_capped
 
 
 def _definitions(tests: Sequence[Verdict]) -> list[Definition]:
@@ -177,7 +157,7 @@ def rate_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
     import pandas as pd
 
-    def place(one: Comparison) -> tuple[str, str, int, str, float]:
+    def place(one: Comparison) -> tuple[str | float, ...]:
         setting = one.changed.setting
         return one.policy, one.table, one.n_robots, setting.name, setting.onset
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
 from swarm_logistics_env import spi
@@ -18,8 +18,7 @@ from swarm_logistics_env.studies.comparison import Arm, Comparison
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT, Outcome
-from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.warehouse.faults import text_of
+from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from .answer import Answer
 from .figures import X_LABELS, indicator_panels
@@ -38,7 +37,7 @@ def axis(found: Answer) -> tuple[float, float]:
     return min(values) - span, max(values) + span
 
 
-def page_data(results: StudyResults) -> dict[str, JsonValue]:
+def page_data(results: StudyResults) -> Json:
     """Return all that the page's script needs, as JSON holds it."""
     arms = {arm.case.key: arm for _, _, arm in results.plan.cells}
     places = {key: place for place, key in enumerate(arms)}
@@ -81,9 +80,8 @@ def _mean_p(outcomes: Sequence[Outcome | None]) -> float | None:
     return round(float(np.mean(found)), 4) if len(found) == len(outcomes) else None
 
 
-def _steps(times: NDArray[np.float64]) -> list[JsonValue]:
-    gaps: list[JsonValue] = np.diff(np.rint(times).astype(int), prepend=0).tolist()
-    return gaps
+def _steps(times: ArrayLike) -> list[JsonValue]:
+    return [*np.diff(np.rint(times).astype(int), prepend=0).tolist()]
 
 
 def watch_command(arm: Arm) -> str | None:
@@ -122,12 +120,12 @@ def _question(results: StudyResults, test: Verdict, places: dict[str, int]) -> J
 
 def _first(tests: Sequence[Verdict]) -> int:
     """Return the question that the page opens with: the lowest value that is refuted, or any."""
-    refuted = {
-        number: test.value
+    refuted = (
+        (test.value, number)
         for number, test in enumerate(tests)
         if test.answer_holm == "refuted" and test.value is not None
-    }
-    return min(refuted, key=lambda number: refuted[number], default=0)
+    )
+    return min(refuted, default=(0.0, 0))[1]
 
 
 def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterator[Json]:

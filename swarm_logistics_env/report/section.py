@@ -7,13 +7,12 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.spi.estimate import SIGNS, Estimate
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.specification import seeds_in_words
 from swarm_logistics_env.studies.verdict import Cell, Verdict
@@ -26,16 +25,9 @@ if TYPE_CHECKING:
 SATURATED = "†"
 NOTHING = "–"
 DECIDED = ("supported", "refuted", "equivalent")
-UNAFFECTED = "same runs"
+UNAFFECTED = SIGNS["unaffected"].word
 # The words for verdicts, in the order in which they are counted.
-WORDS = {
-    "supported": "supported",
-    "refuted": "refuted",
-    "equivalent": "equivalent",
-    "inconclusive": "open",
-    "unaffected": UNAFFECTED,
-    "blocked": "undefined",
-}
+WORDS = {**{verdict: sign.word for verdict, sign in SIGNS.items()}, "blocked": "undefined"}
 FLAGS = {
     "single_seed": "One seed gives a value, but no interval and no verdict",
     "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
@@ -53,6 +45,7 @@ FLAGS = {
 }
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 Row = TypeVar("Row")
+Texts = tuple[str, ...]
 
 
 @dataclass
@@ -74,8 +67,7 @@ class Figure:
     draw: Draw
 
 
-@dataclass(frozen=True)
-class Sentence:
+class Sentence(NamedTuple):
     """One verdict in words; `verdict`: the conclusion, a name in `WORDS`."""
 
     head: str
@@ -83,14 +75,13 @@ class Sentence:
     verdict: str
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """A heading with a figure, sentences, a table, lines of text, or several of them."""
 
     title: str
-    columns: tuple[str, ...] = ()
-    rows: tuple[tuple[str, ...], ...] = ()
-    lines: tuple[str, ...] = ()
+    columns: Texts = ()
+    rows: tuple[Texts, ...] = ()
+    lines: Texts = ()
     sentences: tuple[Sentence, ...] = ()
     figures: tuple[Figure, ...] = ()
 
@@ -129,14 +120,14 @@ def fixed(value: float, digits: int) -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
-def limits(interval: Interval | Estimate | None, digits: int) -> str:
+def limits(interval: spi.Interval | Estimate | None, digits: int) -> str:
     """Return the limits of an interval to so many digits, e.g. "[101.2, ∞]"; empty: none."""
     if interval is None or interval.low is None or interval.high is None:
         return ""
     return f"[{fixed(interval.low, digits)}, {fixed(interval.high, digits)}]"
 
 
-def bracketed(interval: Interval | Estimate | None, digits: int) -> str:
+def bracketed(interval: spi.Interval | Estimate | None, digits: int) -> str:
     """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
     if interval is None:
         return NOTHING

@@ -21,7 +21,7 @@ from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
 from . import section
 from .figures import rate_figures
-from .section import NOTHING, Section
+from .section import NOTHING, Section, Texts
 
 CellColumn = tuple[str, Callable[[Cell], str]]
 
@@ -100,7 +100,7 @@ def _sentences(results: StudyResults) -> Iterator[Section]:
             yield Section(f"{policy}: what the text says", columns, tuple(said), (reference.whose,))
 
 
-def sentences(reference: Reference, tests: Sequence[Verdict]) -> list[tuple[str, ...]]:
+def sentences(reference: Reference, tests: Sequence[Verdict]) -> list[Texts]:
     """Return a row for each claim of the reference's text, those of a sentence together."""
     by_question = {test.compared.question: test for test in tests}
     rows = []
@@ -111,9 +111,9 @@ def sentences(reference: Reference, tests: Sequence[Verdict]) -> list[tuple[str,
     return rows
 
 
-def claims(heading: str, tests: Sequence[Verdict]) -> list[tuple[str, ...]]:
+def claims(heading: str, tests: Sequence[Verdict]) -> list[Texts]:
     """Return a row for each claim: below the heading what it asks, our value, and the verdict."""
-    rows: list[tuple[str, ...]] = []
+    rows: list[Texts] = []
     for test in tests:
         compared = test.compared
         sign = ">" if test.claimed else "<" if compared.definition.compares == "policy" else "≤"

@@ -147,11 +147,8 @@ def _row(values: Sequence[str]) -> str:
 
 def _inert(text: str) -> str:
     """Return a text of which Markdown makes neither a tag, nor a link, nor a picture."""
-    return re.sub(r"<(?=[A-Za-z/!?])|(?<=\])(?=\()", _escape, plain(text))
-
-
-def _escape(found: re.Match[str]) -> str:
-    return "&lt;" if found[0] else "\\"
+    live = r"<(?=[A-Za-z/!?])|(?<=\])(?=\()"
+    return re.sub(live, lambda found: "&lt;" if found[0] else "\\", plain(text))
 
 
 def html(results: StudyResults, document: Document, drawings: Mapping[str, str]) -> str:

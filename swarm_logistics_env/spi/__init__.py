@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NoReturn
 
-from .definitions import (
-    adaptability,
-    fault_tolerance,
-    relative_change,
-    robustness,
-    scalability,
-)
+from .definitions import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
 from .inputs import IndicatorError

@@ -135,10 +135,5 @@ def equivalence(
             identical=identical,
         )
 
-    return Equivalence(
-        margin=margin,
-        alpha=alpha,
-        change=against(0.0),
-        above=against(-margin),
-        below=against(margin),
-    )
+    change, above, below = against(0.0), against(-margin), against(margin)
+    return Equivalence(margin=margin, alpha=alpha, change=change, above=above, below=below)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, NamedTuple, TypedDict
+from typing import Literal, NamedTuple, TypeAlias, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,8 @@ from .inputs import (
 from .ratio import MIN_SEEDS, Term, over_trainings, paired_ratio, ratio_of_samples, welch
 from .summaries import at_stake, pairing_correlation
 
+# Performances by name, with their weights in numerator and denominator.
+Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float, float]]
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
 
@@ -190,7 +192,7 @@ class Options(TypedDict, total=False):
 
 def judge(
     indicator: str,
-    terms: Mapping[str, tuple[ArrayLike, float, float]],
+    terms: Weighted,
     *,
     offset: float = 0.0,
     threshold: float = 0.0,
@@ -267,7 +269,7 @@ def _tested(
     # The true P of one that is capped is larger, and moves D by the sign of its weight.
     leaning = float(test.value) - threshold
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
-    few = asked.n_trainings is not None and asked.n_trainings < LEAST_TRAININGS
+    few = (asked.n_trainings or LEAST_TRAININGS) < LEAST_TRAININGS
     blocked = capped or bool(test.degenerate) or n_seeds < LEAST_SEEDS or few
     normal = not paired or n_seeds < MIN_SEEDS
     hidden = bool(test.p_seen < 1.0 - asked.confidence <= test.p_value)
@@ -298,7 +300,7 @@ def _tested(
 
 
 def _checked(
-    terms: Mapping[str, tuple[ArrayLike, float, float]],
+    terms: Weighted,
     saturated: Collection[str],
     *,
     paired: bool,

@@ -53,8 +53,7 @@ def adjust(estimates: Sequence[Estimate | Equivalence]) -> tuple[Verdict, ...]:
     if len(confidences) > 1:
         raise IndicatorError(f"confidence = {confidences} in one family: should be one number")
     return tuple(
-        estimate.verdict_for(p)
-        for estimate, p in zip(estimates, adjusted_p_values(estimates), strict=True)
+        estimate.verdict_for(p) for estimate, p in zip(estimates, adjusted_p_values(estimates))
     )
 
 
@@ -128,7 +127,7 @@ def _boundaries(seeds: tuple[int, ...], alpha: float, spending: Spending) -> tup
         alphas.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
         start, mass = points, weights * density
         points = np.linspace(-boundary, boundary, _GRID)
-        steps = (points[:, np.newaxis] - start) / step
+        steps = (points[:, None] - start) / step
         density = np.exp(-0.5 * steps**2) @ mass / (step * math.sqrt(2.0 * math.pi))
         weights = _simpson(points)
         information, spent = now, spent + to_spend

@@ -86,7 +86,7 @@ def paired_ratio(
     above, below = hidden_above, hidden_below = stdtr(df, -statistic), stdtr(df, statistic)
     t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + confidence / 2)))
     if n >= MIN_SEEDS:
-        pivots = resampled_pivots(num - value[..., np.newaxis] * den)
+        pivots = resampled_pivots(num - value[..., None] * den)
         mirrored = -pivots[::-1]
 
         def larger_p(statistic: Numbers, pivots: Numbers) -> Numbers:
@@ -138,8 +138,8 @@ def fieller_limits(
     value = num.mean(axis=-1) / mean_den
     # Fieller's quadratic around the estimate: with num replaced by num - value den its mean is 0,
     # so the discriminant is a sum of squares and nothing cancels.
-    residual = num - value[..., np.newaxis] * den
-    den_centred = den - mean_den[..., np.newaxis]
+    residual = num - value[..., None] * den
+    den_centred = den - mean_den[..., None]
     scale = n * (n - 1)
     s_rr = np.square(residual).sum(axis=-1) / scale
     s_rd = (residual * den_centred).sum(axis=-1) / scale
@@ -265,18 +265,19 @@ def ratio_of_samples(
         p_value = 2.0 * float(stdtr(df, -abs(mean) / math.sqrt(variance)))
         low, high = _limits(terms, difference, value, mean_den, 0.5 + confidence / 2)
     n = min(term.sample.size for term in terms)
-    return RatioTest(
-        value=np.asarray(value + offset),
-        low=np.asarray(low + offset),
-        high=np.asarray(high + offset),
-        probability=probability_of(np.asarray(p_value), np.asarray(mean)),
-        p_value=np.asarray(p_value),
-        difference_sd=np.asarray(0.0 if degenerate else math.sqrt(variance * n)),
-        degrees_of_freedom=df,
-        degenerate=np.asarray(degenerate),
-        unbounded=np.asarray(math.isinf(low) and not degenerate),
-        p_seen=np.asarray(p_value),
-    )
+    found = {
+        "value": value + offset,
+        "low": low + offset,
+        "high": high + offset,
+        "probability": probability_of(np.asarray(p_value), np.asarray(mean)),
+        "p_value": p_value,
+        "difference_sd": 0.0 if degenerate else math.sqrt(variance * n),
+        "degenerate": degenerate,
+        "unbounded": math.isinf(low) and not degenerate,
+        "p_seen": p_value,
+    }
+    arrays = {name: np.asarray(one) for name, one in found.items()}
+    return RatioTest(**arrays, degrees_of_freedom=df)
 
 
 def welch(terms: Sequence[Term], theta: float) -> tuple[float, float, float]:

@@ -43,14 +43,9 @@ def resilience_index(
         times = delivery_times(name, runs)
         return np.array([np.count_nonzero(run > onset) for run in times], dtype=np.float64)
 
-    return judge(
-        "resilience",
-        {
-            "faulty": (after_onset("faulty", faulty), 1.0, 0.0),
-            "reference": (after_onset("reference", reference), 0.0, 1.0),
-        },
-        **options,
-    )
+    broken, sound = after_onset("faulty", faulty), after_onset("reference", reference)
+    terms = {"faulty": (broken, 1.0, 0.0), "reference": (sound, 0.0, 1.0)}
+    return judge("resilience", terms, **options)
 
 
 def repair_times(

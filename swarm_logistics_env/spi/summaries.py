@@ -258,7 +258,7 @@ def p_with_hidden(
         n: Runs of which none stalled.
     """
     worst = np.zeros(())
-    for share, chance in zip(*_hidden(n), strict=True):
+    for share, chance in zip(*_hidden(n)):
         worst = np.maximum(worst, chance * p_above(statistic - share * loss))
     return worst
 

@@ -140,10 +140,9 @@ def read_trials(
     path = Path(path)
     rows, others, digest = read_rows(path, columns or {}, ignore, decimal)
     varying = [name for name in others if len({row.cells[name] for row in rows}) > 1]
-    spelled: dict[str, str] = {}  # each fault in small letters to how its first row has it
     faults = dict.fromkeys(row.text("fault") for row in rows)
-    for name in faults:
-        spelled.setdefault(name.casefold(), name)
+    # Each fault in small letters to how its first row has it.
+    spelled = {name.casefold(): name for name in reversed(faults)}
     trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
     found = _events(path, trials) if "time" in rows[0].names else _runs(path, trials)
     _check_pairing(path, found)
@@ -164,7 +163,7 @@ def _trial(
     fault, faulty = row.text("fault"), row.whole_or_none("faulty", 0) or 0
     fault = _FAULT_NAMES.get(fault.lower(), spelled[fault.casefold()])
     is_fault = fault not in (NO_FAULT, REPEATED)
-    onset = row.number_or_none("onset", 0.0) or 0.0
+    onset = row.number_or_none("onset") or 0.0
     if row.text("duration"):
         duration = row.number("duration", 0.0)
     if is_fault and not faulty:
@@ -221,7 +220,7 @@ def _events(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
         )
     runs: dict[object, tuple[Trial, list[float]]] = {}
     for trial, row in rows:
-        time = row.number_or_none("time", 0.0)
+        time = row.number_or_none("time")
         if time is not None and trial.duration is not None and time > trial.duration:
             raise row.error("time", f"should not be after its duration {trial.duration:g}")
         if trial.onset and trial.duration is None:

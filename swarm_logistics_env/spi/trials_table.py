@@ -9,8 +9,8 @@ import math
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from .inputs import IndicatorError
 
@@ -32,8 +32,7 @@ _MEANING = {word: column for column, words in NAMES.items() for word in (column,
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One row of a file.
 
     Attributes:
@@ -69,9 +68,9 @@ class Row:
             should += f", as every column that varies is a parameter; else --ignore {column!r}"
         raise self.error(column, should)
 
-    def number_or_none(self, column: str, least: float) -> float | None:
-        """Return a cell as a number; None: it is empty or not there."""
-        return self.number(column, least) if self.text(column) else None
+    def number_or_none(self, column: str) -> float | None:
+        """Return a cell as a number, 0 or more; None: it is empty or not there."""
+        return self.number(column, 0.0) if self.text(column) else None
 
     def whole_or_none(self, column: str, least: float) -> int | None:
         """Return a cell as a whole number; None: it is empty or not there."""

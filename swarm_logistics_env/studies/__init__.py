@@ -1,7 +1,5 @@
 """Studies: from a specification to runs, a store, verdicts and a report."""
 
-from __future__ import annotations
-
 from .study import Study
 
 __all__ = ["Study"]

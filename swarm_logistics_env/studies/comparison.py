@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple, Unpack
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor, comparing
-from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.estimate import Estimate, Options
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.tasks.task import Case
 
 CONFIDENCE = 0.95  # of intervals and verdicts, unless a look of a study makes it larger
@@ -105,7 +103,7 @@ class Comparison:
     @property
     def arms(self) -> tuple[Arm, ...]:
         """The two or three arms whose P it needs."""
-        return (self.original, *([self.removed] if self.removed else []), self.changed)
+        return tuple(filter(None, (self.original, self.removed, self.changed)))
 
     @property
     def arguments(self) -> dict[str, Arm]:
@@ -131,20 +129,18 @@ class Comparison:
 
     def estimate(
         self,
-        performance: Mapping[Arm, NDArray[np.float64]],
+        performance: Mapping[Arm, Numbers],
         *,
-        paired: bool = True,
-        saturated: Collection[Arm] = (),
-        identical: bool = False,
-        confidence: float = CONFIDENCE,
+        capped: Collection[Arm] = (),
+        **options: Unpack[Options],
     ) -> Estimate:
         """Return the indicator over seeds.
 
         Args:
             performance: P of each arm, shape (n_seeds,) [items], seed by seed.
-            paired, confidence: as in `spi.Options`.
-            saturated: arms whose P is capped, every item delivered in a run.
-            identical: whether the original and the changed arm gave the same runs.
+            capped: arms whose P is capped, every item delivered in a run.
+            options: further ones of `spi.Options`; identical: whether the original and the changed
+                arm gave the same runs, and there is no arm with the robots removed.
 
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
@@ -155,11 +151,8 @@ class Comparison:
             **{name: performance[arm] for name, arm in named.items()},
             **definition.arguments(Change(before, after, self.n_robots)),
             threshold=self.threshold,
-            paired=paired,
-            confidence=confidence,
-            saturated=[name for name, arm in named.items() if arm in saturated],
-            # The removed robots make the third condition another one by construction.
-            **({} if self.removed else {"identical": identical}),
+            saturated=[name for name, arm in named.items() if arm in capped],
+            **options,
         )
 
 

@@ -22,8 +22,6 @@ from .specification import Specification, seeds_in_words
 
 NOTE = "study"
 _Count = Annotated[int, Field(gt=0, strict=True)]
-_Seed = Annotated[int, Field(ge=0, strict=True)]
-_Share = Annotated[float, Field(gt=0, lt=1)]
 
 
 class StoredSpecification(BaseModel):
@@ -78,10 +76,10 @@ class Declaration(BaseModel):
 
     model_config = ConfigDict(frozen=True, from_attributes=True)
 
-    first_seed: _Seed
+    first_seed: Annotated[int, Field(ge=0, strict=True)]
     seeds: _Count
     looks: tuple[_Count, ...] = ()
-    margin: _Share = MARGIN
+    margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
 
     @property
     def seed_numbers(self) -> range:
@@ -205,14 +203,9 @@ def note(
     imported: Origin | None = None,
 ) -> None:
     """Note a study in its store, for `StoredStudy.of`."""
-    fields = {
-        "specification": specification,
-        "code": code,
-        "identities": dict(identities),
-        "declared": declared,
-        "imported": imported,
-    }
-    runs.note({NOTE: to_json(fields).decode()})
+    fields = {"specification": specification, "code": code, "identities": identities}
+    told = to_json({**fields, "declared": declared, "imported": imported})
+    runs.note({NOTE: told.decode()})
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:
@@ -233,7 +226,11 @@ def merge(directories: Sequence[Path], out: Path) -> int:
     for directory, other in stored.items():
         if other.imported is not None:
             raise StudyError(f"{directory} was imported: only studies that were run are merged")
-        if differing := _differing(one, other):
+        mine, theirs = (
+            each.specification.model_dump() | each.model_dump(exclude={"specification"})
+            for each in (one, other)
+        )
+        if differing := [name for name in mine | theirs if mine.get(name) != theirs.get(name)]:
             raise StudyError(
                 f"{first} and {directory} differ in {', '.join(differing)}: should be shards "
                 "of one study"
@@ -243,12 +240,3 @@ def merge(directories: Sequence[Path], out: Path) -> int:
             runs.absorb(directory / FILE_NAME)
         note(runs, one.specification, one.code, one.identities, one.declared)
         return len(runs)
-
-
-def _differing(one: StoredStudy, other: StoredStudy) -> list[str]:
-    """Return what two studies do not have in common."""
-    mine, theirs = (
-        each.specification.model_dump() | each.model_dump(exclude={"specification"})
-        for each in (one, other)
-    )
-    return [name for name in mine | theirs if mine.get(name) != theirs.get(name)]

@@ -19,8 +19,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import replace
+from typing import NamedTuple, Self
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
@@ -34,11 +34,11 @@ from .verdict import Cell, judge_one, same_runs
 
 # All about a condition but its policy: scenario, faults, behaviour and table.
 _Content = tuple[TaskScenario, tuple[TaskFault, ...], int, str]
+_Unmatched = tuple[str, str, tuple[str, ...]]
 _Judged = dict[str, dict[_Content, Cell]]  # keyed by the policy's label
 
 
-@dataclass(frozen=True)
-class Matching:
+class Matching(NamedTuple):
     """The conditions that two studies share, and the judged policies and conditions of one alone.
 
     A condition is named by policy, "change" and the condition in words.
@@ -52,7 +52,7 @@ class Matching:
     """
 
     matches: tuple[tuple[str, Cell, Cell], ...]
-    unmatched: tuple[tuple[str, str, tuple[str, ...]], ...]
+    unmatched: tuple[_Unmatched, ...]
     seeds: tuple[int, ...] | None
     notes: tuple[str, ...]
 
@@ -68,7 +68,7 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     if len(before) == len(after) == 1:
         partners = dict(zip(after, before))
     matches = list[tuple[str, Cell, Cell]]()
-    unmatched, notes = list[tuple[str, str, tuple[str, ...]]](), list[str]()
+    unmatched, notes = list[_Unmatched](), list[str]()
     for study, judged, other, others, known in (
         ("old", before, "new", after, partners.values()),
         ("new", after, "old", before, partners.keys()),
@@ -136,8 +136,7 @@ _GATE = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class Gate:
+class Gate(NamedTuple):
     """One condition to fail on; see the grammar above.
 
     Attributes:
@@ -168,14 +167,9 @@ class Gate:
                 f"gate {text!r}: should be [possibly] {SUBJECTS} <|> NUMBER [at TEXT], "
                 'e.g. "R < 0" or "possibly change < -0.1 at N = 25"'
             )
-        return cls(
-            text.strip(),
-            match["possibly"] is not None,
-            match["subject"],
-            match["sign"] == "<",
-            float(match["number"]),
-            match["at"] or "",
-        )
+        possibly, below = match["possibly"] is not None, match["sign"] == "<"
+        number, at = float(match["number"]), match["at"] or ""
+        return cls(text.strip(), possibly, match["subject"], below, number, at)
 
     def holds_for(self, value: float) -> bool:
         """Return whether an exact value, which leaves nothing to chance, makes the gate fail."""
@@ -191,8 +185,7 @@ class Gate:
 _Found = Estimate | float | str
 
 
-@dataclass(frozen=True)
-class GateAnswer:
+class GateAnswer(NamedTuple):
     """The answer of one comparison or condition to a gate.
 
     Attributes:
@@ -222,8 +215,8 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswe
     Raises:
         StudyError: the gate is about nothing that the studies hold.
     """
-    found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
-    asked = list(found)
+    is_change = gate.subject == "change"
+    asked = list(_changes(gate, old, new) if is_change else _indicators(gate, new))
     if not asked:
         where = f" at {gate.at!r}" if gate.at else ""
         raise StudyError(
@@ -256,10 +249,8 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
             name += f" ({comparison.table})"
         if gate.at not in name:
             continue
-        margin = new.plan.specification.margin
-        found = judge_one(
-            comparison, new.cells_of(comparison), paired=new.plan.paired, margin=margin
-        )
+        cells, margin = new.cells_of(comparison), new.plan.specification.margin
+        found = judge_one(comparison, cells, paired=new.plan.paired, margin=margin)
         estimate = found.estimate
         if estimate is None:
             yield name, str(found.problem)

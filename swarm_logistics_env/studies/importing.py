@@ -135,14 +135,9 @@ def _case(origin: Origin, row: Trial) -> Case:
         parameters=row.parameters,
     )
     fault = RecordedFault(mode=row.fault, robots=row.faulty, onset=row.onset)
-    return Case(
-        PolicySpec(name=row.policy),
-        identity,
-        scenario,
-        (fault,) if row.faulty else (),
-        int(row.fault == REPEATED),
-        task=RECORDED,
-    )
+    policy, behaviour = PolicySpec(name=row.policy), int(row.fault == REPEATED)
+    faults = (fault,) if row.faulty else ()
+    return Case(policy, identity, scenario, faults, behaviour, task=RECORDED)
 
 
 def _outcome(row: Trial) -> Outcome:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.spi.resilience import SurvivalCurve
+from swarm_logistics_env.spi.inputs import Numbers
 
 from .comparison import Arm, Comparison
 from .results import StudyResults, Times
@@ -27,12 +25,11 @@ class RepairCurve(NamedTuple):
         back: which runs came back by the end, (n_runs,).
     """
 
-    curve: SurvivalCurve
+    curve: spi.SurvivalCurve
     back: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Resilience:
+class Resilience(NamedTuple):
     """The measures of one fault that begins during the run.
 
     Attributes:
@@ -46,8 +43,8 @@ class Resilience:
     """
 
     compared: Comparison
-    against_removed: Estimate | None
-    against_whole: Estimate | None
+    against_removed: spi.Estimate | None
+    against_whole: spi.Estimate | None
     single: tuple[RepairCurve, ...] = ()
     problem: str | None = None
 
@@ -85,7 +82,9 @@ def mid_run_faults(results: StudyResults) -> list[Comparison]:
     ]
 
 
-def _index(results: StudyResults, faulty: Arm, reference: Arm, threshold: float) -> Estimate | None:
+def _index(
+    results: StudyResults, faulty: Arm, reference: Arm, threshold: float
+) -> spi.Estimate | None:
     named = {"faulty": results.outcomes_of(faulty), "reference": results.outcomes_of(reference)}
     try:
         return spi.resilience_index(
@@ -146,33 +145,25 @@ class RateCurve(NamedTuple):
     """
 
     runs: str
-    seconds: NDArray[np.float64]
-    deliveries: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    seconds: Numbers
+    deliveries: Numbers
+    low: Numbers
+    high: Numbers
 
 
 def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurve, ...]:
     """Return the delivery rates without fault, with the robots removed, and with the fault."""
     window, end = window_of(comparison), comparison.original.case.scenario.duration
     seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
-    arms = {
-        "no fault": comparison.original,
-        "removed": comparison.removed,
-        "fault": comparison.changed,
-    }
+    original, removed, faulty = comparison.original, comparison.removed, comparison.changed
+    arms = {"no fault": original, "removed": removed, "fault": faulty}
     curves = []
     for runs, arm in arms.items():
         times = results.times_of(arm) if arm else ()
         if times:
-            counts = [
-                np.searchsorted(one, seconds, side="right")
-                - np.searchsorted(one, seconds - window, side="right")
-                for one in times
-            ]
-            limits = np.array(
-                [spi.mean_interval(column) for column in np.transpose(counts)], dtype=np.float64
-            )
+            ends = [np.searchsorted(one, [seconds - window, seconds], "right") for one in times]
+            counts = np.diff(ends, axis=1)[:, 0]
+            limits = np.array([spi.mean_interval(column) for column in counts.T], np.float64)
             curves.append(RateCurve(runs, seconds, *limits.T))
     return tuple(curves)
 
@@ -180,8 +171,7 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
 # -- a policy beside published values -----------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Agreement:
+class Agreement(NamedTuple):
     """How near one policy comes to the reference.
 
     Attributes:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import islice, pairwise, product
+from itertools import chain, islice, pairwise, product
 from typing import Self
 
 from swarm_logistics_env.errors import StudyError
@@ -27,6 +27,7 @@ from .specification import (
     Sizes,
     Specification,
 )
+from .verdict import grouped
 
 SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
 
@@ -73,10 +74,8 @@ class Plan:
             for arm in comparison.arms
         ]
         cells += [(policy, table, arm) for (policy, table), arm in self.nulls.items()]
-        factors = [(policy, table, arm.setting.name) for policy, table, arm in cells]
-        order = {factor: place for place, factor in enumerate(dict.fromkeys(factors))}
-        cells.sort(key=lambda cell: order[cell[0], cell[1], cell[2].setting.name])
-        return tuple(dict.fromkeys(cells))
+        by_factor = grouped(cells, lambda cell: (cell[0], cell[1], cell[2].setting.name))
+        return tuple(dict.fromkeys(chain.from_iterable(by_factor.values())))
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:

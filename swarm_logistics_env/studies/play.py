@@ -55,11 +55,7 @@ class Tally:
 
 
 def play(
-    runs: Sequence[Run],
-    engine: Engine,
-    store: Runs,
-    title: str,
-    end: float | None = None,
+    runs: Sequence[Run], engine: Engine, store: Runs, title: str, end: float | None = None
 ) -> tuple[list[Outcome], float]:
     """Play runs and keep each in the store at once; show a progress bar.
 

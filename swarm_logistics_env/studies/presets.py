@@ -108,7 +108,6 @@ def load_reference(name: str | None) -> Reference | None:
     Raises:
         StudyError: there is none of that name.
     """
-    known = {"paper": PAPER}
-    if name is not None and name not in known:
-        raise StudyError(f"no reference {name!r}{suggest(name, known)}")
-    return None if name is None else known[name]
+    if name not in (None, "paper"):
+        raise StudyError(f"no reference {name!r}{suggest(name, ['paper'])}")
+    return PAPER if name else None

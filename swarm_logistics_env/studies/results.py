@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparison import Arm, Comparison
@@ -23,7 +21,7 @@ from .verdict import Cell, Verdict, judge_one, under_holm
 if TYPE_CHECKING:
     import pandas as pd
 
-Times = tuple[NDArray[np.float64], ...]
+Times = tuple[Numbers, ...]
 Place = tuple[str, str, Arm]  # of a cell: policy, table, arm
 
 
@@ -100,31 +98,18 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
     reference = load_reference(plan.specification.reference)
     looks = declared.looks if declared else plan.specification.looks
     exploratory = declared is not None and not declared.covers(plan)
+    late_margin = declared is not None and declared.margin != margin
     verdicts: Iterable[Verdict] = ()
     if plan.specification.until_clear:
         found = standing(plan, outcomes)
         plan = replace(plan, specification=plan.specification.replace(seeds=found.shared_seeds))
         verdicts = found.verdicts
-    cells = tuple(
-        Cell.of(
-            policy,
-            table,
-            arm,
-            [outcomes.get((one.key, seed)) for one in arm.case.trainings for seed in plan.seeds],
-            paired=plan.paired,
-            reference=reference,
-        )
-        for policy, table, arm in plan.cells
-    )
+    cells = []
+    for policy, table, arm in plan.cells:
+        runs = [outcomes.get((one.key, seed)) for one in arm.case.trainings for seed in plan.seeds]
+        cells.append(Cell.of(policy, table, arm, runs, paired=plan.paired, reference=reference))
     results = StudyResults(
-        plan,
-        reference,
-        cells,
-        (),
-        exploratory=exploratory,
-        outcomes=outcomes,
-        looks=looks,
-        late_margin=declared is not None and declared.margin != margin,
+        plan, reference, tuple(cells), (), exploratory, outcomes, looks, late_margin
     )
     verdicts = verdicts or under_holm(
         [

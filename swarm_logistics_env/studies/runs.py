@@ -59,18 +59,24 @@ class Runs:
     Every error of SQLite becomes a StudyError that names the file.
 
     Args:
-        path: the file, made where it is missing; None: kept in memory only.
+        path: the file, made with its folder where it is missing; None: kept in memory only.
         read_only: write nothing, neither into the file nor beside it, for a file that nobody else
             writes.
 
     Raises:
-        StudyError: the file is not a store, or its schema is not this version's.
+        StudyError: the file is not a store, its schema is not this version's, or its folder cannot
+            be made.
     """
 
     def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
         self.path = path
         self._read_only = read_only
         place = str(path or ":memory:")
+        if path is not None and not read_only:
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise StudyError(f"cannot write to {path.parent}: {error.strerror}") from error
         if path is not None and read_only:
             # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
             place = f"{path.absolute().as_uri()}?immutable=1"
@@ -79,6 +85,7 @@ class Runs:
             self._connection = sqlite3.connect(
                 place, timeout=TIMEOUT, isolation_level=None, uri=read_only
             )
+            self._execute = self._connection.execute
             try:
                 self._prepare()
             except BaseException:
@@ -119,7 +126,6 @@ class Runs:
             raise StudyError(f"{out} holds a study already: {way} into a new directory")
         unfinished = out / f"{FILE_NAME}.unfinished"
         try:
-            out.mkdir(parents=True, exist_ok=True)
             unfinished.unlink(missing_ok=True)
         except OSError as error:
             raise StudyError(f"cannot write to {out}: {error.strerror}") from error
@@ -151,7 +157,7 @@ class Runs:
         failed = outcome.error is not None
         row = (run.key, canonical_json(_described(run)), failed, result, outcome.wall_seconds)
         with self._transaction():
-            self._connection.execute(f"INSERT INTO runs VALUES (?, ?, ?, ?, ?) {_REPLACE}", row)
+            self._execute(f"INSERT INTO runs VALUES (?, ?, ?, ?, ?) {_REPLACE}", row)
 
     def absorb(self, path: Path) -> None:
         """Add the runs of another store, to which `add`'s rule applies.
@@ -161,7 +167,7 @@ class Runs:
         """
         Runs(path).close()
         with self._explained():
-            self._connection.execute("ATTACH ? AS other", (str(path),))
+            self._execute("ATTACH ? AS other", (str(path),))
         try:
             with self._transaction():
                 for key, seed in self._read(_CLASH):
@@ -169,11 +175,9 @@ class Runs:
                         f"{path} has another result than the stores before it for the run {key} "
                         f"(seed {seed}), of the same scenario, policy and code"
                     )
-                self._connection.execute(
-                    f"INSERT INTO runs SELECT * FROM other.runs WHERE true {_REPLACE}"
-                )
+                self._execute(f"INSERT INTO runs SELECT * FROM other.runs WHERE true {_REPLACE}")
         finally:
-            self._connection.execute("DETACH other")
+            self._execute("DETACH other")
 
     def succeeded(self) -> set[str]:
         """Return the keys of the runs that need not run again."""
@@ -230,20 +234,20 @@ class Runs:
 
     def _read(self, query: str) -> list[tuple[str, ...]]:
         with self._explained():
-            return self._connection.execute(query).fetchall()
+            return self._execute(query).fetchall()
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         """Keep all that the block writes or, if it fails, nothing of it."""
         with self._explained():
-            self._connection.execute("BEGIN IMMEDIATE")
+            self._execute("BEGIN IMMEDIATE")
             try:
                 yield
             except BaseException:
                 if self._connection.in_transaction:
-                    self._connection.execute("ROLLBACK")
+                    self._execute("ROLLBACK")
                 raise
-            self._connection.execute("COMMIT")
+            self._execute("COMMIT")
 
     @contextmanager
     def _sound(self) -> Iterator[None]:
@@ -266,14 +270,14 @@ class Runs:
 
     def _prepare(self) -> None:
         # One moment's answers: another process may be making the tables.
-        self._connection.execute("BEGIN")
+        self._execute("BEGIN")
         try:
             ((version,),) = self._read("PRAGMA user_version")
             ((application,),) = self._read("PRAGMA application_id")
             tables = self._read("SELECT 1 FROM sqlite_master")
         finally:
             if self._connection.in_transaction:  # a full disk has ended it already
-                self._connection.execute("ROLLBACK")
+                self._execute("ROLLBACK")
         is_ours = int(application) == APPLICATION_ID
         if not is_ours and tables:
             raise StudyError(f"{self.path} is a database, but not the store of a study")
@@ -286,22 +290,22 @@ class Runs:
             return
         # A process that is killed loses nothing; a power cut at most the latest runs.
         self._change_to_wal()
-        self._connection.execute("PRAGMA synchronous = NORMAL")
+        self._execute("PRAGMA synchronous = NORMAL")
         if is_ours:
             return
         with self._transaction():
             # Another process may have made the tables since: two shards start at once.
             if not self._read("SELECT 1 FROM sqlite_master"):
                 for statement in _SCHEMA:
-                    self._connection.execute(statement)
-                self._connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-                self._connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+                    self._execute(statement)
+                self._execute(f"PRAGMA application_id = {APPLICATION_ID}")
+                self._execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
 
     def _change_to_wal(self) -> None:
         give_up = time.monotonic() + TIMEOUT
         while True:
             try:
-                self._connection.execute("PRAGMA journal_mode = WAL")
+                self._execute("PRAGMA journal_mode = WAL")
             except sqlite3.OperationalError as error:
                 # When two processes change a new file at once, SQLite refuses one without waiting.
                 if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > give_up:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, ClassVar, TypeVar
@@ -100,6 +100,12 @@ class Factor(_Part):
     scenario: Fields = Field(default_factory=dict)
 
 
+def _ascending(values: tuple[int, ...]) -> tuple[int, ...]:
+    if list(values) != sorted(set(values)):
+        raise ValueError("should be ascending, each size once")
+    return values
+
+
 class Sizes(Factor):
     """Swarm sizes N, ascending; every step from one to the next gives a scalability S.
 
@@ -108,15 +114,8 @@ class Sizes(Factor):
         superlinear: steps (N, N + m) that are also tested for S > 1.
     """
 
-    values: Annotated[tuple[PositiveInt, ...], Field(min_length=2)]
+    values: Annotated[tuple[PositiveInt, ...], Field(min_length=2), AfterValidator(_ascending)]
     superlinear: tuple[tuple[PositiveInt, PositiveInt], ...] = ()
-
-    @field_validator("values")
-    @classmethod
-    def _ascending(cls, values: tuple[int, ...]) -> tuple[int, ...]:
-        if list(values) != sorted(set(values)):
-            raise ValueError("should be ascending, each size once")
-        return values
 
 
 class Faults(Factor):
@@ -147,8 +146,7 @@ class Faults(Factor):
     @property
     def manner(self) -> Manner:
         """The fields of a fault that say how it fails and whom it strikes, as far as given."""
-        fields = {"factor": self.factor, "intermittent": self.intermittent, "role": self.role}
-        return {name: value for name, value in fields.items() if value is not None}
+        return self.model_dump(include={"factor", "intermittent", "role"}, exclude_none=True)
 
     def __str__(self) -> str:
         """Return in words how long, how far and how steadily robots fail; empty: for good."""
@@ -161,6 +159,12 @@ class Faults(Factor):
         return ", ".join(said)
 
 
+def _from_above_0(values: tuple[float, ...]) -> tuple[float, ...]:
+    if values[0] == 0.0:
+        raise ValueError("should start with x_o above 0: A is relative to it")
+    return values
+
+
 class Parameter(Factor):
     """Values of one field of the scenario; the change from the first to each other gives an A.
 
@@ -170,14 +174,9 @@ class Parameter(Factor):
     """
 
     name: str
-    values: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=2), _ONCE]
-
-    @field_validator("values")
-    @classmethod
-    def _relative(cls, values: tuple[float, ...]) -> tuple[float, ...]:
-        if values[0] == 0.0:
-            raise ValueError("should start with x_o above 0: A is relative to it")
-        return values
+    values: Annotated[
+        tuple[NonNegativeFloat, ...], Field(min_length=2), _ONCE, AfterValidator(_from_above_0)
+    ]
 
 
 class Ablation(Factor):
@@ -268,13 +267,9 @@ class Specification(_Part):
     def _known(cls, faults: tuple[Faults, ...], info: ValidationInfo) -> tuple[Faults, ...]:
         if "task" in info.data:
             task = task_of(info.data["task"])
-            known = set(task.failure_modes) - {task.removed}
-            modes = [
-                mode for factor in faults for both in factor.modes for mode in both.split(BOTH)
-            ]
-            for mode in modes:
-                if mode not in known:
-                    raise ValueError(f"no failure mode {mode!r}{suggest(mode, known)}")
+            given = (mode for factor in faults for mode in factor.modes)
+            modes = (one for both in given for one in both.split(BOTH))
+            _refuse_unknown("failure mode", modes, {*task.failure_modes} - {task.removed})
         return faults
 
     @field_validator("parameters")
@@ -283,21 +278,23 @@ class Specification(_Part):
         cls, parameters: tuple[Parameter, ...], info: ValidationInfo
     ) -> tuple[Parameter, ...]:
         if "task" in info.data:
-            known = task_of(info.data["task"]).fields
-            for name in (factor.name for factor in parameters):
-                if name == "n_robots":
-                    raise ValueError("swarm sizes belong in `sizes`, where S judges them")
-                if name not in known:
-                    raise ValueError(f"no numeric scenario field {name!r}{suggest(name, known)}")
+            names = [factor.name for factor in parameters]
+            if "n_robots" in names:
+                raise ValueError("swarm sizes belong in `sizes`, where S judges them")
+            _refuse_unknown("numeric scenario field", names, task_of(info.data["task"]).fields)
         return parameters
 
     @field_validator("indicators")
     @classmethod
     def _defined(cls, symbols: tuple[str, ...]) -> tuple[str, ...]:
-        for symbol in symbols:
-            if symbol not in DEFINITIONS:
-                raise ValueError(f"no indicator {symbol!r}{suggest(symbol, DEFINITIONS)}")
+        _refuse_unknown("indicator", symbols, DEFINITIONS)
         return symbols
+
+
+def _refuse_unknown(what: str, names: Iterable[str], known: Collection[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise ValueError(f"no {what} {name!r}{suggest(name, known)}")
 
 
 def looks_up_to(most: int) -> tuple[int, ...]:

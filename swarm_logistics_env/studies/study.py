@@ -150,7 +150,8 @@ class Study:
             engine = "process" if processes is not None and processes > 1 else "local"
         if isinstance(engine, str):
             engine = engine_named(engine, processes, address)
-        if self.specification.until_clear and shard:
+        until_clear = self.specification.until_clear
+        if until_clear and shard:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
@@ -167,7 +168,7 @@ class Study:
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
                 title = self.specification.name
-                if self.specification.until_clear:
+                if until_clear:
                     seeds = max(run.seed for run in missing) - self.specification.first_seed + 1
                     title += f", up to {seeds} seeds"
                 if minutes is not None:
@@ -177,7 +178,7 @@ class Study:
                 left = len(missing) - len(finished)
                 tried |= {run.key for run in missing}
                 seconds += took
-                if left or not self.specification.until_clear:
+                if left or not until_clear:
                     break
         errors = [one.error for one in outcomes if one.error is not None]
         error = errors[0].strip().splitlines()[-1] if errors else None
@@ -291,10 +292,5 @@ class Study:
                 finalize(self, self._memory.close)
             yield self._memory
             return
-        if not existing:
-            try:
-                self.out.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise StudyError(f"cannot write to {self.out}: {error.strerror}") from error
         with Runs.existing(self.out) if existing else Runs(self.out / FILE_NAME) as opened:
             yield opened

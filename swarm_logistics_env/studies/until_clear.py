@@ -12,11 +12,11 @@ Everything follows from the outcomes, so a study that was killed goes on as if i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.equivalence import ALPHA
-from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.tasks.task import Case, Run
 
 from .comparison import CONFIDENCE, Arm, Comparison
@@ -28,8 +28,7 @@ MOST_SEEDS = 200
 SPENDING: spi.Spending = "linear"
 
 
-@dataclass(frozen=True)
-class Standing:
+class Standing(NamedTuple):
     """The state of the comparisons of a study at its latest look.
 
     Attributes:
@@ -55,11 +54,8 @@ def standing(plan: Plan, outcomes: Outcomes) -> Standing:
         wanted |= family.wanted
     shared = [n for n in runs.looks if not any(runs.missing(case, n) for case in plan.cases)]
     verdicts = {comparison: one for family in found for comparison, one in family.judged().items()}
-    return Standing(
-        tuple(verdicts[comparison] for comparison in plan.comparisons),
-        tuple(wanted.values()),
-        max(shared, default=first),
-    )
+    in_order = tuple(verdicts[comparison] for comparison in plan.comparisons)
+    return Standing(in_order, tuple(wanted.values()), max(shared, default=first))
 
 
 class _Looks:
@@ -72,10 +68,9 @@ class _Looks:
         self._outcomes = outcomes
 
     def missing(self, case: Case, n_seeds: int) -> list[Run]:
-        seeds = self.plan.seeds[:n_seeds]
         return [
             case.run(self.plan.code, seed)
-            for seed in seeds
+            for seed in self.plan.seeds[:n_seeds]
             if (case.key, seed) not in self._outcomes
         ]
 
@@ -100,7 +95,6 @@ class _Family:
 
     def __init__(self, members: Sequence[Comparison], runs: _Looks) -> None:
         self.wanted: dict[str, Run] = {}
-        self._members = members
         self._runs = runs
         self._found: dict[Comparison, Verdict] = {}
         self._look: dict[Comparison, int] = {}  # the last at which each was judged
@@ -138,7 +132,7 @@ class _Family:
 
     def _stop_clear_ones(self, look: int, n_seeds: int) -> None:
         """Note p on the scale on which 0.05 decides, and stop by Holm's steps, smallest p first."""
-        tested = list[tuple[float, Comparison, Estimate]]()
+        tested = list[tuple[float, Comparison, spi.Estimate]]()
         for comparison in list(self._open):
             estimate = self._found[comparison].estimate
             if estimate and estimate.identical:  # nothing to test, at any number of seeds
@@ -163,23 +157,19 @@ class _Family:
 
     def judged(self) -> dict[Comparison, Verdict]:
         """Return every comparison, with the equivalences under Holm, each at its own look."""
-        tests = {c: self._found[c].equivalence for c in self._members}
-        if None in tests.values():  # not asked, or one is blocked
+        tests = {c: one.equivalence for c, one in self._found.items() if one.equivalence}
+        if len(tests) < len(self._found):  # not asked, or one is blocked
             return self._found
-        left = [c for c in self._members if (test := tests[c]) and not test.identical]
+        left = {c: test for c, test in tests.items() if not test.identical}
 
         def ratio(comparison: Comparison) -> float:
             """Return p as a multiple of the level that it needs."""
-            test, look = tests[comparison], self._look[comparison]
-            if test is None or test.p_value is None:
-                return 1.0
-            return test.p_value / self._runs.alpha(look, 2 * ALPHA / len(left)) * 2
+            p, look = left[comparison].p_value, self._look[comparison]
+            return 1.0 if p is None else p / self._runs.alpha(look, 2 * ALPHA / len(left)) * 2
 
-        shown = {c for c in self._members if c not in left}
         while left and ratio(first := min(left, key=ratio)) < 1.0:
-            left.remove(first)
-            shown.add(first)
+            del left[first]
         for comparison, test in tests.items():
-            verdict = test.verdict if test and comparison in shown else "inconclusive"
+            verdict = "inconclusive" if comparison in left else test.verdict
             self._found[comparison] = replace(self._found[comparison], equivalence_holm=verdict)
         return self._found

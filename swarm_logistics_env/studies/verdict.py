@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi import estimate as words
-from swarm_logistics_env.spi.equivalence import ALPHA, Equivalence, equivalence
-from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.spi import Equivalence, Estimate, Interval, equivalence
+from swarm_logistics_env.spi.equivalence import ALPHA
 from swarm_logistics_env.tasks.task import Outcome
 
 from .comparison import CONFIDENCE, Arm, Comparison, Setting
@@ -79,15 +77,12 @@ class Cell:
             for count, what in ((failed, "failed"), (missing, "missing"))
             if count
         ]
-        return cls(
-            policy,
-            table,
-            arm,
-            tuple(one for one in found if one is not None and one.error is None),
-            ", ".join(problems) or None,
-            reference.performance.get(arm.setting) if reference else None,
-            reference is not None and arm.setting in reference.cells,
-        )
+        kept = tuple(one for one in found if one is not None and one.error is None)
+        problem = ", ".join(problems) or None
+        if reference is None:
+            return cls(policy, table, arm, kept, problem)
+        published, counted = reference.performance.get(arm.setting), arm.setting in reference.cells
+        return cls(policy, table, arm, kept, problem, published, counted)
 
     @cached_property
     def by_seed(self) -> NDArray[np.float64]:
@@ -119,9 +114,8 @@ class Cell:
     @cached_property
     def one_run(self) -> Interval:
         """Mean P with the 95 % interval of one further run."""
-        if not self.n_seeds:
-            return _UNKNOWN
-        return self._possible(spi.prediction_interval(self.by_seed.ravel()))
+        p = self.by_seed.ravel()
+        return self._possible(spi.prediction_interval(p)) if p.size else _UNKNOWN
 
     def _possible(self, interval: Interval) -> Interval:
         """Return an interval that ends at the number of items where none comes back."""
@@ -144,10 +138,8 @@ class Cell:
     @property
     def published_inside(self) -> bool | None:
         """Whether the published P lies in the interval of one run; None: unknown."""
-        _, low, high = self.one_run
-        if self.published is None or low is None or high is None:
-            return None
-        return low <= self.published <= high
+        p, (_, low, high) = self.published, self.one_run
+        return None if p is None or low is None or high is None else low <= p <= high
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,8 +168,8 @@ class Verdict:
     saturated: bool
     margin: float
     p_holm: float | None = None
-    verdict_holm: words.Verdict | None = None
-    equivalence_holm: words.Verdict | None = None
+    verdict_holm: spi.Verdict | None = None
+    equivalence_holm: spi.Verdict | None = None
     stopped_at: int | None = None
     published: float | None = None
     claimed: bool | None = None
@@ -308,15 +300,12 @@ def judge_one(
     ]
     if not problems:
         digests = (cells[arm].digests for arm in (comparison.original, comparison.changed))
+        # The removed robots make the third condition another one by construction.
         identical = comparison.removed is None and same_runs(*digests)
         samples = {arm: cells[arm].by_seed for arm in comparison.arms}
         try:
             estimate = comparison.estimate(
-                samples,
-                paired=paired,
-                saturated=saturated,
-                identical=identical,
-                confidence=confidence,
+                samples, capped=saturated, paired=paired, identical=identical, confidence=confidence
             )
             if comparison.definition.unchanged(margin) is not None:  # S has no such question
                 named = dict(zip(("p_o", "p_new", "p_s"), comparison.arguments.values()))

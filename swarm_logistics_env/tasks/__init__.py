@@ -1,7 +1,5 @@
 """Tasks: what a study can play."""
 
-from __future__ import annotations
-
 from swarm_logistics_env.policies.files import StableBaselinesModel
 
 from .parallel_policies import RandomActions, SumOfInfos, SumOfRewards

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import inspect
 import math
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import streams
 from swarm_logistics_env.errors import PolicyError, StudyError
 
-from .parallel_wrappers import Env, Value
+from .parallel_wrappers import ByAgent, Env, Value
 
 
 class RandomActions:
@@ -45,7 +45,7 @@ def agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str |
         StudyError: the environment has another number of agents.
     """
     present = [row for row in range(n_robots) if row not in absent]
-    names = list(env.possible_agents)
+    names = env.possible_agents
     if len(names) != len(present):
         raise StudyError(
             f"the environment of {len(present)} robots has {len(names)} agents: should have as "
@@ -56,7 +56,7 @@ def agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str |
 
 
 def observation_rows(
-    env: Env, agents: Sequence[str | None], observations: Mapping[str, Value]
+    env: Env, agents: Sequence[str | None], observations: ByAgent
 ) -> NDArray[np.float32]:
     """Return observations as rows (N, D), flattened; those of absent robots are zero.
 
@@ -66,17 +66,15 @@ def observation_rows(
         agent: np.asarray(spaces.flatten(env.observation_space(agent), value), dtype=np.float32)
         for agent, value in observations.items()
     }
-    width = max((len(row) for row in flat.values()), default=0)
+    width = max(map(len, flat.values()), default=0)
     rows = np.zeros((len(agents), width), dtype=np.float32)
     for row, agent in enumerate(agents):
-        if agent is not None and agent in flat:
+        if agent in flat:
             rows[row, : len(flat[agent])] = flat[agent]
     return rows
 
 
-def agent_actions(
-    env: Env, agents: Sequence[str | None], actions: Sequence[Value]
-) -> dict[str, Value]:
+def agent_actions(env: Env, agents: Sequence[str | None], actions: Sequence[Value]) -> ByAgent:
     """Return the rows of actions by agent, each of its action space's type.
 
     Raises:
@@ -84,12 +82,11 @@ def agent_actions(
     """
     if len(actions) != len(agents):
         raise PolicyError(f"{len(actions)} actions for {len(agents)} robots")
-    present = set(env.agents)
-    found: dict[str, Value] = {}
-    for row, agent in enumerate(agents):
-        if agent is None or agent not in present:
+    found: ByAgent = {}
+    for row, (agent, action) in enumerate(zip(agents, actions)):
+        if agent is None or agent not in env.agents:
             continue
-        space, action = env.action_space(agent), actions[row]
+        space = env.action_space(agent)
         if isinstance(space, spaces.Discrete):
             action = int(action)
         elif isinstance(space, spaces.Box | spaces.MultiDiscrete | spaces.MultiBinary):
@@ -101,7 +98,7 @@ def agent_actions(
 
 
 # What one step adds to P: of the environment after the step, its rewards and its infos.
-Gain = Callable[[Env, Mapping[str, Value], Mapping[str, Value]], float]
+Gain = Callable[[Env, ByAgent, ByAgent], float]
 
 REMEDY = (
     "the indicators are ratios, so P needs a true zero: give another measure (performance=a "
@@ -120,7 +117,7 @@ class SumOfRewards:
 
     shared: bool = False
 
-    def __call__(self, env: Env, rewards: Mapping[str, Value], infos: Mapping[str, Value]) -> float:
+    def __call__(self, env: Env, rewards: ByAgent, infos: ByAgent) -> float:
         """Return what one step adds."""
         return _total(rewards.values(), self.shared)
 
@@ -137,7 +134,7 @@ class SumOfInfos:
     key: str
     shared: bool = False
 
-    def __call__(self, env: Env, rewards: Mapping[str, Value], infos: Mapping[str, Value]) -> float:
+    def __call__(self, env: Env, rewards: ByAgent, infos: ByAgent) -> float:
         """Return what one step adds."""
         return _total((info[self.key] for info in infos.values() if self.key in info), self.shared)
 

@@ -33,6 +33,7 @@ from .parallel_policies import (
 from .parallel_wrappers import (
     FAILURE_MODES,
     REMOVED,
+    ByAgent,
     Env,
     FailingRobots,
     RobotFault,
@@ -225,7 +226,7 @@ class ParallelTask:
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
 
-        def add(observations: Mapping[str, Value], rewards: Mapping[str, Value]) -> None:
+        def add(observations: ByAgent, rewards: ByAgent) -> None:
             for agent in sorted(observations):
                 space = env.observation_space(agent)
                 digest.update(np.asarray(flatten(space, observations[agent])).tobytes())

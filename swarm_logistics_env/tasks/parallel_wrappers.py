@@ -22,6 +22,7 @@ from swarm_logistics_env.records import Record
 
 # An observation, an action or an info: PettingZoo leaves their types to each environment.
 Value: TypeAlias = Any
+ByAgent: TypeAlias = dict[str, Value]
 Env: TypeAlias = ParallelEnv[str, Value, Value]
 
 
@@ -46,14 +47,14 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
     """
 
     def reset(
-        self, seed: int | None = None, options: dict[str, Value] | None = None
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        self, seed: int | None = None, options: ByAgent | None = None
+    ) -> tuple[ByAgent, ByAgent]:
         """Begin an episode; observations and infos of all possible agents."""
         observations, infos = self.env.reset(seed=seed, options=options)
         self.agents = list(self.possible_agents)
         return self._padded(self.env.agents, observations, infos)
 
-    def step(self, actions: dict[str, Value]) -> tuple[dict[str, Value], ...]:
+    def step(self, actions: ByAgent) -> tuple[ByAgent, ...]:
         """Step with the actions of the agents that are there; all possible agents are answered."""
         there = list(self.env.agents)
         observations, rewards, _, truncations, infos = self.env.step(
@@ -73,18 +74,18 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
         )
 
     def _padded(
-        self, there: Sequence[str], observations: dict[str, Value], infos: dict[str, Value]
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
-        active = {agent: agent in there for agent in self.possible_agents}
-        return {
-            agent: observations[agent]
-            if is_active
-            else create_zero_array(self.observation_space(agent))
-            for agent, is_active in active.items()
-        }, {
-            agent: {**infos.get(agent, {}), "active": int(is_active)}
-            for agent, is_active in active.items()
-        }
+        self, there: Sequence[str], observations: ByAgent, infos: ByAgent
+    ) -> tuple[ByAgent, ByAgent]:
+        seen: ByAgent = {}
+        told: ByAgent = {}
+        for agent in self.possible_agents:
+            active = agent in there
+            told[agent] = {**infos.get(agent, {}), "active": int(active)}
+            if active:
+                seen[agent] = observations[agent]
+            else:
+                seen[agent] = create_zero_array(self.observation_space(agent))
+        return seen, told
 
 
 class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
@@ -130,8 +131,8 @@ class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's
                     )
 
     def reset(
-        self, seed: int | None = None, options: dict[str, Value] | None = None
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        self, seed: int | None = None, options: ByAgent | None = None
+    ) -> tuple[ByAgent, ByAgent]:
         """Begin an episode; the seed also decides how many agents it has."""
         seed = self._next if seed is None else seed
         self._next = seed + 1
@@ -241,12 +242,12 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
                 raise FaultError(f"{fault.robots} robots fail of {len(self._rows)}")
 
     def reset(
-        self, seed: int | None = None, options: dict[str, Value] | None = None
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        self, seed: int | None = None, options: ByAgent | None = None
+    ) -> tuple[ByAgent, ByAgent]:
         """Begin an episode; the seed also decides which robots fail. None: the next seed."""
         self._seed = self._seed + 1 if seed is None else seed
         self._steps = 0
-        self._last: dict[str, Value] = {}
+        self._last: ByAgent = {}
         self._noise: dict[str, np.random.Generator] = {}
         size = max(self._rows.values()) + 1
         self._failing = [
@@ -255,7 +256,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         observations, infos = self.env.reset(seed=seed, options=options)
         return self._observed(observations), infos
 
-    def step(self, actions: dict[str, Value]) -> tuple[dict[str, Value], ...]:
+    def step(self, actions: ByAgent) -> tuple[ByAgent, ...]:
         """Step with the actions that failing robots execute; observations as they sense them."""
         executed = {agent: self._executed(agent, action) for agent, action in actions.items()}
         observations, *others = self.env.step(executed)
@@ -275,7 +276,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         self._last[agent] = action
         return action
 
-    def _observed(self, observations: dict[str, Value]) -> dict[str, Value]:
+    def _observed(self, observations: ByAgent) -> ByAgent:
         self.given = observations
         return {agent: self._sensed(agent, value) for agent, value in observations.items()}
 

@@ -24,17 +24,18 @@ from swarm_logistics_env.errors import StudyError, suggest
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.records import canonical_json
 
+Seconds: TypeAlias = NDArray[np.float64]
 Fields: TypeAlias = Mapping[str, object]  # of a record, by name
 
 
-def _ascending(times: NDArray[np.float64]) -> NDArray[np.float64]:
+def _ascending(times: Seconds) -> Seconds:
     if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
         raise ValueError("should ascend")
     return times
 
 
 Times = Annotated[
-    NDArray[np.float64],
+    Seconds,
     BeforeValidator(lambda times: np.asarray(times, dtype=np.float64)),
     AfterValidator(_ascending),
     PlainSerializer(lambda times: times.tolist()),
@@ -84,7 +85,12 @@ class Outcome:
         return self.ended_at if self.all_delivered else math.inf
 
 
-class TaskScenario(Protocol):
+class _Fields(Protocol):
+    def model_dump(self, *, mode: str = "python") -> Fields:
+        """Return the fields."""
+
+
+class TaskScenario(_Fields, Protocol):
     """A scenario of a task: a record (`records.Record`) that says how many robots, and how long."""
 
     @property
@@ -95,14 +101,11 @@ class TaskScenario(Protocol):
     def duration(self) -> float:
         """Time at which a run ends at the latest [s]."""
 
-    def model_dump(self, *, mode: str = "python") -> Fields:
-        """Return its fields."""
-
     def conditions(self) -> list[tuple[str, str, str]]:
         """Return rows of name, value, and unit with meaning, for the report."""
 
 
-class TaskFault(Protocol):
+class TaskFault(_Fields, Protocol):
     """A fault of a task: a record that says which robots fail, how, and from when on."""
 
     @property
@@ -112,9 +115,6 @@ class TaskFault(Protocol):
     @property
     def onset(self) -> float:
         """When it begins [s]."""
-
-    def model_dump(self, *, mode: str = "python") -> Fields:
-        """Return its fields."""
 
 
 @runtime_checkable

@@ -16,9 +16,7 @@ from swarm_logistics_env.policies.policy import code_digest
 from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
-from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
 
 from .task import Case, Fields, Outcome, TaskScenario
 

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
-import numpy as np
 import pygame
-from numpy.typing import NDArray
 
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.rendering.palette import SURROUNDINGS
 from swarm_logistics_env.rendering.picture import Picture
-from swarm_logistics_env.rendering.sprites import new_canvas, to_array, words
+from swarm_logistics_env.rendering.sprites import Pixels, new_canvas, to_array, words
 
 MOST_TAKES = 4
 LAST_FRAME = 2.0  # [s] it stays so long, so that a looping film can be read
 
 
-@dataclass(frozen=True)
-class Take:
+class Take(NamedTuple):
     """One of the runs that a film shows.
 
     Attributes:
@@ -75,7 +72,7 @@ class Film:
         self._n_last = round(LAST_FRAME * frame_rate)
         self.n_frames = math.ceil(self._until / self._period) + 1 + self._n_last
 
-    def frames(self) -> Iterator[NDArray[np.uint8]]:
+    def frames(self) -> Iterator[Pixels]:
         """Play the runs and return their pictures: (H, W, 3), red, green, blue, even sides.
 
         Raises:
@@ -94,11 +91,11 @@ class Film:
         for _ in range(self._n_last):
             yield frame
 
-    def _draw(self) -> NDArray[np.uint8]:
+    def _draw(self) -> Pixels:
         canvas = new_canvas(self._width, self._head + self._tall)
         canvas.fill(SURROUNDINGS)
         x = 0
-        for take, picture in zip(self._takes, self._pictures, strict=True):
+        for take, picture in zip(self._takes, self._pictures):
             world = take.play.world
             room = pygame.Rect(x, 0, picture.width, self._head).inflate(-self._text_height, 0)
             # Large, so that it can be read where the film is small.

@@ -5,10 +5,11 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 import zlib
 from collections.abc import Callable
 from importlib import resources
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,10 @@ from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
-from swarm_logistics_env.watch.session import SPEEDS, Session
+
+from .session import SPEEDS, Session
+
+Message: TypeAlias = dict[str, Any]
 
 _TOLD = ("seed", "speed", "paused", "mode", "note", "policy", "against", "names")
 _SHAPE = (
@@ -33,7 +37,7 @@ _BLOCKS = ("item", "neighbour", "lowest_timer")
 _TIMER_STEPS = 8  # shades of the timer's halo
 
 
-def fixed_data(session: Session) -> dict[str, Any]:
+def fixed_data(session: Session) -> Message:
     """Return what never changes: colours, failure modes, speeds, policies to choose from."""
     return {
         "colours": {
@@ -50,7 +54,7 @@ def fixed_data(session: Session) -> dict[str, Any]:
     }
 
 
-def frame(session: Session) -> dict[str, Any]:
+def frame(session: Session) -> Message:
     """Return what is true now. Lengths in mm, times in s, angles in mrad; x right, y up.
 
     `arenas` has for each of the two runs: `poses` (3 N numbers: x, y, heading of each robot, or
@@ -58,12 +62,12 @@ def frame(session: Session) -> dict[str, Any]:
     mark, robot it follows] of each), `items` (x, y of each that is stored), `requested` ([x, y,
     carrier] of the item asked for, or None) and `deliveries` (their times).
     """
-    frame: dict[str, Any] = {
+    frame: Message = {
         **{name: getattr(session, name) for name in _TOLD},
-        "time": round(session.run.world.state.time, 3),
+        "time": round(session.state.time, 3),
         "over": session.is_over,
         "scenario": {name: getattr(session.scenario, name) for name in _SHAPE},
-        "obstacles": _millimetres(session.run.world.state.obstacle_position),
+        "obstacles": _millimetres(session.state.obstacle_position),
         "events": [[round(e.time, 1), e.robot, e.label] for e in session.events],
         "selected": _selected(session),
     }
@@ -72,12 +76,12 @@ def frame(session: Session) -> dict[str, Any]:
     return frame
 
 
-def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
+def changes(before: Message, after: Message) -> Message:
     """Return the entries of `after` that are not the same in `before`."""
     return {name: value for name, value in after.items() if before.get(name, ...) != value}
 
 
-def encode(message: dict[str, Any]) -> str:
+def encode(message: Message) -> str:
     """Return a message as JSON."""
     return json.dumps(message, separators=(",", ":"), allow_nan=False)
 
@@ -142,7 +146,7 @@ def observation_parts(
     return found
 
 
-def _arena(play: Play) -> dict[str, Any]:
+def _arena(play: Play) -> Message:
     state, scenario = play.world.state, play.world.scenario
     poses: list[int | None] = []
     robots: list[list[Any] | None] = []
@@ -159,12 +163,10 @@ def _arena(play: Play) -> dict[str, Any]:
         robots.append(
             [palette.activity(state, robot), age, mark, palette.followed(state, scenario, robot)]
         )
-    requested = None
+    requested, stored = None, state.item_status == STORED
     if state.requested != NOBODY:
-        place = _millimetres(state.item_position[state.requested][np.newaxis])[0]
+        (place,) = _millimetres(state.item_position[[state.requested]])
         requested = [*place, state.carrier]
-    stored = state.item_status == STORED
-    if requested:
         stored[state.requested] = False
     return {
         "poses": poses,
@@ -175,11 +177,11 @@ def _arena(play: Play) -> dict[str, Any]:
     }
 
 
-def _selected(session: Session) -> dict[str, Any] | None:
+def _selected(session: Session) -> Message | None:
     robot = session.selected
     if robot is None:
         return None
-    state, row = session.run.world.state, session.run.world.observe()[robot]
+    state, row = session.state, session.run.world.observe()[robot]
     seen = unflatten(row, session.scenario)
     beams = np.min([seen[f"range_{what}"] for what in ("robots", "walls", "items")], axis=0)
     return {
@@ -215,7 +217,7 @@ class Recording:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._play: object = None
-        self._last: dict[str, Any] = {}
+        self._last: Message = {}
         self._messages: list[str] = []
 
     def note(self) -> None:
@@ -223,7 +225,7 @@ class Recording:
         session = self._session
         if session.run is not self._play:  # another episode
             self._play, self._last, self._messages = session.run, {}, []
-        time = session.run.world.state.time
+        time = session.state.time
         if self._last and time < self._last["time"] + _SPACING - 1e-9 and not session.is_over:
             return
         now = {**frame(session), "selected": None, "note": "", "paused": False}
@@ -244,7 +246,7 @@ def recorded_page(session: Session, until: float) -> str:
     """Play a session up to a time [s], or to its end; return the page that replays it."""
     recording = Recording(session)
     recording.note()
-    while not session.is_over and session.run.world.state.time < until - 1e-9:
+    while not session.is_over and session.state.time < until - 1e-9:
         session.advance()
         recording.note()
     return recording.page()
@@ -262,8 +264,7 @@ def _page_around(text: str) -> str:
         f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
         "img-src data:; base-uri 'none'; form-action 'none'"
     )
-    head, tail = page.split("<!-- files -->")[0], page.split("<!-- /files -->")[1]
-    body, end = tail.split("<!-- scripts -->")[0], tail.split("<!-- /scripts -->")[1]
+    head, _, body, _, end = re.split("<!-- /?(?:files|scripts) -->", page)
     return (
         f'{head}<meta http-equiv="Content-Security-Policy" content="{policy}">'
         f"<style>{css}</style>{body}"

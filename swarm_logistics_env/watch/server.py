@@ -14,11 +14,12 @@ import time
 from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, how_to_install
-from swarm_logistics_env.watch.messages import Recording, changes, encode, fixed_data, frame, obey
-from swarm_logistics_env.watch.session import Session
+
+from .messages import Message, Recording, changes, encode, fixed_data, frame, obey
+from .session import Session
 
 if TYPE_CHECKING:
     from aiohttp import web
@@ -79,7 +80,7 @@ class WatchServer:
         self.token = token or secrets.token_urlsafe(18)
         self.recording = Recording(session)
         self.address = ""
-        self._pages: dict[web.WebSocketResponse, dict[str, Any]] = {}
+        self._pages: dict[web.WebSocketResponse, Message] = {}
 
         @web.middleware
         async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:

@@ -9,12 +9,11 @@ from collections.abc import Callable, Sequence
 from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError, suggest
-from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.faults import FaultLike, checked_faults, failed_robots
+from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES, failure_mode
+from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults, failed_robots
+from swarm_logistics_env.warehouse.state import WarehouseState
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 
@@ -57,10 +56,10 @@ class Session:
         seed: int = 0,
         faults: Sequence[FaultLike] = (),
         speed: float = 1.0,
-        load: Callable[[str], Policy] = policies.load,
+        load: Callable[[str], policies.Policy] = policies.load,
     ) -> None:
         self.load, self._planned = load, checked_faults("faults", faults)
-        named = [name for name in (policy, against) if name is not None]
+        named = filter(None, (policy, against))
         self.choices = tuple(dict.fromkeys([*named, *policies.NAMES]))
         self.paused, self.mode = False, "FM4"
         self.set_speed(speed)
@@ -75,6 +74,11 @@ class Session:
         return self.run.world.scenario
 
     @property
+    def state(self) -> WarehouseState:
+        """The state of the run, beside which the other one plays."""
+        return self.run.world.state
+
+    @property
     def is_over(self) -> bool:
         """Whether both runs have come to their ends."""
         return self.run.is_over and self.beside.is_over
@@ -82,9 +86,7 @@ class Session:
     @property
     def names(self) -> tuple[str, str]:
         """The titles of the two runs."""
-        if self.against is None:
-            return self.policy, f"{self.policy} without faults"
-        return self.policy, self.against
+        return self.policy, self.against or f"{self.policy} without faults"
 
     # Time
 
@@ -164,10 +166,10 @@ class Session:
     def break_robot(self, robot: int | None = None) -> None:
         """Let `robot` fail from now on in the chosen mode; None means the selected robot."""
         robot = self._meant(robot)
-        if self.mode in self.run.world.state.failure_modes[robot]:
+        if self.mode in self.state.failure_modes[robot]:
             self.note = f"robot {robot} already fails in mode {self.mode}"
             return
-        now = round(self.run.world.state.time, 9)
+        now = round(self.state.time, 9)
         fault = Fault(self.mode, [robot], onset=now)
         self._set_faults([*self.run.world.faults, fault])
         self._look_after_selection()
@@ -195,7 +197,7 @@ class Session:
     def toggle_robot(self, robot: int) -> None:
         """Select a robot, and break it, or repair it if it fails."""
         self.select(robot)
-        if self.run.world.state.failed[robot]:
+        if self.state.failed[robot]:
             self.repair_robot(robot)
         else:
             self.break_robot(robot)
@@ -243,12 +245,12 @@ class Session:
             self.beside.world.set_faults(faults)
 
     def _look_after_selection(self) -> None:
-        robot, present = self.selected, self.run.world.state.robot_present
+        robot, present = self.selected, self.state.robot_present
         if robot is not None and not (robot < len(present) and present[robot]):
             self.selected = None
 
     def _log(self, robot: int, mode: str | None) -> None:
-        self.events.append(Event(self.run.world.state.time, robot, mode))
+        self.events.append(Event(self.state.time, robot, mode))
 
     def _meant(self, robot: int | None) -> int:
         if robot is None:
@@ -261,6 +263,6 @@ class Session:
         return robot
 
     def _check_there(self, robot: int) -> None:
-        state = self.run.world.state
+        state = self.state
         if not (0 <= robot < state.n_robots and state.robot_present[robot]):
             raise SetupError(f"robot = {robot}: should be one that is in the warehouse")
