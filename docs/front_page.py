@@ -195,7 +195,7 @@ def draw(rows: Rows, path: Path) -> None:
 
 
 def with_address(text: str, address: str | None) -> str:
-    """Return the README whose pictures and links lead to a repository, "https://.."; None: as is."""
+    """Return the README with absolute links to a repository, "https://.."; None: as it is."""
     if address is None:
         return text
     text = re.sub(r'(src="|!\[[^]]*\]\()(?=docs/)', rf"\g<1>{address}/raw/main/", text)

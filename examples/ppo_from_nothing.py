@@ -28,6 +28,7 @@ def network(n_outputs):
 
 
 def main(total_timesteps=1_000_000, duration=200.0, seed=0, judged=20):
+    torch.set_num_threads(1)  # networks this small are slower on several
     torch.manual_seed(seed)
     scenario = Scenario(n_robots=10, n_items=8, restock=True, duration=duration, **SMALL)
     env = SwarmVecEnv(

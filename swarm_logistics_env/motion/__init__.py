@@ -1,5 +1,5 @@
 """A robot's memory, and its observations and commands in the frame of its own motion."""
 
-from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionFrame
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
 
-__all__ = ["INPUTS", "OUTPUTS", "MotionFrame"]
+__all__ = ["INPUTS", "OUTPUTS", "MotionView"]

@@ -51,7 +51,7 @@ INPUTS = _names()
 LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
 
 
-class MotionFrame:
+class MotionView:
     """Makes network inputs from observation rows, and commands from outputs, row by row.
 
     Each row has a memory of its own (see `memory`), begun anew by `begin`.

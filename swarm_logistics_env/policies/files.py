@@ -114,7 +114,7 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
 
     Its input "inputs" is float32 (robots, inputs), in the order of its card; its output "outputs"
     is float32 (robots, 3), `motion.OUTPUTS`. What makes inputs of observations and a memory, and
-    commands of outputs, is `motion.MotionFrame`; docs/training.md has an example. The metadata hold
+    commands of outputs, is `motion.MotionView`; docs/training.md has an example. The metadata hold
     the card, and as "deviations" three numbers: the standard deviations of the noise that is added
     to the outputs at each step, zeros for a policy that does not explore.
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionFrame, random_heading
+from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionView, random_heading
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -53,7 +53,7 @@ class Homing:
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: the control period."""
         self._period = scenario.control_period
-        self._frame = MotionFrame(scenario)
+        self._frame = MotionView(scenario)
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode with random headings and empty memories."""
@@ -75,7 +75,7 @@ class Homing:
     def _decide(
         self,
         observations: NDArray[np.float32],
-        frame: MotionFrame,
+        frame: MotionView,
         random_headings: NDArray[np.int64],
         commands: NDArray[np.float64],
     ) -> None:

@@ -27,7 +27,7 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionFrame, random_heading
+from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionView, random_heading
 from swarm_logistics_env.policies.homing import (
     AVOID_GAIN,
     AVOID_RANGE,
@@ -82,7 +82,7 @@ class HomingStock(Homing):
     def _decide(
         self,
         observations: NDArray[np.float32],
-        frame: MotionFrame,
+        frame: MotionView,
         random_headings: NDArray[np.int64],
         commands: NDArray[np.float64],
     ) -> None:

@@ -24,7 +24,7 @@ from pydantic import (
 
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionFrame
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -295,7 +295,7 @@ class LearnedPolicy:
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: its control period and its body."""
-        self._frame = MotionFrame(scenario, self.card.network.listens)
+        self._frame = MotionView(scenario, self.card.network.listens)
         self.reset(0, 0)
 
     def reset(self, n_robots: int, seed: int) -> None:

@@ -219,7 +219,14 @@ class PolicySpec(Record):
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         if makers and self.name.endswith(SB3_SUFFIX):
             return copy.deepcopy(_model(self.name))
-        return copy.deepcopy(_loaded(self.name, canonical_json(self.parameters), self.trusted))
+        found = _loaded(self.name, canonical_json(self.parameters), self.trusted)
+        try:
+            return copy.deepcopy(found)
+        except Exception as error:  # of code that is not ours
+            raise PolicyError(
+                f"policy {self.name!r} cannot be copied ({type(error).__name__}): should keep "
+                "arrays, not an environment, as each run gets a copy"
+            ) from error
 
     def identity(self, makers: Makers = NO_MAKERS) -> str:
         """Return text that changes whenever the policy's behaviour may have; `makers` as `load`.

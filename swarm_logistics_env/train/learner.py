@@ -28,7 +28,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.motion.frame import OUTPUTS, MotionFrame
+from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.motion.memory import body_of
 from swarm_logistics_env.policies.learned import STREAM, Network
 from swarm_logistics_env.records import becoming
@@ -102,7 +102,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     """
 
     def __init__(self, worlds: SwarmVecEnv, scenario: Scenario, network: Network) -> None:
-        self.frame = MotionFrame(scenario, network.listens)
+        self.frame = MotionView(scenario, network.listens)
         self._n_inputs = len(network.inputs)
         self.observations = np.zeros((worlds.num_envs, 0), np.float32)
         self._known = np.zeros((worlds.num_envs, len(KNOWN)), np.float32)

@@ -230,7 +230,7 @@ class Commands(NamedTuple):
     n_logged: Annotated[Integers, 1]  # steps in `log`
 
 
-class Outcome(NamedTuple):
+class StepResult(NamedTuple):
     """What the last step has to tell beside the state; each an array of one."""
 
     refused: Annotated[Integers, 1]  # place, row by row, of a command that is not finite; or NOBODY
@@ -249,7 +249,7 @@ class World(NamedTuple):
     items: Items
     obstacles: Annotated[Numbers, "n_obstacles", 2]  # [m]
     progress: Progress
-    outcome: Outcome
+    outcome: StepResult
     robot_grid: Grid
     item_grid: Grid
     nearby: Nearby

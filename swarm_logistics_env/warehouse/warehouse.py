@@ -22,7 +22,7 @@ from .logistics import IDLE, MESSAGE
 from .packing import blank, packed
 from .physics import Physics
 from .state import NOBODY, STORED, WarehouseState
-from .structs import Claims, Commands, Nearby, Outcome, Sensed, World, lengths_of, parameters_of
+from .structs import Claims, Commands, Nearby, Sensed, StepResult, World, lengths_of, parameters_of
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
@@ -360,7 +360,7 @@ class Warehouse:
             items=state.items,
             obstacles=state.obstacle_position,
             progress=state.progress,
-            outcome=blank(Outcome, lengths),
+            outcome=blank(StepResult, lengths),
             robot_grid=self._robot_grid,
             item_grid=self._item_grid,
             nearby=blank(Nearby, lengths),

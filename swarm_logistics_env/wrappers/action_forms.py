@@ -69,7 +69,7 @@ class MotionFrame(Wrapper):
 
     def begun(self, seed: int) -> None:
         """Begin an episode of empty memories and random headings."""
-        self._frame = motion.MotionFrame(self.warehouse.scenario, self._listens)
+        self._frame = motion.MotionView(self.warehouse.scenario, self._listens)
         self._frame.begin(row_keys(seed, "motion frame", self.warehouse.state.n_robots))
 
     def step_arrays(self, outputs: ArrayLike) -> ArrayStep:

@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.frame import INPUTS, LEAD, MotionFrame
+from swarm_logistics_env.motion.frame import INPUTS, LEAD, MotionView
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
 Rows = NDArray[np.float32]
 
 
-def frame_of(n_robots: int = 1, seed: int = 0, listens: bool = True) -> MotionFrame:
-    frame = MotionFrame(Scenario(), listens)
+def frame_of(n_robots: int = 1, seed: int = 0, listens: bool = True) -> MotionView:
+    frame = MotionView(Scenario(), listens)
     frame.begin(row_keys(seed, "test", n_robots))
     return frame
 
@@ -111,7 +111,7 @@ def test_standing_still_with_the_requested_item_is_being_stuck() -> None:
 
 
 def test_rows_begin_anew_by_themselves() -> None:
-    def run(frame: MotionFrame, steps: int) -> Rows:
+    def run(frame: MotionView, steps: int) -> Rows:
         for _ in range(steps):
             seen = frame.read(anything(6))
             frame.command(np.full((6, 3), 0.25))
@@ -173,7 +173,7 @@ def test_a_caged_robot_lets_go_and_carries_off_what_is_in_its_way() -> None:
 
 def test_a_robot_knows_its_own_body_whatever_its_neighbours_have() -> None:
     scenario = Scenario(max_speed=1.0, handling_time=0.5, drive="differential")
-    frame, rows = MotionFrame(Scenario()), np.tile(amid(), (2, 1))
+    frame, rows = MotionView(Scenario()), np.tile(amid(), (2, 1))
     bodies = np.stack([known.body_of(Scenario()), known.body_of(scenario)])
     frame.begin(row_keys(0, "test", 2), bodies)
     assert frame.read(rows)[:, -3:].tolist() == [[1.0, 0.0, 0.0], [0.5, 0.25, 1.0]]

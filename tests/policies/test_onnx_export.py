@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionFrame
+from swarm_logistics_env.motion import INPUTS, OUTPUTS, MotionView
 from swarm_logistics_env.policies import PolicyCard
 from swarm_logistics_env.policies.files import CARD, DEVIATIONS, write_onnx
 from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy, explore
@@ -54,7 +54,7 @@ def test_it_says_what_numpy_says_on_every_row_of_an_episode(
     policy.configure(scenario)
     policy.reset(25, 3)
     # Beside the policy, a frame of its own: with the same rows it has the same memories.
-    frame = MotionFrame(scenario, policy.card.network.listens)
+    frame = MotionView(scenario, policy.card.network.listens)
     keys = row_keys(3, STREAM, 25)
     frame.begin(keys)
     furthest = 0.0

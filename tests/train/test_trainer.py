@@ -19,7 +19,7 @@ from stable_baselines3.common.callbacks import ConvertCallback
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
-from swarm_logistics_env.motion.frame import INPUTS, MotionFrame
+from swarm_logistics_env.motion.frame import INPUTS, MotionView
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.tasks.warehouse_task import WarehouseTask, code_version
 from swarm_logistics_env.train import evaluation, trainer
@@ -110,7 +110,7 @@ def test_the_view_trains_what_the_policy_plays_and_goes_on_from_a_checkpoint(sma
     view = trainer._new_view(training)
     view.seed(3)
     inputs = view.reset()
-    frame = MotionFrame(training.scenario)
+    frame = MotionView(training.scenario)
     frame.begin(view.frame.keys)
     rng = np.random.default_rng(0)
     for _ in range(20):
