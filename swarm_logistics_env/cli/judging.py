@@ -155,8 +155,6 @@ def judge_command(
 
     usual = Path("results", "judged", Path(asked).stem)
     directory = out or _free(usual)
-    if directory not in (out, usual):
-        echo(f"{usual} holds an earlier judgement, so this one goes into {directory}")
     count = import_results(
         Path(asked),
         directory,
@@ -166,6 +164,8 @@ def judge_command(
         decimal=decimal or ".",
         setup=_stated(setup or []),
     )
+    if directory not in (out, usual):
+        echo(f"{usual} holds an earlier judgement, so this one is in {directory}")
     imported = StoredStudy.existing(directory).imported
     echo("\n".join([f"{count} runs in {asked}", *(imported.notes if imported else ()), ""]))
     show_report(Study.stored(directory).findings(), directory, full=full)

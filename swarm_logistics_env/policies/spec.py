@@ -9,6 +9,7 @@ import importlib
 import inspect
 import json
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -364,8 +365,12 @@ def _imported(name: str) -> Callable[..., Policy] | None:
     module, colon, attribute = name.partition(":")
     if not colon:
         return None
-    if module.endswith(".py") and Path(module).parent == Path():  # a file of this folder
-        module = Path(module).stem
+    path = Path(module)
+    if path.suffix == ".py" and (path.is_file() or path.parent == Path()):
+        # A file of this folder or another, in which it finds its neighbours.
+        if (folder := str(path.parent.resolve())) not in sys.path:
+            sys.path.append(folder)
+        module = path.stem
     if "/" in module or module.endswith(".py"):
         raise PolicyError(
             f"policy {name!r}: should be MODULE:CLASS, as '{Path(module).stem}:{attribute}', with "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import zip_longest
@@ -79,15 +80,16 @@ class Line(NamedTuple):
         test, problems = self.tests[0], {test.problem for test in self.tests}
         if not any(one.estimate for one in self.tests):
             others = f", and {len(problems) - 1} more reasons" if len(problems) > 1 else ""
-            is_unplayed = all(str(problem).endswith(" missing") for problem in problems)
-            return f"{'no verdict' if is_unplayed else words[0]}: {test.problem}{others}"
+            if all(str(problem).endswith(" missing") for problem in problems):
+                return "not played yet"
+            return f"{words[0]}: {test.problem}{others}"
+        if all(one.estimate and one.conclusion is None for one in self.tests):
+            return f"no verdict: {self.indicator} lacks runs"
         if len(self.tests) > 1:
             return words[0] if len(set(words)) == 1 else section.counted(words)
         assert test.estimate is not None
         if test.conclusion == UNAFFECTED:
             return f"{words[0]}, exact"
-        if test.conclusion is None:
-            return f"no verdict: other questions on {self.indicator} lack runs"
         if "unbounded" in test.flags and test.conclusion in section.DECIDED:
             return f"{words[0]} by its test; P_o is too near 0 for an interval"
         if test.conclusion != "inconclusive":
@@ -150,10 +152,23 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
         lines = [_line(here) for here in alike.values()]
         if most is None or len(lines) <= most:
             break
+    # Recorded trials may ask one question in several tables, at other values of a parameter.
+    times = Counter((line.policy, line.question) for line in lines)
+    lines = [
+        line._replace(about=f"{line.about}, {_part_of_title(line.tests[0].compared.table)}")
+        if times[line.policy, line.question] > 1
+        else line
+        for line in lines
+    ]
     order, policies = list(DEFINITIONS), results.policies
     lines.sort(key=lambda line: (policies.index(line.policy), order.index(line.indicator)))
     shown = lines if most is None else _undefined_together(lines)
     return Answer(_asked(results), _performance(results), tuple(shown), _last(results))
+
+
+def _part_of_title(table: str) -> str:
+    """Return what stands in brackets at the end of a table's title, or else the title."""
+    return table.rstrip(")").rpartition(" (")[2]
 
 
 def _undefined_together(lines: Sequence[Line]) -> Iterator[Line]:
@@ -279,12 +294,23 @@ def _last(results: StudyResults) -> str:
         parts.append("two seeds give no verdict")
     if results.exploratory:
         parts.append("exploratory: other seeds than were declared, whose report this replaces")
+    if results.late_margin:
+        parts.append("equivalence is exploratory: another margin was declared")
     if any(test.saturated for test in tests):
         parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):
         parts.append("some runs stalled (P below a quarter of the median; --full names them)")
     if any(test.conclusion == "inconclusive" for test in tests):
-        parts.append(f"so many more {runs} find such a value in 4 of 5 studies")
+        parts.append(
+            f"so many more {runs} would tell such a value from the threshold in 4 of 5 studies"
+        )
+    beside = [test for test in tests if test.conclusion == "inconclusive" and _on_one_side(test)]
+    reasons = {
+        "so few seeds may hide stalls": any("hidden_stalls" in test.flags for test in beside),
+        "Holm counts all questions": any(test.plain in section.DECIDED for test in beside),
+    }
+    if why := " or ".join(reason for reason, holds in reasons.items() if holds):
+        parts.append(f"open beside an interval on one side of it: {why}")
     claims = [test for test in tests if test.claim]
     told = reference.claims if reference else {}
     of_text = [test for test in claims if test.compared.question in told]
@@ -297,9 +323,16 @@ def _last(results: StudyResults) -> str:
     return f"{line[0].upper()}{line[1:]}."
 
 
+def _on_one_side(test: Verdict) -> bool:
+    """Return whether an interval leaves out the threshold."""
+    _, low, high = test.interval or (None, None, None)
+    threshold = test.compared.threshold
+    return low is not None and high is not None and not low <= threshold <= high
+
+
 def in_a_sentence(results: StudyResults) -> str:
     """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
-    known = [test for test in results.verdicts if test.interval]
+    known = [one for one in results.verdicts if one.interval and one.interval.low is not None]
     known = [test for test in known if test.compared.indicator != "change"] or known
     words = section.counted(said(test.conclusion) for test in results.verdicts)
     told = f"{_performance(results)[:-1]} over {section.seeds_text(results)}"

@@ -214,7 +214,9 @@ def seeds_text(results: StudyResults) -> str:
     """Return over which seeds everything is, e.g. "20 paired seeds (0 to 19)"."""
     seeds = results.plan.seeds
     if not results.plan.paired:
-        return f"{len(seeds)} unpaired {'run' if len(seeds) == 1 else 'runs'} a condition"
+        fewest = min(cell.n_seeds for cell in results.cells)
+        count = f"{fewest} to {len(seeds)}" if fewest < len(seeds) else f"{fewest}"
+        return f"{count} unpaired {'run' if count == '1' else 'runs'} a condition"
     count = "one seed" if len(seeds) == 1 else f"{len(seeds)} paired seeds"
     return f"{count} ({seeds_in_words(seeds)})"
 

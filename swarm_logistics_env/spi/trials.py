@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -141,18 +142,41 @@ def read_trials(
     rows, others, digest = read_rows(path, columns or {}, ignore, decimal)
     varying = [name for name in others if len({row.cells[name] for row in rows}) > 1]
     faults = dict.fromkeys(row.text("fault") for row in rows)
+    _check_columns(path, rows[0], faults)
     # Each fault in small letters to how its first row has it.
     spelled = {name.casefold(): name for name in reversed(faults)}
     trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
-    found = _events(path, trials) if "time" in rows[0].names else _runs(path, trials)
+    found = _events(path, trials) if "time" in rows[0].names else _runs(trials)
     _check_pairing(path, found)
     _check_durations(path, found)
-    notes = (
+    notes = [
         f"The faults {spelled[name.casefold()]} and {name} are taken for one."
         for name in faults
         if name not in spelled.values()
-    )
+    ]
+    counts = Counter(trial.condition for trial in found)
+    if varying and min(counts.values()) == 1 < max(counts.values()):
+        notes.append(
+            f"{len(found)} trials in {len(counts)} conditions, as {' and '.join(varying)} varies, "
+            f"some of a single trial: --ignore {varying[0]!r} if it was only noted."
+        )
     return Trials(path.name, digest, tuple(found), tuple(notes))
+
+
+def _check_columns(path: Path, row: Row, faults: Iterable[str]) -> None:
+    """Refuse a file without the columns that no other can stand for, all of them at once."""
+    lacking = {}
+    if not {"performance", "time"} & row.names.keys():
+        lacking["performance"] = "column 'performance', or time, for one delivery a row"
+    fails = any(_FAULT_NAMES.get(one.lower()) not in (NO_FAULT, REPEATED) for one in faults)
+    if fails and "faulty" not in row.names:
+        lacking["faulty"] = "column 'faulty', for how many robots fail"
+    if lacking:
+        options = " ".join(f"--column {name}=NAME" for name in lacking)
+        raise IndicatorError(
+            f"{path} has no {' and no '.join(lacking.values())}: it has "
+            f"{', '.join(map(repr, row.cells))}; say which it is by {options}"
+        )
 
 
 def _trial(
@@ -192,13 +216,7 @@ def _trial(
     )
 
 
-def _runs(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
-    first = rows[0][1]
-    if "performance" not in first.names:
-        raise IndicatorError(
-            f"{path} has no column 'performance', or time, for one delivery a row: it has "
-            f"{', '.join(map(repr, first.cells))}; say which it is by --column performance=NAME"
-        )
+def _runs(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
     labels: dict[object, int] = {}
     for trial, row in rows:
         label = row.text("trial")

@@ -56,7 +56,8 @@ class StoredSpecification(BaseModel):
     def differing(self, asked: Specification, place: Path) -> list[str]:
         """Return which fields of what is asked are not those that were declared.
 
-        How far it is played, and how it is judged, may change: `Declaration` guards these.
+        How far it is played, and how it is judged, may change: `Declaration` tells whether verdicts
+        are exploratory then, and `StudyResults.late_margin` whether equivalence is.
         """
         declared = self.read(place, task=asked.played)
         free = ("seeds", "first_seed", "looks", "until_clear", "margin", "reference")

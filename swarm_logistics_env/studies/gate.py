@@ -8,10 +8,9 @@ P_old of every condition under which both judge a policy, over the seeds that th
 fails where R lies below 0 beyond chance, "possibly R < 0" wherever that is not ruled out, for want
 of seeds as well.
 `at` keeps the comparisons and conditions whose name holds the text, e.g. "R < 0 at FM4, m = 1".
-Verdicts are Holm-adjusted over what is kept, and at one of the newer study's declared looks they
-are as strict as those of its report. What cannot be judged fails: a policy without a match
-in the other study, failed runs, studies that share no seed. If both studies have the same runs, the
-change is exactly 0, and the gate fails if "0 < number" (or ">") is true.
+Verdicts are Holm-adjusted over what is kept. What cannot be judged fails: failed runs, and for
+`change` a policy without a match in the other study, or studies that share no seed. If both studies
+have the same runs, the change is exactly 0, and the gate fails if "0 < number" (or ">") is true.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, TypeVar
+from typing import Annotated, ClassVar, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -250,6 +250,15 @@ class Specification(_Part):
         """The task itself."""
         return task_of(self.task)
 
+    def trusting(self) -> Self:
+        """Return the specification with policies that may be files which run code."""
+
+        def trusted(policy: PolicySpec) -> PolicySpec:
+            return policy.replace(trusted=True)
+
+        parts = (one.replace(policy=trusted(one.policy)) for one in self.ablations)
+        return self.replace(policies=tuple(map(trusted, self.policies)), ablations=tuple(parts))
+
     @field_validator("scenario", mode="before")
     @classmethod
     def _of_the_task(cls, value: object, info: ValidationInfo) -> object:
@@ -334,7 +343,7 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
         raise StudyError(f"{path}: {error}") from error
     named = (*specification.policies, *(ablation.policy for ablation in specification.ablations))
     refuse_untrusted(path, None, named, trust_code=trust_code)
-    return specification
+    return specification.trusting() if trust_code else specification
 
 
 def seeds_in_words(seeds: Sequence[int]) -> str:

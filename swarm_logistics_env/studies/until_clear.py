@@ -55,7 +55,9 @@ def standing(plan: Plan, outcomes: Outcomes) -> Standing:
     shared = [n for n in runs.looks if not any(runs.missing(case, n) for case in plan.cases)]
     verdicts = {comparison: one for family in found for comparison, one in family.judged().items()}
     in_order = tuple(verdicts[comparison] for comparison in plan.comparisons)
-    return Standing(in_order, tuple(wanted.values()), max(shared, default=first))
+    # Seed by seed, so that a study that is stopped early has something of every question.
+    evenly = tuple(sorted(wanted.values(), key=lambda run: run.seed))
+    return Standing(in_order, evenly, max(shared, default=first))
 
 
 class _Looks:
@@ -75,10 +77,12 @@ class _Looks:
         ]
 
     def cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
-        seeds = self.plan.seeds[:n_seeds]
+        seeds, arms, known = self.plan.seeds[:n_seeds], comparison.arms, self._outcomes
+        # Before the first look is complete, the seeds of all arms tell a value and no verdict.
+        there = [seed for seed in seeds if all((arm.case.key, seed) in known for arm in arms)]
         return {
-            arm: Cell.of("", "", arm, [self._outcomes.get((arm.case.key, seed)) for seed in seeds])
-            for arm in comparison.arms
+            arm: Cell.of("", "", arm, [known.get((arm.case.key, s)) for s in there or seeds])
+            for arm in arms
         }
 
     def alpha(self, look: int, alpha: float) -> float:

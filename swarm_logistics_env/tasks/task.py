@@ -314,7 +314,7 @@ def refuse_untrusted(
         task, policies: that it names.
         trust_code: whether they may.
     """
-    said = [f"task {task!r}"] if task is not None and ":" in task else []
+    said = [f"task {task!r}"] if isinstance(task, str) and ":" in task else []
     said += [f"policy {policy.name!r}" for policy in policies if policy.runs_code]
     if said and not trust_code:
         raise StudyError(

@@ -114,8 +114,11 @@ def test_policy_of_ones_own_is_found_where_the_command_is_run(
     # As the installed script is started: without the folder it is run in.
     monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
     monkeypatch.chdir(tmp_path)
-    assert app.run(["run", "--policy", "lazy_policy:Lazy", *SMALL.split()]) == 0
-    assert "P = 0 items" in capsys.readouterr().out
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "deep_policy.py").write_text(OWN)
+    for name in ("lazy_policy:Lazy", "deep/deep_policy.py:Lazy"):
+        assert app.run(["run", "--policy", name, *SMALL.split()]) == 0
+        assert "P = 0 items" in capsys.readouterr().out
 
 
 def test_a_scenario_is_read_from_a_file(command: Command) -> None:

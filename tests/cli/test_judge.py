@@ -69,7 +69,7 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     report = (out / "report.md").read_text()
     assert "| arena | 4 m x 4 m |\n| robots | 8 |\n| floor | tiles |" in report
     # The same trials again are another study beside it.
-    assert "so this one goes into results/judged/lab-2" in command(TRIALS)
+    assert "so this one is in results/judged/lab-2" in command(TRIALS)
     assert Path("results", "judged", "lab-2", "report.md").is_file()
     assert "holds a study already" in command(f"{TRIALS} --out {out}", code=2)
 

@@ -11,8 +11,9 @@ import pytest
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.cli.study_commands import study_of
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.errors import PolicyError, StudyError
 from swarm_logistics_env.policies import Policy, PolicySpec
+from swarm_logistics_env.studies.specification import read_study_file
 
 pytest.importorskip("stable_baselines3")
 
@@ -55,7 +56,9 @@ def test_the_command_line_asks_too(model: Path, capsys: pytest.CaptureFixture[st
     assert app.run([*arguments, "--trust-code"]) == 0
 
 
-def test_a_study_reads_it_where_the_command_trusts_it_and_no_file_says_so(model: Path) -> None:
+def test_a_study_reads_it_where_somebody_trusts_it_and_no_file_says_so(
+    model: Path, tmp_path: Path
+) -> None:
     text = str(model)
     with pytest.raises(PolicyError, match="executes the code in it"):
         PolicySpec.of(text).load()
@@ -64,6 +67,15 @@ def test_a_study_reads_it_where_the_command_trusts_it_and_no_file_says_so(model:
     assert study.plan().cases[0].policy.trusted
     with pytest.raises(ValueError, match="'trusted' is no field of a table"):
         PolicySpec.of({"name": text, "trusted": True})
+    file = tmp_path / "study.toml"
+    file.write_text(f'policies = ["{model}"]\nsizes = [{{ values = [2, 3] }}]\n')
+    with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
+        read_study_file(file)
+    (policy,) = read_study_file(file, trust_code=True).policies
+    assert isinstance(policy.load(), Policy)
+    file.write_text("task = 5\n")
+    with pytest.raises(StudyError, match="task"):
+        read_study_file(file)
 
 
 def test_what_is_no_model_or_one_of_other_spaces_is_refused(model: Path, tmp_path: Path) -> None:

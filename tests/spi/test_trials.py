@@ -103,6 +103,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         ("\udcff", "is not a CSV file in UTF-8"),
         ("robots,p\n4,\x001\n", r"line 2: holds '\x00': should be plain text"),
         ("trial,robots\n1,8\n", "has no column 'performance', or time"),
+        ("robots,fault,broken,boxes\n4,jam,1,2\n", "by --column performance=NAME --column faulty="),
         ("robots,p,items\n4,1,1\n", "has columns 'p' and 'items', both performance"),
         ("robots,fualt,p\n4,none,1\n", "has a column 'fualt'; did you mean 'fault'?"),
         (HEAD + GOOD + "2,8,none,,ten\n", "line 3, column 'delivered': 'ten': should be a number"),
@@ -133,6 +134,13 @@ def test_a_broken_file_is_refused_by_line_column_and_remedy(
     assert words in str(caught.value)
     assert str(caught.value).startswith(str(tmp_path / "trials.csv"))
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_number_that_splits_the_trials_is_named(tmp_path: Path) -> None:
+    text = "robots,temperature,p\n4,20,1\n4,20,2\n8,20,2\n8,21,3\n"
+    (note,) = read(tmp_path, text).notes
+    assert "4 trials in 3 conditions, as temperature varies" in note
+    assert read(tmp_path, text, ignore=["temperature"]).notes == ()
 
 
 def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:

@@ -101,6 +101,14 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
         assert estimate.p_value == alone.p_value
 
 
+def test_stopped_before_the_first_look_it_has_a_value_of_every_question_and_no_verdict() -> None:
+    study = until_clear(60)
+    study.run(Engine(most=35))
+    found = verdicts_of(study)
+    assert {test.estimate and test.estimate.n_seeds for test in found.values()} <= {8, 9}
+    assert {test.conclusion for test in found.values()} == {None}
+
+
 def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
     looks, softened = looks_up_to(30), 0
     for number in range(10):

@@ -77,7 +77,7 @@ def test_numbers_of_numbers_and_central_control_by_numbers_are_refused(form: Any
 def test_it_reads_and_commands_as_the_frame_of_the_shipped_networks_does() -> None:
     fields = {"n_robots": 4, "faults": [Fault("removed", 2, onset=0.5)], "duration": 1.0}
     env, inner = MotionFrame(small(**fields)), small(**fields)
-    frame = motion.MotionFrame(Scenario())
+    frame = motion.MotionView(Scenario())
     rng = np.random.default_rng(0)
     for seed in (3, 4):
         read, rows = env.reset_arrays(seed), inner.reset_arrays(seed)
