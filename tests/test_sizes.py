@@ -48,7 +48,7 @@ MOST = {
     "files of the package": 124,
     "lines of code of studies and report": 3_950,
     "lines of tests": 15_000,
-    "lines of verification, benchmarks, interop and the scripts of docs": 5_130,
+    "lines of verification, benchmarks, interop and the scripts of docs": 5_135,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,

@@ -52,12 +52,12 @@ class Trace:
 
     def _held(self, value: object) -> str | None:
         """Return the name of the kind that a value is or has among its elements."""
-        if isinstance(value, dict):
-            value = tuple(value.values())
-        for one in value if isinstance(value, list | tuple) else (value,):
-            for each in one if isinstance(one, tuple) else (one,):
-                if isinstance(each, self._kinds):
-                    return next(kind.__name__ for kind in self._kinds if isinstance(each, kind))
+        inside = list(value.values()) if isinstance(value, dict) else value
+        found = [value, *(inside if isinstance(inside, list | tuple) else ())]
+        pairs = [one for one in found[1:] if isinstance(one, tuple)]
+        for each in (*found, *(part for pair in pairs for part in pair)):
+            if isinstance(each, self._kinds):
+                return next(kind.__name__ for kind in self._kinds if isinstance(each, kind))
         return None
 
     def _note(self, frame: FrameType, event: str, argument: object) -> None:

@@ -32,7 +32,8 @@ def tables(results: StudyResults) -> Iterator[Section]:
     Each has a table of P and the first indicator, then one of each further indicator.
     """
     tests = grouped(results.verdicts, lambda test: (test.compared.policy, test.compared.table))
-    for place, rows in grouped(results.cells, lambda cell: (cell.policy, cell.table)).items():
+    for place in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
+        rows = [cell for cell in results.cells if (cell.policy, cell.table) == place]
         published = any(cell.published is not None for cell in rows)
         setting: CellColumn = ("", lambda cell: cell.words)
         columns = [setting]

@@ -104,20 +104,27 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         found = standing(plan, outcomes)
         plan = replace(plan, specification=plan.specification.replace(seeds=found.shared_seeds))
         verdicts = found.verdicts
-    cells = []
-    for policy, table, arm in plan.cells:
-        runs = [outcomes.get((one.key, seed)) for one in arm.case.trainings for seed in plan.seeds]
-        cells.append(Cell.of(policy, table, arm, runs, paired=plan.paired, reference=reference))
-    results = StudyResults(
-        plan, reference, tuple(cells), (), exploratory, outcomes, looks, late_margin
+    cells: dict[Place, Cell] = {}
+    for place in plan.cells:
+        cases = place[-1].case.trainings
+        runs = [outcomes.get((one.key, seed)) for one in cases for seed in plan.seeds]
+        cells[place] = Cell.of(*place, runs, paired=plan.paired, reference=reference)
+    if not plan.specification.until_clear:
+        found_alone = []
+        for each in plan.comparisons:
+            of_arms = {arm: cells[each.policy, each.table, arm] for arm in each.arms}
+            found_alone.append(judge_one(each, of_arms, paired=plan.paired, margin=margin))
+        verdicts = under_holm(found_alone)
+    return StudyResults(
+        plan,
+        reference,
+        tuple(cells.values()),
+        tuple(_beside(reference, one) for one in verdicts),
+        exploratory,
+        outcomes,
+        looks,
+        late_margin,
     )
-    verdicts = verdicts or under_holm(
-        [
-            judge_one(each, results.cells_of(each), paired=plan.paired, margin=margin)
-            for each in plan.comparisons
-        ]
-    )
-    return replace(results, verdicts=tuple(_beside(reference, one) for one in verdicts))
 
 
 def _beside(reference: Reference | None, verdict: Verdict) -> Verdict:

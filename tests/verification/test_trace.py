@@ -1,0 +1,16 @@
+"""An episode and a policy's text take short ways, as CONTRIBUTING.md promises."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from verification.trace import episode_to_table, text_to_policy
+
+
+def test_ways_are_short(tmp_path: Path) -> None:
+    episode, policy = episode_to_table(tmp_path), text_to_policy()
+    assert {"episode.run_episode", "tables.tables"} <= episode.hops.keys()
+    assert len(episode.hops) <= 9
+    assert len(episode.containers) <= 5
+    assert {"spec.PolicySpec.of", "spec.PolicySpec.load"} <= policy.hops.keys()
+    assert len(policy.hops) <= 6
