@@ -269,7 +269,7 @@ def _tested(
     # The true P of one that is capped is larger, and moves D by the sign of its weight.
     leaning = float(test.value) - threshold
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
-    few = (asked.n_trainings or LEAST_TRAININGS) < LEAST_TRAININGS
+    few = asked.n_trainings is not None and asked.n_trainings < LEAST_TRAININGS
     blocked = capped or bool(test.degenerate) or n_seeds < LEAST_SEEDS or few
     normal = not paired or n_seeds < MIN_SEEDS
     hidden = bool(test.p_seen < 1.0 - asked.confidence <= test.p_value)

@@ -110,11 +110,11 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         runs = [outcomes.get((one.key, seed)) for one in cases for seed in plan.seeds]
         cells[place] = Cell.of(*place, runs, paired=plan.paired, reference=reference)
     if not plan.specification.until_clear:
-        found_alone = []
+        judged = []
         for each in plan.comparisons:
             of_arms = {arm: cells[each.policy, each.table, arm] for arm in each.arms}
-            found_alone.append(judge_one(each, of_arms, paired=plan.paired, margin=margin))
-        verdicts = under_holm(found_alone)
+            judged.append(judge_one(each, of_arms, paired=plan.paired, margin=margin))
+        verdicts = under_holm(judged)
     return StudyResults(
         plan,
         reference,
