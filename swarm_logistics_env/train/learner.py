@@ -12,7 +12,6 @@ import math
 import os
 import pickle
 import random
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -240,24 +239,11 @@ def device_of(asked: str | None) -> str:
 def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
     """Return the tensors of a policy file (`policies.learned.tensor_shapes`) from PPO's policy."""
     tensors = {"deviations": _array(policy.log_std.exp())}
-    for layer, linear in enumerate(linears(policy)):
+    hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
+    for layer, linear in enumerate([*hidden, policy.action_net]):
         tensors[f"layers.{layer}.weight"] = _array(linear.weight)
         tensors[f"layers.{layer}.bias"] = _array(linear.bias)
     return tensors
-
-
-def take_tensors(policy: Any, tensors: Mapping[str, NDArray[np.float32]]) -> None:
-    """Give PPO's policy the layers of a policy file; its deviations stay as they are."""
-    with torch.no_grad():
-        for layer, linear in enumerate(linears(policy)):
-            linear.weight.copy_(torch.from_numpy(tensors[f"layers.{layer}.weight"]))
-            linear.bias.copy_(torch.from_numpy(tensors[f"layers.{layer}.bias"]))
-
-
-def linears(policy: Any) -> list[torch.nn.Linear]:
-    """Return the layers from inputs to outputs of PPO's policy."""
-    hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
-    return [*hidden, policy.action_net]
 
 
 def _array(tensor: torch.Tensor) -> NDArray[np.float32]:

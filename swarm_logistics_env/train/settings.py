@@ -137,8 +137,6 @@ class PPOSettings(Part):
         least_deviation: the lower limit of deviations at the start and at the end; it changes
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.
-        value_warmup: updates at the start in which the value network alone learns, so that what a
-            training goes on from is not spoilt by values that mean nothing yet.
         value_hidden: widths of the value network, which is not shipped. It reads more than a robot
             can sense, see `network_view.KNOWN`.
     """
@@ -158,7 +156,6 @@ class PPOSettings(Part):
     deviations: tuple[PositiveFloat, PositiveFloat, PositiveFloat] = (0.5, 0.5, 0.5)
     least_deviation: tuple[PositiveFloat, PositiveFloat] = (0.001, 0.001)
     least_until: Fraction = 1.0
-    value_warmup: NonNegativeInt = 0
     value_hidden: tuple[PositiveInt, ...] = (128, 128)
 
     def floor(self, done: float) -> float:

@@ -10,17 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from swarm_logistics_env.errors import PolicyError, TrainingError
-from swarm_logistics_env.policies import PolicySpec, load
+from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.policies.files import write_policy
-from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
+from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH
@@ -36,12 +33,10 @@ from swarm_logistics_env.train.evaluation import (
 from swarm_logistics_env.train.learner import (
     NetworkView,
     device_of,
-    linears,
     make_learner,
     read_checkpoint,
     restore,
     save_checkpoint,
-    take_tensors,
     tensors_of,
 )
 from swarm_logistics_env.train.training import Training, make_worlds
@@ -87,7 +82,6 @@ def train(
             f"callbacks = {callbacks!r}: should be a list of callbacks of stable-baselines3"
         )
     device, begun = device_of(device), _new_view(training)
-    first = None if training.start is None else _tensors_of_start(training, training.start)
     enter(out, training, command)
     # Small networks gain little from more threads and lose much if cores are shared; the sums would
     # depend on the number of threads as well.
@@ -101,8 +95,6 @@ def train(
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
         restore(learner, state)
-    elif first is not None:
-        take_tensors(learner.policy, first)
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
         log.references = log.references or reference_means(training)
@@ -127,20 +119,6 @@ def train(
 
 def _new_view(training: Training) -> NetworkView:
     return NetworkView(make_worlds(training), training.scenario, training.network)
-
-
-def _tensors_of_start(training: Training, name: str) -> Mapping[str, NDArray[np.float32]]:
-    # A training file may come from elsewhere, so it imports nothing.
-    policy = None if PolicySpec(name=name).runs_code else load(name)
-    network = training.network
-    if not isinstance(policy, LearnedPolicy):
-        raise TrainingError(f"start = {name!r}: should be a trained policy")
-    # What it hears and how it explores may differ; its tensors have to fit.
-    try:
-        check_tensors(network, policy.tensors)
-    except PolicyError as error:
-        raise TrainingError(f"start = {name!r}: {error}") from error
-    return policy.tensors
 
 
 @dataclass
@@ -230,15 +208,10 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
     def _on_rollout_start(self) -> None:
         self._log.cpu_seconds += self._cpu_seconds()
-        is_free = self.model._n_updates >= self._training.ppo.value_warmup * self.model.n_epochs
-        policy = self.model.policy
-        for layer in linears(policy):
-            layer.requires_grad_(is_free)
-        policy.log_std.requires_grad_(is_free)
         done = min(1.0, self.num_timesteps / self._training.agent_steps)
         floor = self._training.ppo.floor(done)
         with torch.no_grad():
-            policy.log_std.clamp_(min=math.log(floor))
+            self.model.policy.log_std.clamp_(min=math.log(floor))
         curve = self._log.curve
         if (
             not curve

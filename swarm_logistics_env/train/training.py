@@ -45,9 +45,8 @@ class Training(Part):
         name: the policy's name.
         about: a sentence about the policy, for its card.
         scenario: the conditions; a table of fields makes one.
-        start: name or path of a trained policy that this one goes on from; none: from nothing.
-        worlds: kinds of worlds that run side by side. A training from nothing begins to learn in
-            easy ones, which therefore stand beside the hard ones.
+        worlds: kinds of worlds that run side by side. A training begins to learn in easy ones,
+            which therefore stand beside the hard ones.
         threads: how many threads step the worlds, and how many processes measure the scores; no
             result depends on it.
         seed: the number that decides everything random.
@@ -68,7 +67,6 @@ class Training(Part):
     name: FileName = "policy"
     about: str = ""
     scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
-    start: str | None = None
     worlds: Annotated[
         tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(each_of(WorldKind))
     ] = (WorldKind(count=6),)
