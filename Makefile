@@ -136,7 +136,7 @@ clean:
 	rm -rf .venvs build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,onnx
+$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := hypothesis pytest torch torchrl
