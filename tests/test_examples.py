@@ -13,10 +13,12 @@ from swarm_logistics_env import FAILURE_MODES, Scenario, Warehouse, policies
 from swarm_logistics_env.motion import MotionView
 from swarm_logistics_env.policies import PolicyCard, SwarmDT
 from swarm_logistics_env.policies.learned import STREAM
+from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.studies import Study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
+MIXED = f"{EXAMPLES / 'mixed_swarm.py'}:Mixed"
 
 
 def main(name: str, **sizes: Any) -> Any:
@@ -67,6 +69,24 @@ def test_the_onnx_file_says_what_the_network_says_on_every_row_of_an_episode(
         [said] = session.run(None, {"inputs": inputs})
         np.testing.assert_allclose(said, policy._network(inputs), rtol=0, atol=1e-5)
         rows = world.step(frame.command(said))
+
+
+def test_each_robot_of_a_mixed_swarm_does_what_its_policy_does_upon_the_same_rows() -> None:
+    scenario = Scenario(n_robots=10, n_items=20, duration=20.0)
+    world = Warehouse(scenario)
+    rows = world.reset(0)
+    mixed, *parts = (policies.load(name) for name in (MIXED, "swarm-dt", "ppo-delivery"))
+    for policy in (mixed, *parts):
+        start(policy, scenario, 0)
+    while not world.is_over_time:
+        commands = mixed.act(rows)
+        first, second = (part.act(rows) for part in parts)
+        np.testing.assert_array_equal(commands, np.concatenate([first[:8], second[8:]]))
+        rows = world.step(commands)
+    again = policies.load(MIXED)
+    assert policies.identity(mixed) == policies.identity(again)
+    again.parameters["parts"].pop()  # type: ignore[attr-defined]  # of this class
+    assert policies.identity(mixed) != policies.identity(again)
 
 
 def test_own_policy_is_judged_beside_swarm_dt(tmp_path: Path) -> None:

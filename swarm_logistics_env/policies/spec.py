@@ -31,7 +31,7 @@ from swarm_logistics_env.policies.files import (
 )
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
-from swarm_logistics_env.policies.policy import Mixed, Policy, identity
+from swarm_logistics_env.policies.policy import Policy, identity
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.records import Record, canonical_json
 
@@ -69,7 +69,7 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
             `swarm_logistics_env.policies`, "package.module:Class", or the path of a policy file.
             Naming a class imports, and so executes, its module. A file that `swarm-logistics
             train` wrote (.safetensors) executes nothing; a model that stable-baselines3 saved
-            (.zip) does. "NAME=20,NAME=5" mixes them in one swarm, see `policies.policy.Mixed`.
+            (.zip) does.
         trust_code: whether to read a file although that executes the code in it.
         parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
 
@@ -81,16 +81,11 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         raise PolicyError(
             f"policy {name!r} is {len(several)} trainings: should name one of {', '.join(several)}"
         )
-    make = (
-        NAMES.get(name)
-        or _declared(name)
-        or _mixed(name, trust_code)
-        or _filed(name, trust_code)
-        or _imported(name)
-    )
+    make = NAMES.get(name) or _declared(name) or _filed(name, trust_code) or _imported(name)
     if make is None:
         known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
-        near = f" (a name, 'package.module:Class' or a file){suggest(name, known)}"
+        meant = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, known)
+        near = f" (a name, 'package.module:Class' or a file){meant}"
         raise PolicyError(f"no policy {name!r}{_classes_of(name) or near}")
     try:
         policy = make(**parameters)
@@ -313,15 +308,6 @@ def _declared(name: str) -> Callable[..., Policy] | None:
         made: Callable[..., Policy] = point.load()
         return made
     return None
-
-
-def _mixed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
-    if not re.fullmatch(r"[^,]+=\d+(,[^,]+=\d+)+", name):
-        return None
-    parts = [part.rpartition("=") for part in name.split(",")]
-    return functools.partial(
-        Mixed, [(load(part, trust_code=trust_code), int(count)) for part, _, count in parts]
-    )
 
 
 def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
