@@ -69,20 +69,18 @@ class Homing:
         frame.read(observations)
         numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
         commands = np.zeros((len(observations), 4))
-        self._decide(observations, frame, numbers, commands)
+        self._decide(observations, numbers, commands)
         return frame.command(frame.outputs_for(commands))
 
     def _decide(
         self,
         observations: NDArray[np.float32],
-        frame: MotionView,
         random_headings: NDArray[np.int64],
         commands: NDArray[np.float64],
     ) -> None:
         """Fill the commands (N, 4), in the robots' own frames."""
-        decide_homing(
-            observations, frame.memory, frame.keys, random_headings, self._period, commands
-        )
+        memory, keys = self._frame.memory, self._frame.keys
+        decide_homing(observations, memory, keys, random_headings, self._period, commands)
 
 
 @kernel
@@ -102,9 +100,7 @@ def decide_homing(
         sensed, own = rows[robot], memory[robot]
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
         x, y = own[known.HEADING_X], own[known.HEADING_Y]
-        push_x, push_y = away_from_neighbours(sensed, AVOID_RANGE)
-        push_x *= AVOID_GAIN
-        push_y *= AVOID_GAIN
+        push_x, push_y = away_from_neighbours(sensed, AVOID_RANGE, AVOID_GAIN)
         speed, gripper = 1.0, -1.0
         if sensed[row.CARRYING_REQUESTED] > 0.5:
             # Inside it stands, and lets go only once it takes its delivery for broken.
@@ -119,26 +115,28 @@ def decide_homing(
             x, y = freest_direction(sensed, own, x + push_x, y + push_y)
         else:
             item = requested_item(sensed, own, is_inside)
-            if item >= 0:
-                x, y = sensed[item + 1], sensed[item + 2]
-                away = max(math.sqrt(x * x + y * y), 1e-6)
-                x, y = x / away + 0.5 * push_x, y / away + 0.5 * push_y
-                speed = min(1.0, away / (2.0 * period))
-                if away < GRIP_RANGE:
-                    gripper = 1.0
+            if item >= 0 and sensed[row.CARRYING] < 0.5:
+                x, y, speed, gripper = fetch(sensed, item, push_x, push_y, period)
             else:
                 x, y = search_direction(sensed, own, x, y, is_inside)
-                x += push_x
-                y += push_y
+                x, y = x + push_x, y + push_y
                 speed = min(1.0, max(math.sqrt(x * x + y * y), 0.3))
-        length = max(math.sqrt(x * x + y * y), 1e-9)
-        commands[robot, 0], commands[robot, 1] = speed * x / length, speed * y / length
-        commands[robot, 2], commands[robot, 3] = 0.0, gripper
+        drive(x, y, speed, gripper, commands[robot])
 
 
 @kernel
-def away_from_neighbours(sensed: NDArray[np.float32], reach: float) -> tuple[float, float]:
-    """Return the sum of the directions away from neighbours, 1 .. 0 at distance 0 .. `reach`."""
+def drive(x: float, y: float, speed: float, gripper: float, command: NDArray[np.float64]) -> None:
+    """Fill one robot's command (4,): `speed` in the direction (x, y), of any length; no turn."""
+    length = max(math.sqrt(x * x + y * y), 1e-9)
+    command[0], command[1] = speed * x / length, speed * y / length
+    command[2], command[3] = 0.0, gripper
+
+
+@kernel
+def away_from_neighbours(
+    sensed: NDArray[np.float32], reach: float, gain: float
+) -> tuple[float, float]:
+    """Return the sum of directions away from neighbours, `gain` .. 0 at distance 0 .. `reach`."""
     push_x, push_y = 0.0, 0.0
     for place in range(row.N_NEIGHBOURS):
         there = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * place
@@ -147,13 +145,16 @@ def away_from_neighbours(sensed: NDArray[np.float32], reach: float) -> tuple[flo
         if 0.0 < away < reach:
             push_x -= (1.0 - away / reach) * x / away
             push_y -= (1.0 - away / reach) * y / away
-    return push_x, push_y
+    return gain * push_x, gain * push_y
 
 
 @kernel
 def requested_item(sensed: NDArray[np.float32], own: NDArray[np.float64], is_inside: bool) -> int:
-    """Return the column of the requested item if the robot may lift it; -1: none."""
-    if sensed[row.CARRYING] > 0.5 or own[known.FAILED] > 0.5:
+    """Return the column of the nearest requested item for a robot that has not failed; -1: none.
+
+    Not one that a robot inside held itself a moment ago.
+    """
+    if own[known.FAILED] > 0.5:
         return -1
     for place in range(row.N_ITEMS_IN_VIEW):
         there = row.ITEMS + row.ITEM_WIDTH * place
@@ -161,6 +162,17 @@ def requested_item(sensed: NDArray[np.float32], own: NDArray[np.float64], is_ins
         if sensed[there] > 0.5 and sensed[there + 3] > 0.5 and not left_here:
             return there
     return -1
+
+
+@kernel
+def fetch(
+    sensed: NDArray[np.float32], item: int, push_x: float, push_y: float, period: float
+) -> tuple[float, float, float, float]:
+    """Return the direction, speed and gripper of a robot on its way to the item in a column."""
+    x, y = sensed[item + 1], sensed[item + 2]
+    away = max(math.sqrt(x * x + y * y), 1e-6)
+    speed, gripper = min(1.0, away / (2.0 * period)), 1.0 if away < GRIP_RANGE else -1.0
+    return x / away + 0.5 * push_x, y / away + 0.5 * push_y, speed, gripper
 
 
 @kernel
@@ -180,9 +192,9 @@ def search_direction(
             y -= 2.0 * approach * towards_y
         push = WALL_GAIN * (1.0 - walls[nearest] / WALL_RANGE)
         wall_x, wall_y = -push * towards_x, -push * towards_y
-    spread_x, spread_y = away_from_neighbours(sensed, SPREAD_RANGE)
-    x += wall_x + SPREAD_GAIN * spread_x
-    y += wall_y + SPREAD_GAIN * spread_y
+    spread_x, spread_y = away_from_neighbours(sensed, SPREAD_RANGE, SPREAD_GAIN)
+    x += wall_x + spread_x
+    y += wall_y + spread_y
     home = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
     if is_inside and home > 0.5:
         x -= own[known.HOME_X] / home

@@ -27,15 +27,17 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionView, random_heading
+from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, random_heading
 from swarm_logistics_env.policies.homing import (
     AVOID_GAIN,
     AVOID_RANGE,
-    GRIP_RANGE,
     Homing,
     away_from_neighbours,
+    drive,
+    fetch,
     freest_direction,
     home_direction,
+    requested_item,
     search_direction,
 )
 
@@ -82,14 +84,13 @@ class HomingStock(Homing):
     def _decide(
         self,
         observations: NDArray[np.float32],
-        frame: MotionView,
         random_headings: NDArray[np.int64],
         commands: NDArray[np.float64],
     ) -> None:
         decide_homing_stock(
             observations,
-            frame.memory,
-            frame.keys,
+            self._frame.memory,
+            self._frame.keys,
             random_headings,
             self._period,
             self.parameters["holders"],
@@ -121,10 +122,8 @@ def decide_homing_stock(
         forget_if_lost(own, is_inside)
         home_x, home_y, sure = known.kept_home(own)
         x, y = own[known.HEADING_X], own[known.HEADING_Y]
-        push_x, push_y = away_from_neighbours(sensed, AVOID_RANGE)
-        push_x *= AVOID_GAIN
-        push_y *= AVOID_GAIN
-        item = requested_in_view(sensed, own)
+        push_x, push_y = away_from_neighbours(sensed, AVOID_RANGE, AVOID_GAIN)
+        item = requested_item(sensed, own, False)
         speed, gripper = 1.0, -1.0
         stands = is_inside and sensed[row.CARRYING_REQUESTED] > 0.5  # to deliver
         if sensed[row.CARRYING] > 0.5 and own[known.STUCK] > STUCK and not stands:
@@ -164,21 +163,14 @@ def decide_homing_stock(
             if item < 0 and stocks and sure > 0.0 and own[known.CANNOT_LIFT] <= 0.0:
                 item = item_to_stock(sensed, own, home_x, home_y, 0.0 if holds else FAR)
             if item >= 0:
-                x, y = sensed[item + 1], sensed[item + 2]
-                length = max(math.sqrt(x * x + y * y), 1e-6)
-                x, y = x / length + 0.5 * push_x, y / length + 0.5 * push_y
-                speed = min(1.0, length / (2.0 * period))
-                if length < GRIP_RANGE:
-                    gripper = 1.0
+                x, y, speed, gripper = fetch(sensed, item, push_x, push_y, period)
             else:
                 if sure == 0.0 and sensed[row.LOWEST_TIMER] > 0.5:
                     x, y = home_direction(sensed, own, x, y)
                 x, y = search_direction(sensed, own, x, y, is_inside)
                 x, y = x + push_x, y + push_y
                 speed = min(1.0, max(math.sqrt(x * x + y * y), 0.3))
-        length = max(math.sqrt(x * x + y * y), 1e-9)
-        commands[robot, 0], commands[robot, 1] = speed * x / length, speed * y / length
-        commands[robot, 2], commands[robot, 3] = 0.0, gripper
+        drive(x, y, speed, gripper, commands[robot])
 
 
 @kernel
@@ -186,18 +178,6 @@ def forget_if_lost(own: NDArray[np.float64], is_inside: bool) -> None:
     """Forget the kept direction home if the distance reckoned with it cannot be."""
     if (own[known.AWAY] > LOST) if is_inside else (own[known.AWAY] < -LOST):
         own[known.KEPT_X], own[known.KEPT_Y], own[known.AWAY] = 0.0, 0.0, 0.0
-
-
-@kernel
-def requested_in_view(sensed: NDArray[np.float32], own: NDArray[np.float64]) -> int:
-    """Return the column of the requested item if a robot that has not failed sees it; -1: none."""
-    if own[known.FAILED] > 0.5:
-        return -1
-    for place in range(row.N_ITEMS_IN_VIEW):
-        there = row.ITEMS + row.ITEM_WIDTH * place
-        if sensed[there] > 0.5 and sensed[there + 3] > 0.5:
-            return there
-    return -1
 
 
 @kernel
@@ -224,7 +204,7 @@ def hold_direction(
     """Return the velocity, in top speeds, to where a robot holds its item inside the area."""
     least = -1.0 if is_inside else 0.5
     deeper = max(least, min(1.0, (own[known.AWAY] + DEPTH) / (2.0 * period)))
-    far_x, far_y = away_from_neighbours(sensed, SPREAD_RANGE)
+    far_x, far_y = away_from_neighbours(sensed, SPREAD_RANGE, 1.0)
     aside = max(-0.7, min(0.7, SPREAD_GAIN * (home_x * far_y - home_y * far_x)))
     return deeper * home_x - aside * home_y, deeper * home_y + aside * home_x
 
