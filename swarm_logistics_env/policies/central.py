@@ -199,9 +199,7 @@ class Central:
             return math.dist((x, y), state.item_position[self._task[0]].tolist())
         if self._planned_at < 0:
             return np.inf
-        row = min(max(int(y / CELL), 0), len(self._far) - 1)
-        column = min(max(int(x / CELL), 0), self._far.shape[1] - 1)
-        return float(self._far[row, column]) * CELL
+        return float(self._far[_cell(self._far, x, y)]) * CELL
 
     def _may_hold(self, state: WarehouseState, worker: int) -> bool:
         if self._task[1]:
@@ -220,33 +218,24 @@ class Central:
         if not carries and math.dist((x, y), state.item_position[item].tolist()) < 0.3:
             return self._towards(state.robot_position[worker], state.item_position[item])
         if state.time >= self._planned_at + REPLAN - 1e-6:
-            self._plan(state, worker)
+            others = state.robot_present.copy()
+            others[worker] = False
+            self._cost, self._far = self._ways(state, others, NOBODY if carries else item)
+            self._planned_at = state.time
         waypoint = lookahead(self._cost, self._far, CELL, x, y, LOOKAHEAD)
         if carries and waypoint[0] >= scenario.storage_width - CELL:
             waypoint = (waypoint[0] + 1.0, waypoint[1])  # no braking at the edge
         return self._towards(state.robot_position[worker], np.array(waypoint))
 
-    def _plan(self, state: WarehouseState, worker: int) -> None:
-        item, carries = self._task
-        others = state.robot_present.copy()
-        others[worker] = False
-        self._cost = self._costs(state, carries, others)
-        goal: NDArray[np.bool_] = np.zeros_like(self._cost, np.bool_)
-        if carries:
-            goal[:, int(self._scenario.storage_width / CELL) :] = True
-        else:
-            x, y = state.item_position[item].tolist()
-            goal[min(int(y / CELL), goal.shape[0] - 1), min(int(x / CELL), goal.shape[1] - 1)] = (
-                True
-            )
-        self._far = cost_to_go(self._cost, goal)
-        self._planned_at = state.time
+    def _ways(
+        self, state: WarehouseState, robots: NDArray[np.bool_], item: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the cost of each cell and of the way from it, among `robots`.
 
-    def _costs(
-        self, state: WarehouseState, carries: bool, robots: NDArray[np.bool_]
-    ) -> NDArray[np.float64]:
-        """Return the cost of each cell for a robot that carries an item or not, among `robots`."""
-        scenario = self._scenario
+        Args:
+            item: to which an unladen robot drives; NOBODY: a laden one drives home.
+        """
+        scenario, carries = self._scenario, item == NOBODY
         discs = [_discs(state.robot_position[robots], scenario.robot_radius, CROWDED)]
         discs += [_discs(state.obstacle_position, scenario.obstacle_radius, BLOCKED)]
         if carries:
@@ -254,13 +243,19 @@ class Central:
             discs += [_discs(stored, scenario.item_radius, BLOCKED)]
         around = np.vstack(discs)
         around[:, 2] += scenario.robot_radius + MARGIN
-        return costmap(
+        cost = costmap(
             scenario.warehouse_width,
             scenario.warehouse_height,
             CELL,
             scenario.robot_radius,
             around,
         )
+        goal: NDArray[np.bool_] = np.zeros_like(cost, np.bool_)
+        if carries:
+            goal[:, int(scenario.storage_width / CELL) :] = True
+        else:
+            goal[_cell(cost, *state.item_position[item].tolist())] = True
+        return cost, cost_to_go(cost, goal)
 
     # -- how -----------------------------------------------------------------------------------
 
@@ -313,6 +308,12 @@ class Central:
             forward = np.maximum(forward, 0.0)
             left[:] = 0.0
         return np.stack([forward, left, turn, gripper], axis=1)
+
+
+def _cell(grid: NDArray[np.float64], x: float, y: float) -> tuple[int, int]:
+    """Return row and column of the cell of a grid in which (x, y) [m] lies, or that is nearest."""
+    rows, columns = grid.shape
+    return min(max(int(y / CELL), 0), rows - 1), min(max(int(x / CELL), 0), columns - 1)
 
 
 def _discs(centres: NDArray[np.float64], radius: float, cost: float) -> NDArray[np.float64]:

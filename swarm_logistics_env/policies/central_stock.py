@@ -21,7 +21,7 @@ from swarm_logistics_env.policies.central import (
     Central,
     WaitingPlaces,
 )
-from swarm_logistics_env.policies.routes import cost_to_go, lookahead
+from swarm_logistics_env.policies.routes import lookahead
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 # Lengths in m.
@@ -80,7 +80,9 @@ class CentralStock(Central):
                 room -= 1
 
         if laden.any() and state.time >= self._home_planned_at + REPLAN - 1e-6:
-            self._plan_home(state, laden)
+            among = state.robot_present & ~laden
+            self._home_cost, self._home_far = self._ways(state, among, NOBODY)
+            self._home_planned_at = state.time
         for robot in np.flatnonzero(laden).tolist():
             gripper[robot] = 0.0
             if self._slot[robot] == NOBODY and n_held > most_held and is_free.any():
@@ -113,13 +115,6 @@ class CentralStock(Central):
         is_free: NDArray[np.bool_] = (away > SLOT_RADIUS).all(axis=1)
         is_free[self._slot[self._slot != NOBODY]] = False
         return is_free
-
-    def _plan_home(self, state: WarehouseState, laden: NDArray[np.bool_]) -> None:
-        self._home_cost = self._costs(state, True, state.robot_present & ~laden)
-        goal = np.zeros(self._home_cost.shape, np.bool_)
-        goal[:, int(self._scenario.storage_width / CELL) :] = True
-        self._home_far = cost_to_go(self._home_cost, goal)
-        self._home_planned_at = state.time
 
     def _way_with_stock(self, position: NDArray[np.float64]) -> tuple[float, float]:
         """Return where a laden robot drives next [m]."""
