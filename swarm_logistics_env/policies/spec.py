@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import copy
 import functools
 import importlib
@@ -85,8 +84,7 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     if make is None:
         known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         meant = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, known)
-        near = f" (a name, 'package.module:Class' or a file){meant}"
-        raise PolicyError(f"no policy {name!r}{_classes_of(name) or near}")
+        raise PolicyError(f"no policy {name!r} (a name, 'package.module:Class' or a file){meant}")
     try:
         policy = make(**parameters)
     except SwarmLogisticsError:
@@ -326,27 +324,6 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
     return None
 
 
-def _classes_of(module: str) -> str:
-    """Return the end of an error message that proposes the classes with `act` of a module.
-
-    Its file is looked for in the current folder and read, not imported; empty: there is none.
-    """
-    path = Path(module.removesuffix(".py").replace(".", "/") + ".py")
-    try:
-        tree = ast.parse(path.read_bytes())
-    except (OSError, SyntaxError, ValueError):
-        return ""
-    found = [
-        f"{path.stem}:{node.name}"
-        for node in tree.body
-        if isinstance(node, ast.ClassDef)
-        if any(isinstance(part, ast.FunctionDef) and part.name == "act" for part in node.body)
-    ]
-    if not found:
-        return f": {path} has no class with a method act"
-    return f": should name its class, {' or '.join(map(repr, found))}"
-
-
 def _imported(name: str) -> Callable[..., Policy] | None:
     module, colon, attribute = name.partition(":")
     if not colon:
@@ -357,21 +334,11 @@ def _imported(name: str) -> Callable[..., Policy] | None:
         if (folder := str(path.parent.resolve())) not in sys.path:
             sys.path.append(folder)
         module = path.stem
-    if "/" in module or module.endswith(".py"):
-        raise PolicyError(
-            f"policy {name!r}: should be MODULE:CLASS, as '{Path(module).stem}:{attribute}', with "
-            "the module's folder as the current one or on PYTHONPATH"
-        )
     try:
         found: Any = importlib.import_module(module)
         for part in attribute.split("."):
             found = getattr(found, part)
-    except (ImportError, AttributeError, ValueError) as error:
-        hint = _classes_of(module)
-        if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0]:
-            hint = ": should lie in this folder, on PYTHONPATH, or be installed"
-        raise PolicyError(f"policy {name!r} cannot be imported: {error}{hint}") from None
-    except Exception as error:  # of code that is not ours
+    except Exception as error:  # of code that is not ours, too
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
     if not callable(found):
