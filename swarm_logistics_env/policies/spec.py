@@ -50,13 +50,11 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
     "central-stock": CentralStock,
 }
 
+# Each file names the command that made it.
+TRAINED = {path.stem: path for path in sorted(WEIGHTS.glob(f"*{SUFFIX}"))}
 NAMES: dict[str, Callable[..., Policy]] = {
     **SCRIPTED,
-    # These are trained; each file names the command that made it.
-    **{
-        path.stem: functools.partial(read_policy, path)
-        for path in sorted(WEIGHTS.glob(f"*{SUFFIX}"))
-    },
+    **{name: functools.partial(read_policy, path) for name, path in TRAINED.items()},
 }
 
 
@@ -89,8 +87,6 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         policy = make(**parameters)
     except SwarmLogisticsError:
         raise
-    except TypeError as error:
-        raise PolicyError(f"policy {name!r} cannot be made: {error}") from None
     except Exception as error:  # of code that is not ours
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be made: {kind}: {error}") from error
@@ -198,22 +194,23 @@ class PolicySpec(Record):
         Raises:
             PolicyError: it cannot be found or built.
         """
+        found: Policy
+        if self.made is None and self.name in makers:
+            try:
+                found = makers[self.name](**self.parameters)
+            except TypeError as error:
+                raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
+            return found
         if self.made is not None:
             if not (makers or isinstance(self.made, Policy)):
                 raise PolicyError(f"policy {self.made!r}: should have the methods reset and act")
-            own: Policy = copy.deepcopy(self.made)
-            return own
-        if self.name in makers:
-            try:
-                made: Policy = makers[self.name](**self.parameters)
-            except TypeError as error:
-                raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
-            return made
-        if makers and self.name in NAMES:
+            found = self.made
+        elif makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
-        if makers and self.name.endswith(SB3_SUFFIX):
-            return copy.deepcopy(_model(self.name))
-        found = _loaded(self.name, canonical_json(self.parameters), self.trusted)
+        elif makers and self.name.endswith(SB3_SUFFIX):
+            found = _model(self.name)
+        else:
+            found = _loaded(self.name, canonical_json(self.parameters), self.trusted)
         try:
             return copy.deepcopy(found)
         except Exception as error:  # of code that is not ours
@@ -249,13 +246,12 @@ def _loaded(name: str, parameters: str, trusted: bool) -> Policy:
 def known_policies() -> Iterator[tuple[str, str, str]]:
     """Yield name, kind and a sentence of each policy of the package, then of those installed."""
     for name, make in SCRIPTED.items():
-        given = make.keywords if isinstance(make, functools.partial) else {}
-        kind = make.func if isinstance(make, functools.partial) else make
-        about = (inspect.getdoc(kind) or "").partition("\n\n")[0].replace("\n", " ")
-        with_ = "".join(f" {field} = {value}." for field, value in given.items())
-        yield name, "scripted", about + with_
-    for path in sorted(WEIGHTS.glob(f"*{SUFFIX}")):
-        yield path.stem, "trained", read_card(path).about
+        made = make if isinstance(make, functools.partial) else functools.partial(make)
+        about = (inspect.getdoc(made.func) or "").partition("\n\n")[0].replace("\n", " ")
+        given = "".join(f" {field} = {value}." for field, value in made.keywords.items())
+        yield name, "scripted", about + given
+    for name, path in TRAINED.items():
+        yield name, "trained", read_card(path).about
     for point in entry_points(group=ENTRY_POINTS):
         yield point.name, "installed", point.value
 
