@@ -32,39 +32,6 @@ def read_policy(path: Path) -> LearnedPolicy:
         PolicyError: the file cannot be read, is cut short, carries something else, or its numbers
             are not those of the network on its card.
     """
-    card, tensors = _contents(path)
-    try:
-        return LearnedPolicy(card, tensors)
-    except PolicyError as error:
-        raise PolicyError(f"the policy file {path} cannot be used: {error}") from None
-
-
-def read_card(path: Path) -> PolicyCard:
-    """Return the card of a policy file.
-
-    Raises:
-        PolicyError: as `read_policy`.
-    """
-    return read_policy(path).card
-
-
-def write_policy(path: Path, card: PolicyCard, tensors: Mapping[str, NDArray[np.float32]]) -> None:
-    """Write a policy file, whole or not at all.
-
-    Raises:
-        PolicyError: the tensors are not those of the network on the card, or it cannot be written.
-    """
-    from safetensors.numpy import save
-
-    check_tensors(card.network, tensors)
-    content = save(
-        {name: np.ascontiguousarray(t) for name, t in tensors.items()}, {CARD: card.to_json()}
-    )
-    with becoming(path, PolicyError) as part:
-        part.write_bytes(content)
-
-
-def _contents(path: Path) -> tuple[PolicyCard, dict[str, NDArray[np.float32]]]:
     from safetensors import SafetensorError, safe_open
 
     try:
@@ -97,9 +64,34 @@ def _contents(path: Path) -> tuple[PolicyCard, dict[str, NDArray[np.float32]]]:
     except (SafetensorError, TypeError) as error:
         raise PolicyError(f"{path} is cut short or no safetensors file: {error}") from None
     try:
-        return PolicyCard.from_json(header[CARD]), tensors
+        return LearnedPolicy(PolicyCard.from_json(header[CARD]), tensors)
     except PolicyError as error:
-        raise PolicyError(f"the card in {path} cannot be read: {error}") from None
+        raise PolicyError(f"the policy file {path} cannot be used: {error}") from None
+
+
+def read_card(path: Path) -> PolicyCard:
+    """Return the card of a policy file.
+
+    Raises:
+        PolicyError: as `read_policy`.
+    """
+    return read_policy(path).card
+
+
+def write_policy(path: Path, card: PolicyCard, tensors: Mapping[str, NDArray[np.float32]]) -> None:
+    """Write a policy file, whole or not at all.
+
+    Raises:
+        PolicyError: the tensors are not those of the network on the card, or it cannot be written.
+    """
+    from safetensors.numpy import save
+
+    check_tensors(card.network, tensors)
+    content = save(
+        {name: np.ascontiguousarray(t) for name, t in tensors.items()}, {CARD: card.to_json()}
+    )
+    with becoming(path, PolicyError) as part:
+        part.write_bytes(content)
 
 
 SB3_SUFFIX = ".zip"

@@ -93,7 +93,7 @@ def test_a_card_that_is_none_or_of_another_version_is_refused(
         refused(file, "is safetensors without a card")
     for text in ("", "[1]", '{"name": "x"}', '{"a": 1}', "\0"):
         save_file(tensors, file, {CARD: text})
-        refused(file, "the card in .* cannot be read")
+        refused(file, "cannot be used: PolicyCard")
     for old, new, sentence in (
         ('"format":1', '"format":2', "PolicyCard.format = 2"),
         ("wall_3", "wall_33", "column 3 is 'wall_33': should be 'wall_3'"),
