@@ -182,8 +182,7 @@ class Learning:
             about=f"{self.learner} from nothing in the {self.world} world, see interop/.",
             network=Network(inputs=INPUTS, hidden=SETTINGS.hidden, exploration=1.0),
             versions=versions() | libraries,
-            scenario=self.scenario.model_dump(mode="json", exclude_defaults=True)
-            | {"heading_drift": self.scenario.heading_drift},
+            scenario=self.scenario.model_dump(mode="json", exclude_defaults=True),
             seed=self.seed,
             agent_steps=self.agent_steps,
         )

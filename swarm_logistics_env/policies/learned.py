@@ -105,8 +105,7 @@ class PolicyCard(_Part):
         versions: the versions of the packages that trained it; "simulation" is the digest of the
             world's code (`tasks.warehouse_task.code_version`) at that time.
         scored_with: the version of this package, and the digest, with which it was scored.
-        scenario: what it was trained in, fields that differ from the defaults, and always
-            `heading_drift`: cards from before there was one read it as 0.
+        scenario: what it was trained in, fields that differ from the defaults.
         training: the specification of the training.
         seed: the training's seed.
         agent_steps: decisions of single robots that it learned from.
@@ -125,11 +124,6 @@ class PolicyCard(_Part):
     agent_steps: NonNegativeInt = 0
     scores: tuple[Score, ...] = ()
     scored_with: dict[str, str] = Field(default_factory=dict)
-
-    @field_validator("scenario")
-    @classmethod
-    def _with_drift(cls, scenario: dict[str, Any]) -> dict[str, Any]:
-        return {"heading_drift": 0.0, **scenario}
 
 
 class FeedForward:

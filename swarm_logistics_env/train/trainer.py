@@ -8,7 +8,6 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import torch
 from stable_baselines3 import PPO
@@ -21,7 +20,6 @@ from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.train.evaluation import (
     enter,
     evaluate,
@@ -268,14 +266,8 @@ def _card(training: Training, agent_steps: int, log: TrainingLog, command: str =
         network=training.network,
         command=command,
         versions=log.versions or versions(),
-        scenario=_changed(training.scenario),
+        scenario=training.scenario.model_dump(mode="json", exclude_defaults=True),
         training=training.model_dump(mode="json", exclude_defaults=True),
         seed=training.seed,
         agent_steps=agent_steps,
     )
-
-
-def _changed(scenario: Scenario) -> dict[str, Any]:
-    changed = scenario.model_dump(mode="json", exclude_defaults=True)
-    # The field is always written, because a card without it is from before there was one.
-    return {"heading_drift": scenario.heading_drift, **changed}
