@@ -7,6 +7,7 @@ import math
 import platform
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from copy import deepcopy
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -21,7 +22,7 @@ from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.policies import Policy, load
 from swarm_logistics_env.policies.learned import Score
-from swarm_logistics_env.records import Record, becoming, file_name
+from swarm_logistics_env.records import becoming, file_name, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Arm
@@ -44,10 +45,8 @@ def versions() -> dict[str, str]:
     """Return the versions of everything that a training's result depends on."""
     found = {"python": platform.python_version(), "simulation": code_version()}
     for package in PACKAGES:
-        try:
+        with suppress(PackageNotFoundError):
             found[package] = version(package)
-        except PackageNotFoundError:
-            continue
     return found
 
 
@@ -57,48 +56,32 @@ def simulation() -> dict[str, str]:
     return {name: found[name] for name in ("swarm-logistics-env", "simulation") if name in found}
 
 
-def enter(directory: Path, training: Record, command: str) -> bool:
-    """Make the directory of a training or search, or enter it to go on; note when and by what.
-
-    Returns:
-        Whether it had been begun before.
+def enter(directory: Path, training: Training, command: str) -> None:
+    """Make the directory of a training, or enter it to go on; note when and by what.
 
     Raises:
         TrainingError: it cannot be written, or holds another training.
     """
-    path = directory / FILE_NAME
-    asked = json.loads(training.to_json())
-    record: dict[str, Any] = {"command": command, "training": asked, "sessions": []}
+    path, asked = directory / FILE_NAME, json.loads(training.to_json())
+    sessions: list[dict[str, Any]] = []
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        is_begun = path.exists()
-        if is_begun:
-            record = json.loads(path.read_text(encoding="utf-8"))
-            _check_same(directory, record["training"], asked)
-            record |= {"command": command, "training": asked}
-        record["sessions"].append(
-            {"began": datetime.now(UTC).isoformat(timespec="seconds"), "versions": versions()}
-        )
-        with becoming(path, TrainingError) as part:
-            part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise TrainingError(f"cannot write to {directory}: {error.strerror}") from error
-    except KeyError as error:
-        raise TrainingError(f"{path} is no record of a training: it lacks {error}") from error
-    except ValueError as error:
-        if isinstance(error, TrainingError):
-            raise
-        raise TrainingError(f"{path} is no record of a training: {error}") from error
-    return is_begun
-
-
-def _check_same(directory: Path, there: dict[str, Any], asked: dict[str, Any]) -> None:
-    differing = sorted(n for n in asked if n not in MAY_CHANGE and there.get(n) != asked[n])
-    if differing:
-        raise TrainingError(
-            f"{directory} holds a training with another {', '.join(differing)}: should be the same "
-            "to go on, or --out another directory"
-        )
+    if path.exists():
+        record = read_table(path, "record of a training", TrainingError)
+        there, sessions = record.get("training", {}), record.get("sessions", [])
+        differing = sorted(n for n in asked if n not in MAY_CHANGE and there.get(n) != asked[n])
+        if differing:
+            raise TrainingError(
+                f"{directory} holds a training with another {', '.join(differing)}: should be the "
+                "same to go on, or --out another directory"
+            )
+    began = datetime.now(UTC).isoformat(timespec="seconds")
+    sessions.append({"began": began, "versions": versions()})
+    with becoming(path, TrainingError) as part:
+        record = {"command": command, "training": asked, "sessions": sessions}
+        part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 
 
 # Scores are measured on seeds 0, 1, .. and trainings use seeds of 63 bits: these are neither.
@@ -159,20 +142,18 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
         TrainingError: a run failed, so that the scores would not be of all seeds.
     """
     asked = training.scores
-    if not asked.seeds or not (len(asked.sizes) > 1 or asked.modes):
+    sizes = [{"values": sorted(asked.sizes)}] if len(asked.sizes) > 1 else []
+    faults = [{"modes": asked.modes, "robots": asked.robots}] if asked.modes else []
+    if not asked.seeds or not (sizes or faults):
         return ()
-    factors: dict[str, Any] = {}
-    if len(asked.sizes) > 1:
-        factors["sizes"] = [{"values": sorted(asked.sizes)}]
-    if asked.modes:
-        factors["faults"] = [{"modes": asked.modes, "robots": asked.robots}]
     study = Study(
         out=out,
         name=file_name(f"scores-{training.name}"),
         policies=[policy],
         seeds=asked.seeds,
         scenario=training.scenario.replace(n_robots=asked.n_robots),
-        **factors,
+        sizes=sizes,
+        faults=faults,
     )
     study.run(processes=training.threads)
     results = study.findings()

@@ -27,7 +27,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
+from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
 from swarm_logistics_env.motion.memory import body_of
 from swarm_logistics_env.policies.learned import STREAM, Network
 from swarm_logistics_env.records import becoming
@@ -102,13 +102,12 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def __init__(self, worlds: SwarmVecEnv, scenario: Scenario, network: Network) -> None:
         self.frame = MotionView(scenario, network.listens)
-        self._n_inputs = len(network.inputs)
         self.observations = np.zeros((worlds.num_envs, 0), np.float32)
         self._known = np.zeros((worlds.num_envs, len(KNOWN)), np.float32)
         self._begun, self._seed = 0, 0
         super().__init__(
             worlds,
-            Box(-np.inf, np.inf, (self._n_inputs + len(KNOWN),), np.float32),
+            Box(-np.inf, np.inf, (len(INPUTS) + len(KNOWN),), np.float32),
             Box(-1.0, 1.0, (len(OUTPUTS),), np.float32),
         )
 
@@ -148,7 +147,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         if over.size:
             last = np.stack([infos[row]["terminal_observation"] for row in over.tolist()])
             # The value network knows of one step before: the next episode has begun already.
-            ends = np.hstack([self.frame.peek(last, over)[:, : self._n_inputs], self._known[over]])
+            ends = np.hstack([self.frame.peek(last, over), self._known[over]])
             for row, read in zip(over.tolist(), ends):
                 infos[row]["terminal_observation"] = read
             for world, rows in enumerate(self.venv.rows_of_worlds):
@@ -163,7 +162,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         self._bodies[self.venv.rows_of_worlds[world]] = body_of(scenario)
 
     def _read(self) -> NDArray[np.float32]:
-        inputs = self.frame.read(self.observations)[:, : self._n_inputs]
+        inputs = self.frame.read(self.observations)
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
             read_known(world.warehouse.address, self.frame.turned[rows], self._known[rows])
         return np.hstack([inputs, self._known])
@@ -182,14 +181,8 @@ ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": 
 FIRST_OUTPUTS = (0.8, 0.0, 0.0)
 
 
-def make_learner(
-    training: Training, view: NetworkView, device: str, *, goes_on: bool = False
-) -> PPO:
-    """Return PPO as the training asks for it; seeds the worlds and global generators.
-
-    Args:
-        goes_on: whether the worlds are in mid-training: nothing is seeded then.
-    """
+def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
+    """Return PPO as the training asks for it; seeds the worlds and global generators."""
     ppo, network = training.ppo, training.network
     first, last = ppo.learning_rate, ppo.final_learning_rate
     learner = PPO(
@@ -211,7 +204,7 @@ def make_learner(
             "net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)},
             "activation_fn": ACTIVATIONS[network.activation],
         },
-        seed=None if goes_on else training.seed,
+        seed=training.seed,
         device=device,
     )
     with torch.no_grad():
@@ -226,14 +219,10 @@ def device_of(asked: str | None) -> str:
     Raises:
         TrainingError: there is no such device.
     """
-    has_gpu = torch.cuda.is_available()
-    if asked not in (None, "cpu", "cuda"):
-        raise TrainingError(f"device = {asked!r}: should be 'cpu' or 'cuda'")
-    if asked == "cuda" and not has_gpu:
-        raise TrainingError(
-            "device = 'cuda': torch finds no GPU here; should be 'cpu', or left out"
-        )
-    return asked or ("cuda" if has_gpu else "cpu")
+    found = ["cpu", "cuda"] if torch.cuda.is_available() else ["cpu"]
+    if asked not in (None, *found):
+        raise TrainingError(f"device = {asked!r}: should be left out or one of {found} here")
+    return asked or found[-1]
 
 
 def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
@@ -305,7 +294,8 @@ def read_checkpoint(directory: Path) -> dict[str, Any] | None:
 
 
 def restore(learner: PPO, state: dict[str, Any]) -> None:
-    """Bring a learner that was made over the checkpoint's view to where it stood."""
+    """Bring a new learner, over the checkpoint's view, to where it stood."""
+    learner.set_env(state["view"], force_reset=False)
     learner.policy.load_state_dict(state["policy"])
     learner.policy.optimizer.load_state_dict(state["optimizer"])
     learner.num_timesteps = state["num_timesteps"]

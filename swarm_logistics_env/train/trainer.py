@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import torch
 from stable_baselines3 import PPO
@@ -19,7 +20,7 @@ from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.records import becoming
-from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH
+from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import (
     enter,
     evaluate,
@@ -79,19 +80,17 @@ def train(
         raise TrainingError(
             f"callbacks = {callbacks!r}: should be a list of callbacks of stable-baselines3"
         )
-    device, begun = device_of(device), _new_view(training)
+    device, view = device_of(device), _new_view(training)
     enter(out, training, command)
     # Small networks gain little from more threads and lose much if cores are shared; the sums would
     # depend on the number of threads as well.
     torch.set_num_threads(1)
     state = read_checkpoint(out)
-    view, log = begun, TrainingLog()
-    if state is not None:
-        begun.close()
-        view, log = state["view"], state["log"]
-    learner = make_learner(training, view, device, goes_on=state is not None)
+    learner, log = make_learner(training, view, device), TrainingLog()
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
+        view.close()
+        view, log = state["view"], state["log"]
         restore(learner, state)
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
@@ -163,23 +162,20 @@ class TrainingLog:
 
     def draw(self, picture: Path, title: str, seeds: int) -> None:
         """Draw P over agent-steps as a PNG, with a line for each scripted policy."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        canvas = Figure(figsize=(WIDTH, 0.62 * WIDTH), layout="constrained")
-        FigureCanvasAgg(canvas)
-        axes = canvas.subplots()
         steps = [row["agent_steps"] / MILLION for row in self.curve]
-        axes.plot(steps, [row["P"] for row in self.curve], MARKERS[0] + "-", color=COLOURS[0])
-        for name, measured in self.references.items():
-            axes.axhline(measured["P"], color=INK, linestyle="--", linewidth=0.8)
-            axes.annotate(name, (steps[-1], measured["P"]), ha="right", va="bottom", fontsize=8)
-        axes.set_xlabel("million agent-steps")
-        axes.set_ylabel(f"P, mean over {seeds} seeds [items]")
-        axes.set_title(title, fontsize="medium", loc="left")
-        axes.set_ylim(bottom=0.0)
-        axes.spines[["top", "right"]].set_visible(False)
-        canvas.savefig(picture, dpi=150)
+        p = [row["P"] for row in self.curve]
+
+        def curve(canvas: Any) -> None:
+            axes = canvas.subplots()
+            axes.plot(steps, p, MARKERS[0] + "-", color=COLOURS[0])
+            for name, measured in self.references.items():
+                axes.axhline(measured["P"], color=INK, linestyle="--", linewidth=0.8)
+                axes.annotate(name, (steps[-1], measured["P"]), ha="right", va="bottom")
+            y_label = f"P, mean over {seeds} seeds [items]"
+            axes.set(title=title, xlabel="million agent-steps", ylabel=y_label, ylim=(0.0, None))
+
+        _, png = images(curve, 0.62 * WIDTH)
+        picture.write_bytes(png)
 
 
 class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
