@@ -24,16 +24,14 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import create_mlp
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
-from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
 from swarm_logistics_env.motion.memory import body_of
-from swarm_logistics_env.policies.learned import STREAM, Network
+from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.records import becoming
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key, row_keys
-from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.train.training import Training, make_worlds
 from swarm_logistics_env.warehouse.packing import unpacked_at
 from swarm_logistics_env.warehouse.structs import NOBODY, World
 
@@ -91,17 +89,19 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     alone reads, `KNOWN`, stands behind these inputs.
 
     Args:
-        worlds: every robot is a row.
-        scenario: of the worlds.
-        network: what it reads.
+        training: whose worlds these are; every robot is a row.
 
     Attributes:
         frame: of each robot's motion, with its memory.
         observations: the latest rows (num_envs, D).
+
+    Raises:
+        TrainingError, SetupError, ScenarioError, FaultError: the worlds cannot be.
     """
 
-    def __init__(self, worlds: SwarmVecEnv, scenario: Scenario, network: Network) -> None:
-        self.frame = MotionView(scenario, network.listens)
+    def __init__(self, training: Training) -> None:
+        worlds = make_worlds(training)
+        self.frame = MotionView(training.scenario, training.network.listens)
         self.observations = np.zeros((worlds.num_envs, 0), np.float32)
         self._known = np.zeros((worlds.num_envs, len(KNOWN)), np.float32)
         self._begun, self._seed = 0, 0
@@ -236,10 +236,10 @@ def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
 
 
 def _array(tensor: torch.Tensor) -> NDArray[np.float32]:
-    return tensor.detach().cpu().numpy().astype(np.float32).copy()
+    return tensor.detach().cpu().numpy().astype(np.float32)
 
 
-def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) -> None:
+def save_checkpoint(directory: Path, learner: PPO, log: Any) -> None:
     """Write a checkpoint, whole or not at all; until then the one before stays.
 
     To be called between updates: after learning from a batch, before collecting the next; or
@@ -255,7 +255,7 @@ def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) 
         "n_updates": learner._n_updates,
         "last_observations": learner._last_obs,
         "last_starts": learner._last_episode_starts,
-        "view": pickle.dumps(view),
+        "view": learner.env,
         "torch": torch.get_rng_state(),
         "cuda": torch.cuda.get_rng_state_all(),
         # stable-baselines3 shuffles minibatches by numpy's global generator.
@@ -272,8 +272,6 @@ def save_checkpoint(directory: Path, learner: PPO, view: NetworkView, log: Any) 
 def read_checkpoint(directory: Path) -> dict[str, Any] | None:
     """Return the checkpoint in a training's directory; None: there is none.
 
-    Its "view" is the worlds as they stood.
-
     It is a pickle: resume trainings of your own only.
 
     Raises:
@@ -284,7 +282,6 @@ def read_checkpoint(directory: Path) -> dict[str, Any] | None:
         return None
     try:
         state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=False)
-        state["view"] = pickle.loads(state["view"])
     except (OSError, RuntimeError, EOFError, pickle.UnpicklingError, AttributeError) as error:
         reason = str(error).splitlines()[0]
         raise TrainingError(
@@ -294,7 +291,8 @@ def read_checkpoint(directory: Path) -> dict[str, Any] | None:
 
 
 def restore(learner: PPO, state: dict[str, Any]) -> None:
-    """Bring a new learner, over the checkpoint's view, to where it stood."""
+    """Bring a new learner to where that of the checkpoint stood, and its worlds as well."""
+    learner.env.close()
     learner.set_env(state["view"], force_reset=False)
     learner.policy.load_state_dict(state["policy"])
     learner.policy.optimizer.load_state_dict(state["optimizer"])

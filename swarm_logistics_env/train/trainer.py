@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
@@ -38,7 +37,7 @@ from swarm_logistics_env.train.learner import (
     save_checkpoint,
     tensors_of,
 )
-from swarm_logistics_env.train.training import Training, make_worlds
+from swarm_logistics_env.train.training import Training
 
 CHECKPOINT_EVERY = 20.0  # seconds
 CURVE, PICTURE = "curve.csv", "curve.png"
@@ -80,7 +79,7 @@ def train(
         raise TrainingError(
             f"callbacks = {callbacks!r}: should be a list of callbacks of stable-baselines3"
         )
-    device, view = device_of(device), _new_view(training)
+    device, view = device_of(device), NetworkView(training)
     enter(out, training, command)
     # Small networks gain little from more threads and lose much if cores are shared; the sums would
     # depend on the number of threads as well.
@@ -89,18 +88,17 @@ def train(
     learner, log = make_learner(training, view, device), TrainingLog()
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     if state is not None:
-        view.close()
-        view, log = state["view"], state["log"]
+        log = state["log"]
         restore(learner, state)
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
         log.references = log.references or reference_means(training)
         total, done = training.agent_steps, learner.num_timesteps
         with ProgressBar(training.name, total, "agent-steps", done=done) as progress:
-            callback = TrainingCallback(training, view, log, out, progress)
+            callback = TrainingCallback(training, log, out, progress)
             learner.learn(total - done, [callback, *callbacks], reset_num_timesteps=False)
             callback.end()
-    view.close()
+    learner.env.close()
     asked = training.evaluation
     log.draw(out / PICTURE, f"{training.name}, N = {asked.n_robots}", asked.seeds)
     tensors = tensors_of(learner.policy)
@@ -112,10 +110,6 @@ def train(
     if scores:
         write_policy(path, card.replace(scores=scores, scored_with=simulation()), tensors)
     return path
-
-
-def _new_view(training: Training) -> NetworkView:
-    return NetworkView(make_worlds(training), training.scenario, training.network)
 
 
 @dataclass
@@ -182,15 +176,10 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
     """Evaluates and writes checkpoints between updates."""
 
     def __init__(
-        self,
-        training: Training,
-        view: NetworkView,
-        log: TrainingLog,
-        out: Path,
-        progress: ProgressBar,
+        self, training: Training, log: TrainingLog, out: Path, progress: ProgressBar
     ) -> None:
         super().__init__()
-        self._training, self._view, self._log = training, view, log
+        self._training, self._log = training, log
         self._out, self._progress = out, progress
         self._start, self._saved_at = time.monotonic(), -math.inf
         self._before = log.seconds
@@ -229,9 +218,8 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         return self._cpu - before
 
     def _save(self) -> None:
-        learner: PPO = self.model
         self._log.seconds = self._before + time.monotonic() - self._start
-        save_checkpoint(self._out, learner, self._view, self._log)
+        save_checkpoint(self._out, self.model, self._log)
         self._saved_at = time.monotonic()
 
     def _evaluate(self) -> None:

@@ -14,8 +14,7 @@ import torch
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.motion.memory import HELD
-from swarm_logistics_env.train.learner import KNOWN, make_learner, read_known
-from swarm_logistics_env.train.trainer import _new_view
+from swarm_logistics_env.train.learner import KNOWN, NetworkView, make_learner, read_known
 from swarm_logistics_env.warehouse.state import CARRIED
 
 
@@ -45,7 +44,7 @@ def test_the_critic_knows_where_the_requested_item_is() -> None:
 
 
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:
-    view = _new_view(small())
+    view = NetworkView(small())
     view.seed(0)
     view.reset()
     n_steps, commands = 0, np.ones((view.num_envs, 3), np.float32)
@@ -61,7 +60,7 @@ def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None
 
 
 def test_the_actor_sees_nothing_of_it(small: Any) -> None:
-    policy = make_learner(small(), _new_view(small()), "cpu").policy
+    policy = make_learner(small(), NetworkView(small()), "cpu").policy
     columns = torch.randn(50, len(INPUTS) + len(KNOWN))
     changed = columns.clone()
     changed[:, len(INPUTS) :] += 1.0

@@ -22,9 +22,9 @@ from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS, MotionView
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.tasks.warehouse_task import WarehouseTask, code_version
-from swarm_logistics_env.train import evaluation, trainer
+from swarm_logistics_env.train import evaluation
 from swarm_logistics_env.train.evaluation import simulation
-from swarm_logistics_env.train.learner import KNOWN, make_learner, tensors_of
+from swarm_logistics_env.train.learner import KNOWN, NetworkView, make_learner, tensors_of
 from swarm_logistics_env.train.settings import Indicators, Scores
 from swarm_logistics_env.train.trainer import train
 
@@ -92,7 +92,7 @@ def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_cal
 
 def test_torch_and_the_policy_file_agree(small: Any) -> None:
     training = small()
-    learner = make_learner(training, trainer._new_view(training), "cpu")
+    learner = make_learner(training, NetworkView(training), "cpu")
     with torch.no_grad():
         for parameter in learner.policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
@@ -107,7 +107,7 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
 
 def test_the_view_trains_what_the_policy_plays_and_goes_on_from_a_checkpoint(small: Any) -> None:
     training = small(worlds=[{"n_robots": 3}])
-    view = trainer._new_view(training)
+    view = NetworkView(training)
     view.seed(3)
     inputs = view.reset()
     frame = MotionView(training.scenario)
