@@ -85,7 +85,7 @@ def test_the_worlds_of_the_task_are_those_that_all_learn_in(name: str) -> None:
     path = Path(shared.__file__).parent / "swarm_logistics" / f"{name}.yaml"
     fields, preset = yaml.safe_load(path.read_text("utf-8")), load_training("delivery")
     assert fields.pop("rewards") == preset.rewards == shared.REWARDS
-    its_own = preset.world_scenarios[0] if name == "small" else preset.scenario
+    its_own = preset.each_world[0][1] if name == "small" else preset.scenario
     assert Scenario(**fields) == shared.WORLDS[name] == its_own
 
 

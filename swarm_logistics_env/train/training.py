@@ -89,8 +89,7 @@ class Training(Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        scenarios = self.world_scenarios
-        if any(scenario.message_size for scenario in scenarios):
+        if any(scenario.message_size for _, scenario in self.each_world):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         played = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
         for size in sorted(played):
@@ -112,10 +111,10 @@ class Training(Part):
         return self
 
     @property
-    def world_scenarios(self) -> tuple[Scenario, ...]:
-        """The scenario of every world."""
+    def each_world(self) -> tuple[tuple[WorldKind, Scenario], ...]:
+        """The kind and the scenario of every world."""
         return tuple(
-            self.scenario.replace(n_robots=kind.n_robots, **kind.scenario)
+            (kind, self.scenario.replace(n_robots=kind.n_robots, **kind.scenario))
             for kind in self.worlds
             for _ in range(kind.count)
         )
@@ -155,16 +154,16 @@ def make_worlds(training: Training) -> SwarmVecEnv:
     """
     from swarm_logistics_env.adapters import SwarmVecEnv  # loads torch
 
-    scenarios = training.world_scenarios
-    kinds = [kind for kind in training.worlds for _ in range(kind.count)]
+    worlds = training.each_world
 
-    def make_env(world: int) -> Wrapper:
-        core = SwarmLogisticsEnv(scenarios[world], rewards=training.rewards)
-        env = EpisodeMix(core, kinds[world].conditions or training.conditions)
+    def make_env(number: int) -> Wrapper:
+        kind, scenario = worlds[number]
+        core = SwarmLogisticsEnv(scenario, rewards=training.rewards)
+        env = EpisodeMix(core, kind.conditions or training.conditions)
         asked = training.indicators
         return env if asked is None else IndicatorReward(env, **dict(asked), own_reward=1.0)
 
-    return SwarmVecEnv(make_env=make_env, n_worlds=len(scenarios), threads=training.threads)
+    return SwarmVecEnv(make_env=make_env, n_worlds=len(worlds), threads=training.threads)
 
 
 class EpisodeMix(Wrapper):

@@ -25,7 +25,7 @@ def test_every_preset_can_be(name: str) -> None:
 def test_worlds_of_several_kinds_stand_side_by_side() -> None:
     kinds: Any = [{"count": 2, "n_robots": 3, "scenario": {"n_items": 8}}, {"n_robots": 5}]
     training = Training(worlds=kinds)
-    met = [(world.n_robots, world.n_items) for world in training.world_scenarios]
+    met = [(world.n_robots, world.n_items) for _, world in training.each_world]
     assert (met, training.rows) == ([(3, 8), (3, 8), (5, 60)], 11)
 
 
