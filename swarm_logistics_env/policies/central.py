@@ -142,7 +142,9 @@ class Central:
         velocity = self._drift(state, goals, is_under_item, worker)
         if worker != NOBODY:
             velocity[worker] = self._on_its_way(state, worker)
-            gripper[worker] = 1.0 if self._may_hold(state, worker) else 0.0
+            # Of several items in reach the requested one comes first, so no other gets lifted.
+            may_hold = self._task[1] or self._to_item(state) <= self._scenario.pickup_range
+            gripper[worker] = 1.0 if may_hold else 0.0
         return self._steer(state, velocity, gripper)
 
     def _stock(
@@ -194,19 +196,16 @@ class Central:
             self._trusted_from[self._worker] = state.time + DISTRUST
 
     def _left(self, state: WarehouseState) -> float:
-        x, y = state.robot_position[self._worker].tolist()
         if not self._task[1]:
-            return math.dist((x, y), state.item_position[self._task[0]].tolist())
+            return self._to_item(state)
         if self._planned_at < 0:
             return np.inf
+        x, y = state.robot_position[self._worker].tolist()
         return float(self._far[_cell(self._far, x, y)]) * CELL
 
-    def _may_hold(self, state: WarehouseState, worker: int) -> bool:
-        if self._task[1]:
-            return True
-        away = state.robot_position[worker] - state.item_position[self._task[0]]
-        # The requested item comes first where several are in reach, so nothing else gets lifted.
-        return math.hypot(*away.tolist()) <= self._scenario.pickup_range
+    def _to_item(self, state: WarehouseState) -> float:
+        """Return how far the worker is from the item of its task [m]."""
+        return math.dist(state.robot_position[self._worker], state.item_position[self._task[0]])
 
     # -- where to ------------------------------------------------------------------------------
 
@@ -215,7 +214,7 @@ class Central:
         x, y = state.robot_position[worker].tolist()
         if carries and x >= scenario.storage_width:
             return np.array([1.0, 0.0])  # the area may have become narrower
-        if not carries and math.dist((x, y), state.item_position[item].tolist()) < 0.3:
+        if not carries and self._to_item(state) < 0.3:
             return self._towards(state.robot_position[worker], state.item_position[item])
         if state.time >= self._planned_at + REPLAN - 1e-6:
             others = state.robot_present.copy()

@@ -111,16 +111,13 @@ class StableBaselinesModel:
 
     def __init__(self, path: Path) -> None:
         try:
-            self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-        except OSError as error:
-            raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
-        try:
             from stable_baselines3 import PPO
         except ImportError:
             raise PolicyError(
                 f"{path} needs stable-baselines3: install swarm-logistics-env[train]"
             ) from None
         try:
+            self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
             self._model: Any = PPO.load(path, device="cpu")
         except Exception as error:  # whatever the code in a file that is none raises
             reason = (str(error) or type(error).__name__).splitlines()[0]

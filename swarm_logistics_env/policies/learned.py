@@ -343,9 +343,7 @@ def check_tensors(network: Network, tensors: Mapping[str, NDArray[Any]]) -> None
     """Raise PolicyError unless these are the tensors of such a network."""
     shapes = tensor_shapes(network)
     if tensors.keys() != shapes.keys():
-        missing = sorted(shapes.keys() - tensors.keys())
-        unknown = sorted(tensors.keys() - shapes.keys())
-        raise PolicyError(f"its tensors lack {missing} and have {unknown} that no layer is for")
+        raise PolicyError(f"its tensors are {sorted(tensors)}: should be {sorted(shapes)}")
     for name, shape in shapes.items():
         tensor = tensors[name]
         if tensor.shape != shape or tensor.dtype != np.float32:

@@ -168,29 +168,25 @@ def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
 
 def scores_of(results: StudyResults) -> tuple[Score, ...]:
     """Return every P and every indicator of a study with its interval."""
-    found: list[tuple[str, Arm, spi.Interval | spi.Estimate, int]] = [
-        ("P", cell.arm, cell.mean, cell.n_seeds) for cell in results.cells if cell.n_seeds
+    found = [
+        _scored("P", cell.arm, cell.mean, cell.n_seeds) for cell in results.cells if cell.n_seeds
     ]
     for test in results.verdicts:
         if (estimate := test.estimate) is not None:
             compared = test.compared
-            found.append((compared.indicator, compared.changed, estimate, estimate.n_seeds))
-    scores = (
-        Score(
-            measure=measure,
-            condition=_in_words(arm),
-            value=value.value,
-            low=value.low,
-            high=value.high,
-            seeds=seeds,
-        )
-        for measure, arm, value, seeds in found
+            found.append(_scored(compared.indicator, compared.changed, estimate, estimate.n_seeds))
+    return tuple(dict.fromkeys(found))
+
+
+def _scored(measure: str, arm: Arm, value: spi.Interval | spi.Estimate, seeds: int) -> Score:
+    in_words = str(arm.setting)
+    if arm.setting.kind != "size":
+        in_words = f"N = {arm.case.scenario.n_robots}, {in_words}"
+    return Score(
+        measure=measure,
+        condition=in_words,
+        value=value.value,
+        low=value.low,
+        high=value.high,
+        seeds=seeds,
     )
-    return tuple(dict.fromkeys(scores))
-
-
-def _in_words(arm: Arm) -> str:
-    setting = str(arm.setting)
-    if arm.setting.kind == "size":
-        return setting
-    return f"N = {arm.case.scenario.n_robots}, {setting}"

@@ -10,7 +10,6 @@ from __future__ import annotations
 import inspect
 import math
 import os
-import pickle
 import random
 from pathlib import Path
 from typing import Any
@@ -174,6 +173,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
 
 CHECKPOINT = "checkpoint.pt"
+KEPT = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
 ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 
 # What an untrained network says whatever it reads: it drives ahead, so that it meets things. One
@@ -251,10 +251,7 @@ def save_checkpoint(directory: Path, learner: PPO, log: Any) -> None:
     state = {
         "policy": learner.policy.state_dict(),
         "optimizer": learner.policy.optimizer.state_dict(),
-        "num_timesteps": learner.num_timesteps,
-        "n_updates": learner._n_updates,
-        "last_observations": learner._last_obs,
-        "last_starts": learner._last_episode_starts,
+        **{name: getattr(learner, name) for name in KEPT},
         "view": learner.env,
         "torch": torch.get_rng_state(),
         "cuda": torch.cuda.get_rng_state_all(),
@@ -282,8 +279,8 @@ def read_checkpoint(directory: Path) -> dict[str, Any] | None:
         return None
     try:
         state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=False)
-    except (OSError, RuntimeError, EOFError, pickle.UnpicklingError, AttributeError) as error:
-        reason = str(error).splitlines()[0]
+    except Exception as error:  # whatever reading a pickle that is none raises
+        reason = str(error).partition("\n")[0]
         raise TrainingError(
             f"the checkpoint {path} cannot be read ({reason}): train into a new directory"
         ) from error
@@ -296,10 +293,8 @@ def restore(learner: PPO, state: dict[str, Any]) -> None:
     learner.set_env(state["view"], force_reset=False)
     learner.policy.load_state_dict(state["policy"])
     learner.policy.optimizer.load_state_dict(state["optimizer"])
-    learner.num_timesteps = state["num_timesteps"]
-    learner._n_updates = state["n_updates"]
-    learner._last_obs = state["last_observations"]
-    learner._last_episode_starts = state["last_starts"]
+    for name in KEPT:
+        setattr(learner, name, state[name])
     torch.set_rng_state(state["torch"])
     if state["cuda"] and torch.cuda.is_available():
         torch.cuda.set_rng_state_all(state["cuda"])

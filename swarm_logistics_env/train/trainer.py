@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -146,13 +145,10 @@ class TrainingLog:
 
     def write(self, directory: Path) -> None:
         """Write curve.csv, whole or not at all."""
-        with (
-            becoming(directory / CURVE, TrainingError) as part,
-            part.open("w", encoding="utf-8", newline="") as file,
-        ):
-            writer = csv.DictWriter(file, self.curve[0])
-            writer.writeheader()
-            writer.writerows(self.curve)
+        from pandas import DataFrame
+
+        with becoming(directory / CURVE, TrainingError) as part:
+            DataFrame(self.curve).to_csv(part, index=False, na_rep="nan")
 
     def draw(self, picture: Path, title: str, seeds: int) -> None:
         """Draw P over agent-steps as a PNG, with a line for each scripted policy."""

@@ -67,7 +67,7 @@ def test_a_file_that_is_too_large_or_cut_short_is_refused(
         ({"layers.1.weight": np.zeros((6, 9), np.float32)}, r"layers.1.weight .*\(6, 9\).*\(6, 8"),
         ({"deviations": np.zeros(3)}, "its tensor deviations is float64"),
         ({"deviations": np.full(3, np.nan, np.float32)}, "its tensor deviations is not finite"),
-        ({"other": np.zeros(3, np.float32)}, r"have \['other'\]"),
+        ({"other": np.zeros(3, np.float32)}, r"tensors are .*'other'\]: should be .*weight'\]"),
     ],
 )
 def test_tensors_that_the_network_has_no_use_for_are_refused(
