@@ -2,7 +2,7 @@
 
 Robots sense and remember what those of `homing` do, and six simple mechanisms are added:
 
-* Every `ROLE_TIME` a robot draws whether it holds, stocks, or works on requests alone.
+* Every `ROLE_TIME` a robot draws whether it holds or stocks.
 * A robot that holds lifts any item and waits with it just inside the area, so that it is delivered
   at once when it is asked for. Where it sees the requested item, it swaps: out, drop, lift, in.
 * A robot that stocks puts items down in front of the area, but only where no other item is near:
@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
 from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, random_heading
@@ -43,6 +42,7 @@ from swarm_logistics_env.policies.homing import (
 
 # Lengths in m; distances from the delivery area are as a robot reckons them.
 ROLE_TIME = 40.0  # [s]
+HOLDERS = 0.6  # the share of robots that hold; the others stock
 FIRST_ROLE = 2_000_003  # number in the robot's stream
 NEAR, FAR = 0.8, 1.2  # items are put down nearer than the one, lifted farther than the other
 CARRIED_OFF = 1.0  # where an item is put down for which there is no gap
@@ -57,29 +57,12 @@ PULL = 0.4  # home, beside a random direction of length 1
 class HomingStock(Homing):
     """Homing that carries stock to the delivery area before anybody asks for it.
 
-    Args:
-        holders: the share of robots that hold items inside the delivery area, 0 to 1.
-        stockers: the share that puts items down beside it, 0 to 1; with `holders` at most 1. The
-            others work on requests alone.
-
-    Raises:
-        PolicyError: a share is below 0, or both together are above 1.
-
     Example:
-        >>> policy = HomingStock(holders=0.5)
+        >>> policy = HomingStock()
         >>> policy.reset(n_robots=3, seed=0)
         >>> policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape
         (3, 4)
     """
-
-    def __init__(self, holders: float = 0.6, stockers: float = 0.4) -> None:
-        if not (holders >= 0.0 and stockers >= 0.0 and holders + stockers <= 1.0 + 1e-9):
-            raise PolicyError(
-                f"holders = {holders}, stockers = {stockers}: should be shares of 0 or more, "
-                "together at most 1"
-            )
-        self.parameters = {"holders": float(holders), "stockers": float(stockers)}
-        super().__init__()
 
     def _decide(
         self,
@@ -87,16 +70,8 @@ class HomingStock(Homing):
         random_headings: NDArray[np.int64],
         commands: NDArray[np.float64],
     ) -> None:
-        decide_homing_stock(
-            observations,
-            self._frame.memory,
-            self._frame.keys,
-            random_headings,
-            self._period,
-            self.parameters["holders"],
-            self.parameters["stockers"],
-            commands,
-        )
+        memory, keys = self._frame.memory, self._frame.keys
+        decide_homing_stock(observations, memory, keys, random_headings, self._period, commands)
 
 
 @kernel
@@ -106,8 +81,6 @@ def decide_homing_stock(
     keys: NDArray[np.uint64],
     random_headings: NDArray[np.int64],
     period: float,
-    holders: float,
-    stockers: float,
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4) from rows (N, D), memories and the numbers of random headings."""
@@ -118,7 +91,7 @@ def decide_homing_stock(
         turns = random_headings[robot] * RANDOM_HEADING_TIME / ROLE_TIME
         turn = int(turns + uniform(keys[robot], FIRST_ROLE))
         role = uniform(keys[robot], FIRST_ROLE + 1 + turn)
-        holds = role < holders and own[known.CANNOT_DELIVER] < 0.5
+        holds = role < HOLDERS and own[known.CANNOT_DELIVER] < 0.5
         forget_if_lost(own, is_inside)
         home_x, home_y, sure = known.kept_home(own)
         x, y = own[known.HEADING_X], own[known.HEADING_Y]
@@ -159,7 +132,7 @@ def decide_homing_stock(
         else:
             if item >= 0 and is_inside and sensed[item + 4] > 0.5:
                 item = -1  # it could not deliver it
-            stocks = holds or role > 1.0 - stockers
+            stocks = holds or role > HOLDERS
             if item < 0 and stocks and sure > 0.0 and own[known.CANNOT_LIFT] <= 0.0:
                 item = item_to_stock(sensed, own, home_x, home_y, 0.0 if holds else FAR)
             if item >= 0:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import load
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
@@ -20,8 +19,8 @@ SMALL = Scenario(
 WITHOUT_STOCK = {"homing-stock": "homing", "central-stock": "central"}
 
 
-def fresh(n_robots: int, name: str = "homing", **parameters: Any) -> Any:
-    policy = load(name, **parameters)
+def fresh(n_robots: int, name: str = "homing") -> Any:
+    policy = load(name)
     policy.reset(n_robots, 0)
     return policy
 
@@ -100,22 +99,14 @@ def test_with_a_stock_it_gets_on_with_robots_that_fail(name: str, mode: str) -> 
     assert run_episode(SMALL, load(name), 0, (Fault(mode, 2),)).delivered >= 4
 
 
-@pytest.mark.parametrize(("holders", "drops"), [(0.0, True), (1.0, False)])
-def test_who_holds_keeps_its_item_and_who_stocks_puts_it_down_before_the_area(
-    holders: float, drops: bool
-) -> None:
-    policy = fresh(20, "homing-stock", holders=holders, stockers=1.0 - holders)
-    policy.act(rows_of(20, EAST))
-    policy.act(rows_of(20, EAST, inside=True))
-    leaving = rows_of(20, (-1.0, 0.0))
+def test_who_holds_keeps_its_item_and_who_stocks_puts_it_down_before_the_area() -> None:
+    policy = fresh(400, "homing-stock")
+    policy.act(rows_of(400, EAST))
+    policy.act(rows_of(400, EAST, inside=True))
+    leaving = rows_of(400, (-1.0, 0.0))
     leaving[:, row.CARRYING] = 1.0
     gripper = policy.act(leaving)[:, 3]
-    assert (gripper == (-1.0 if drops else 0.0)).all()
+    assert set(gripper) == {-1.0, 0.0}
+    assert (gripper == 0.0).mean() == pytest.approx(0.6, abs=0.08)
     leaving[:, row.ITEMS : row.ITEMS + 3] = (1.0, 0.3, 0.3)  # no gap beside this item
     assert (policy.act(leaving)[:, 3] == 0.0).all()
-
-
-@pytest.mark.parametrize(("holders", "stockers"), [(-0.1, 0.4), (0.7, 0.7)])
-def test_shares_that_cannot_be_are_refused(holders: float, stockers: float) -> None:
-    with pytest.raises(PolicyError, match="holders"):
-        load("homing-stock", holders=holders, stockers=stockers)
