@@ -36,53 +36,6 @@ CLEARANCE, OBSTACLE_RANGE = 0.28, 0.5
 N_DIRECTIONS = 32
 
 
-class Homing:
-    """Every robot remembers for some ten seconds where it last entered the delivery area.
-
-    Example:
-        >>> policy = Homing()
-        >>> policy.reset(n_robots=3, seed=0)
-        >>> policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape
-        (3, 4)
-    """
-
-    def __init__(self) -> None:
-        self.configure(Scenario())
-        self.reset(0, 0)
-
-    def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows: the control period."""
-        self._period = scenario.control_period
-        self._frame = MotionView(scenario)
-
-    def reset(self, n_robots: int, seed: int) -> None:
-        """Begin an episode with random headings and empty memories."""
-        self._frame.begin(row_keys(seed, "homing", n_robots))
-
-    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return commands (N, 4) for observation rows (N, D).
-
-        Raises:
-            PolicyError: there are more or fewer rows than robots at `reset`.
-        """
-        frame = self._frame
-        frame.read(observations)
-        numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
-        commands = np.zeros((len(observations), 4))
-        self._decide(observations, numbers, commands)
-        return frame.command(frame.outputs_for(commands))
-
-    def _decide(
-        self,
-        observations: NDArray[np.float32],
-        random_headings: NDArray[np.int64],
-        commands: NDArray[np.float64],
-    ) -> None:
-        """Fill the commands (N, 4), in the robots' own frames."""
-        memory, keys = self._frame.memory, self._frame.keys
-        decide_homing(observations, memory, keys, random_headings, self._period, commands)
-
-
 @kernel
 def decide_homing(
     rows: NDArray[np.float32],
@@ -92,7 +45,7 @@ def decide_homing(
     period: float,
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill the commands (N, 4) from rows (N, D) and memories (N, memory.N_COLUMNS).
+    """Fill the commands (N, 4), in the robots' own frames, from rows (N, D) and memories.
 
     `random_headings` (N,) are the numbers of the random directions whose turn it is.
     """
@@ -252,3 +205,42 @@ def freest_direction(
         if worth > most:
             most, best_x, best_y = worth, go_x, go_y
     return best_x, best_y
+
+
+class Homing:
+    """Every robot remembers for some ten seconds where it last entered the delivery area.
+
+    Example:
+        >>> policy = Homing()
+        >>> policy.reset(n_robots=3, seed=0)
+        >>> policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape
+        (3, 4)
+    """
+
+    _decide = staticmethod(decide_homing)
+
+    def __init__(self) -> None:
+        self.configure(Scenario())
+        self.reset(0, 0)
+
+    def configure(self, scenario: Scenario) -> None:
+        """Take what a robot's maker knows: the control period."""
+        self._period = scenario.control_period
+        self._frame = MotionView(scenario)
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode with random headings and empty memories."""
+        self._frame.begin(row_keys(seed, "homing", n_robots))
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return commands (N, 4) for observation rows (N, D).
+
+        Raises:
+            PolicyError: there are more or fewer rows than robots at `reset`.
+        """
+        frame = self._frame
+        frame.read(observations)
+        numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+        commands = np.zeros((len(observations), 4))
+        self._decide(observations, frame.memory, frame.keys, numbers, self._period, commands)
+        return frame.command(frame.outputs_for(commands))

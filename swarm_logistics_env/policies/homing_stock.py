@@ -54,26 +54,6 @@ STUCK = 0.4  # a robot tries a random direction until the memory's 1 has fallen 
 PULL = 0.4  # home, beside a random direction of length 1
 
 
-class HomingStock(Homing):
-    """Homing that carries stock to the delivery area before anybody asks for it.
-
-    Example:
-        >>> policy = HomingStock()
-        >>> policy.reset(n_robots=3, seed=0)
-        >>> policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape
-        (3, 4)
-    """
-
-    def _decide(
-        self,
-        observations: NDArray[np.float32],
-        random_headings: NDArray[np.int64],
-        commands: NDArray[np.float64],
-    ) -> None:
-        memory, keys = self._frame.memory, self._frame.keys
-        decide_homing_stock(observations, memory, keys, random_headings, self._period, commands)
-
-
 @kernel
 def decide_homing_stock(
     rows: NDArray[np.float32],
@@ -199,3 +179,16 @@ def item_to_stock(
         if sensed[there + 4] < 0.5 and away > least:
             return there
     return -1
+
+
+class HomingStock(Homing):
+    """Homing that carries stock to the delivery area before anybody asks for it.
+
+    Example:
+        >>> policy = HomingStock()
+        >>> policy.reset(n_robots=3, seed=0)
+        >>> policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape
+        (3, 4)
+    """
+
+    _decide = staticmethod(decide_homing_stock)
