@@ -102,11 +102,8 @@ class CentralStock(Central):
     def _slots(self) -> NDArray[np.float64]:
         """Return the places of the slots (S, 2) [m]; one row stands in the other's gaps."""
         along = np.arange(0.5 * SLOT_PITCH, self._scenario.warehouse_height - 0.3, SLOT_PITCH)
-        rows = [
-            (np.full(len(along), self._scenario.storage_width - row), along + shift * SLOT_PITCH)
-            for row, shift in zip(ROWS, (0.0, 0.5))
-        ]
-        return np.concatenate([np.column_stack(row) for row in rows])
+        x = self._scenario.storage_width - np.repeat(ROWS, len(along))
+        return np.column_stack([x, np.concatenate([along, along + 0.5 * SLOT_PITCH])])
 
     def _are_free(self, state: WarehouseState, slots: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which slots have no item and no robot on its way with one (S,)."""

@@ -42,8 +42,8 @@ class Policy(Protocol):
         """Return commands (N, 4) in [-1, 1] for observation rows (N, D)."""
 
 
-def start(policy: Policy, scenario: Scenario, seed: int) -> None:
-    """Let `policy` begin an episode.
+def checked(policy: object) -> Policy:
+    """Return the policy that `policy` is.
 
     Raises:
         PolicyError: it is none.
@@ -53,7 +53,16 @@ def start(policy: Policy, scenario: Scenario, seed: int) -> None:
             f"policy = {policy!r}: should have the methods reset and act, as what "
             "policies.load(name) returns has"
         )
-    configure = getattr(policy, "configure", None)
+    return policy
+
+
+def start(policy: Policy, scenario: Scenario, seed: int) -> None:
+    """Let `policy` begin an episode.
+
+    Raises:
+        PolicyError: it is none.
+    """
+    configure = getattr(checked(policy), "configure", None)
     if configure is not None:
         configure(scenario)
     policy.reset(scenario.n_robots, seed)

@@ -30,7 +30,7 @@ from swarm_logistics_env.policies.files import (
 )
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
-from swarm_logistics_env.policies.policy import Policy, identity
+from swarm_logistics_env.policies.policy import Policy, checked, identity
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.records import Record, canonical_json
 
@@ -84,15 +84,12 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         meant = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, known)
         raise PolicyError(f"no policy {name!r} (a name, 'package.module:Class' or a file){meant}")
     try:
-        policy = make(**parameters)
+        return checked(make(**parameters))
     except SwarmLogisticsError:
         raise
     except Exception as error:  # of code that is not ours
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be made: {kind}: {error}") from error
-    if not isinstance(policy, Policy):
-        raise PolicyError(f"{name!r} is no policy: it should have the methods reset and act")
-    return policy
 
 
 # A task's own policies need not be the warehouse's `Policy`.
@@ -202,9 +199,7 @@ class PolicySpec(Record):
                 raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
             return found
         if self.made is not None:
-            if not (makers or isinstance(self.made, Policy)):
-                raise PolicyError(f"policy {self.made!r}: should have the methods reset and act")
-            found = self.made
+            found = self.made if makers else checked(self.made)
         elif makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         elif makers and self.name.endswith(SB3_SUFFIX):

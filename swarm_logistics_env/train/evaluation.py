@@ -62,7 +62,7 @@ def enter(directory: Path, training: Training, command: str) -> None:
     Raises:
         TrainingError: it cannot be written, or holds another training.
     """
-    path, asked = directory / FILE_NAME, json.loads(training.to_json())
+    path, asked = directory / FILE_NAME, training.model_dump(mode="json")
     sessions: list[dict[str, Any]] = []
     try:
         directory.mkdir(parents=True, exist_ok=True)

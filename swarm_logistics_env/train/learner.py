@@ -129,10 +129,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world."""
         self.observations = self.venv.reset()
-        self._bodies = np.empty((self.num_envs, 3))
-        for world in range(len(self.venv.worlds)):
-            self._note_body(world)
-        self.frame.begin(self._keys(), self._bodies)
+        self.frame.begin(self._keys(), self._bodies())
         return self._read()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
@@ -149,16 +146,15 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             ends = np.hstack([self.frame.peek(last, over), self._known[over]])
             for row, read in zip(over.tolist(), ends):
                 infos[row]["terminal_observation"] = read
-            for world, rows in enumerate(self.venv.rows_of_worlds):
-                if dones[rows].any():
-                    self._note_body(world)
-            self.frame.begin_rows(over, self._keys()[over], self._bodies[over])
+            self.frame.begin_rows(over, self._keys()[over], self._bodies()[over])
         return self._read(), rewards, dones, infos
 
-    def _note_body(self, world: int) -> None:
+    def _bodies(self) -> NDArray[np.float64]:
         # Every episode may have robots of another kind.
-        scenario = self.venv.worlds[world].warehouse.scenario
-        self._bodies[self.venv.rows_of_worlds[world]] = body_of(scenario)
+        bodies = np.empty((self.num_envs, 3))
+        for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
+            bodies[rows] = body_of(world.warehouse.scenario)
+        return bodies
 
     def _read(self) -> NDArray[np.float32]:
         inputs = self.frame.read(self.observations)

@@ -177,8 +177,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         super().__init__()
         self._training, self._log = training, log
         self._out, self._progress = out, progress
-        self._start, self._saved_at = time.monotonic(), -math.inf
-        self._before = log.seconds
+        self._start, self._saved_at = time.monotonic() - log.seconds, -math.inf
         self._cpu = time.process_time()
 
     def _on_step(self) -> bool:
@@ -186,9 +185,8 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         return True
 
     def _on_rollout_start(self) -> None:
-        self._log.cpu_seconds += self._cpu_seconds()
-        done = min(1.0, self.num_timesteps / self._training.agent_steps)
-        floor = self._training.ppo.floor(done)
+        self._log.cpu_seconds += time.process_time() - self._cpu
+        floor = self._training.ppo.floor(self.num_timesteps / self._training.agent_steps)
         with torch.no_grad():
             self.model.policy.log_std.clamp_(min=math.log(floor))
         curve = self._log.curve
@@ -199,22 +197,17 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
             self._evaluate()
         if time.monotonic() - self._saved_at >= CHECKPOINT_EVERY:
             self._save()
-        self._cpu_seconds()
+        self._cpu = time.process_time()
 
     def end(self) -> None:
         """Evaluate and save the policy at the end of the training."""
-        self._log.cpu_seconds += self._cpu_seconds()
+        self._log.cpu_seconds += time.process_time() - self._cpu
         if self._log.curve[-1]["agent_steps"] < self.num_timesteps:
             self._evaluate()
         self._save()
 
-    def _cpu_seconds(self) -> float:
-        """Return the processor time since the last call [s]."""
-        before, self._cpu = self._cpu, time.process_time()
-        return self._cpu - before
-
     def _save(self) -> None:
-        self._log.seconds = self._before + time.monotonic() - self._start
+        self._log.seconds = time.monotonic() - self._start
         save_checkpoint(self._out, self.model, self._log)
         self._saved_at = time.monotonic()
 
@@ -227,7 +220,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         )
         row = {
             "agent_steps": self.num_timesteps,
-            "seconds": round(self._before + time.monotonic() - self._start, 1),
+            "seconds": round(time.monotonic() - self._start, 1),
             "cpu_seconds": round(log.cpu_seconds, 1),
         }
         log.curve.append({**row, **means})

@@ -33,7 +33,7 @@ def test_a_class_is_loaded_by_module_or_the_file_of_this_folder_and_name(own_mod
         ("no_such_module:Class", {}, "ModuleNotFoundError: No module named 'no_such_mod"),
         ("own_policies:Stil", {}, "cannot be imported: .* no attribute 'Stil'"),
         ("own_policies:number", {}, "is a int: should be a class"),
-        ("own_policies:NoPolicy", {}, "is no policy: it should have the methods reset and act"),
+        ("own_policies:NoPolicy", {}, "NoPolicy object .* should have the methods reset and act"),
         (":Class", {}, "cannot be imported"),
         ("swarm-dt", {"taxis_gian": 1.0}, "no field 'taxis_gian'; did you mean 'taxis_gain'"),
         ("swarm-dt", {"drop_rate": -1.0}, r"drop_rate = -1.0: should be greater than or equal"),
