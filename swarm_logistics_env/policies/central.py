@@ -15,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.policies.routes import BLOCKED, CROWDED, cost_to_go, costmap, lookahead
+from swarm_logistics_env.policies.routes import (
+    BLOCKED,
+    CROWDED,
+    cell_at,
+    cost_to_go,
+    costmap,
+    lookahead,
+)
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
@@ -163,14 +170,14 @@ class Central:
         if item == NOBODY:
             return NOBODY
         carrier = int(state.item_carrier[item])
-        if self._worker != NOBODY and self._task == (item, carrier != NOBODY):
+        task = (item, carrier != NOBODY)
+        if self._worker != NOBODY and self._task == task:
             self._judge(state)
         is_trusted = self._trusted_from <= state.time
         if carrier != NOBODY:
             worker = carrier if is_trusted[carrier] else NOBODY
         else:
             worker = self._nearest(state, item, is_trusted)
-        task = (item, carrier != NOBODY)
         if worker != self._worker or task != self._task:
             self._worker, self._task = worker, task
             self._best, self._best_at = np.inf, state.time
@@ -201,7 +208,7 @@ class Central:
         if self._planned_at < 0:
             return np.inf
         x, y = state.robot_position[self._worker].tolist()
-        return float(self._far[_cell(self._far, x, y)]) * CELL
+        return float(self._far[cell_at(self._far, CELL, x, y)]) * CELL
 
     def _to_item(self, state: WarehouseState) -> float:
         """Return how far the worker is from the item of its task [m]."""
@@ -253,7 +260,7 @@ class Central:
         if carries:
             goal[:, int(scenario.storage_width / CELL) :] = True
         else:
-            goal[_cell(cost, *state.item_position[item].tolist())] = True
+            goal[cell_at(cost, CELL, *state.item_position[item].tolist())] = True
         return cost, cost_to_go(cost, goal)
 
     # -- how -----------------------------------------------------------------------------------
@@ -307,12 +314,6 @@ class Central:
             forward = np.maximum(forward, 0.0)
             left[:] = 0.0
         return np.stack([forward, left, turn, gripper], axis=1)
-
-
-def _cell(grid: NDArray[np.float64], x: float, y: float) -> tuple[int, int]:
-    """Return row and column of the cell of a grid in which (x, y) [m] lies, or that is nearest."""
-    rows, columns = grid.shape
-    return min(max(int(y / CELL), 0), rows - 1), min(max(int(x / CELL), 0), columns - 1)
 
 
 def _discs(centres: NDArray[np.float64], radius: float, cost: float) -> NDArray[np.float64]:

@@ -60,12 +60,16 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
                 for j in range(columns):
                     column = j + 1 if order < 2 else columns - j
                     straight = min(
-                        min(far[row - 1, column], far[row + 1, column]),
-                        min(far[row, column - 1], far[row, column + 1]),
+                        far[row - 1, column],
+                        far[row + 1, column],
+                        far[row, column - 1],
+                        far[row, column + 1],
                     )
                     aslant = min(
-                        min(far[row - 1, column - 1], far[row - 1, column + 1]),
-                        min(far[row + 1, column - 1], far[row + 1, column + 1]),
+                        far[row - 1, column - 1],
+                        far[row - 1, column + 1],
+                        far[row + 1, column - 1],
+                        far[row + 1, column + 1],
                     )
                     step = cost[row - 1, column - 1]
                     best = min(straight + step, aslant + 1.4142135623730951 * step)
@@ -74,6 +78,13 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
                         has_changed = True
         if not has_changed:
             return far[1:-1, 1:-1].copy()
+
+
+@kernel
+def cell_at(grid: NDArray[np.float64], cell: float, x: float, y: float) -> tuple[int, int]:
+    """Return row and column of the cell of a grid in which (x, y) [m] lies, or that is nearest."""
+    rows, columns = grid.shape
+    return min(max(int(y / cell), 0), rows - 1), min(max(int(x / cell), 0), columns - 1)
 
 
 @kernel
@@ -90,8 +101,8 @@ def lookahead(
     A line counts as straight as long as no cell on it costs more than those the way leads through.
     """
     rows, columns = cost.shape
-    first_row = row = min(max(int(y / cell), 0), rows - 1)
-    first_column = column = min(max(int(x / cell), 0), columns - 1)
+    first = cell_at(cost, cell, x, y)
+    row, column = first
     goal_x, goal_y = (column + 0.5) * cell, (row + 0.5) * cell
     dearest = 1.0
     for step in range(n_cells):
@@ -115,10 +126,8 @@ def lookahead(
         is_open = True
         for sample in range(1, n_samples + 1):
             part = sample / n_samples
-            r = min(max(int((y + part * (to_y - y)) / cell), 0), rows - 1)
-            c = min(max(int((x + part * (to_x - x)) / cell), 0), columns - 1)
-            is_first = r == first_row and c == first_column
-            if not is_first and cost[r, c] > dearest:
+            r, c = cell_at(cost, cell, x + part * (to_x - x), y + part * (to_y - y))
+            if (r, c) != first and cost[r, c] > dearest:
                 is_open = False
                 break
         if not is_open and step > 0:
