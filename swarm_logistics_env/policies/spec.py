@@ -82,7 +82,8 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     if make is None:
         known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         meant = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, known)
-        raise PolicyError(f"no policy {name!r} (a name, 'package.module:Class' or a file){meant}")
+        kinds = "a name, 'package.module:Class' or a .safetensors or .zip file"
+        raise PolicyError(f"no policy {name!r} ({kinds}){meant}")
     try:
         return checked(make(**parameters))
     except SwarmLogisticsError:
@@ -310,8 +311,6 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
                 "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
             )
         return functools.partial(StableBaselinesPolicy, path)
-    if path.is_file() and path.suffix != ".py":
-        raise PolicyError(f"{name} is no policy file: should end in {' or '.join(SUFFIXES)}")
     return None
 
 

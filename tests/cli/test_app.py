@@ -102,7 +102,7 @@ def test_what_is_wrong_with_a_policy_of_ones_own_is_one_sentence(command: Comman
         ("own_policy:Short", "TypeError: Short.reset() takes 2 positional arguments but 3 were"),
         ("own_policy:Unmade", "'own_policy:Unmade' cannot be made: KeyError: 'gain'"),
         ("own_policy:Laxy", "module 'own_policy' has no attribute 'Laxy'"),
-        ("own_policy", "no policy 'own_policy' (a name, 'package.module:Class' or a file)"),
+        ("own_policy", "no policy 'own_policy' (a name, 'package.module:Class' or a "),
     ):
         assert said in command(f"run --policy {name} {SMALL}", code=2)
 

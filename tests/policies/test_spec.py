@@ -29,7 +29,7 @@ def test_a_class_is_loaded_by_module_or_the_file_of_this_folder_and_name(own_mod
 @pytest.mark.parametrize(
     ("name", "parameters", "complaint"),
     [
-        ("swarm-td", {}, r"no policy 'swarm-td' \(.* or a file\); did you mean 'swarm-dt'\?$"),
+        ("swarm-td", {}, r"no policy 'swarm-td' \(.* file\); did you mean 'swarm-dt'\?$"),
         ("no_such_module:Class", {}, "ModuleNotFoundError: No module named 'no_such_mod"),
         ("own_policies:Stil", {}, "cannot be imported: .* no attribute 'Stil'"),
         ("own_policies:number", {}, "is a int: should be a class"),
