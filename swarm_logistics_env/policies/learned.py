@@ -101,7 +101,7 @@ class PolicyCard(_Part):
         command: the command line that trained it.
         versions: the versions of the packages that trained it; "simulation" is the digest of the
             world's code (`tasks.warehouse_task.code_version`) at that time.
-        scored_with: the version of this package, and the digest, with which it was scored.
+        scored_with: the versions with which it was scored.
         scenario: what it was trained in, fields that differ from the defaults.
         training: the specification of the training.
         seed: the training's seed.

@@ -204,7 +204,7 @@ class PolicySpec(Record):
         elif makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         elif makers and self.name.endswith(SB3_SUFFIX):
-            found = _model(self.name)
+            found = _model(Path(self.name))
         else:
             found = _loaded(self.name, canonical_json(self.parameters), self.trusted)
         try:
@@ -229,9 +229,7 @@ class PolicySpec(Record):
         return canonical_json({"given": self.parameters, "policy": found})
 
 
-@functools.lru_cache(maxsize=8)
-def _model(name: str) -> Policy:
-    return StableBaselinesModel(Path(name))
+_model = functools.lru_cache(maxsize=8)(StableBaselinesModel)
 
 
 @functools.lru_cache(maxsize=8)

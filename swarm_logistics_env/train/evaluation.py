@@ -50,12 +50,6 @@ def versions() -> dict[str, str]:
     return found
 
 
-def simulation() -> dict[str, str]:
-    """Return those of the versions that say which world was played in."""
-    found = versions()
-    return {name: found[name] for name in ("swarm-logistics-env", "simulation") if name in found}
-
-
 def enter(directory: Path, training: Training, command: str) -> None:
     """Make the directory of a training, or enter it to go on; note when and by what.
 

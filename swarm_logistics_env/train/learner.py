@@ -10,7 +10,6 @@ from __future__ import annotations
 import inspect
 import math
 import os
-import random
 from pathlib import Path
 from typing import Any
 
@@ -253,7 +252,6 @@ def save_checkpoint(directory: Path, learner: PPO, log: Any) -> None:
         "cuda": torch.cuda.get_rng_state_all(),
         # stable-baselines3 shuffles minibatches by numpy's global generator.
         "numpy": np.random.get_state(),  # noqa: NPY002 - see above
-        "python": random.getstate(),
         "log": log,
     }
     with becoming(directory / CHECKPOINT, TrainingError) as part, part.open("wb") as file:
@@ -292,10 +290,9 @@ def restore(learner: PPO, state: dict[str, Any]) -> None:
     for name in KEPT:
         setattr(learner, name, state[name])
     torch.set_rng_state(state["torch"])
-    if state["cuda"] and torch.cuda.is_available():
+    if torch.cuda.is_available():
         torch.cuda.set_rng_state_all(state["cuda"])
     np.random.set_state(state["numpy"])  # noqa: NPY002 - see above
-    random.setstate(state["python"])
 
 
 class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the environment of the type check

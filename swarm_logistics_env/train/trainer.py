@@ -24,7 +24,6 @@ from swarm_logistics_env.train.evaluation import (
     evaluate,
     reference_means,
     score,
-    simulation,
     versions,
 )
 from swarm_logistics_env.train.learner import (
@@ -107,7 +106,7 @@ def train(
     write_policy(path, card, tensors)
     scores = score(LearnedPolicy(card, tensors), training, out / "scores")
     if scores:
-        write_policy(path, card.replace(scores=scores, scored_with=simulation()), tensors)
+        write_policy(path, card.replace(scores=scores, scored_with=versions()), tensors)
     return path
 
 
@@ -222,8 +221,9 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
             "agent_steps": self.num_timesteps,
             "seconds": round(time.monotonic() - self._start, 1),
             "cpu_seconds": round(log.cpu_seconds, 1),
+            **means,
         }
-        log.curve.append({**row, **means})
+        log.curve.append(row)
         for name, value in means.items():
             self.logger.record(f"evaluation/{name}", value)
         self._progress.say(log.sentence(means))

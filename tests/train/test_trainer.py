@@ -23,7 +23,7 @@ from swarm_logistics_env.motion.frame import INPUTS, MotionView
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.tasks.warehouse_task import WarehouseTask, code_version
 from swarm_logistics_env.train import evaluation
-from swarm_logistics_env.train.evaluation import simulation
+from swarm_logistics_env.train.evaluation import versions
 from swarm_logistics_env.train.learner import KNOWN, NetworkView, make_learner, tensors_of
 from swarm_logistics_env.train.settings import Indicators, Scores
 from swarm_logistics_env.train.trainer import train
@@ -59,7 +59,7 @@ def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> N
     assert card.agent_steps == 640
     assert card.scenario["warehouse_width"] == 5.0
     assert {"torch", "swarm-logistics-env", "simulation"} <= card.versions.keys()
-    assert card.scored_with == simulation()
+    assert card.scored_with == versions()
     measured = {(score.measure, score.condition) for score in card.scores}
     assert measured >= {("P", "N = 2"), ("P", "N = 3"), ("P", "N = 3, FM4, m = 1")}
     curve = (tmp_path / "curve.csv").read_text().splitlines()
