@@ -27,49 +27,6 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 
-class WaitingPlaces:
-    """Gives each robot an item to wait under, spread out, or a place at the wall.
-
-    Unladen robots drive under items, which laden ones have to go around anyway.
-
-    Args:
-        n_robots: rows of robots.
-        laden_wait: whether robots that carry an item wait for a place to wait as well.
-    """
-
-    def __init__(self, n_robots: int, laden_wait: bool = True) -> None:
-        self._laden_wait = laden_wait
-        self.item = np.full(n_robots, NOBODY)  # that each robot waits under
-
-    def places(
-        self, state: WarehouseState, worker: int, scenario: Scenario
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return where each robot should wait (N, 2) [m], and which have an item to wait under.
-
-        Args:
-            worker: the robot that has no time to wait, or NOBODY.
-        """
-        free = state.item_status == STORED
-        if state.requested != NOBODY:
-            free[state.requested] = False
-        waits = state.robot_present & (self._laden_wait | (state.robot_item == NOBODY))
-        if worker != NOBODY:
-            waits[worker] = False
-        item = self.item
-        item[~waits | ~free[item]] = NOBODY
-        is_taken = np.zeros(len(free), np.bool_)
-        is_taken[item[item != NOBODY]] = True
-        for robot in np.flatnonzero(waits & (item == NOBODY)).tolist():
-            candidates = np.flatnonzero(free & ~is_taken)
-            if not len(candidates):
-                break
-            item[robot] = _loneliest(state, robot, candidates, is_taken)
-            is_taken[item[robot]] = True
-        has_item = item != NOBODY
-        at_the_wall = _rank_and_file(len(item), scenario)
-        return np.where(has_item[:, None], state.item_position[item], at_the_wall), has_item
-
-
 def _loneliest(
     state: WarehouseState, robot: int, candidates: NDArray[np.int64], is_taken: NDArray[np.bool_]
 ) -> int:
@@ -110,6 +67,7 @@ class Central:
     """
 
     needs_state = True
+    laden_wait = True  # whether robots that carry an item wait for a place to wait as well
 
     def __init__(self) -> None:
         self._scenario = Scenario()
@@ -122,7 +80,7 @@ class Central:
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode; nothing here is random."""
         self._trusted_from = np.full(n_robots, -np.inf)  # [s]
-        self._waiting = WaitingPlaces(n_robots)
+        self._waits_under = np.full(n_robots, NOBODY)  # the item of each robot
         self._worker = NOBODY
         self._task: tuple[int, bool] = (NOBODY, False)
         self._best, self._best_at = np.inf, 0.0
@@ -143,7 +101,7 @@ class Central:
                 f"a state of {state.n_robots} robots: reset was told {len(self._trusted_from)}"
             )
         worker = self._assign(state)
-        goals, is_under_item = self._waiting.places(state, worker, self._scenario)
+        goals, is_under_item = self._waiting_places(state, worker)
         gripper = np.where(state.robot_item == NOBODY, 0.0, -1.0)  # nobody hoards
         self._stock(state, worker, goals, gripper)
         velocity = self._drift(state, goals, is_under_item, worker)
@@ -162,6 +120,37 @@ class Central:
         gripper: NDArray[np.float64],
     ) -> None:
         """Change what robots without a request do: where they go [m] and what they hold."""
+
+    def _waiting_places(
+        self, state: WarehouseState, worker: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return where each robot should wait (N, 2) [m], and which have an item to wait under.
+
+        They are spread out. Unladen robots drive under items, which laden ones have to go around
+        anyway. Who has no item waits at the wall.
+
+        Args:
+            worker: the robot that has no time to wait, or NOBODY.
+        """
+        free = state.item_status == STORED
+        if state.requested != NOBODY:
+            free[state.requested] = False
+        waits = state.robot_present & (self.laden_wait | (state.robot_item == NOBODY))
+        if worker != NOBODY:
+            waits[worker] = False
+        item = self._waits_under
+        item[~waits | ~free[item]] = NOBODY
+        is_taken = np.zeros(len(free), np.bool_)
+        is_taken[item[item != NOBODY]] = True
+        for robot in np.flatnonzero(waits & (item == NOBODY)).tolist():
+            candidates = np.flatnonzero(free & ~is_taken)
+            if not len(candidates):
+                break
+            item[robot] = _loneliest(state, robot, candidates, is_taken)
+            is_taken[item[robot]] = True
+        has_item = item != NOBODY
+        at_the_wall = _rank_and_file(len(item), self._scenario)
+        return np.where(has_item[:, None], state.item_position[item], at_the_wall), has_item
 
     # -- who -----------------------------------------------------------------------------------
 

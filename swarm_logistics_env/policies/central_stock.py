@@ -19,7 +19,6 @@ from swarm_logistics_env.policies.central import (
     LOOKAHEAD,
     REPLAN,
     Central,
-    WaitingPlaces,
 )
 from swarm_logistics_env.policies.routes import lookahead
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
@@ -43,10 +42,11 @@ class CentralStock(Central):
         True
     """
 
+    laden_wait = False
+
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode without stock; nothing here is random."""
         super().reset(n_robots, seed)
-        self._waiting = WaitingPlaces(n_robots, laden_wait=False)
         self._slot = np.full(n_robots, NOBODY)  # to which each robot takes its item
         self._home_planned_at = -np.inf
 
@@ -70,7 +70,7 @@ class CentralStock(Central):
         most_held = int(HELD_SHARE * state.n_robots)
         n_held = int((laden & (self._slot == NOBODY)).sum())
 
-        item = self._waiting.item
+        item = self._waits_under
         room = int(is_free.sum()) + most_held - n_held
         for robot in np.flatnonzero(others & (item != NOBODY)).tolist():
             place = state.item_position[item[robot]]

@@ -317,7 +317,7 @@ def _imported(name: str) -> Callable[..., Policy] | None:
     if not colon:
         return None
     path = Path(module)
-    if path.suffix == ".py" and (path.is_file() or path.parent == Path()):
+    if path.suffix == ".py":
         # A file of this folder or another, in which it finds its neighbours.
         if (folder := str(path.parent.resolve())) not in sys.path:
             sys.path.append(folder)

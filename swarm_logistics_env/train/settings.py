@@ -21,18 +21,16 @@ from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.records import Record, each_of
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.faults import Fault
 
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 
-def _known(modes: tuple[str, ...]) -> tuple[str, ...]:
-    for mode in modes:
-        failure_mode(mode)
-    return modes
+def _known(mode: str) -> str:
+    failure_mode(mode)
+    return mode
 
 
-Modes = Annotated[tuple[str, ...], AfterValidator(_known)]
+Mode = Annotated[str, AfterValidator(_known)]
 
 
 class Part(Record):
@@ -53,7 +51,7 @@ class Conditions(Part):
     """
 
     weight: PositiveFloat = 1.0
-    modes: Modes = ()
+    modes: tuple[Mode, ...] = ()
     robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
     onset: tuple[NonNegativeFloat, NonNegativeFloat] = (0.0, 0.0)
     scenario: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
@@ -177,12 +175,11 @@ class Evaluation(Part):
     every: PositiveInt = 1_000_000
     seeds: PositiveInt = 4
     n_robots: PositiveInt = 25
-    faults: dict[str, PositiveInt] = Field(default_factory=dict)
+    faults: dict[Mode, PositiveInt] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
         for mode, robots in self.faults.items():
-            Fault(mode, robots)
             if robots > self.n_robots:
                 raise ValueError(
                     f"faults.{mode} = {robots}: should be at most n_robots = {self.n_robots}"
@@ -203,7 +200,7 @@ class Scores(Part):
 
     seeds: NonNegativeInt = 30
     sizes: tuple[PositiveInt, ...] = (5, 10, 25, 50, 100)
-    modes: Modes = ()
+    modes: tuple[Mode, ...] = ()
     robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
     n_robots: PositiveInt = 25
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, Warehouse, run_episode
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import load
-from swarm_logistics_env.policies.central import WaitingPlaces
 from swarm_logistics_env.policies.policy import decide, mask_unreachable_commands, start
 
 SMALL = Scenario(
@@ -89,7 +88,9 @@ def test_where_items_are_few_the_others_line_up_at_the_wall() -> None:
     scenario = SMALL.replace(n_robots=12, n_items=3)
     world = Warehouse(scenario)
     world.reset(0)
-    places, has_item = WaitingPlaces(12).places(world.state, 4, scenario)
+    policy: Any = load("central")
+    start(policy, scenario, 0)
+    places, has_item = policy._waiting_places(world.state, 4)
     assert has_item.sum() == 2  # the requested item is left out
     assert not has_item[4]
     assert (places[~has_item, 0] < 0.6).all()
