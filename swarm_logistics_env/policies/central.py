@@ -26,28 +26,6 @@ from swarm_logistics_env.policies.routes import (
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
-
-def _loneliest(
-    state: WarehouseState, robot: int, candidates: NDArray[np.int64], is_taken: NDArray[np.bool_]
-) -> int:
-    """Return the candidate farthest from all that are taken, less half the way to it."""
-    places = state.item_position[candidates]
-    way = np.linalg.norm(places - state.robot_position[robot], axis=1)
-    if not is_taken.any():
-        return int(candidates[way.argmin()])
-    gaps = np.linalg.norm(places[:, None] - state.item_position[is_taken], axis=2).min(axis=1)
-    return int(candidates[(gaps - 0.5 * way).argmax()])
-
-
-def _rank_and_file(n_robots: int, scenario: Scenario) -> NDArray[np.float64]:
-    """Return places along the wall opposite the delivery area (N, 2) [m]."""
-    pitch = 2 * scenario.robot_radius + 0.1
-    per_file = max(int((scenario.warehouse_height - 0.1) / pitch), 1)
-    file, rank = np.divmod(np.arange(n_robots), per_file)
-    places = np.stack([(file + 0.5) * pitch, (rank + 0.5) * pitch + 0.05], axis=1)
-    return np.minimum(places, [scenario.warehouse_width - pitch / 2, np.inf])
-
-
 CELL = 0.125  # [m]
 MARGIN = 0.03  # [m] kept from what a laden robot must not touch
 LOOKAHEAD = 16  # cells
@@ -303,6 +281,27 @@ class Central:
             forward = np.maximum(forward, 0.0)
             left[:] = 0.0
         return np.stack([forward, left, turn, gripper], axis=1)
+
+
+def _loneliest(
+    state: WarehouseState, robot: int, candidates: NDArray[np.int64], is_taken: NDArray[np.bool_]
+) -> int:
+    """Return the candidate farthest from all that are taken, less half the way to it."""
+    places = state.item_position[candidates]
+    way = np.linalg.norm(places - state.robot_position[robot], axis=1)
+    if not is_taken.any():
+        return int(candidates[way.argmin()])
+    gaps = np.linalg.norm(places[:, None] - state.item_position[is_taken], axis=2).min(axis=1)
+    return int(candidates[(gaps - 0.5 * way).argmax()])
+
+
+def _rank_and_file(n_robots: int, scenario: Scenario) -> NDArray[np.float64]:
+    """Return places along the wall opposite the delivery area (N, 2) [m]."""
+    pitch = 2 * scenario.robot_radius + 0.1
+    per_file = max(int((scenario.warehouse_height - 0.1) / pitch), 1)
+    file, rank = np.divmod(np.arange(n_robots), per_file)
+    places = np.stack([(file + 0.5) * pitch, (rank + 0.5) * pitch + 0.05], axis=1)
+    return np.minimum(places, [scenario.warehouse_width - pitch / 2, np.inf])
 
 
 def _discs(centres: NDArray[np.float64], radius: float, cost: float) -> NDArray[np.float64]:
