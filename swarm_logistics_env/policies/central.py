@@ -79,12 +79,15 @@ class Central:
                 f"a state of {state.n_robots} robots: reset was told {len(self._trusted_from)}"
             )
         worker = self._assign(state)
-        goals, is_under_item = self._waiting_places(state, worker)
+        others = state.robot_present.copy()
+        if worker != NOBODY:
+            others[worker] = False
+        goals, is_under_item = self._waiting_places(state, others)
         gripper = np.where(state.robot_item == NOBODY, 0.0, -1.0)  # nobody hoards
-        self._stock(state, worker, goals, gripper)
+        self._stock(state, others, goals, gripper)
         velocity = self._drift(state, goals, is_under_item, worker)
         if worker != NOBODY:
-            velocity[worker] = self._on_its_way(state, worker)
+            velocity[worker] = self._on_its_way(state, worker, others)
             # Of several items in reach the requested one comes first, so no other gets lifted.
             may_hold = self._task[1] or self._to_item(state) <= self._scenario.pickup_range
             gripper[worker] = 1.0 if may_hold else 0.0
@@ -93,14 +96,14 @@ class Central:
     def _stock(
         self,
         state: WarehouseState,
-        worker: int,
+        others: NDArray[np.bool_],
         goals: NDArray[np.float64],
         gripper: NDArray[np.float64],
     ) -> None:
         """Change what robots without a request do: where they go [m] and what they hold."""
 
     def _waiting_places(
-        self, state: WarehouseState, worker: int
+        self, state: WarehouseState, others: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Return where each robot should wait (N, 2) [m], and which have an item to wait under.
 
@@ -108,14 +111,12 @@ class Central:
         anyway. Who has no item waits at the wall.
 
         Args:
-            worker: the robot that has no time to wait, or NOBODY.
+            others: which robots have time to wait (N,).
         """
         free = state.item_status == STORED
         if state.requested != NOBODY:
             free[state.requested] = False
-        waits = state.robot_present & (self.laden_wait | (state.robot_item == NOBODY))
-        if worker != NOBODY:
-            waits[worker] = False
+        waits = others & (self.laden_wait | (state.robot_item == NOBODY))
         item = self._waits_under
         item[~waits | ~free[item]] = NOBODY
         is_taken = np.zeros(len(free), np.bool_)
@@ -183,7 +184,9 @@ class Central:
 
     # -- where to ------------------------------------------------------------------------------
 
-    def _on_its_way(self, state: WarehouseState, worker: int) -> NDArray[np.float64]:
+    def _on_its_way(
+        self, state: WarehouseState, worker: int, others: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
         scenario, (item, carries) = self._scenario, self._task
         x, y = state.robot_position[worker].tolist()
         if carries and x >= scenario.storage_width:
@@ -191,8 +194,6 @@ class Central:
         if not carries and self._to_item(state) < 0.3:
             return self._towards(state.robot_position[worker], state.item_position[item])
         if state.time >= self._planned_at + REPLAN - 1e-6:
-            others = state.robot_present.copy()
-            others[worker] = False
             self._cost, self._far = self._ways(state, others, NOBODY if carries else item)
             self._planned_at = state.time
         waypoint = lookahead(self._cost, self._far, CELL, x, y, LOOKAHEAD)

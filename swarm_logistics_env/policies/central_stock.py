@@ -53,15 +53,12 @@ class CentralStock(Central):
     def _stock(
         self,
         state: WarehouseState,
-        worker: int,
+        others: NDArray[np.bool_],
         goals: NDArray[np.float64],
         gripper: NDArray[np.float64],
     ) -> None:
         """Let waiting robots lift items, and laden ones take theirs to a slot or hold it inside."""
         position, edge = state.robot_position, self._scenario.storage_width
-        others = state.robot_present.copy()
-        if worker != NOBODY:
-            others[worker] = False
         # Who carries the requested item without being trusted to deliver it lets it go.
         laden = others & (state.robot_item != NOBODY) & (state.robot_item != state.requested)
         self._slot[~laden] = NOBODY
