@@ -206,7 +206,7 @@ def note(
     """Note a study in its store, for `StoredStudy.of`."""
     fields = {"specification": specification, "code": code, "identities": identities}
     told = to_json({**fields, "declared": declared, "imported": imported})
-    runs.note({NOTE: told.decode()})
+    runs.note(NOTE, told.decode())
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:
