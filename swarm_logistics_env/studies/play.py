@@ -56,14 +56,14 @@ class Tally:
 
 def play(
     runs: Sequence[Run], engine: Engine, store: Runs, title: str, end: float | None = None
-) -> tuple[list[Outcome], float]:
+) -> list[Outcome]:
     """Play runs and keep each in the store at once; show a progress bar.
 
     Args:
         end: when to stop (`time.monotonic`) [s]; None: when all are played.
 
     Returns:
-        The outcomes, as they finished, and how long it took [s].
+        The outcomes, as they finished.
     """
     progress = ProgressBar(
         title, len(runs), "runs", parts=Counter(run.case.policy.title for run in runs)
@@ -80,7 +80,7 @@ def play(
             progress.reach(len(outcomes), f"{failed} failed", done)
             if end is not None and time.monotonic() > end:
                 break
-    return outcomes, progress.seconds
+    return outcomes
 
 
 def serial(runs: Iterable[Run]) -> Played:

@@ -59,7 +59,7 @@ class Study:
         Raises:
             StudyError: there is no such preset, or a field cannot be.
         """
-        return cls._of(load_preset(name).replace(**fields), out)
+        return cls(out=out, **{**dict(load_preset(name)), **fields})
 
     @classmethod
     def from_file(
@@ -79,7 +79,7 @@ class Study:
             StudyError: the file cannot be read, or a field of it is unknown or cannot be.
         """
         found = read_study_file(Path(path), trust_code=trust_code)
-        return cls._of(found.replace(**fields), out)
+        return cls(out=out, **{**dict(found), **fields})
 
     @classmethod
     def stored(cls, out: str | Path, *, task: Task | None = None, trust_code: bool = False) -> Self:
@@ -98,17 +98,11 @@ class Study:
         out = Path(out)
         noted = StoredStudy.existing(out)
         specification = noted.specification.read(out, task=task, trust_code=trust_code)
-        study = cls._of(specification, out)
+        study = cls(out=out, **dict(specification))
         if noted.imported is not None:
             study._plan = imported_plan(specification, noted.imported)
         else:
             study._plan = make_plan(specification, code=noted.code, identities=noted.identities)
-        return study
-
-    @classmethod
-    def _of(cls, specification: Specification, out: str | Path | None) -> Self:
-        study = cls(out=out)
-        study.specification = specification
         return study
 
     def plan(self) -> Plan:
@@ -146,16 +140,17 @@ class Study:
                 f"this study was played under code version {plan.code}, this is "
                 f"{code}: plan it anew, and all of it runs again"
             )
-        if engine is None:
-            engine = "process" if processes is not None and processes > 1 else "local"
-        if isinstance(engine, str):
-            engine = engine_named(engine, processes, address)
+        if engine is None or isinstance(engine, str):
+            usual = "process" if (processes or 1) > 1 else "local"
+            engine = engine_named(engine or usual, processes, address)
         until_clear = self.specification.until_clear
         if until_clear and shard:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
-        whole, seconds, outcomes = self._runs(shard), 0.0, list[Outcome]()
+        whole, outcomes = self._runs(shard), list[Outcome]()
+        start, left = time.monotonic(), 0
+        end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.model_validate(self.specification)
@@ -163,8 +158,6 @@ class Study:
             done = store.succeeded()
             kept = sum(run.key in done for run in whole)
             tried: set[str] = set()
-            end = None if minutes is None else time.monotonic() + 60.0 * minutes
-            left = 0
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
                 title = self.specification.name
@@ -173,15 +166,14 @@ class Study:
                     title += f", up to {seeds} seeds"
                 if minutes is not None:
                     title += f", for {minutes:g} min"
-                finished, took = play(missing, engine, store, title, end)
+                finished = play(missing, engine, store, title, end)
                 outcomes += finished
-                left = len(missing) - len(finished)
                 tried |= {run.key for run in missing}
-                seconds += took
-                if left or not until_clear:
+                if left := len(missing) - len(finished):
                     break
         errors = [one.error for one in outcomes if one.error is not None]
         error = errors[0].strip().splitlines()[-1] if errors else None
+        seconds = time.monotonic() - start
         return Tally(len(outcomes), len(errors), kept, seconds, error, left)
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
@@ -218,7 +210,7 @@ class Study:
         Raises:
             StudyError: the store cannot be read, or is another study's.
         """
-        if self._memory is None and (self.out is None or not (self.out / FILE_NAME).is_file()):
+        if self.out is None or not (self.out / FILE_NAME).is_file():
             return None  # nothing has been run: what is asked now will be declared
         plan = self.plan()
         with self._store(existing=True) as store:
