@@ -143,8 +143,7 @@ class Study:
         if engine is None or isinstance(engine, str):
             usual = "process" if (processes or 1) > 1 else "local"
             engine = engine_named(engine or usual, processes, address)
-        until_clear = self.specification.until_clear
-        if until_clear and shard:
+        if self.specification.until_clear and shard:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
@@ -160,13 +159,7 @@ class Study:
             tried: set[str] = set()
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
-                title = self.specification.name
-                if until_clear:
-                    seeds = max(run.seed for run in missing) - self.specification.first_seed + 1
-                    title += f", up to {seeds} seeds"
-                if minutes is not None:
-                    title += f", for {minutes:g} min"
-                finished = play(missing, engine, store, title, end)
+                finished = play(missing, engine, store, self.specification.name, end)
                 outcomes += finished
                 tried |= {run.key for run in missing}
                 if left := len(missing) - len(finished):
