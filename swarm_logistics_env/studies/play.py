@@ -12,7 +12,7 @@ import signal
 import threading
 import time
 import traceback
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -65,19 +65,14 @@ def play(
     Returns:
         The outcomes, as they finished.
     """
-    progress = ProgressBar(
-        title, len(runs), "runs", parts=Counter(run.case.policy.title for run in runs)
-    )
     outcomes: list[Outcome] = []
-    done, finished = Counter[str](), engine(runs)
     # Closed at once where this stops early, so that no worker outlives it.
-    with closing(finished), progress:
+    with closing(engine(runs)) as finished, ProgressBar(title, len(runs), "runs") as progress:
         for run, outcome in finished:
             store.add(run, outcome)
             outcomes.append(outcome)
-            done[run.case.policy.title] += 1
             failed = sum(each.error is not None for each in outcomes)
-            progress.reach(len(outcomes), f"{failed} failed", done)
+            progress.reach(len(outcomes), f"{failed} failed")
             if end is not None and time.monotonic() > end:
                 break
     return outcomes
