@@ -56,26 +56,25 @@ class Tally:
 
 def play(
     runs: Sequence[Run], engine: Engine, store: Runs, title: str, end: float | None = None
-) -> list[Outcome]:
+) -> list[str | None]:
     """Play runs and keep each in the store at once; show a progress bar.
 
     Args:
         end: when to stop (`time.monotonic`) [s]; None: when all are played.
 
     Returns:
-        The outcomes, as they finished.
+        What each run raised, as they finished; None: it succeeded.
     """
-    outcomes: list[Outcome] = []
+    errors: list[str | None] = []
     # Closed at once where this stops early, so that no worker outlives it.
     with closing(engine(runs)) as finished, ProgressBar(title, len(runs), "runs") as progress:
         for run, outcome in finished:
             store.add(run, outcome)
-            outcomes.append(outcome)
-            failed = sum(each.error is not None for each in outcomes)
-            progress.reach(len(outcomes), f"{failed} failed")
+            errors.append(outcome.error)
+            progress.reach(len(errors), f"{len(errors) - errors.count(None)} failed")
             if end is not None and time.monotonic() > end:
                 break
-    return outcomes
+    return errors
 
 
 def serial(runs: Iterable[Run]) -> Played:

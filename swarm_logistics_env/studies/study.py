@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.tasks.task import Outcome, Run, Task
+from swarm_logistics_env.tasks.task import Run, Task
 
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
@@ -147,7 +147,7 @@ class Study:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
-        whole, outcomes = self._runs(shard), list[Outcome]()
+        whole, errors = self._runs(shard), list[str | None]()
         start, left = time.monotonic(), 0
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
@@ -160,14 +160,13 @@ class Study:
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
                 finished = play(missing, engine, store, self.specification.name, end)
-                outcomes += finished
+                errors += finished
                 tried |= {run.key for run in missing}
                 if left := len(missing) - len(finished):
                     break
-        errors = [one.error for one in outcomes if one.error is not None]
-        error = errors[0].strip().splitlines()[-1] if errors else None
-        seconds = time.monotonic() - start
-        return Tally(len(outcomes), len(errors), kept, seconds, error, left)
+        failed = [error for error in errors if error is not None]
+        first = failed[0].strip().splitlines()[-1] if failed else None
+        return Tally(len(errors), len(failed), kept, time.monotonic() - start, first, left)
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs
