@@ -102,21 +102,16 @@ class Declaration(BaseModel):
 
     def warning(self, plan: Plan) -> str:
         """Return the warning for a plan that this does not cover, and what to declare instead."""
-        declared = _counted(self.seed_numbers)
+        declared = f"seeds {seeds_in_words(self.seed_numbers)}"
         if self.looks:
             declared = f"looks at {', '.join(map(str, self.looks))} seeds from {self.first_seed} on"
         fresh = max(self.seed_numbers.stop, plan.seeds[-1] + 1)
         return (
-            f"This study declared {declared} before its first run: over {_counted(plan.seeds)} "
-            "every verdict is exploratory. For verdicts that stand, run a new study in another "
-            f"directory, on fresh seeds, until it is clear: --first-seed {fresh} --until-clear "
-            "--out DIRECTORY."
+            f"This study declared {declared} before its first run: over seeds "
+            f"{seeds_in_words(plan.seeds)} every verdict is exploratory. For verdicts that stand, "
+            "run a new study in another directory, on fresh seeds, until it is clear: "
+            f"--first-seed {fresh} --until-clear --out DIRECTORY."
         )
-
-
-def _counted(seeds: Sequence[int]) -> str:
-    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
-    return f"{count} ({seeds_in_words(seeds)})"
 
 
 class Origin(Record):

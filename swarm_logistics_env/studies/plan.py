@@ -14,7 +14,6 @@ from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.task import Case, Run, TaskFault
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
-from .presets import load_reference
 from .specification import (
     BOTH,
     Ablation,
@@ -152,11 +151,10 @@ def make_plan(
 
     Raises:
         StudyError: the specification varies nothing, a step of it cannot be, two factors with one
-            heading vary the same under different conditions, there is no such reference, or a
-            policy of several trainings is to be played until it is clear.
+            heading vary the same under different conditions, or a policy of several trainings is to
+            be played until it is clear.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
-    load_reference(specification.reference)  # a name that is wrong is told before anything is run
     task = specification.played
     several = [policy.name for policy in specification.policies if policy.trainings]
     if several and specification.until_clear:

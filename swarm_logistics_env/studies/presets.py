@@ -100,14 +100,3 @@ def load_preset(name: str) -> Specification:
     if name not in PRESETS:
         raise StudyError(f"no study preset {name!r}{suggest(name, PRESETS)}")
     return PRESETS[name]
-
-
-def load_reference(name: str | None) -> Reference | None:
-    """Return the reference of that name; None for none.
-
-    Raises:
-        StudyError: there is none of that name.
-    """
-    if name not in (None, "paper"):
-        raise StudyError(f"no reference {name!r}{suggest(name, ['paper'])}")
-    return PAPER if name else None

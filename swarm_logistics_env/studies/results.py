@@ -13,7 +13,7 @@ from swarm_logistics_env.tasks.task import Outcome
 from .comparison import Arm, Comparison
 from .declaration import Declaration
 from .plan import Plan
-from .presets import Reference, load_reference
+from .presets import PAPER, Reference
 from .runs import Outcomes
 from .until_clear import standing
 from .verdict import Cell, Verdict, judge_one, under_holm
@@ -95,7 +95,7 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         declared: what was declared before the first run; None: what the plan says.
     """
     margin = plan.specification.margin
-    reference = load_reference(plan.specification.reference)
+    reference = PAPER if plan.specification.reference else None
     looks = declared.looks if declared else plan.specification.looks
     exploratory = declared is not None and not declared.covers(plan)
     late_margin = declared is not None and declared.margin != margin

@@ -123,7 +123,9 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     assert "xploratory" not in command(f"{RUN} --out out")
     printed = command(f"{RUN} --out out --seeds 4")
     # It warns before it plays, so that one can still stop it.
-    warning = printed.index("This study declared 2 seeds (0 to 1) before its first run: over 4 ")
+    warning = printed.index(
+        "This study declared seeds 0 to 1 before its first run: over seeds 0 to 3"
+    )
     assert warning < printed.index("1 question, swarm-dt, 4 paired seeds.")
     assert "exploratory: they are over other seeds" in Path("out", "report.md").read_text()
     assert "holds the study 'mine'" in command("study run quick --out out", code=2)
