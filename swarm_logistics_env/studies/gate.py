@@ -63,27 +63,21 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     whatever they are called.
     """
     before, after = _judged(old), _judged(new)
-    partners = {label: label for label in after if label in before}
+    partners = {label: label for label in (*after, *before)}
     if len(before) == len(after) == 1:
         partners = dict(zip(after, before))
     matches = list[tuple[str, Cell, Cell]]()
     unmatched, notes = list[_Unmatched](), list[str]()
-    for study, judged, other, others, known in (
-        ("old", before, "new", after, partners.values()),
-        ("new", after, "old", before, partners.keys()),
-    ):
-        for label in (label for label in judged if label not in known):
-            problem = f"policy {label!r} of the {study} study has no match: the {other} study "
-            problem += f"judges {', '.join(map(repr, others)) or 'no policy'}"
-            names = tuple(_name(label, cell) for cell in judged[label].values())
-            unmatched.append((label, problem, names))
     for label, old_label in partners.items():
         named = label if label == old_label else f"{old_label} -> {label}"
-        theirs, ours = before[old_label], after[label]
+        theirs, ours = before.get(old_label, {}), after.get(label, {})
         common = [content for content in ours if content in theirs]
         if not common:
             names = tuple(_name(named, cell) for cell in (*theirs.values(), *ours.values()))
-            problem = f"policy {named!r} is judged in both studies, but under no common condition"
+            problem = (
+                f"policy {named!r} is judged under no condition of both studies: the old one "
+                f"judges {[*before]}, the new one {[*after]}"
+            )
             unmatched.append((named, problem, names))
             continue
         matches += [(_name(named, ours[c]), theirs[c], ours[c]) for c in common]
@@ -106,17 +100,11 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
 
 def _judged(results: StudyResults) -> _Judged:
     """Return each condition of a judged policy once, by the policy's label and by all but it."""
-    # An ablation's second policy may bear the label of a judged one: its place tells them apart.
-    second = {
-        (comparison.policy, comparison.table, comparison.changed)
-        for comparison in results.plan.comparisons
-        if comparison.definition.compares == "policy"
-    }
     found: _Judged = {}
     for cell in results.cells:
-        if (cell.policy, cell.table, cell.arm) in second:
-            continue
         case = cell.arm.case
+        if case.policy.title != cell.policy:  # the second policy of an ablation
+            continue
         # Imported tables may differ in P at one condition.
         table = "" if results.plan.imported_from is None else cell.table
         content = (case.scenario, case.faults, case.behaviour, table)
