@@ -11,7 +11,7 @@ Everything follows from the outcomes, so a study that was killed goes on as if i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -46,35 +46,29 @@ class Standing(NamedTuple):
 def standing(plan: Plan, outcomes: Outcomes) -> Standing:
     """Return the state of a plan's comparisons after these outcomes."""
     runs = _Looks(plan, outcomes)
-    families = grouped(plan.comparisons, lambda comparison: comparison.family)
-    found = [_Family(members, runs) for members in families.values()]
-    first = plan.specification.looks[0]
-    wanted = {run.key: run for case in plan.cases for run in runs.missing(case, first)}
-    for family in found:
+    wanted, verdicts = runs.missing(plan.cases, runs.looks[0]), dict[Comparison, Verdict]()
+    for members in grouped(plan.comparisons, lambda comparison: comparison.family).values():
+        family = _Family(members, runs)
         wanted |= family.wanted
-    shared = [n for n in runs.looks if not any(runs.missing(case, n) for case in plan.cases)]
-    verdicts = {comparison: one for family in found for comparison, one in family.judged().items()}
+        verdicts |= family.judged()
+    shared = [n_seeds for n_seeds in runs.looks if not runs.missing(plan.cases, n_seeds)]
     in_order = tuple(verdicts[comparison] for comparison in plan.comparisons)
     # Seed by seed, so that a study that is stopped early has something of every question.
     evenly = tuple(sorted(wanted.values(), key=lambda run: run.seed))
-    return Standing(in_order, evenly, max(shared, default=first))
+    return Standing(in_order, evenly, max(shared, default=runs.looks[0]))
 
 
 class _Looks:
     """The outcomes of a plan, as far as each look sees them."""
 
     def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
-        self.plan = plan
-        self.declared = plan.specification.looks
-        self.looks = [look for look in self.declared if look <= len(plan.seeds)]
+        self.plan, self.looks = plan, plan.specification.looks
         self._outcomes = outcomes
 
-    def missing(self, case: Case, n_seeds: int) -> list[Run]:
-        return [
-            case.run(self.plan.code, seed)
-            for seed in self.plan.seeds[:n_seeds]
-            if (case.key, seed) not in self._outcomes
-        ]
+    def missing(self, cases: Iterable[Case], n_seeds: int) -> dict[str, Run]:
+        """Return the runs of cases that are not played yet, by their keys."""
+        runs = (case.run(self.plan.code, s) for case in cases for s in self.plan.seeds[:n_seeds])
+        return {run.key: run for run in runs if (run.case.key, run.seed) not in self._outcomes}
 
     def cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
         seeds, arms, known = self.plan.seeds[:n_seeds], comparison.arms, self._outcomes
@@ -87,7 +81,7 @@ class _Looks:
 
     def alpha(self, look: int, alpha: float) -> float:
         """Return what is spent of an error up to a look, counted from 0."""
-        return spi.look_alphas(self.declared, alpha, spending=SPENDING)[look]
+        return spi.look_alphas(self.looks, alpha, spending=SPENDING)[look]
 
 
 class _Family:
@@ -112,12 +106,10 @@ class _Family:
         n_seeds = self._runs.looks[look]
         # A failed run blocks a comparison for good: it stays in the family and gets no seeds.
         playing = [c for c in self._open if c not in self._found or self._found[c].estimate]
-        for comparison in playing:
-            for arm in comparison.arms:
-                missing = self._runs.missing(arm.case, n_seeds)
-                self.wanted.update((run.key, run) for run in missing)
+        cases = [arm.case for comparison in playing for arm in comparison.arms]
+        self.wanted = self._runs.missing(cases, n_seeds)
         complete = not self.wanted
-        if not (complete or look == 0):
+        if look and not complete:
             return False
         # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
         # side of the margin.
