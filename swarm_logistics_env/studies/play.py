@@ -130,7 +130,10 @@ def _in_processes(count: int, runs: Iterable[Run]) -> Played:
         with workers(min(count, len(waiting))) as pool:
             interrupted = yield from _played(pool, waiting, count)
         for run in interrupted:
-            yield run, _played_alone(run)
+            with workers(1) as alone:
+                ended_again = yield from _played(alone, deque([run]), 1)
+            if ended_again:
+                yield run, Outcome(error="WorkerDied: two worker processes ended in this run\n")
 
 
 def _played(
@@ -155,20 +158,6 @@ def _played(
             except BrokenProcessPool:
                 interrupted.append(run)
     return interrupted
-
-
-def _played_alone(run: Run) -> Outcome:
-    others = set(multiprocessing.active_children())
-    with workers(1) as pool:
-        (worker,) = set(multiprocessing.active_children()) - others
-        try:
-            return pool.submit(_play, _pickled(run)).result()
-        except BrokenProcessPool:
-            worker.join()
-    code = worker.exitcode or 0
-    cause = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-    error = f"WorkerDied: two worker processes ended in this run, the second by {cause}\n"
-    return Outcome(error=error)
 
 
 @contextmanager

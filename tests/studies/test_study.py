@@ -193,7 +193,7 @@ def test_run_whose_worker_is_killed_is_tried_again_once(
     study = Study(**{**sizes, "policies": ["dying_policy:Dying"], "seeds": 1})
     tally = study.run("process", processes=1)
     assert (tally.played, tally.failed) == (3, deaths - 1)
-    assert study.results()["error"].str.contains("SIGKILL").sum() == deaths - 1
+    assert study.results()["error"].str.contains("WorkerDied").sum() == deaths - 1
 
 
 def test_time_that_is_over_leaves_runs_for_the_same_call(sizes: dict[str, Any]) -> None:
