@@ -50,7 +50,6 @@ def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path
             part.unlink(missing_ok=True)
 
 
-_OTHER_KIND = ("int_type", "tuple_type")
 _LONGEST_NAME = 80  # of a file [characters]; with an ending it fits every file system
 _FILE_NAME = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{_LONGEST_NAME - 1}}}")
 
@@ -107,16 +106,7 @@ class Record(BaseModel):
 
     @classmethod
     def _sentence(cls, error: ValidationError) -> str:
-        found: list[dict[str, Any]] = [dict(problem) for problem in error.errors()]
-        # A list that lost its bad items is also too short; the bad items are reported alone.
-        deeper = {problem["loc"][:-1] for problem in found}
-        found = [p for p in found if p["type"] != "too_short" or p["loc"] not in deeper]
-        # A field may be a number or a list: if one of them has a more precise error, that the
-        # value is not the other is left out.
-        precise = {p["loc"][:1] for p in found if p["type"] not in _OTHER_KIND}
-        found = [p for p in found if p["type"] not in _OTHER_KIND or p["loc"][:1] not in precise]
-        problems = (cls._problem(problem) for problem in found)
-        return "; ".join(dict.fromkeys(problems))
+        return "; ".join(dict.fromkeys(cls._problem(dict(one)) for one in error.errors()))
 
     @classmethod
     def _problem(cls, problem: dict[str, Any]) -> str:
