@@ -44,13 +44,6 @@ _REPLACE = """ON CONFLICT (key) DO UPDATE SET failed = excluded.failed, outcome 
 _CLASH = """SELECT key, json_extract(runs.run, '$.seed') FROM main.runs JOIN other.runs AS theirs
     USING (key) WHERE NOT (runs.failed OR theirs.failed) AND runs.outcome != theirs.outcome"""
 
-# SQLite's codes of a write that did not fit: of the file itself, of its log, of the log's index.
-_FULL = (
-    sqlite3.SQLITE_FULL,
-    sqlite3.SQLITE_IOERR_WRITE,
-    sqlite3.SQLITE_IOERR_SHMSIZE,
-    sqlite3.SQLITE_IOERR_SHMOPEN,
-)
 _OUTCOME = TypeAdapter(Outcome)
 
 Outcomes = Mapping[tuple[str, int], Outcome]  # by the key of the case, and the seed
@@ -255,9 +248,7 @@ class Runs:
         try:
             yield
         except sqlite3.Error as error:
-            is_full = getattr(error, "sqlite_errorcode", None) in _FULL
-            why = f"{error}: there is no room on its disk" if is_full else f"{error}"
-            raise StudyError(f"cannot use the store {self.path}: {why}") from error
+            raise StudyError(f"cannot use the store {self.path}: {error}") from error
 
     def _prepare(self) -> None:
         ((application, version, tables),) = self._execute(_HEADER)
