@@ -114,7 +114,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
         RECORDED.code(),
         {},
         nulls={
-            (arm.case.policy.title, title): arm
+            (title, arms[0]): arm
             for title, arms in tables
             for arm in arms[1:]
             if arm.setting == OTHER_BEHAVIOUR

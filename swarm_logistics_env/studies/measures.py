@@ -106,7 +106,7 @@ def _null(results: StudyResults, comparison: Comparison) -> tuple[Times, Times]:
     Raises:
         StudyError: why there can be no times to come back.
     """
-    null = results.plan.nulls.get((comparison.policy, comparison.table))
+    null = results.plan.nulls.get((comparison.table, comparison.original))
     other = results.times_of(null) if null else ()
     if null is None or not other:
         raise StudyError("the runs of the no-fault null are missing")

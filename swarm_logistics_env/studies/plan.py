@@ -39,7 +39,7 @@ class Plan:
         comparisons: all comparisons, in the order of the report.
         code: the version of the code that decides the result of a run.
         identities: the identities of the policies, by their names in the specification.
-        nulls: by label of the policy and table, an arm without fault that shares the worlds of the
+        nulls: by table and original arm, an arm without fault that shares the worlds of the
             original one, not its behaviour: what chance alone makes of the two. For faults that
             begin during the run.
         paired: whether all conditions share their seeds.
@@ -52,7 +52,7 @@ class Plan:
     comparisons: tuple[Comparison, ...]
     code: str
     identities: Mapping[str, str]
-    nulls: Mapping[tuple[str, str], Arm] = field(default_factory=dict)
+    nulls: Mapping[tuple[str, Arm], Arm] = field(default_factory=dict)
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
@@ -71,7 +71,7 @@ class Plan:
             for comparison in self.comparisons
             for arm in comparison.arms
         ]
-        cells += [(policy, table, arm) for (policy, table), arm in self.nulls.items()]
+        cells += [(null.case.policy.title, table, null) for (table, _), null in self.nulls.items()]
         by_factor = grouped(cells, lambda cell: (cell[0], cell[1], cell[2].setting.name))
         return tuple(dict.fromkeys(chain.from_iterable(by_factor.values())))
 
@@ -150,9 +150,8 @@ def make_plan(
         identities: of its policies when it was played; None: they are loaded and asked.
 
     Raises:
-        StudyError: the specification varies nothing, a step of it cannot be, two factors with one
-            heading vary the same under different conditions, or a policy of several trainings is to
-            be played until it is clear.
+        StudyError: the specification varies nothing, a step of it cannot be, or a policy of several
+            trainings is to be played until it is clear.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
     task = specification.played
@@ -179,8 +178,6 @@ def make_plan(
     comparisons = tuple(
         dict.fromkeys(one for one in asked if one.indicator in specification.indicators)
     )
-    if code is None:  # what was played so stays readable
-        _refuse_one_name_for_two(comparisons)
     if not comparisons:
         raise StudyError(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
@@ -188,23 +185,11 @@ def make_plan(
         )
     # Only comparisons with the robots removed have a time to come back, which needs the null.
     nulls = {
-        (one.policy, one.table): Arm(OTHER_BEHAVIOUR, replace(one.original.case, behaviour=1))
+        (one.table, one.original): Arm(OTHER_BEHAVIOUR, replace(one.original.case, behaviour=1))
         for one in comparisons
         if one.removed and one.changed.setting.onset
     }
     return Plan(specification, comparisons, code or task.code(), identities, nulls)
-
-
-def _refuse_one_name_for_two(comparisons: Sequence[Comparison]) -> None:
-    found: dict[tuple[str, str, Setting], str] = {}
-    for comparison in comparisons:
-        for arm in comparison.arms:
-            place = comparison.policy, comparison.table, arm.setting
-            if found.setdefault(place, arm.case.key) != arm.case.key:
-                raise StudyError(
-                    f"title = {comparison.table!r} heads {str(arm.setting)!r} under two different "
-                    "conditions: each factor should have a title of its own"
-                )
 
 
 def _asked(specification: Specification, cases: Sequence[Case]) -> Iterator[Comparison]:

@@ -96,10 +96,6 @@ def test_cases_and_runs_are_known_by_content() -> None:
         ({"faults": [{"modes": ["FM1"], "robots": [25]}]}, "no working robot is left"),
         ({"faults": [{"modes": ["FM1"], "onsets": [500]}]}, "or nothing fails"),
         (
-            {"faults": [{"modes": ["FM1"], "title": "one", "duration": t} for t in (5.0, 9.0)]},
-            "title = 'one' heads 'FM1, m = 1' under two different conditions",
-        ),
-        (
             {"faults": [{"modes": ["FM1"]}], "reference": "papr"},
             "reference = 'papr': should be 'paper'",
         ),
