@@ -40,14 +40,15 @@ def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path
     whole = path.resolve()  # a link stays a link
     part = whole.with_name(f".{path.stem[:80]}.part{path.suffix}") if is_plain else path
     try:
-        yield part
-        if is_plain:
-            part.replace(whole)
+        try:
+            yield part
+            if is_plain:
+                part.replace(whole)
+        finally:
+            if is_plain:
+                part.unlink(missing_ok=True)
     except OSError as error:
         raise error_type(f"cannot write {path}: {error.strerror or error}") from error
-    finally:
-        if is_plain:
-            part.unlink(missing_ok=True)
 
 
 _LONGEST_NAME = 80  # of a file [characters]; with an ending it fits every file system

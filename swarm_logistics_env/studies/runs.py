@@ -116,20 +116,13 @@ class Runs:
         Raises:
             StudyError: `out` holds a study, or cannot be written.
         """
-        if (out / FILE_NAME).exists():
+        path = out / FILE_NAME
+        if path.exists():
             raise StudyError(f"{out} holds a study already: {way} into a new directory")
-        unfinished = out / f"{FILE_NAME}.unfinished"
-        try:
-            unfinished.unlink(missing_ok=True)
-        except OSError as error:
-            raise StudyError(f"cannot write to {out}: {error.strerror}") from error
-        try:
-            with cls(unfinished) as runs:
+        with becoming(path, StudyError) as part:
+            part.unlink(missing_ok=True)  # what one left that was killed
+            with cls(part) as runs:
                 yield runs
-            unfinished.rename(out / FILE_NAME)
-        finally:
-            for left in out.glob(f"{unfinished.name}*"):
-                left.unlink()
 
     def __enter__(self) -> Self:
         return self
