@@ -66,7 +66,7 @@ def _read_reference(path: Path) -> Reference:
     """Return the published values in a TOML file; `paper_values.toml` says what it holds."""
     told = tomllib.loads(path.read_text(encoding="utf-8"))
     performance = {
-        _setting(kind, name, float(value)): p
+        Setting(kind, name, float(value)): p
         for kind, rows in told["performance"].items()
         for name, row in rows.items()
         for value, p in row.items()
@@ -75,7 +75,7 @@ def _read_reference(path: Path) -> Reference:
     cells = tuple(setting for setting in performance if setting not in repeated)
     sentences: dict[str, dict[Question, bool]] = {}
     for sentence in told["sentences"]:
-        claims = sentences.setdefault(sentence["text"], {})
+        claims = sentences[sentence["text"]] = {}
         for one in sentence["claims"]:
             symbol, name, threshold = one["indicator"], one["name"], one.get("threshold", 0.0)
             kind = DEFINITIONS[symbol].compares
