@@ -91,14 +91,9 @@ class Declaration(BaseModel):
         """Return whether the verdicts of a plan were declared, and so are not exploratory."""
         if plan.imported_from is not None:
             return True  # nothing is added to what was imported
-        if not self.looks:
-            # A part of the declared seeds is a choice as well, made with the results at hand.
-            return plan.seeds == self.seed_numbers
-        return (
-            len(plan.seeds) in self.looks
-            and plan.specification.looks == self.looks
-            and plan.seeds[0] == self.first_seed
-        )
+        # A part of the declared seeds is a choice as well, made with the results at hand.
+        same_looks = self.looks in ((), plan.specification.looks)
+        return plan.seeds == self.seed_numbers and same_looks
 
     def warning(self, plan: Plan) -> str:
         """Return the warning for a plan that this does not cover, and what to declare instead."""

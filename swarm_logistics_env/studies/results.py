@@ -96,9 +96,8 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
     """
     margin = plan.specification.margin
     reference = PAPER if plan.specification.reference else None
-    looks = declared.looks if declared else plan.specification.looks
-    exploratory = declared is not None and not declared.covers(plan)
-    late_margin = declared is not None and declared.margin != margin
+    declared = declared or Declaration.model_validate(plan.specification)
+    exploratory = not declared.covers(plan)
     verdicts: Iterable[Verdict] = ()
     if plan.specification.until_clear:
         found = standing(plan, outcomes)
@@ -122,8 +121,8 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         tuple(_beside(reference, one) for one in verdicts),
         exploratory,
         outcomes,
-        looks,
-        late_margin,
+        declared.looks,
+        late_margin=declared.margin != margin,
     )
 
 
