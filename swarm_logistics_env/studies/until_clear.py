@@ -11,6 +11,7 @@ Everything follows from the outcomes, so a study that was killed goes on as if i
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -70,7 +71,21 @@ class _Looks:
         runs = (case.run(self.plan.code, s) for case in cases for s in self.plan.seeds[:n_seeds])
         return {run.key: run for run in runs if (run.case.key, run.seed) not in self._outcomes}
 
-    def cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
+    def judged(self, comparisons: Iterable[Comparison], n_seeds: int) -> dict[Comparison, Verdict]:
+        """Judge comparisons at a look, as far as it is played."""
+        # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
+        # side of the margin.
+        confidence = 1 - self.alpha(n_seeds, 1 - CONFIDENCE)
+        alpha = self.alpha(n_seeds, 2 * ALPHA) / 2
+        margin, found = self.plan.specification.margin, dict[Comparison, Verdict]()
+        for comparison in comparisons:
+            cells = self._cells(comparison, n_seeds)
+            found[comparison] = judge_one(
+                comparison, cells, paired=True, margin=margin, confidence=confidence, alpha=alpha
+            )
+        return found
+
+    def _cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
         seeds, arms, known = self.plan.seeds[:n_seeds], comparison.arms, self._outcomes
         # Before the first look is complete, the seeds of all arms tell a value and no verdict.
         there = [seed for seed in seeds if all((arm.case.key, seed) in known for arm in arms)]
@@ -79,9 +94,10 @@ class _Looks:
             for arm in arms
         }
 
-    def alpha(self, look: int, alpha: float) -> float:
-        """Return what is spent of an error up to a look, counted from 0."""
-        return spi.look_alphas(self.looks, alpha, spending=SPENDING)[look]
+    def alpha(self, n_seeds: int, alpha: float) -> float:
+        """Return what is spent of an error up to the look at `n_seeds`, or the next one."""
+        spent = spi.look_alphas(self.looks, alpha, spending=SPENDING)
+        return spent[bisect_left(self.looks, n_seeds)]
 
 
 class _Family:
@@ -93,40 +109,19 @@ class _Family:
 
     def __init__(self, members: Sequence[Comparison], runs: _Looks) -> None:
         self.wanted: dict[str, Run] = {}
-        self._runs = runs
+        self._runs, self._open = runs, list(members)
         self._found: dict[Comparison, Verdict] = {}
-        self._look: dict[Comparison, int] = {}  # the last at which each was judged
-        self._open = list(members)
-        for look in range(len(runs.looks)):
-            if not self._open or not self._judged_at(look):
+        for n_seeds in runs.looks:
+            # A failed run blocks a comparison for good: it stays in the family and gets no seeds.
+            playing = [c for c in self._open if c not in self._found or self._found[c].estimate]
+            self.wanted = runs.missing([arm.case for c in playing for arm in c.arms], n_seeds)
+            if not (self.wanted and self._found):
+                self._found |= runs.judged(playing, n_seeds)
+            if self.wanted:
                 break
+            self._stop_clear_ones(n_seeds)
 
-    def _judged_at(self, look: int) -> bool:
-        """Judge what is open at a look; return whether its runs are there."""
-        n_seeds = self._runs.looks[look]
-        # A failed run blocks a comparison for good: it stays in the family and gets no seeds.
-        playing = [c for c in self._open if c not in self._found or self._found[c].estimate]
-        cases = [arm.case for comparison in playing for arm in comparison.arms]
-        self.wanted = self._runs.missing(cases, n_seeds)
-        complete = not self.wanted
-        if look and not complete:
-            return False
-        # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
-        # side of the margin.
-        confidence = 1 - self._runs.alpha(look, 1 - CONFIDENCE)
-        alpha = self._runs.alpha(look, 2 * ALPHA) / 2
-        margin = self._runs.plan.specification.margin
-        for comparison in playing:
-            cells = self._runs.cells(comparison, n_seeds)
-            self._found[comparison] = judge_one(
-                comparison, cells, paired=True, margin=margin, confidence=confidence, alpha=alpha
-            )
-            self._look[comparison] = look
-        if complete:
-            self._stop_clear_ones(look, n_seeds)
-        return complete
-
-    def _stop_clear_ones(self, look: int, n_seeds: int) -> None:
+    def _stop_clear_ones(self, n_seeds: int) -> None:
         """Note p on the scale on which 0.05 decides, and stop by Holm's steps, smallest p first."""
         tested = list[tuple[float, Comparison, spi.Estimate]]()
         for comparison in list(self._open):
@@ -137,7 +132,7 @@ class _Family:
                 tested.append((estimate.p_value, comparison, estimate))
         for p, comparison, estimate in sorted(tested, key=lambda one: one[0]):
             # Once one stays open the level stays as it is, and every larger p is above it.
-            level = self._runs.alpha(look, (1 - CONFIDENCE) / len(self._open))
+            level = self._runs.alpha(n_seeds, (1 - CONFIDENCE) / len(self._open))
             is_clear = p < level
             self._found[comparison] = replace(
                 self._found[comparison],
@@ -160,8 +155,8 @@ class _Family:
 
         def ratio(comparison: Comparison) -> float:
             """Return p as a multiple of the level that it needs."""
-            p, look = left[comparison].p_value, self._look[comparison]
-            return 1.0 if p is None else p / self._runs.alpha(look, 2 * ALPHA / len(left)) * 2
+            p, n_seeds = left[comparison].p_value, left[comparison].change.n_seeds
+            return 1.0 if p is None else p / self._runs.alpha(n_seeds, 2 * ALPHA / len(left)) * 2
 
         while left and ratio(first := min(left, key=ratio)) < 1.0:
             del left[first]
