@@ -14,7 +14,7 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.spi.trials import Trial
-from swarm_logistics_env.tasks.task import NAMES, Task, refuse_untrusted
+from swarm_logistics_env.tasks.task import Task, refuse_untrusted
 
 from .plan import Plan
 from .runs import FILE_NAME, Runs
@@ -44,11 +44,6 @@ class StoredSpecification(BaseModel):
         Raises:
             StudyError: it is damaged, or its task cannot be found.
         """
-        if task is None and ":" not in self.task and self.task not in NAMES:
-            raise StudyError(
-                f"{place}: was played on the task {self.task!r} of a script: should be handed over "
-                "again, as Study.stored(.., task=..)"
-            )
         if task is None:
             refuse_untrusted(place, self.task, trust_code=trust_code)
         return Specification(**{**self.model_dump(), "task": task or self.task})
