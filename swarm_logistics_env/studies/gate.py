@@ -16,7 +16,6 @@ have the same runs, the change is exactly 0, and the gate fails if "0 < number" 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple, Self
@@ -229,11 +228,9 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
         for one in new.verdicts
         if one.compared.indicator == gate.subject
     )
-    labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
     for comparison in comparisons:
-        name = f"{comparison.policy}: {comparison.indicator}, {comparison.label}"
-        if labels[comparison.policy, comparison.label] > 1:
-            name += f" ({comparison.table})"
+        asked = f"{comparison.label} ({comparison.table})"
+        name = f"{comparison.policy}: {comparison.indicator}, {asked}"
         if gate.at not in name:
             continue
         cells, margin = new.cells_of(comparison), new.plan.specification.margin
