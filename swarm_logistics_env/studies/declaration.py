@@ -212,15 +212,8 @@ def merge(directories: Sequence[Path], out: Path) -> int:
     for directory, other in stored.items():
         if other.imported is not None:
             raise StudyError(f"{directory} was imported: only studies that were run are merged")
-        mine, theirs = (
-            each.specification.model_dump() | each.model_dump(exclude={"specification"})
-            for each in (one, other)
-        )
-        if differing := [name for name in mine | theirs if mine.get(name) != theirs.get(name)]:
-            raise StudyError(
-                f"{first} and {directory} differ in {', '.join(differing)}: should be shards "
-                "of one study"
-            )
+        if other != one:
+            raise StudyError(f"{first} and {directory} differ: should be shards of one study")
     with Runs.new(out, "merge") as runs:
         for directory in directories:
             runs.absorb(directory / FILE_NAME)
