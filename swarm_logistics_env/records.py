@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
-    AfterValidator,
     BaseModel,
     ConfigDict,
+    Field,
     ValidationError,
     ValidationInfo,
     model_validator,
@@ -52,7 +52,6 @@ def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path
 
 
 _LONGEST_NAME = 80  # of a file [characters]; with an ending it fits every file system
-_FILE_NAME = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{_LONGEST_NAME - 1}}}")
 
 
 class Record(BaseModel):
@@ -195,17 +194,10 @@ def _texts(place: str, value: object) -> Iterator[tuple[str, str]]:
                 waiting += [(f"{place}.{number}", each) for number, each in enumerate(values)]
 
 
-def _checked_file_name(name: str) -> str:
-    if not _FILE_NAME.fullmatch(name):
-        raise ValueError(
-            "should be of letters, digits, - and _, and points within, at most "
-            f"{_LONGEST_NAME}: files are called so"
-        )
-    return name
-
-
-# A name from a file that becomes part of a path.
-FileName = Annotated[str, AfterValidator(_checked_file_name)]
+# A name from a file that becomes part of a path: letters, digits, - and _, and points within.
+FileName = Annotated[
+    str, Field(pattern=r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", max_length=_LONGEST_NAME)
+]
 
 
 def file_name(text: str) -> str:
@@ -226,7 +218,7 @@ def _in_plain_words(problem: dict[str, Any]) -> str:
         least = problem["ctx"]["min_length"]
         return f"should have at least {least} item{'' if least == 1 else 's'}"
     message = str(problem["msg"]).removeprefix("Value error, ")
-    return message.replace("Input should", "should")
+    return re.sub("^(Input|String) should", "should", message)
 
 
 def _short(value: object) -> str:
