@@ -18,7 +18,7 @@ from swarm_logistics_env.tasks.task import Task, refuse_untrusted
 
 from .plan import Plan
 from .runs import FILE_NAME, Runs
-from .specification import Specification, seeds_in_words
+from .specification import Specification
 
 NOTE = "study"
 _Count = Annotated[int, Field(gt=0, strict=True)]
@@ -89,19 +89,6 @@ class Declaration(BaseModel):
         # A part of the declared seeds is a choice as well, made with the results at hand.
         same_looks = self.looks in ((), plan.specification.looks)
         return plan.seeds == self.seed_numbers and same_looks
-
-    def warning(self, plan: Plan) -> str:
-        """Return the warning for a plan that this does not cover, and what to declare instead."""
-        declared = f"seeds {seeds_in_words(self.seed_numbers)}"
-        if self.looks:
-            declared = f"looks at {', '.join(map(str, self.looks))} seeds from {self.first_seed} on"
-        fresh = max(self.seed_numbers.stop, plan.seeds[-1] + 1)
-        return (
-            f"This study declared {declared} before its first run: over seeds "
-            f"{seeds_in_words(plan.seeds)} every verdict is exploratory. For verdicts that stand, "
-            "run a new study in another directory, on fresh seeds, until it is clear: "
-            f"--first-seed {fresh} --until-clear --out DIRECTORY."
-        )
 
 
 class Origin(Record):

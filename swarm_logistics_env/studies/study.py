@@ -196,18 +196,17 @@ class Study:
         except StudyError:  # nothing has been run
             return 0, len(whole)
 
-    def exploratory_because(self) -> str | None:
-        """Return why verdicts over the asked seeds are exploratory; None: they are not.
+    def is_exploratory(self) -> bool:
+        """Return whether verdicts over the asked seeds would be exploratory.
 
         Raises:
             StudyError: the store cannot be read, or is another study's.
         """
         if self.out is None or not (self.out / FILE_NAME).is_file():
-            return None  # nothing has been run: what is asked now will be declared
-        plan = self.plan()
+            return False  # nothing has been run: what is asked now will be declared
         with self._store(existing=True) as store:
             noted = self._own_metadata(store)
-        return None if not noted or noted.declared.covers(plan) else noted.declared.warning(plan)
+        return noted is not None and not noted.declared.covers(self.plan())
 
     def findings(self) -> StudyResults:
         """Return every cell and every verdict, from the runs that are there.
