@@ -144,11 +144,8 @@ class StoredStudy(BaseModel):
         note = runs.notes().get(NOTE)
         try:
             return None if note is None else cls.model_validate_json(note, strict=True)
-        except ValidationError as error:
-            name = ".".join(map(str, error.errors()[0]["loc"])) or NOTE
-            raise StudyError(
-                f"the store {runs.path} is damaged: its note {name!r} does not read"
-            ) from None
+        except ValidationError:
+            raise StudyError(f"the store {runs.path} is damaged: its note does not read") from None
 
     @classmethod
     def existing(cls, directory: Path) -> Self:
@@ -176,9 +173,14 @@ def note(
     imported: Origin | None = None,
 ) -> None:
     """Note a study in its store, for `StoredStudy.of`."""
-    fields = {"specification": specification, "code": code, "identities": identities}
-    told = to_json({**fields, "declared": declared, "imported": imported})
-    runs.note(NOTE, told.decode())
+    told = {
+        "specification": specification,
+        "code": code,
+        "identities": identities,
+        "declared": declared,
+        "imported": imported,
+    }
+    runs.note(NOTE, to_json(told).decode())
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:
