@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self, TypeVar
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -42,9 +42,6 @@ HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
 FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 20, 10
 
 
-T = TypeVar("T")
-
-
 def _told_apart(policies: tuple[PolicySpec, ...]) -> tuple[PolicySpec, ...]:
     """Return policies; files with the same name on their cards are called by their paths."""
     counts = Counter(policy.title for policy in policies)
@@ -72,15 +69,6 @@ TaskSource = Annotated[
 class _Part(Record):
     model_config = ConfigDict(arbitrary_types_allowed=True)
     error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-
-def _each_once(values: tuple[T, ...]) -> tuple[T, ...]:
-    if len(set(values)) < len(values):
-        raise ValueError("should hold each value once")
-    return values
-
-
-_ONCE = AfterValidator(_each_once)
 
 
 class Factor(_Part):
@@ -130,9 +118,9 @@ class Faults(Factor):
             without it, they are drawn.
     """
 
-    modes: Annotated[tuple[str, ...], Field(min_length=1), _ONCE]
-    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1), _ONCE] = (1, 2, 3)
-    onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), _ONCE] = (0.0,)
+    modes: Annotated[tuple[str, ...], Field(min_length=1)]
+    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
+    onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1)] = (0.0,)
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
     intermittent: tuple[PositiveFloat, PositiveFloat] | None = None
@@ -155,8 +143,8 @@ class Faults(Factor):
 
 
 def _from_above_0(values: tuple[float, ...]) -> tuple[float, ...]:
-    if values[0] == 0.0:
-        raise ValueError("should start with x_o above 0: A is relative to it")
+    if values[0] == 0.0 or values[0] in values[1:]:
+        raise ValueError("should start with x_o above 0 and not repeat it: A is relative to it")
     return values
 
 
@@ -170,7 +158,7 @@ class Parameter(Factor):
 
     name: str
     values: Annotated[
-        tuple[NonNegativeFloat, ...], Field(min_length=2), _ONCE, AfterValidator(_from_above_0)
+        tuple[NonNegativeFloat, ...], Field(min_length=2), AfterValidator(_from_above_0)
     ]
 
 
@@ -225,7 +213,7 @@ class Specification(_Part):
     faults: Annotated[tuple[Faults, ...], BeforeValidator(each_of(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(each_of(Parameter))] = ()
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(each_of(Ablation))] = ()
-    indicators: Annotated[tuple[str, ...], Field(min_length=1), _ONCE] = tuple(DEFINITIONS)
+    indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
     until_clear: bool = False
     margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
     reference: Literal["paper"] | None = None
