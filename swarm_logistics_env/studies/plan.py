@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, pairwise, product
@@ -199,7 +199,7 @@ def _asked(specification: Specification, cases: Sequence[Case]) -> Iterator[Comp
         for sizes in specification.sizes:
             yield from _scalability(sizes, base)
         for faults in specification.faults:
-            yield from _robustness(faults, base)
+            yield from _robustness(faults, base, specification.indicators)
         for parameter in specification.parameters:
             yield from _adaptability(parameter, base)
         for ablation, lesser in zip(specification.ablations, cases[n_policies:]):
@@ -234,7 +234,7 @@ def _scalability(sizes: Sizes, base: Case) -> Iterator[Comparison]:
         yield Comparison(table, "S", arms[small], arms[large], threshold=SUPERLINEAR)
 
 
-def _robustness(faults: Faults, base: Case) -> Iterator[Comparison]:
+def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iterator[Comparison]:
     """Yield the indicators of every mode, m and onset.
 
     An indicator that needs robots removed is left out where the task cannot remove any.
@@ -260,7 +260,9 @@ def _robustness(faults: Faults, base: Case) -> Iterator[Comparison]:
     arms = [original]
     for onset, mode, m in product(faults.onsets, faults.modes, faults.robots):
         arms.append(arm(mode, m, onset, faults.duration, faults.manner))
-    if task.removed is not None:
+    # Some tasks cannot remove robots in mid-run, and need not where nobody asks.
+    wanted = [one for one in comparing("fault") if one.symbol in indicators]
+    if task.removed is not None and any(one.needs_removed for one in wanted):
         # The robots that are removed are those that would have failed.
         whom: Manner = {} if faults.role is None else {"role": faults.role}
         for onset, m in product(faults.onsets, faults.robots):
