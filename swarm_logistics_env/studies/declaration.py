@@ -48,13 +48,13 @@ class StoredSpecification(BaseModel):
             refuse_untrusted(place, self.task, trust_code=trust_code)
         return Specification(**{**self.model_dump(), "task": task or self.task})
 
-    def differing(self, asked: Specification, place: Path) -> list[str]:
+    def differing(self, asked: Specification) -> list[str]:
         """Return which fields of what is asked are not those that were declared.
 
         How far it is played, and how it is judged, may change: `Declaration` tells whether verdicts
         are exploratory then, and `StudyResults.late_margin` whether equivalence is.
         """
-        declared = self.read(place, task=asked.played)
+        declared = Specification(**{**self.model_dump(), "task": asked.played})
         free = ("seeds", "first_seed", "looks", "until_clear", "margin", "reference")
         mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
         theirs["task"] = self.task
@@ -77,18 +77,13 @@ class Declaration(BaseModel):
     looks: tuple[_Count, ...] = ()
     margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
 
-    @property
-    def seed_numbers(self) -> range:
-        """The seeds of every condition."""
-        return range(self.first_seed, self.first_seed + self.seeds)
-
     def covers(self, plan: Plan) -> bool:
         """Return whether the verdicts of a plan were declared, and so are not exploratory."""
         if plan.imported_from is not None:
             return True  # nothing is added to what was imported
         # A part of the declared seeds is a choice as well, made with the results at hand.
-        same_looks = self.looks in ((), plan.specification.looks)
-        return plan.seeds == self.seed_numbers and same_looks
+        seeds = range(self.first_seed, self.first_seed + self.seeds)
+        return plan.seeds == seeds and self.looks in ((), plan.specification.looks)
 
 
 class Origin(Record):

@@ -257,7 +257,7 @@ class Study:
             return None
         if noted.imported is not None:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
-        if differing := noted.specification.differing(self.specification, self.out or Path()):
+        if differing := noted.specification.differing(self.specification):
             raise StudyError(
                 f"{self.out} holds the study {noted.specification.name!r} with other "
                 f"{', '.join(differing)}: this one should be kept in another directory, --out "
