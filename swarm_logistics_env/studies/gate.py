@@ -201,12 +201,11 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswe
     Raises:
         StudyError: the gate is about nothing that the studies hold.
     """
-    is_change = gate.subject == "change"
-    asked = list(_changes(gate, old, new) if is_change else _indicators(gate, new))
+    found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
+    asked = list(found)
     if not asked:
-        where = f" at {gate.at!r}" if gate.at else ""
         raise StudyError(
-            f"gate {gate.text!r}: the studies hold no {gate.subject}{where}, so it tests nothing"
+            f"gate {gate.text!r}: the studies hold nothing that it names, so it tests nothing"
         )
     verdicts = iter(spi.adjust([value for _, value in asked if isinstance(value, Estimate)]))
     said = []
