@@ -47,7 +47,7 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
         seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
         setup=tuple((setup or {}).items()),
         trials=tuple(replace(rows[0], times=None) for rows in conditions.values()),
-        notes=trials.notes,
+        notes=(*trials.notes, *_without_removed(trials)),
     )
     specification = Specification(
         name=file_name(Path(trials.file).stem),
@@ -70,6 +70,15 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
         declared = Declaration.model_validate(specification)
         note(runs, specification, RECORDED.code(), {}, declared, origin)
     return len(trials.rows)
+
+
+def _without_removed(trials: Trials) -> Iterator[str]:
+    """Yield why FT is not asked, where robots failed and none were taken away."""
+    faults = {row.fault for row in trials.rows} - {NO_FAULT, REPEATED}
+    if faults and RECORDED.removed not in faults:
+        yield (
+            f"No FT: it needs trials without the robots, fault = {RECORDED.removed}; R is asked."
+        )
 
 
 def imported_plan(specification: Specification, origin: Origin) -> Plan:

@@ -59,6 +59,7 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     printed = command(f"{TRIALS} --setup setup.toml --setup floor=tiles --full")
     assert printed.startswith("6 runs in lab.csv\n")
     assert "| wheel, m = 1 | 10.6 [8.4, 12.8] | [6.2, 14.9] | -0.013 [" in printed
+    assert "No FT: it needs trials without the robots, fault = removed" in printed
     assert "For a paper: lab: P at N = 8, no fault: 12.3 [" in printed
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
