@@ -1,8 +1,7 @@
-"""Progress of long work, of a study or a training: bars at a terminal, a sparse line elsewhere."""
+"""Progress of long work, of a study or a training: a bar at a terminal, a sparse line elsewhere."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from time import monotonic
 from typing import Self
 
@@ -13,7 +12,6 @@ from rich.table import Table
 from rich.text import Text
 
 LINE_EVERY = 30.0  # seconds between plain lines
-_NOTHING: Mapping[str, int] = {}
 
 
 class ProgressBar:
@@ -24,8 +22,6 @@ class ProgressBar:
         total: how much there is to do, in `unit`.
         unit: in words, e.g. "runs".
         done: how much of it was done before now.
-        parts: how much there is to do of each part of it, by the part's name; several have a bar
-            each.
         console: the console to write to; None means standard error.
     """
 
@@ -36,13 +32,10 @@ class ProgressBar:
         unit: str,
         *,
         done: int = 0,
-        parts: Mapping[str, int] = _NOTHING,
         console: Console | None = None,
     ) -> None:
         self._label, self._total, self._unit = label, total, unit
         self._first = self._done = done
-        self._parts = parts if len(parts) > 1 else {}
-        self._parts_done: Mapping[str, int] = {}
         self._note = ""
         self._console = console or Console(stderr=True, highlight=False)
         self._live: Live | None = None
@@ -67,41 +60,32 @@ class ProgressBar:
         """Time since it was entered, or until it was left [s]."""
         return (self._stopped_at or monotonic()) - self._start
 
-    def reach(self, done: int, note: str = "", parts: Mapping[str, int] = _NOTHING) -> None:
+    def reach(self, done: int, note: str = "") -> None:
         """Show that so much is done.
 
         Args:
             note: what plain lines say besides.
-            parts: how much is done of each part.
         """
-        self._done, self._note, self._parts_done = done, note, parts
+        self._done, self._note = done, note
         if not self._live and monotonic() - self._last_line >= LINE_EVERY:
             self.say()
 
     def say(self, what: str = "") -> None:
         """Print a line: how much is done, and `what`."""
         self._last_line = monotonic()
-        _, *parts = self._shown()
-        reached = f"{self._done:,} of {self._total:,} {self._unit}"
-        if parts:
-            each = (f"{name} {done:,} of {total:,}" for name, done, total in parts)
-            reached += f" ({', '.join(each)})"
-        told = (reached, self._note, self._pace(), what)
+        told = (self._reached(), self._note, self._pace(), what)
         line = f"{self._label}: {', '.join(part for part in told if part)}"
         self._console.print(line, soft_wrap=True, markup=False)
 
     def __rich__(self) -> RenderableType:
-        """Return the bars as they are now; they take 80 columns."""
-        bars = Table.grid(padding=(0, 1))
-        for name, done, total in self._shown():
-            reached = f"{done:,} of {total:,} {self._unit}"
-            bars.add_row(Text(name), Bar(total=total, completed=done, width=20), reached)
-        return Group(bars, f"{self._pace()}, {clock(self.seconds)} so far")
+        """Return the bar as it is now; it takes 80 columns."""
+        shown = Table.grid(padding=(0, 1))
+        bar = Bar(total=self._total, completed=self._done, width=20)
+        shown.add_row(Text(self._label), bar, self._reached())
+        return Group(shown, f"{self._pace()}, {clock(self.seconds)} so far")
 
-    def _shown(self) -> list[tuple[str, int, int]]:
-        """Return name, what is done and what there is to do: of the whole, then of each part."""
-        parts = [(name, self._parts_done.get(name, 0), n) for name, n in self._parts.items()]
-        return [(self._label, self._done, self._total), *parts]
+    def _reached(self) -> str:
+        return f"{self._done:,} of {self._total:,} {self._unit}"
 
     def _pace(self) -> str:
         rate = (self._done - self._first) / max(self.seconds, 1e-9)

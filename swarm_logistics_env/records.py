@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
-    AfterValidator,
     BaseModel,
     ConfigDict,
+    Field,
     ValidationError,
     ValidationInfo,
     model_validator,
@@ -40,19 +40,18 @@ def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path
     whole = path.resolve()  # a link stays a link
     part = whole.with_name(f".{path.stem[:80]}.part{path.suffix}") if is_plain else path
     try:
-        yield part
-        if is_plain:
-            part.replace(whole)
+        try:
+            yield part
+            if is_plain:
+                part.replace(whole)
+        finally:
+            if is_plain:
+                part.unlink(missing_ok=True)
     except OSError as error:
         raise error_type(f"cannot write {path}: {error.strerror or error}") from error
-    finally:
-        if is_plain:
-            part.unlink(missing_ok=True)
 
 
-_OTHER_KIND = ("int_type", "tuple_type")
 _LONGEST_NAME = 80  # of a file [characters]; with an ending it fits every file system
-_FILE_NAME = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{_LONGEST_NAME - 1}}}")
 
 
 class Record(BaseModel):
@@ -107,16 +106,7 @@ class Record(BaseModel):
 
     @classmethod
     def _sentence(cls, error: ValidationError) -> str:
-        found: list[dict[str, Any]] = [dict(problem) for problem in error.errors()]
-        # A list that lost its bad items is also too short; the bad items are reported alone.
-        deeper = {problem["loc"][:-1] for problem in found}
-        found = [p for p in found if p["type"] != "too_short" or p["loc"] not in deeper]
-        # A field may be a number or a list: if one of them has a more precise error, that the
-        # value is not the other is left out.
-        precise = {p["loc"][:1] for p in found if p["type"] not in _OTHER_KIND}
-        found = [p for p in found if p["type"] not in _OTHER_KIND or p["loc"][:1] not in precise]
-        problems = (cls._problem(problem) for problem in found)
-        return "; ".join(dict.fromkeys(problems))
+        return "; ".join(dict.fromkeys(cls._problem(dict(one)) for one in error.errors()))
 
     @classmethod
     def _problem(cls, problem: dict[str, Any]) -> str:
@@ -204,17 +194,10 @@ def _texts(place: str, value: object) -> Iterator[tuple[str, str]]:
                 waiting += [(f"{place}.{number}", each) for number, each in enumerate(values)]
 
 
-def _checked_file_name(name: str) -> str:
-    if not _FILE_NAME.fullmatch(name):
-        raise ValueError(
-            "should be of letters, digits, - and _, and points within, at most "
-            f"{_LONGEST_NAME}: files are called so"
-        )
-    return name
-
-
-# A name from a file that becomes part of a path.
-FileName = Annotated[str, AfterValidator(_checked_file_name)]
+# A name from a file that becomes part of a path: letters, digits, - and _, and points within.
+FileName = Annotated[
+    str, Field(pattern=r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", max_length=_LONGEST_NAME)
+]
 
 
 def file_name(text: str) -> str:
@@ -235,7 +218,7 @@ def _in_plain_words(problem: dict[str, Any]) -> str:
         least = problem["ctx"]["min_length"]
         return f"should have at least {least} item{'' if least == 1 else 's'}"
     message = str(problem["msg"]).removeprefix("Value error, ")
-    return message.replace("Input should", "should")
+    return re.sub("^(Input|String) should", "should", message)
 
 
 def _short(value: object) -> str:

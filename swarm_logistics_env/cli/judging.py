@@ -19,7 +19,7 @@ from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, slug
 from swarm_logistics_env.report.write import write_report
-from swarm_logistics_env.spi import mean_interval
+from swarm_logistics_env.spi import mean_interval, read_trials
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
@@ -155,15 +155,15 @@ def judge_command(
 
     usual = Path("results", "judged", Path(asked).stem)
     directory = out or _free(usual)
-    count = import_results(
-        Path(asked),
-        directory,
+    stated = _stated(setup or [])
+    trials = read_trials(
+        asked,
         columns=dict(_pair("--column", text) for text in columns or []),
         ignore=ignore or (),
         duration=duration,
         decimal=decimal or ".",
-        setup=_stated(setup or []),
     )
+    count = import_results(trials, directory, stated)
     if directory not in (out, usual):
         echo(f"{usual} holds an earlier judgement, so this one is in {directory}")
     imported = StoredStudy.existing(directory).imported

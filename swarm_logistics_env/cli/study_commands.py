@@ -131,8 +131,11 @@ def run_command(
     player = engine_named(engine, processes, address)
     say(str(chosen.plan()))
     echo()
-    if warning := chosen.exploratory_because():
-        say(f"{warning}\n")
+    if chosen.is_exploratory():
+        say(
+            "This study declared other seeds before its first run: every verdict is exploratory. "
+            "For verdicts that stand, run a new study on fresh seeds: --first-seed and --out.\n"
+        )
     if policies:
         tell_what_a_pilot_shows(chosen)
     tally = run_study(chosen, player, part)

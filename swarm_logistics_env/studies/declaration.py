@@ -14,11 +14,11 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.spi.trials import Trial
-from swarm_logistics_env.tasks.task import NAMES, Task, refuse_untrusted
+from swarm_logistics_env.tasks.task import Task, refuse_untrusted
 
 from .plan import Plan
 from .runs import FILE_NAME, Runs
-from .specification import Specification, seeds_in_words
+from .specification import Specification
 
 NOTE = "study"
 _Count = Annotated[int, Field(gt=0, strict=True)]
@@ -44,22 +44,17 @@ class StoredSpecification(BaseModel):
         Raises:
             StudyError: it is damaged, or its task cannot be found.
         """
-        if task is None and ":" not in self.task and self.task not in NAMES:
-            raise StudyError(
-                f"{place}: was played on the task {self.task!r} of a script: should be handed over "
-                "again, as Study.stored(.., task=..)"
-            )
         if task is None:
             refuse_untrusted(place, self.task, trust_code=trust_code)
         return Specification(**{**self.model_dump(), "task": task or self.task})
 
-    def differing(self, asked: Specification, place: Path) -> list[str]:
+    def differing(self, asked: Specification) -> list[str]:
         """Return which fields of what is asked are not those that were declared.
 
         How far it is played, and how it is judged, may change: `Declaration` tells whether verdicts
         are exploratory then, and `StudyResults.late_margin` whether equivalence is.
         """
-        declared = self.read(place, task=asked.played)
+        declared = Specification(**{**self.model_dump(), "task": asked.played})
         free = ("seeds", "first_seed", "looks", "until_clear", "margin", "reference")
         mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
         theirs["task"] = self.task
@@ -82,41 +77,13 @@ class Declaration(BaseModel):
     looks: tuple[_Count, ...] = ()
     margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
 
-    @property
-    def seed_numbers(self) -> range:
-        """The seeds of every condition."""
-        return range(self.first_seed, self.first_seed + self.seeds)
-
     def covers(self, plan: Plan) -> bool:
         """Return whether the verdicts of a plan were declared, and so are not exploratory."""
         if plan.imported_from is not None:
             return True  # nothing is added to what was imported
-        if not self.looks:
-            # A part of the declared seeds is a choice as well, made with the results at hand.
-            return plan.seeds == self.seed_numbers
-        return (
-            len(plan.seeds) in self.looks
-            and plan.specification.looks == self.looks
-            and plan.seeds[0] == self.first_seed
-        )
-
-    def warning(self, plan: Plan) -> str:
-        """Return the warning for a plan that this does not cover, and what to declare instead."""
-        declared = _counted(self.seed_numbers)
-        if self.looks:
-            declared = f"looks at {', '.join(map(str, self.looks))} seeds from {self.first_seed} on"
-        fresh = max(self.seed_numbers.stop, plan.seeds[-1] + 1)
-        return (
-            f"This study declared {declared} before its first run: over {_counted(plan.seeds)} "
-            "every verdict is exploratory. For verdicts that stand, run a new study in another "
-            f"directory, on fresh seeds, until it is clear: --first-seed {fresh} --until-clear "
-            "--out DIRECTORY."
-        )
-
-
-def _counted(seeds: Sequence[int]) -> str:
-    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
-    return f"{count} ({seeds_in_words(seeds)})"
+        # A part of the declared seeds is a choice as well, made with the results at hand.
+        seeds = range(self.first_seed, self.first_seed + self.seeds)
+        return plan.seeds == seeds and self.looks in ((), plan.specification.looks)
 
 
 class Origin(Record):
@@ -172,11 +139,8 @@ class StoredStudy(BaseModel):
         note = runs.notes().get(NOTE)
         try:
             return None if note is None else cls.model_validate_json(note, strict=True)
-        except ValidationError as error:
-            name = ".".join(map(str, error.errors()[0]["loc"])) or NOTE
-            raise StudyError(
-                f"the store {runs.path} is damaged: its note {name!r} does not read"
-            ) from None
+        except ValidationError:
+            raise StudyError(f"the store {runs.path} is damaged: its note does not read") from None
 
     @classmethod
     def existing(cls, directory: Path) -> Self:
@@ -204,9 +168,14 @@ def note(
     imported: Origin | None = None,
 ) -> None:
     """Note a study in its store, for `StoredStudy.of`."""
-    fields = {"specification": specification, "code": code, "identities": identities}
-    told = to_json({**fields, "declared": declared, "imported": imported})
-    runs.note({NOTE: told.decode()})
+    told = {
+        "specification": specification,
+        "code": code,
+        "identities": identities,
+        "declared": declared,
+        "imported": imported,
+    }
+    runs.note(NOTE, to_json(told).decode())
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:
@@ -227,15 +196,8 @@ def merge(directories: Sequence[Path], out: Path) -> int:
     for directory, other in stored.items():
         if other.imported is not None:
             raise StudyError(f"{directory} was imported: only studies that were run are merged")
-        mine, theirs = (
-            each.specification.model_dump() | each.model_dump(exclude={"specification"})
-            for each in (one, other)
-        )
-        if differing := [name for name in mine | theirs if mine.get(name) != theirs.get(name)]:
-            raise StudyError(
-                f"{first} and {directory} differ in {', '.join(differing)}: should be shards "
-                "of one study"
-            )
+        if other != one:
+            raise StudyError(f"{first} and {directory} differ: should be shards of one study")
     with Runs.new(out, "merge") as runs:
         for directory in directories:
             runs.absorb(directory / FILE_NAME)

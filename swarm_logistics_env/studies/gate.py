@@ -16,7 +16,6 @@ have the same runs, the change is exactly 0, and the gate fails if "0 < number" 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple, Self
@@ -63,27 +62,21 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     whatever they are called.
     """
     before, after = _judged(old), _judged(new)
-    partners = {label: label for label in after if label in before}
+    partners = {label: label for label in (*after, *before)}
     if len(before) == len(after) == 1:
         partners = dict(zip(after, before))
     matches = list[tuple[str, Cell, Cell]]()
     unmatched, notes = list[_Unmatched](), list[str]()
-    for study, judged, other, others, known in (
-        ("old", before, "new", after, partners.values()),
-        ("new", after, "old", before, partners.keys()),
-    ):
-        for label in (label for label in judged if label not in known):
-            problem = f"policy {label!r} of the {study} study has no match: the {other} study "
-            problem += f"judges {', '.join(map(repr, others)) or 'no policy'}"
-            names = tuple(_name(label, cell) for cell in judged[label].values())
-            unmatched.append((label, problem, names))
     for label, old_label in partners.items():
         named = label if label == old_label else f"{old_label} -> {label}"
-        theirs, ours = before[old_label], after[label]
+        theirs, ours = before.get(old_label, {}), after.get(label, {})
         common = [content for content in ours if content in theirs]
         if not common:
             names = tuple(_name(named, cell) for cell in (*theirs.values(), *ours.values()))
-            problem = f"policy {named!r} is judged in both studies, but under no common condition"
+            problem = (
+                f"policy {named!r} is judged under no condition of both studies: the old one "
+                f"judges {[*before]}, the new one {[*after]}"
+            )
             unmatched.append((named, problem, names))
             continue
         matches += [(_name(named, ours[c]), theirs[c], ours[c]) for c in common]
@@ -106,17 +99,11 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
 
 def _judged(results: StudyResults) -> _Judged:
     """Return each condition of a judged policy once, by the policy's label and by all but it."""
-    # An ablation's second policy may bear the label of a judged one: its place tells them apart.
-    second = {
-        (comparison.policy, comparison.table, comparison.changed)
-        for comparison in results.plan.comparisons
-        if comparison.definition.compares == "policy"
-    }
     found: _Judged = {}
     for cell in results.cells:
-        if (cell.policy, cell.table, cell.arm) in second:
-            continue
         case = cell.arm.case
+        if case.policy.title != cell.policy:  # the second policy of an ablation
+            continue
         # Imported tables may differ in P at one condition.
         table = "" if results.plan.imported_from is None else cell.table
         content = (case.scenario, case.faults, case.behaviour, table)
@@ -214,12 +201,11 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswe
     Raises:
         StudyError: the gate is about nothing that the studies hold.
     """
-    is_change = gate.subject == "change"
-    asked = list(_changes(gate, old, new) if is_change else _indicators(gate, new))
+    found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
+    asked = list(found)
     if not asked:
-        where = f" at {gate.at!r}" if gate.at else ""
         raise StudyError(
-            f"gate {gate.text!r}: the studies hold no {gate.subject}{where}, so it tests nothing"
+            f"gate {gate.text!r}: the studies hold nothing that it names, so it tests nothing"
         )
     verdicts = iter(spi.adjust([value for _, value in asked if isinstance(value, Estimate)]))
     said = []
@@ -241,11 +227,9 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
         for one in new.verdicts
         if one.compared.indicator == gate.subject
     )
-    labels = Counter((comparison.policy, comparison.label) for comparison in comparisons)
     for comparison in comparisons:
-        name = f"{comparison.policy}: {comparison.indicator}, {comparison.label}"
-        if labels[comparison.policy, comparison.label] > 1:
-            name += f" ({comparison.table})"
+        asked = f"{comparison.label} ({comparison.table})"
+        name = f"{comparison.policy}: {comparison.indicator}, {asked}"
         if gate.at not in name:
             continue
         cells, margin = new.cells_of(comparison), new.plan.specification.margin

@@ -12,8 +12,7 @@ import numpy as np
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.records import file_name
-from swarm_logistics_env.spi.inputs import IndicatorError
-from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials, read_trials
+from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials
 from swarm_logistics_env.tasks.task import Case, Outcome
 from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
@@ -25,37 +24,21 @@ from .specification import Specification
 from .verdict import grouped
 
 
-def import_results(
-    file: Path,
-    out: Path,
-    *,
-    columns: Mapping[str, str] | None = None,
-    ignore: Sequence[str] = (),
-    duration: float | None = None,
-    decimal: str = ".",
-    setup: Mapping[str, str] | None = None,
-) -> int:
-    """Make a study of a CSV file of trials (`spi.read_trials`); return how many runs it holds.
+def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = None) -> int:
+    """Make a study of the trials in a file (`spi.read_trials`); return how many runs it holds.
 
     Swarm sizes without fault, failure modes and the values of each parameter become a table each;
     the values of everything else that the file varies make tables of their own. A parameter's x_o
     is its value in the file's first row. With seeds the study is paired, without them it is not.
 
     Args:
-        file: the CSV.
+        trials: of the file.
         out: directory of the study; it may not hold another.
-        columns, ignore, duration, decimal: as for `spi.read_trials`.
         setup: name and value of what the report is to say of the conditions.
 
     Raises:
-        StudyError: the file cannot be read, a row of it cannot be, or nothing is compared in it.
+        StudyError: a trial stands alone, or nothing that it can be relative to is there.
     """
-    try:
-        trials = read_trials(
-            file, columns=columns, ignore=ignore, duration=duration, decimal=decimal
-        )
-    except IndicatorError as error:
-        raise StudyError(str(error)) from error
     conditions = grouped(trials.rows, lambda row: row.condition)
     origin = Origin(
         file=trials.file,
@@ -67,7 +50,7 @@ def import_results(
         notes=(*trials.notes, *_without_removed(trials)),
     )
     specification = Specification(
-        name=file_name(file.stem),
+        name=file_name(Path(trials.file).stem),
         task=RECORDED.name,
         policies=tuple(
             PolicySpec(name=name) for name in dict.fromkeys(row.policy for row in trials.rows)
@@ -77,7 +60,7 @@ def import_results(
     try:
         _refuse_unused(origin, imported_plan(specification, origin))
     except StudyError as error:
-        raise StudyError(f"{file}, {error}") from None
+        raise StudyError(f"{trials.file}, {error}") from None
     with Runs.new(out, "import") as runs:
         for rows in conditions.values():
             case = _case(origin, rows[0])
@@ -114,7 +97,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
         RECORDED.code(),
         {},
         nulls={
-            (arm.case.policy.title, title): arm
+            (title, arms[0]): arm
             for title, arms in tables
             for arm in arms[1:]
             if arm.setting == OTHER_BEHAVIOUR

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.inputs import Numbers
 
 from .comparison import Arm, Comparison
@@ -52,24 +51,39 @@ class Resilience(NamedTuple):
 def resiliences(results: StudyResults) -> Iterator[Resilience]:
     """Yield what is known of every fault that begins during the run and has its runs."""
     for comparison in mid_run_faults(results):
-        if not all(map(results.outcomes_of, comparison.arms)):
-            continue
-        faulty, removed = comparison.changed, comparison.removed
-        share = faulty.setting.value / comparison.n_robots
-        indices = (
-            _index(results, faulty, removed, 1.0) if removed else None,
-            _index(results, faulty, comparison.original, 1.0 - share),
-        )
+        if all(map(results.outcomes_of, comparison.arms)):
+            yield _resilience(results, comparison)
+
+
+def _resilience(results: StudyResults, comparison: Comparison) -> Resilience:
+    original, removed, faulty = comparison.original, comparison.removed, comparison.changed
+    null = results.plan.nulls.get((comparison.table, original))
+    arms = filter(None, (*comparison.arms, null))
+    every = [run for arm in arms for run in results.outcomes_of(arm)]
+    single: tuple[RepairCurve, ...] = ()
+    problem = None
+    if removed is None:
+        problem = "no runs with the robots removed are there to compare with"
+    elif null is None or not results.outcomes_of(null):
+        problem = "the runs of the no-fault null are missing"
+    elif any(run.all_delivered for run in every):
+        problem = "the items ran out, and the rate with them: use restock"
+    else:
         try:
-            if removed is None:
-                raise StudyError("no runs with the robots removed are there to compare with")
-            broken = results.times_of(faulty), results.times_of(removed)
-            pairs = broken, _null(results, comparison)
-            single = tuple(_repair_curve(comparison, *pair) for pair in pairs)
-        except (StudyError, spi.IndicatorError) as error:
-            yield Resilience(comparison, *indices, problem=str(error))
-        else:
-            yield Resilience(comparison, *indices, single)
+            single = tuple(
+                _repair_curve(comparison, results.times_of(arm), results.times_of(reference))
+                for arm, reference in ((faulty, removed), (original, null))
+            )
+        except spi.IndicatorError as error:
+            problem = str(error)
+    share = faulty.setting.value / comparison.n_robots
+    return Resilience(
+        comparison,
+        _index(results, faulty, removed, 1.0) if removed else None,
+        _index(results, faulty, original, 1.0 - share),
+        single,
+        problem,
+    )
 
 
 def mid_run_faults(results: StudyResults) -> list[Comparison]:
@@ -98,22 +112,6 @@ def _index(
         )
     except spi.IndicatorError:  # nothing is delivered after the onset in the reference
         return None
-
-
-def _null(results: StudyResults, comparison: Comparison) -> tuple[Times, Times]:
-    """Return the pair without fault.
-
-    Raises:
-        StudyError: why there can be no times to come back.
-    """
-    null = results.plan.nulls.get((comparison.policy, comparison.table))
-    other = results.times_of(null) if null else ()
-    if null is None or not other:
-        raise StudyError("the runs of the no-fault null are missing")
-    arms = (*comparison.arms, null)
-    if any(outcome.all_delivered for arm in arms for outcome in results.outcomes_of(arm)):
-        raise StudyError("the items ran out, and the rate with them: use restock")
-    return results.times_of(comparison.original), other
 
 
 def _repair_curve(comparison: Comparison, times: Times, reference: Times) -> RepairCurve:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain, islice, pairwise, product
+from itertools import chain, pairwise, product
 from typing import Self
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.tasks.task import Case, Run, TaskFault
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
-from .presets import load_reference
 from .specification import (
     BOTH,
     Ablation,
@@ -29,7 +27,7 @@ from .specification import (
 )
 from .verdict import grouped
 
-SUPERLINEAR = 1.0  # threshold of the steps in `Sizes.superlinear`
+SUPERLINEAR = 1.0  # threshold of S for the steps in `Sizes.superlinear`
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Plan:
         comparisons: all comparisons, in the order of the report.
         code: the version of the code that decides the result of a run.
         identities: the identities of the policies, by their names in the specification.
-        nulls: by label of the policy and table, an arm without fault that shares the worlds of the
+        nulls: by table and original arm, an arm without fault that shares the worlds of the
             original one, not its behaviour: what chance alone makes of the two. For faults that
             begin during the run.
         paired: whether all conditions share their seeds.
@@ -54,7 +52,7 @@ class Plan:
     comparisons: tuple[Comparison, ...]
     code: str
     identities: Mapping[str, str]
-    nulls: Mapping[tuple[str, str], Arm] = field(default_factory=dict)
+    nulls: Mapping[tuple[str, Arm], Arm] = field(default_factory=dict)
     paired: bool = True
     imported_from: str | None = None
     imported_seeds: tuple[int, ...] = ()
@@ -73,7 +71,7 @@ class Plan:
             for comparison in self.comparisons
             for arm in comparison.arms
         ]
-        cells += [(policy, table, arm) for (policy, table), arm in self.nulls.items()]
+        cells += [(null.case.policy.title, table, null) for (table, _), null in self.nulls.items()]
         by_factor = grouped(cells, lambda cell: (cell[0], cell[1], cell[2].setting.name))
         return tuple(dict.fromkeys(chain.from_iterable(by_factor.values())))
 
@@ -133,10 +131,10 @@ class Shard:
         """Name of the directory of its store: shards on one disk never share a file."""
         return f"shard-{self.number}-of-{self.count}"
 
-    def of(self, runs: Iterable[Run]) -> list[Run]:
+    def of(self, runs: Sequence[Run]) -> Sequence[Run]:
         """Return every n-th run from the i-th on."""
         # Count all runs, not the missing ones, so that a shard depends on nothing but the plan.
-        return list(islice(runs, self.number - 1, None, self.count))
+        return runs[self.number - 1 :: self.count]
 
 
 def make_plan(
@@ -152,13 +150,10 @@ def make_plan(
         identities: of its policies when it was played; None: they are loaded and asked.
 
     Raises:
-        StudyError: the specification varies nothing, a step of it cannot be, two factors with one
-            heading vary the same under different conditions, there is no such reference, or a
-            policy of several trainings is to be played until it is clear.
+        StudyError: the specification varies nothing, a step of it cannot be, or a policy of several
+            trainings is to be played until it is clear.
         ScenarioError, FaultError, PolicyError: a condition that cannot be built.
     """
-    load_reference(specification.reference)  # a name that is wrong is told before anything is run
-    known: dict[str, str] = {}
     task = specification.played
     several = [policy.name for policy in specification.policies if policy.trainings]
     if several and specification.until_clear:
@@ -167,19 +162,22 @@ def make_plan(
             "until_clear = false (--all-seeds)"
         )
 
-    def case_of(part: str, policy: PolicySpec) -> Case:
-        if identities is not None and part not in identities:
-            raise StudyError(f"the study does not know the identity of its {part}")
-        known[part] = identities[part] if identities else policy.identity(task.policies)
-        return Case(policy, known[part], specification.scenario, task=task)
-
-    asked = _asked(specification, case_of)
+    parts = {f"policy {policy.title}": policy for policy in specification.policies}
+    for number, ablation in enumerate(specification.ablations, start=1):
+        parts[f"ablation {number}"] = ablation.policy
+    if identities is None:
+        identities = {part: policy.identity(task.policies) for part, policy in parts.items()}
+    if unknown := [part for part in parts if part not in identities]:
+        raise StudyError(f"the study does not know the identity of its {unknown[0]}")
+    cases = [
+        Case(policy, identities[part], specification.scenario, task=task)
+        for part, policy in parts.items()
+    ]
+    asked = _asked(specification, cases)
     # What two factors ask alike is asked once, or Holm's family would count it twice.
     comparisons = tuple(
         dict.fromkeys(one for one in asked if one.indicator in specification.indicators)
     )
-    if code is None:  # what was played so stays readable
-        _refuse_one_name_for_two(comparisons)
     if not comparisons:
         raise StudyError(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
@@ -187,43 +185,26 @@ def make_plan(
         )
     # Only comparisons with the robots removed have a time to come back, which needs the null.
     nulls = {
-        (one.policy, one.table): Arm(OTHER_BEHAVIOUR, replace(one.original.case, behaviour=1))
+        (one.table, one.original): Arm(OTHER_BEHAVIOUR, replace(one.original.case, behaviour=1))
         for one in comparisons
         if one.removed and one.changed.setting.onset
     }
-    return Plan(specification, comparisons, code or specification.played.code(), known, nulls)
+    return Plan(specification, comparisons, code or task.code(), identities, nulls)
 
 
-def _refuse_one_name_for_two(comparisons: Sequence[Comparison]) -> None:
-    found: dict[tuple[str, str, Setting], str] = {}
-    for comparison in comparisons:
-        for arm in comparison.arms:
-            place = comparison.policy, comparison.table, arm.setting
-            if found.setdefault(place, arm.case.key) != arm.case.key:
-                raise StudyError(
-                    f"title = {comparison.table!r} heads {str(arm.setting)!r} under two different "
-                    "conditions: each factor should have a title of its own"
-                )
-
-
-def _asked(
-    specification: Specification, case_of: Callable[[str, PolicySpec], Case]
-) -> Iterator[Comparison]:
-    lesser = [
-        (ablation, case_of(f"ablation {number}", ablation.policy))
-        for number, ablation in enumerate(specification.ablations, start=1)
-    ]
-    for policy in specification.policies:
-        base = case_of(f"policy {policy.title}", policy)
+def _asked(specification: Specification, cases: Sequence[Case]) -> Iterator[Comparison]:
+    """Yield what is asked; `cases` are those of the policies, then those of the ablations."""
+    n_policies = len(specification.policies)
+    for base in cases[:n_policies]:
         for sizes in specification.sizes:
-            yield from _scalability(specification, sizes, base)
+            yield from _scalability(sizes, base)
         for faults in specification.faults:
-            yield from _robustness(specification, faults, base)
+            yield from _robustness(faults, base, specification.indicators)
         for parameter in specification.parameters:
-            yield from _adaptability(specification, parameter, base)
-        for ablation, part in lesser:
-            if part.identity != base.identity:
-                yield from _ablation(specification, ablation, base, part)
+            yield from _adaptability(parameter, base)
+        for ablation, lesser in zip(specification.ablations, cases[n_policies:]):
+            if lesser.identity != base.identity:
+                yield from _ablation(ablation, base, lesser)
 
 
 def _title(factor: Factor, general: str, manner: str = "") -> str:
@@ -231,18 +212,16 @@ def _title(factor: Factor, general: str, manner: str = "") -> str:
     return factor.title or (f"{general} ({', '.join(changes)})" if changes else general)
 
 
-def _arm(
-    asked: Specification, base: Case, setting: Setting, changes: Fields, *faults: TaskFault
-) -> Arm:
-    scenario = asked.played.vary(asked.scenario, changes)
+def _arm(base: Case, setting: Setting, changes: Fields, *faults: TaskFault) -> Arm:
+    scenario = base.task.vary(base.scenario, changes)
     return Arm(setting, replace(base, scenario=scenario, faults=faults))
 
 
-def _scalability(asked: Specification, sizes: Sizes, base: Case) -> Iterator[Comparison]:
+def _scalability(sizes: Sizes, base: Case) -> Iterator[Comparison]:
     """Yield the comparisons between neighbouring swarm sizes."""
     table = _title(sizes, "Scalability")
     arms = {
-        n: _arm(asked, base, Setting("size", "n_robots", n), {**sizes.scenario, "n_robots": n})
+        n: _arm(base, Setting("size", "n_robots", n), {**sizes.scenario, "n_robots": n})
         for n in sizes.values
     }
     yield from compared(table, list(arms.values()))
@@ -252,20 +231,16 @@ def _scalability(asked: Specification, sizes: Sizes, base: Case) -> Iterator[Com
                 f"superlinear = ({small}, {large}): should be a step between neighbouring "
                 f"sizes of {sizes.values}"
             )
-        for definition in comparing("size"):
-            if SUPERLINEAR in definition.adjectives:
-                yield Comparison(
-                    table, definition.symbol, arms[small], arms[large], threshold=SUPERLINEAR
-                )
+        yield Comparison(table, "S", arms[small], arms[large], threshold=SUPERLINEAR)
 
 
-def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Comparison]:
+def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iterator[Comparison]:
     """Yield the indicators of every mode, m and onset.
 
     An indicator that needs robots removed is left out where the task cannot remove any.
     """
-    task, table = asked.played, _title(faults, "Fault tolerance and robustness", str(faults))
-    original = _arm(asked, base, NO_FAULT, faults.scenario)
+    task, table = base.task, _title(faults, "Fault tolerance and robustness", str(faults))
+    original = _arm(base, NO_FAULT, faults.scenario)
     scenario = original.case.scenario
     if (m := max(faults.robots)) >= scenario.n_robots:
         raise StudyError(
@@ -280,12 +255,13 @@ def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Co
 
     def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Manner) -> Arm:
         failing = [task.fault(one, m, onset, lasts, manner) for one in mode.split(BOTH)]
-        return _arm(asked, base, Setting("fault", mode, m, onset), faults.scenario, *failing)
+        return _arm(base, Setting("fault", mode, m, onset), faults.scenario, *failing)
 
     arms = [original]
     for onset, mode, m in product(faults.onsets, faults.modes, faults.robots):
         arms.append(arm(mode, m, onset, faults.duration, faults.manner))
-    wanted = [one for one in comparing("fault") if one.symbol in asked.indicators]
+    # Some tasks cannot remove robots in mid-run, and need not where nobody asks.
+    wanted = [one for one in comparing("fault") if one.symbol in indicators]
     if task.removed is not None and any(one.needs_removed for one in wanted):
         # The robots that are removed are those that would have failed.
         whom: Manner = {} if faults.role is None else {"role": faults.role}
@@ -294,24 +270,22 @@ def _robustness(asked: Specification, faults: Faults, base: Case) -> Iterator[Co
     yield from compared(table, arms, task.removed)
 
 
-def _adaptability(asked: Specification, parameter: Parameter, base: Case) -> Iterator[Comparison]:
+def _adaptability(parameter: Parameter, base: Case) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
     name = parameter.name
     table = _title(parameter, f"Adaptability to {name}")
     arms = [
-        _arm(asked, base, Setting("parameter", name, x), {**parameter.scenario, name: x})
+        _arm(base, Setting("parameter", name, x), {**parameter.scenario, name: x})
         for x in parameter.values
     ]
     yield from compared(table, arms)
 
 
-def _ablation(
-    asked: Specification, ablation: Ablation, base: Case, lesser: Case
-) -> Iterator[Comparison]:
+def _ablation(ablation: Ablation, base: Case, lesser: Case) -> Iterator[Comparison]:
     table = _title(ablation, "Ablation")
-    n_robots = asked.played.vary(asked.scenario, ablation.scenario).n_robots
+    n_robots = base.task.vary(base.scenario, ablation.scenario).n_robots
     whole, part = (
-        _arm(asked, case, Setting("policy", case.policy.title, n_robots), ablation.scenario)
+        _arm(case, Setting("policy", case.policy.title, n_robots), ablation.scenario)
         for case in (base, lesser)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".

@@ -12,7 +12,7 @@ import signal
 import threading
 import time
 import traceback
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -56,31 +56,25 @@ class Tally:
 
 def play(
     runs: Sequence[Run], engine: Engine, store: Runs, title: str, end: float | None = None
-) -> tuple[list[Outcome], float]:
+) -> list[str | None]:
     """Play runs and keep each in the store at once; show a progress bar.
 
     Args:
         end: when to stop (`time.monotonic`) [s]; None: when all are played.
 
     Returns:
-        The outcomes, as they finished, and how long it took [s].
+        What each run raised, as they finished; None: it succeeded.
     """
-    progress = ProgressBar(
-        title, len(runs), "runs", parts=Counter(run.case.policy.title for run in runs)
-    )
-    outcomes: list[Outcome] = []
-    done, finished = Counter[str](), engine(runs)
+    errors: list[str | None] = []
     # Closed at once where this stops early, so that no worker outlives it.
-    with closing(finished), progress:
+    with closing(engine(runs)) as finished, ProgressBar(title, len(runs), "runs") as progress:
         for run, outcome in finished:
             store.add(run, outcome)
-            outcomes.append(outcome)
-            done[run.case.policy.title] += 1
-            failed = sum(each.error is not None for each in outcomes)
-            progress.reach(len(outcomes), f"{failed} failed", done)
+            errors.append(outcome.error)
+            progress.reach(len(errors), f"{len(errors) - errors.count(None)} failed")
             if end is not None and time.monotonic() > end:
                 break
-    return outcomes, progress.seconds
+    return errors
 
 
 def serial(runs: Iterable[Run]) -> Played:
@@ -136,7 +130,10 @@ def _in_processes(count: int, runs: Iterable[Run]) -> Played:
         with workers(min(count, len(waiting))) as pool:
             interrupted = yield from _played(pool, waiting, count)
         for run in interrupted:
-            yield run, _played_alone(run)
+            with workers(1) as alone:
+                ended_again = yield from _played(alone, deque([run]), 1)
+            if ended_again:
+                yield run, Outcome(error="WorkerDied: two worker processes ended in this run\n")
 
 
 def _played(
@@ -161,20 +158,6 @@ def _played(
             except BrokenProcessPool:
                 interrupted.append(run)
     return interrupted
-
-
-def _played_alone(run: Run) -> Outcome:
-    others = set(multiprocessing.active_children())
-    with workers(1) as pool:
-        (worker,) = set(multiprocessing.active_children()) - others
-        try:
-            return pool.submit(_play, _pickled(run)).result()
-        except BrokenProcessPool:
-            worker.join()
-    code = worker.exitcode or 0
-    cause = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-    error = f"WorkerDied: two worker processes ended in this run, the second by {cause}\n"
-    return Outcome(error=error)
 
 
 @contextmanager

@@ -66,7 +66,7 @@ def _read_reference(path: Path) -> Reference:
     """Return the published values in a TOML file; `paper_values.toml` says what it holds."""
     told = tomllib.loads(path.read_text(encoding="utf-8"))
     performance = {
-        _setting(kind, name, float(value)): p
+        Setting(kind, name, float(value)): p
         for kind, rows in told["performance"].items()
         for name, row in rows.items()
         for value, p in row.items()
@@ -75,7 +75,7 @@ def _read_reference(path: Path) -> Reference:
     cells = tuple(setting for setting in performance if setting not in repeated)
     sentences: dict[str, dict[Question, bool]] = {}
     for sentence in told["sentences"]:
-        claims = sentences.setdefault(sentence["text"], {})
+        claims = sentences[sentence["text"]] = {}
         for one in sentence["claims"]:
             symbol, name, threshold = one["indicator"], one["name"], one.get("threshold", 0.0)
             kind = DEFINITIONS[symbol].compares
@@ -100,14 +100,3 @@ def load_preset(name: str) -> Specification:
     if name not in PRESETS:
         raise StudyError(f"no study preset {name!r}{suggest(name, PRESETS)}")
     return PRESETS[name]
-
-
-def load_reference(name: str | None) -> Reference | None:
-    """Return the reference of that name; None for none.
-
-    Raises:
-        StudyError: there is none of that name.
-    """
-    if name not in (None, "paper"):
-        raise StudyError(f"no reference {name!r}{suggest(name, ['paper'])}")
-    return PAPER if name else None

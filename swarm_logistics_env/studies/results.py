@@ -13,7 +13,7 @@ from swarm_logistics_env.tasks.task import Outcome
 from .comparison import Arm, Comparison
 from .declaration import Declaration
 from .plan import Plan
-from .presets import Reference, load_reference
+from .presets import PAPER, Reference
 from .runs import Outcomes
 from .until_clear import standing
 from .verdict import Cell, Verdict, judge_one, under_holm
@@ -95,10 +95,9 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         declared: what was declared before the first run; None: what the plan says.
     """
     margin = plan.specification.margin
-    reference = load_reference(plan.specification.reference)
-    looks = declared.looks if declared else plan.specification.looks
-    exploratory = declared is not None and not declared.covers(plan)
-    late_margin = declared is not None and declared.margin != margin
+    reference = PAPER if plan.specification.reference else None
+    declared = declared or Declaration.model_validate(plan.specification)
+    exploratory = not declared.covers(plan)
     verdicts: Iterable[Verdict] = ()
     if plan.specification.until_clear:
         found = standing(plan, outcomes)
@@ -122,8 +121,8 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         tuple(_beside(reference, one) for one in verdicts),
         exploratory,
         outcomes,
-        looks,
-        late_margin,
+        declared.looks,
+        late_margin=declared.margin != margin,
     )
 
 

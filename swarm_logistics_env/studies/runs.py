@@ -35,19 +35,15 @@ _SCHEMA = (
         wall_seconds REAL NOT NULL
     )""",
 )
+# One statement, as another process may be making the tables.
+_HEADER = """SELECT application_id, user_version, (SELECT count(*) FROM sqlite_master)
+    FROM pragma_application_id, pragma_user_version"""
 # A run that failed before is replaced, one that succeeded stays.
 _REPLACE = """ON CONFLICT (key) DO UPDATE SET failed = excluded.failed, outcome = excluded.outcome,
     wall_seconds = excluded.wall_seconds WHERE runs.failed"""
 _CLASH = """SELECT key, json_extract(runs.run, '$.seed') FROM main.runs JOIN other.runs AS theirs
     USING (key) WHERE NOT (runs.failed OR theirs.failed) AND runs.outcome != theirs.outcome"""
 
-# SQLite's codes of a write that did not fit: of the file itself, of its log, of the log's index.
-_FULL = (
-    sqlite3.SQLITE_FULL,
-    sqlite3.SQLITE_IOERR_WRITE,
-    sqlite3.SQLITE_IOERR_SHMSIZE,
-    sqlite3.SQLITE_IOERR_SHMOPEN,
-)
 _OUTCOME = TypeAdapter(Outcome)
 
 Outcomes = Mapping[tuple[str, int], Outcome]  # by the key of the case, and the seed
@@ -70,22 +66,20 @@ class Runs:
 
     def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
         self.path = path
-        self._read_only = read_only
         place = str(path or ":memory:")
-        if path is not None and not read_only:
+        if path is not None and read_only:
+            # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
+            place = f"{path.absolute().as_uri()}?immutable=1"
+        elif path is not None:
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise StudyError(f"cannot write to {path.parent}: {error.strerror}") from error
-        if path is not None and read_only:
-            # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
-            place = f"{path.absolute().as_uri()}?immutable=1"
         with self._explained():
             # Autocommit: transactions are opened by hand, one per run.
             self._connection = sqlite3.connect(
                 place, timeout=TIMEOUT, isolation_level=None, uri=read_only
             )
-            self._execute = self._connection.execute
             try:
                 self._prepare()
             except BaseException:
@@ -122,20 +116,13 @@ class Runs:
         Raises:
             StudyError: `out` holds a study, or cannot be written.
         """
-        if (out / FILE_NAME).exists():
+        path = out / FILE_NAME
+        if path.exists():
             raise StudyError(f"{out} holds a study already: {way} into a new directory")
-        unfinished = out / f"{FILE_NAME}.unfinished"
-        try:
-            unfinished.unlink(missing_ok=True)
-        except OSError as error:
-            raise StudyError(f"cannot write to {out}: {error.strerror}") from error
-        try:
-            with cls(unfinished) as runs:
+        with becoming(path, StudyError) as part:
+            part.unlink(missing_ok=True)  # what one left that was killed
+            with cls(part) as runs:
                 yield runs
-            unfinished.rename(out / FILE_NAME)
-        finally:
-            for left in out.glob(f"{unfinished.name}*"):
-                left.unlink()
 
     def __enter__(self) -> Self:
         return self
@@ -148,8 +135,7 @@ class Runs:
         self._connection.close()
 
     def __len__(self) -> int:
-        ((count,),) = self._read("SELECT count(*) FROM runs")
-        return int(count)
+        return len(self._execute("SELECT key FROM runs"))
 
     def add(self, run: Run, outcome: Outcome) -> None:
         """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
@@ -166,11 +152,10 @@ class Runs:
             StudyError: the file is not a store, or has another result of a run that is here.
         """
         Runs(path).close()
-        with self._explained():
-            self._execute("ATTACH ? AS other", (str(path),))
+        self._execute("ATTACH ? AS other", (str(path),))
         try:
             with self._transaction():
-                for key, seed in self._read(_CLASH):
+                for key, seed in self._execute(_CLASH):
                     raise StudyError(
                         f"{path} has another result than the stores before it for the run {key} "
                         f"(seed {seed}), of the same scenario, policy and code"
@@ -181,7 +166,7 @@ class Runs:
 
     def succeeded(self) -> set[str]:
         """Return the keys of the runs that need not run again."""
-        return {key for (key,) in self._read("SELECT key FROM runs WHERE NOT failed")}
+        return {key for (key,) in self._execute("SELECT key FROM runs WHERE NOT failed")}
 
     def outcomes(self, runs: Iterable[Run]) -> dict[tuple[str, int], Outcome]:
         """Return the outcomes of those of `runs` that finished, by the case's key and the seed."""
@@ -189,7 +174,7 @@ class Runs:
         with self._sound():
             return {
                 wanted[key]: _OUTCOME.validate_json(outcome)
-                for key, outcome in self._read("SELECT key, outcome FROM runs")
+                for key, outcome in self._execute("SELECT key, outcome FROM runs")
                 if key in wanted
             }
 
@@ -210,7 +195,7 @@ class Runs:
         wanted = None if keys is None else set(keys)
         found = []
         with self._sound():
-            for key, run, text in self._read("SELECT key, run, outcome FROM runs ORDER BY key"):
+            for key, run, text in self._execute("SELECT key, run, outcome FROM runs ORDER BY key"):
                 if wanted is None or key in wanted:
                     outcome = _OUTCOME.validate_json(text)
                     result = json.loads(text) | {"delivered": outcome.delivered}
@@ -221,33 +206,25 @@ class Runs:
                     found.append({"run": key} | case | result)
         return pd.DataFrame(found, dtype=object)
 
-    def note(self, notes: Mapping[str, str]) -> None:
-        """Note facts about the study, by name; earlier ones of these names are replaced."""
+    def note(self, name: str, value: str) -> None:
+        """Note a fact about the study; an earlier one of this name is replaced."""
         with self._transaction():
-            self._connection.executemany(
-                "INSERT OR REPLACE INTO notes VALUES (?, ?)", notes.items()
-            )
+            self._execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
 
     def notes(self) -> dict[str, str]:
         """Return what was noted about the study, by name."""
-        return {row[0]: row[1] for row in self._read("SELECT name, value FROM notes")}
+        return {row[0]: row[1] for row in self._execute("SELECT name, value FROM notes")}
 
-    def _read(self, query: str) -> list[tuple[str, ...]]:
+    def _execute(self, statement: str, values: tuple[object, ...] = ()) -> list[tuple[str, ...]]:
         with self._explained():
-            return self._execute(query).fetchall()
+            return self._connection.execute(statement, values).fetchall()
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         """Keep all that the block writes or, if it fails, nothing of it."""
-        with self._explained():
+        with self._explained(), self._connection:
             self._execute("BEGIN IMMEDIATE")
-            try:
-                yield
-            except BaseException:
-                if self._connection.in_transaction:
-                    self._execute("ROLLBACK")
-                raise
-            self._execute("COMMIT")
+            yield
 
     @contextmanager
     def _sound(self) -> Iterator[None]:
@@ -264,30 +241,18 @@ class Runs:
         try:
             yield
         except sqlite3.Error as error:
-            is_full = getattr(error, "sqlite_errorcode", None) in _FULL
-            why = f"{error}: there is no room on its disk" if is_full else f"{error}"
-            raise StudyError(f"cannot use the store {self.path}: {why}") from error
+            raise StudyError(f"cannot use the store {self.path}: {error}") from error
 
     def _prepare(self) -> None:
-        # One moment's answers: another process may be making the tables.
-        self._execute("BEGIN")
-        try:
-            ((version,),) = self._read("PRAGMA user_version")
-            ((application,),) = self._read("PRAGMA application_id")
-            tables = self._read("SELECT 1 FROM sqlite_master")
-        finally:
-            if self._connection.in_transaction:  # a full disk has ended it already
-                self._execute("ROLLBACK")
+        ((application, version, tables),) = self._execute(_HEADER)
         is_ours = int(application) == APPLICATION_ID
-        if not is_ours and tables:
+        if not is_ours and int(tables):
             raise StudyError(f"{self.path} is a database, but not the store of a study")
         if is_ours and int(version) != SCHEMA_VERSION:
             raise StudyError(
                 f"{self.path} has store schema {version}, this version of the package reads "
                 f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
             )
-        if self._read_only:
-            return
         # A process that is killed loses nothing; a power cut at most the latest runs.
         self._change_to_wal()
         self._execute("PRAGMA synchronous = NORMAL")
@@ -295,7 +260,7 @@ class Runs:
             return
         with self._transaction():
             # Another process may have made the tables since: two shards start at once.
-            if not self._read("SELECT 1 FROM sqlite_master"):
+            if not self._execute("SELECT 1 FROM sqlite_master"):
                 for statement in _SCHEMA:
                     self._execute(statement)
                 self._execute(f"PRAGMA application_id = {APPLICATION_ID}")
@@ -305,14 +270,13 @@ class Runs:
         give_up = time.monotonic() + TIMEOUT
         while True:
             try:
-                self._execute("PRAGMA journal_mode = WAL")
+                self._connection.execute("PRAGMA journal_mode = WAL")
+                return
             except sqlite3.OperationalError as error:
                 # When two processes change a new file at once, SQLite refuses one without waiting.
                 if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > give_up:
                     raise
                 time.sleep(0.01)
-            else:
-                return
 
 
 def _described(run: Run) -> dict[str, object]:

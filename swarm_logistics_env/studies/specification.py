@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, Self, TypeVar
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -21,6 +21,7 @@ from pydantic import (
     SkipValidation,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
@@ -41,14 +42,6 @@ HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
 FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 20, 10
 
 
-T = TypeVar("T")
-
-
-def _task(source: object) -> object:
-    task_of(source)
-    return source
-
-
 def _told_apart(policies: tuple[PolicySpec, ...]) -> tuple[PolicySpec, ...]:
     """Return policies; files with the same name on their cards are called by their paths."""
     counts = Counter(policy.title for policy in policies)
@@ -65,10 +58,9 @@ def _told_apart(policies: tuple[PolicySpec, ...]) -> tuple[PolicySpec, ...]:
 
 
 PolicySource = Annotated[PolicySpec, BeforeValidator(PolicySpec.of)]
-# A task's name, its import path or, in Python, the task itself.
+# A task's name, its import path or, in Python, the task itself; the scenario's validator finds it.
 TaskSource = Annotated[
     str | Task,
-    BeforeValidator(_task),
     SkipValidation,
     PlainSerializer(lambda source: source if isinstance(source, str) else source.name),
 ]
@@ -77,15 +69,6 @@ TaskSource = Annotated[
 class _Part(Record):
     model_config = ConfigDict(arbitrary_types_allowed=True)
     error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-
-def _each_once(values: tuple[T, ...]) -> tuple[T, ...]:
-    if len(set(values)) < len(values):
-        raise ValueError("should hold each value once")
-    return values
-
-
-_ONCE = AfterValidator(_each_once)
 
 
 class Factor(_Part):
@@ -135,9 +118,9 @@ class Faults(Factor):
             without it, they are drawn.
     """
 
-    modes: Annotated[tuple[str, ...], Field(min_length=1), _ONCE]
-    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1), _ONCE] = (1, 2, 3)
-    onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), _ONCE] = (0.0,)
+    modes: Annotated[tuple[str, ...], Field(min_length=1)]
+    robots: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 2, 3)
+    onsets: Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1)] = (0.0,)
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
     intermittent: tuple[PositiveFloat, PositiveFloat] | None = None
@@ -160,8 +143,8 @@ class Faults(Factor):
 
 
 def _from_above_0(values: tuple[float, ...]) -> tuple[float, ...]:
-    if values[0] == 0.0:
-        raise ValueError("should start with x_o above 0: A is relative to it")
+    if values[0] == 0.0 or values[0] in values[1:]:
+        raise ValueError("should start with x_o above 0 and not repeat it: A is relative to it")
     return values
 
 
@@ -175,7 +158,7 @@ class Parameter(Factor):
 
     name: str
     values: Annotated[
-        tuple[NonNegativeFloat, ...], Field(min_length=2), _ONCE, AfterValidator(_from_above_0)
+        tuple[NonNegativeFloat, ...], Field(min_length=2), AfterValidator(_from_above_0)
     ]
 
 
@@ -230,10 +213,10 @@ class Specification(_Part):
     faults: Annotated[tuple[Faults, ...], BeforeValidator(each_of(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(each_of(Parameter))] = ()
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(each_of(Ablation))] = ()
-    indicators: Annotated[tuple[str, ...], Field(min_length=1), _ONCE] = tuple(DEFINITIONS)
+    indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
     until_clear: bool = False
     margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
-    reference: str | None = None
+    reference: Literal["paper"] | None = None
 
     @property
     def seed_numbers(self) -> range:
@@ -262,8 +245,6 @@ class Specification(_Part):
     @field_validator("scenario", mode="before")
     @classmethod
     def _of_the_task(cls, value: object, info: ValidationInfo) -> object:
-        if "task" not in info.data:  # its own error is told
-            return value
         task = task_of(info.data["task"])
         if isinstance(value, dict):
             return task.vary(task.default, value)
@@ -271,33 +252,16 @@ class Specification(_Part):
             raise ValueError(f"should be a table of fields or a {type(task.default).__name__}")
         return value
 
-    @field_validator("faults")
-    @classmethod
-    def _known(cls, faults: tuple[Faults, ...], info: ValidationInfo) -> tuple[Faults, ...]:
-        if "task" in info.data:
-            task = task_of(info.data["task"])
-            given = (mode for factor in faults for mode in factor.modes)
-            modes = (one for both in given for one in both.split(BOTH))
-            _refuse_unknown("failure mode", modes, {*task.failure_modes} - {task.removed})
-        return faults
-
-    @field_validator("parameters")
-    @classmethod
-    def _numeric(
-        cls, parameters: tuple[Parameter, ...], info: ValidationInfo
-    ) -> tuple[Parameter, ...]:
-        if "task" in info.data:
-            names = [factor.name for factor in parameters]
-            if "n_robots" in names:
-                raise ValueError("swarm sizes belong in `sizes`, where S judges them")
-            _refuse_unknown("numeric scenario field", names, task_of(info.data["task"]).fields)
-        return parameters
-
-    @field_validator("indicators")
-    @classmethod
-    def _defined(cls, symbols: tuple[str, ...]) -> tuple[str, ...]:
-        _refuse_unknown("indicator", symbols, DEFINITIONS)
-        return symbols
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        task, parameters = self.played, [factor.name for factor in self.parameters]
+        modes = (one for factor in self.faults for mode in factor.modes for one in mode.split(BOTH))
+        _refuse_unknown("failure mode", modes, {*task.failure_modes} - {task.removed})
+        if "n_robots" in parameters:
+            raise ValueError("swarm sizes belong in `sizes`, where S judges them")
+        _refuse_unknown("numeric scenario field", parameters, task.fields)
+        _refuse_unknown("indicator", self.indicators, DEFINITIONS)
+        return self
 
 
 def _refuse_unknown(what: str, names: Iterable[str], known: Collection[str]) -> None:

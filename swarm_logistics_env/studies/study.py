@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.tasks.task import Outcome, Run, Task
+from swarm_logistics_env.tasks.task import Run, Task
 
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
@@ -59,7 +59,7 @@ class Study:
         Raises:
             StudyError: there is no such preset, or a field cannot be.
         """
-        return cls._of(load_preset(name).replace(**fields), out)
+        return cls(out=out, **{**dict(load_preset(name)), **fields})
 
     @classmethod
     def from_file(
@@ -79,7 +79,7 @@ class Study:
             StudyError: the file cannot be read, or a field of it is unknown or cannot be.
         """
         found = read_study_file(Path(path), trust_code=trust_code)
-        return cls._of(found.replace(**fields), out)
+        return cls(out=out, **{**dict(found), **fields})
 
     @classmethod
     def stored(cls, out: str | Path, *, task: Task | None = None, trust_code: bool = False) -> Self:
@@ -98,17 +98,11 @@ class Study:
         out = Path(out)
         noted = StoredStudy.existing(out)
         specification = noted.specification.read(out, task=task, trust_code=trust_code)
-        study = cls._of(specification, out)
+        study = cls(out=out, **dict(specification))
         if noted.imported is not None:
             study._plan = imported_plan(specification, noted.imported)
         else:
             study._plan = make_plan(specification, code=noted.code, identities=noted.identities)
-        return study
-
-    @classmethod
-    def _of(cls, specification: Specification, out: str | Path | None) -> Self:
-        study = cls(out=out)
-        study.specification = specification
         return study
 
     def plan(self) -> Plan:
@@ -146,16 +140,16 @@ class Study:
                 f"this study was played under code version {plan.code}, this is "
                 f"{code}: plan it anew, and all of it runs again"
             )
-        if engine is None:
-            engine = "process" if processes is not None and processes > 1 else "local"
-        if isinstance(engine, str):
-            engine = engine_named(engine, processes, address)
-        until_clear = self.specification.until_clear
-        if until_clear and shard:
+        if engine is None or isinstance(engine, str):
+            usual = "process" if (processes or 1) > 1 else "local"
+            engine = engine_named(engine or usual, processes, address)
+        if self.specification.until_clear and shard:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
-        whole, seconds, outcomes = self._runs(shard), 0.0, list[Outcome]()
+        whole, errors = self._runs(shard), list[str | None]()
+        start, left = time.monotonic(), 0
+        end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.model_validate(self.specification)
@@ -163,26 +157,16 @@ class Study:
             done = store.succeeded()
             kept = sum(run.key in done for run in whole)
             tried: set[str] = set()
-            end = None if minutes is None else time.monotonic() + 60.0 * minutes
-            left = 0
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
-                title = self.specification.name
-                if until_clear:
-                    seeds = max(run.seed for run in missing) - self.specification.first_seed + 1
-                    title += f", up to {seeds} seeds"
-                if minutes is not None:
-                    title += f", for {minutes:g} min"
-                finished, took = play(missing, engine, store, title, end)
-                outcomes += finished
-                left = len(missing) - len(finished)
+                finished = play(missing, engine, store, self.specification.name, end)
+                errors += finished
                 tried |= {run.key for run in missing}
-                seconds += took
-                if left or not until_clear:
+                if left := len(missing) - len(finished):
                     break
-        errors = [one.error for one in outcomes if one.error is not None]
-        error = errors[0].strip().splitlines()[-1] if errors else None
-        return Tally(len(outcomes), len(errors), kept, seconds, error, left)
+        failed = [error for error in errors if error is not None]
+        first = failed[0].strip().splitlines()[-1] if failed else None
+        return Tally(len(errors), len(failed), kept, time.monotonic() - start, first, left)
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs
@@ -212,18 +196,17 @@ class Study:
         except StudyError:  # nothing has been run
             return 0, len(whole)
 
-    def exploratory_because(self) -> str | None:
-        """Return why verdicts over the asked seeds are exploratory; None: they are not.
+    def is_exploratory(self) -> bool:
+        """Return whether verdicts over the asked seeds would be exploratory.
 
         Raises:
             StudyError: the store cannot be read, or is another study's.
         """
-        if self._memory is None and (self.out is None or not (self.out / FILE_NAME).is_file()):
-            return None  # nothing has been run: what is asked now will be declared
-        plan = self.plan()
+        if self.out is None or not (self.out / FILE_NAME).is_file():
+            return False  # nothing has been run: what is asked now will be declared
         with self._store(existing=True) as store:
             noted = self._own_metadata(store)
-        return None if not noted or noted.declared.covers(plan) else noted.declared.warning(plan)
+        return noted is not None and not noted.declared.covers(self.plan())
 
     def findings(self) -> StudyResults:
         """Return every cell and every verdict, from the runs that are there.
@@ -274,7 +257,7 @@ class Study:
             return None
         if noted.imported is not None:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
-        if differing := noted.specification.differing(self.specification, self.out or Path()):
+        if differing := noted.specification.differing(self.specification):
             raise StudyError(
                 f"{self.out} holds the study {noted.specification.name!r} with other "
                 f"{', '.join(differing)}: this one should be kept in another directory, --out "

@@ -11,7 +11,8 @@ Everything follows from the outcomes, so a study that was killed goes on as if i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -46,37 +47,45 @@ class Standing(NamedTuple):
 def standing(plan: Plan, outcomes: Outcomes) -> Standing:
     """Return the state of a plan's comparisons after these outcomes."""
     runs = _Looks(plan, outcomes)
-    families = grouped(plan.comparisons, lambda comparison: comparison.family)
-    found = [_Family(members, runs) for members in families.values()]
-    first = plan.specification.looks[0]
-    wanted = {run.key: run for case in plan.cases for run in runs.missing(case, first)}
-    for family in found:
+    wanted, verdicts = runs.missing(plan.cases, runs.looks[0]), dict[Comparison, Verdict]()
+    for members in grouped(plan.comparisons, lambda comparison: comparison.family).values():
+        family = _Family(members, runs)
         wanted |= family.wanted
-    shared = [n for n in runs.looks if not any(runs.missing(case, n) for case in plan.cases)]
-    verdicts = {comparison: one for family in found for comparison, one in family.judged().items()}
+        verdicts |= family.judged()
+    shared = [n_seeds for n_seeds in runs.looks if not runs.missing(plan.cases, n_seeds)]
     in_order = tuple(verdicts[comparison] for comparison in plan.comparisons)
     # Seed by seed, so that a study that is stopped early has something of every question.
     evenly = tuple(sorted(wanted.values(), key=lambda run: run.seed))
-    return Standing(in_order, evenly, max(shared, default=first))
+    return Standing(in_order, evenly, max(shared, default=runs.looks[0]))
 
 
 class _Looks:
     """The outcomes of a plan, as far as each look sees them."""
 
     def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
-        self.plan = plan
-        self.declared = plan.specification.looks
-        self.looks = [look for look in self.declared if look <= len(plan.seeds)]
+        self.plan, self.looks = plan, plan.specification.looks
         self._outcomes = outcomes
 
-    def missing(self, case: Case, n_seeds: int) -> list[Run]:
-        return [
-            case.run(self.plan.code, seed)
-            for seed in self.plan.seeds[:n_seeds]
-            if (case.key, seed) not in self._outcomes
-        ]
+    def missing(self, cases: Iterable[Case], n_seeds: int) -> dict[str, Run]:
+        """Return the runs of cases that are not played yet, by their keys."""
+        runs = (case.run(self.plan.code, s) for case in cases for s in self.plan.seeds[:n_seeds])
+        return {run.key: run for run in runs if (run.case.key, run.seed) not in self._outcomes}
 
-    def cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
+    def judged(self, comparisons: Iterable[Comparison], n_seeds: int) -> dict[Comparison, Verdict]:
+        """Judge comparisons at a look, as far as it is played."""
+        # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
+        # side of the margin.
+        confidence = 1 - self.alpha(n_seeds, 1 - CONFIDENCE)
+        alpha = self.alpha(n_seeds, 2 * ALPHA) / 2
+        margin, found = self.plan.specification.margin, dict[Comparison, Verdict]()
+        for comparison in comparisons:
+            cells = self._cells(comparison, n_seeds)
+            found[comparison] = judge_one(
+                comparison, cells, paired=True, margin=margin, confidence=confidence, alpha=alpha
+            )
+        return found
+
+    def _cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
         seeds, arms, known = self.plan.seeds[:n_seeds], comparison.arms, self._outcomes
         # Before the first look is complete, the seeds of all arms tell a value and no verdict.
         there = [seed for seed in seeds if all((arm.case.key, seed) in known for arm in arms)]
@@ -85,9 +94,10 @@ class _Looks:
             for arm in arms
         }
 
-    def alpha(self, look: int, alpha: float) -> float:
-        """Return what is spent of an error up to a look, counted from 0."""
-        return spi.look_alphas(self.declared, alpha, spending=SPENDING)[look]
+    def alpha(self, n_seeds: int, alpha: float) -> float:
+        """Return what is spent of an error up to the look at `n_seeds`, or the next one."""
+        spent = spi.look_alphas(self.looks, alpha, spending=SPENDING)
+        return spent[bisect_left(self.looks, n_seeds)]
 
 
 class _Family:
@@ -99,42 +109,19 @@ class _Family:
 
     def __init__(self, members: Sequence[Comparison], runs: _Looks) -> None:
         self.wanted: dict[str, Run] = {}
-        self._runs = runs
+        self._runs, self._open = runs, list(members)
         self._found: dict[Comparison, Verdict] = {}
-        self._look: dict[Comparison, int] = {}  # the last at which each was judged
-        self._open = list(members)
-        for look in range(len(runs.looks)):
-            if not self._open or not self._judged_at(look):
+        for n_seeds in runs.looks:
+            # A failed run blocks a comparison for good: it stays in the family and gets no seeds.
+            playing = [c for c in self._open if c not in self._found or self._found[c].estimate]
+            self.wanted = runs.missing([arm.case for c in playing for arm in c.arms], n_seeds)
+            if not (self.wanted and self._found):
+                self._found |= runs.judged(playing, n_seeds)
+            if self.wanted:
                 break
+            self._stop_clear_ones(n_seeds)
 
-    def _judged_at(self, look: int) -> bool:
-        """Judge what is open at a look; return whether its runs are there."""
-        n_seeds = self._runs.looks[look]
-        # A failed run blocks a comparison for good: it stays in the family and gets no seeds.
-        playing = [c for c in self._open if c not in self._found or self._found[c].estimate]
-        for comparison in playing:
-            for arm in comparison.arms:
-                missing = self._runs.missing(arm.case, n_seeds)
-                self.wanted.update((run.key, run) for run in missing)
-        complete = not self.wanted
-        if not (complete or look == 0):
-            return False
-        # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
-        # side of the margin.
-        confidence = 1 - self._runs.alpha(look, 1 - CONFIDENCE)
-        alpha = self._runs.alpha(look, 2 * ALPHA) / 2
-        margin = self._runs.plan.specification.margin
-        for comparison in playing:
-            cells = self._runs.cells(comparison, n_seeds)
-            self._found[comparison] = judge_one(
-                comparison, cells, paired=True, margin=margin, confidence=confidence, alpha=alpha
-            )
-            self._look[comparison] = look
-        if complete:
-            self._stop_clear_ones(look, n_seeds)
-        return complete
-
-    def _stop_clear_ones(self, look: int, n_seeds: int) -> None:
+    def _stop_clear_ones(self, n_seeds: int) -> None:
         """Note p on the scale on which 0.05 decides, and stop by Holm's steps, smallest p first."""
         tested = list[tuple[float, Comparison, spi.Estimate]]()
         for comparison in list(self._open):
@@ -145,7 +132,7 @@ class _Family:
                 tested.append((estimate.p_value, comparison, estimate))
         for p, comparison, estimate in sorted(tested, key=lambda one: one[0]):
             # Once one stays open the level stays as it is, and every larger p is above it.
-            level = self._runs.alpha(look, (1 - CONFIDENCE) / len(self._open))
+            level = self._runs.alpha(n_seeds, (1 - CONFIDENCE) / len(self._open))
             is_clear = p < level
             self._found[comparison] = replace(
                 self._found[comparison],
@@ -168,8 +155,8 @@ class _Family:
 
         def ratio(comparison: Comparison) -> float:
             """Return p as a multiple of the level that it needs."""
-            p, look = left[comparison].p_value, self._look[comparison]
-            return 1.0 if p is None else p / self._runs.alpha(look, 2 * ALPHA / len(left)) * 2
+            p, n_seeds = left[comparison].p_value, left[comparison].change.n_seeds
+            return 1.0 if p is None else p / self._runs.alpha(n_seeds, 2 * ALPHA / len(left)) * 2
 
         while left and ratio(first := min(left, key=ratio)) < 1.0:
             del left[first]

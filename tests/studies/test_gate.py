@@ -162,7 +162,7 @@ def test_a_judged_policy_without_a_match_fails_and_is_named() -> None:
     one, two = results(WELL), results(WELL, policies=["swarm-dt", "random-walk"])
     for old, new in ((one, two), (two, one)):
         (failing,) = (a for a in answers(Gate.parse("change < 0"), old, new) if a.fails)
-        assert "policy 'random-walk' of the" in str(failing.problem)
+        assert "policy 'random-walk' is judged under no condition of both" in str(failing.problem)
         # A gate on the other policy alone is answered.
         assert not fails("change < 0 at swarm-dt", old, new)
         assert fails("change < 0 at random-walk", old, new)
@@ -172,7 +172,11 @@ def test_what_cannot_be_judged_fails_and_a_gate_on_nothing_is_refused() -> None:
     old = results(WELL, scenario={"n_robots": 10, "n_items": 70})
     failed = judge(old.plan, {place: Outcome(error="x") for place in old.outcomes})
     for gate, new, words in (
-        ("change < 0", results(WELL), "judged in both studies, but under no common condition"),
+        (
+            "change < 0",
+            results(WELL),
+            "policy 'swarm-dt' is judged under no condition of both studies",
+        ),
         ("R < 0", failed, "6 of 6 runs failed"),
     ):
         (answer,) = answers(Gate.parse(gate), old, new)

@@ -120,7 +120,7 @@ from swarm_logistics_env.studies.runs import Runs
 
 for line in sys.stdin:
     with Runs(pathlib.Path(line.strip())) as runs:
-        runs.note({sys.argv[1]: "here"})
+        runs.note(sys.argv[1], "here")
     print("made", flush=True)
 """
 
@@ -146,7 +146,7 @@ def test_a_new_store_is_there_once_it_is_whole_and_never_in_part(tmp_path: Path)
 
     def made(*, stopped: bool) -> None:
         with Runs.new(out, "merge") as runs:
-            runs.note({"name": "value"})
+            runs.note("name", "value")
             assert not (out / FILE_NAME).exists()
             if stopped:
                 raise KeyboardInterrupt
@@ -161,5 +161,5 @@ def test_a_new_store_is_there_once_it_is_whole_and_never_in_part(tmp_path: Path)
     with pytest.raises(StudyError, match="holds a study already: merge into a new directory"):
         made(stopped=False)
     out = out / FILE_NAME / "in"
-    with pytest.raises(StudyError, match=f"cannot write to {out}"):
+    with pytest.raises(StudyError, match=f"cannot write {out}"):
         made(stopped=False)

@@ -72,10 +72,10 @@ def test_merged_parts_are_the_declared_study_and_success_wins(whole: Path, tmp_p
     [
         ("UPDATE runs SET outcome = replace(outcome, '2.0', '1.5')", "has another result"),
         ("DELETE FROM notes", "does not note its study"),
-        (noted("identities", "3"), "its note 'identities' does not read"),
-        (noted("code", '"old"'), "differ in code"),
-        (noted("specification.sizes", "[]"), "differ in sizes"),
-        (noted("declared.seeds", "3"), "differ in declared: should be shards"),
+        (noted("identities", "3"), "is damaged: its note does not read"),
+        (noted("code", '"old"'), "differ: should be shards of one study"),
+        (noted("specification.sizes", "[]"), "differ: should be shards of one study"),
+        (noted("declared.seeds", "3"), "differ: should be shards of one study"),
     ],
 )
 def test_what_is_not_one_study_is_not_merged(

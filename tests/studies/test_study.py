@@ -122,7 +122,7 @@ def test_verdicts_over_others_than_the_declared_seeds_are_exploratory(
     declared = Study(out=tmp_path, **{**fields, "seeds": 2}, first_seed=1000)
     declared.run()
     asked = Study(out=tmp_path, **{**fields, "seeds": seeds}, first_seed=first_seed)
-    assert (asked.exploratory_because() is not None) == exploratory
+    assert asked.is_exploratory() == exploratory
     tally = asked.run()
     assert (tally.kept, tally.played) == (kept, 2 * seeds - kept)
     assert asked.findings().exploratory == exploratory
@@ -141,7 +141,7 @@ def test_another_study_does_not_enter_the_directory_of_this_one(
         notes = runs.notes()
     for field, value in others.items():
         other = Study(out=tmp_path, **{**small, field: value})
-        for ask in (other.run, other.exploratory_because, other.findings):
+        for ask in (other.run, other.is_exploratory, other.findings):
             with pytest.raises(StudyError, match=f"holds the study 'small' with other {field}: "):
                 ask()
     with Runs.existing(tmp_path) as runs:
@@ -193,7 +193,7 @@ def test_run_whose_worker_is_killed_is_tried_again_once(
     study = Study(**{**sizes, "policies": ["dying_policy:Dying"], "seeds": 1})
     tally = study.run("process", processes=1)
     assert (tally.played, tally.failed) == (3, deaths - 1)
-    assert study.results()["error"].str.contains("SIGKILL").sum() == deaths - 1
+    assert study.results()["error"].str.contains("WorkerDied").sum() == deaths - 1
 
 
 def test_time_that_is_over_leaves_runs_for_the_same_call(sizes: dict[str, Any]) -> None:

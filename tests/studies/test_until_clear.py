@@ -183,7 +183,7 @@ def test_a_failed_run_blocks_its_comparison_and_no_other() -> None:
 def test_another_most_is_exploratory_and_shards_are_refused(tmp_path: Path) -> None:
     until_clear(30, tmp_path).run(Engine())
     longer = until_clear(40, tmp_path)
-    assert longer.exploratory_because() is not None
+    assert longer.is_exploratory()
     with pytest.raises(StudyError, match="shard"):
         longer.run(Engine(), shard=Shard(1, 2))
 

@@ -14,6 +14,7 @@ import pytest
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import file_name, steers
+from swarm_logistics_env.spi import IndicatorError, read_trials
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.specification import Specification
@@ -104,8 +105,8 @@ def test_cells_of_trials_are_refused_or_reported(
     for number, name in enumerate(WRITTEN):
         file.write_text(table(column, [name]), encoding="utf-8", newline="")
         try:
-            import_results(file, tmp_path / "tried" / str(number))
-        except StudyError:
+            import_results(read_trials(file), tmp_path / "tried" / str(number))
+        except (StudyError, IndicatorError):
             continue
         kept.append(name.strip())
     assert len(kept) >= 10
