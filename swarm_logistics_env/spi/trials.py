@@ -157,8 +157,9 @@ def read_trials(
     counts = Counter(trial.condition for trial in found)
     if varying and min(counts.values()) == 1 < max(counts.values()):
         notes.append(
-            f"{len(found)} trials in {len(counts)} conditions, as {' and '.join(varying)} varies, "
-            f"some of a single trial: --ignore {varying[0]!r} if it was only noted."
+            f"{len(found)} trials in {len(counts)} conditions, told apart by "
+            f"{' and '.join(varying)}, some of a single trial: leave out what was only noted, as "
+            f"by --ignore {varying[0]!r}."
         )
     return Trials(path.name, digest, tuple(found), tuple(notes))
 
@@ -257,17 +258,16 @@ def _events(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
 
 def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
     """Refuse seeds that do not pair the runs of all conditions one to one."""
-    bare = next((row for row in rows if row.seed is None), None)
-    everywhere = {row.seed for row in rows if row.seed is not None}
-    if not everywhere:
+    seeds = {row.seed for row in rows if row.seed is not None}
+    if not seeds:
         return
-    if bare is not None:
-        raise IndicatorError(
-            f"{path}, line {bare.line}: has no seed, as other rows have: give every run one, or "
-            "leave the column out"
-        )
     conditions: dict[object, dict[int | None, Trial]] = {}
     for row in rows:
+        if row.seed is None:
+            raise IndicatorError(
+                f"{path}, line {row.line}: has no seed, as other rows have: give every run one, or "
+                "leave the column out"
+            )
         of_seed = conditions.setdefault(row.condition, {})
         if (first := of_seed.setdefault(row.seed, row)) is not row:
             raise IndicatorError(
@@ -275,7 +275,7 @@ def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
                 "two rows of one seed in one condition: should be one, or leave the column out"
             )
     for of_seed in conditions.values():
-        if lacking := everywhere.difference(of_seed):
+        if lacking := seeds.difference(of_seed):
             raise IndicatorError(
                 f"{path}, line {min(row.line for row in of_seed.values())}: its condition has no "
                 f"run of seed {min(lacking)}: give every condition the same seeds, or leave the "
@@ -286,9 +286,7 @@ def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
 def _check_durations(path: Path, rows: Sequence[Trial]) -> None:
     for row in rows:
         if row.duration != rows[0].duration:
-            told = ("nothing" if r.duration is None else f"{r.duration:g}" for r in (row, rows[0]))
             raise IndicatorError(
-                f"{path}, line {row.line}: has duration {next(told)}, line {rows[0].line} "
-                f"{next(told)}: runs compared should be of one length; else let P be a rate, and "
-                "leave the column out"
+                f"{path}, line {row.line}: is not as long as line {rows[0].line}: runs compared "
+                "should be of one length; else let P be a rate, and leave the column out"
             )

@@ -119,7 +119,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         ("robots,seed,p\n4,0,1\n8,,2\n", "line 3: has no seed"),
         ("robots,seed,p\n4,0,1\n4,0,2\n", "line 3: has seed 0 like line 2"),
         ("robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n8,2,4\n", "line 2: its condition has no run of"),
-        ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: has duration 90, line 2 60"),
+        ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: is not as long as line 2"),
         ("robots,time\n4,1\n", "has no column trial or seed"),
         ("trial,robots,time,p\n1,4,1,1\n", "has a column of times and one of performance"),
         (JAM, "line 2: duration is missing: should say when a trial ends"),
@@ -139,7 +139,7 @@ def test_a_broken_file_is_refused_by_line_column_and_remedy(
 def test_a_number_that_splits_the_trials_is_named(tmp_path: Path) -> None:
     text = "robots,temperature,p\n4,20,1\n4,20,2\n8,20,2\n8,21,3\n"
     (note,) = read(tmp_path, text).notes
-    assert "4 trials in 3 conditions, as temperature varies" in note
+    assert "4 trials in 3 conditions, told apart by temperature" in note
     assert read(tmp_path, text, ignore=["temperature"]).notes == ()
 
 
