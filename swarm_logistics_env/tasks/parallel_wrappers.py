@@ -81,10 +81,9 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
         for agent in self.possible_agents:
             active = agent in there
             told[agent] = {**infos.get(agent, {}), "active": int(active)}
-            if active:
-                seen[agent] = observations[agent]
-            else:
-                seen[agent] = create_zero_array(self.observation_space(agent))
+            seen[agent] = (
+                observations[agent] if active else create_zero_array(self.observation_space(agent))
+            )
         return seen, told
 
 
@@ -115,16 +114,16 @@ class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's
             raise SetupError("sizes: should be one number of agents or more")
         self._sizes = list(sizes)
         self._envs = {size: make_env(size) for size in sorted(set(sizes))}
-        self._largest = self._envs[max(sizes)]
-        super().__init__(self._largest)
-        self.possible_agents = list(self._largest.possible_agents)
+        largest = self._envs[max(sizes)]
+        super().__init__(largest)
+        # In episodes of every size; what else the wrapper has is that of the episode's environment.
+        self.possible_agents = list(largest.possible_agents)
+        self.observation_space, self.action_space = largest.observation_space, largest.action_space
         self._next = int(np.random.default_rng().integers(2**31))
+        spaces = _spaces(largest)
         for size, env in self._envs.items():
-            for agent in env.possible_agents:
-                if agent not in self.possible_agents or any(
-                    getattr(env, space)(agent) != getattr(self._largest, space)(agent)
-                    for space in ("observation_space", "action_space")
-                ):
+            for agent, its_spaces in _spaces(env).items():
+                if spaces.get(agent) != its_spaces:
                     raise SetupError(
                         f"make_env({size}) has {agent}: should be, with the same spaces, among "
                         f"the agents of make_env({max(sizes)})"
@@ -141,20 +140,15 @@ class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's
         observations, infos = self.env.reset(seed=seed, options=options)
         return observations, infos
 
-    def observation_space(self, agent: str) -> Space[Value]:
-        """Return the space of what an agent observes, in episodes of every size."""
-        space: Space[Value] = self._largest.observation_space(agent)
-        return space
-
-    def action_space(self, agent: str) -> Space[Value]:
-        """Return the space of an agent's actions, in episodes of every size."""
-        space: Space[Value] = self._largest.action_space(agent)
-        return space
-
     def close(self) -> None:
         """Close the environments of all sizes."""
         for env in self._envs.values():
             env.close()
+
+
+def _spaces(env: Env) -> dict[str, tuple[Space[Value], Space[Value]]]:
+    """Return what each agent observes and does, by its name."""
+    return {a: (env.observation_space(a), env.action_space(a)) for a in env.possible_agents}
 
 
 REMOVED = "removed"
@@ -248,7 +242,10 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         self._seed = self._seed + 1 if seed is None else seed
         self._steps = 0
         self._last: ByAgent = {}
-        self._noise: dict[str, np.random.Generator] = {}
+        self._noise = {
+            agent: streams.generator(self._seed, "noisy robot", row)
+            for agent, row in self._rows.items()
+        }
         size = max(self._rows.values()) + 1
         self._failing = [
             (fault, set(failing_rows(self._seed, size, fault.robots))) for fault in self._faults
@@ -285,8 +282,6 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         if "blind" in modes:
             return _each(value, lambda part: np.zeros_like(part)[()])
         if "noisy" in modes:
-            if agent not in self._noise:
-                self._noise[agent] = streams.generator(self._seed, "noisy robot", self._rows[agent])
             return _each(value, lambda part: self._with_noise(agent, part))
         return value
 
