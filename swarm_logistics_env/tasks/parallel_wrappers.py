@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import Space
+from gymnasium.spaces import Box
 from gymnasium.wrappers.utils import create_zero_array
 from pettingzoo import ParallelEnv
 from pettingzoo.utils.wrappers import BaseParallelWrapper
@@ -206,7 +207,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
 
     Raises:
         FaultError: a fault's mode is not among `failures`, or more robots fail than there are.
-        SetupError: "noisy" meets observations that are no floats.
+        SetupError: "noisy" meets observations that are no array of floats.
 
     Example:
         >>> from pettingzoo.sisl import pursuit_v5
@@ -280,26 +281,14 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
     def _sensed(self, agent: str, value: Value) -> Value:
         modes = self._modes(agent)
         if "blind" in modes:
-            return _each(value, lambda part: np.zeros_like(part)[()])
-        if "noisy" in modes:
-            return _each(value, lambda part: self._with_noise(agent, part))
-        return value
-
-    def _with_noise(self, agent: str, part: Value) -> Value:
-        clean = np.asarray(part)
-        if not np.issubdtype(clean.dtype, np.floating):
+            return create_zero_array(self.observation_space(agent))
+        if "noisy" not in modes:
+            return value
+        space = self.observation_space(agent)
+        if not (isinstance(space, Box) and np.issubdtype(space.dtype, np.floating)):
             raise SetupError(
-                f"noisy: {agent} observes {clean.dtype}: should be floats; leave 'noisy' out of "
-                "the task's failures"
+                f"noisy: {agent} observes {space}: should be an array of floats; leave 'noisy' out "
+                "of the task's failures"
             )
-        noise = self._noise[agent].normal(0.0, self._failures["noisy"], clean.shape)
-        return (clean + noise).astype(clean.dtype)
-
-
-def _each(value: Value, change: Value) -> Value:
-    """Return an observation with each array or number in it changed."""
-    if isinstance(value, dict):
-        return {name: _each(part, change) for name, part in value.items()}
-    if isinstance(value, tuple):
-        return tuple(_each(part, change) for part in value)
-    return change(value)
+        noise = self._noise[agent].normal(0.0, self._failures["noisy"], space.shape)
+        return (value + noise).astype(space.dtype)
