@@ -134,14 +134,13 @@ def fieller_limits(
     s_dd = np.square(den_centred).sum(axis=-1) / scale
 
     def limit(t: Numbers, side: int) -> Numbers:
-        finite = np.where(np.isfinite(t), t, 0.0)
-        a = mean_den**2 - finite**2 * s_dd
-        unbounded = (a <= 0.0) | ~np.isfinite(t)
-        root = np.sqrt((finite**2 * s_rd) ** 2 + np.where(unbounded, 0.0, a) * finite**2 * s_rr)
-        shift = (-(finite**2) * s_rd + side * root) / np.where(unbounded, 1.0, a)
-        return np.where(unbounded, np.inf, value + shift)
+        a = mean_den**2 - t**2 * s_dd
+        root = np.sqrt((t**2 * s_rd) ** 2 + a * t**2 * s_rr)
+        shift = (-(t**2) * s_rd + side * root) / a
+        return np.where(a > 0.0, value + shift, np.inf)
 
-    low, high = limit(t_low, -1), limit(t_high, 1)
+    with np.errstate(all="ignore"):  # of what is unbounded
+        low, high = limit(t_low, -1), limit(t_high, 1)
     unbounded = np.isinf(low) | np.isinf(high)
     return np.where(unbounded, -np.inf, low), np.where(unbounded, np.inf, high)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
@@ -204,22 +204,15 @@ class ParallelTask:
         scenario, n_robots = case.scenario, case.scenario.n_robots
         assert isinstance(scenario, ParallelScenario)
         faults = [fault for fault in case.faults if isinstance(fault, RobotFault)]
-
-        def failing(faults: Iterable[RobotFault]) -> tuple[int, ...]:
-            """Return which robots any of these faults names: the sets of one seed are nested."""
-            return failing_rows(seed, n_robots, max((fault.robots for fault in faults), default=0))
-
-        absent = failing(fault for fault in faults if fault.mode == REMOVED)
+        removing = [fault for fault in faults if fault.mode == REMOVED]
+        # The sets of one seed are nested: the largest holds them all.
+        absent, failed = (
+            failing_rows(seed, n_robots, max((fault.robots for fault in some), default=0))
+            for some in (removing, faults)
+        )
         player: Value = case.policy.load(self.policies)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
-
-        def add(observations: ByAgent, rewards: ByAgent) -> None:
-            for agent in sorted(observations):
-                space = env.observation_space(agent)
-                digest.update(np.asarray(flatten(space, observations[agent])).tobytes())
-            digest.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
-
         with closing(self._made(scenario, absent)) as env:
             agents = agents_by_row(env, n_robots, absent)
             broken = FailingRobots(
@@ -233,20 +226,23 @@ class ParallelTask:
                 player.configure(env, agents)
             if hasattr(player, "reset"):
                 player.reset(n_robots, policy_seed)
-            observations, _ = broken.reset(seed=seed)
-            add(broken.given, {})
-            for _ in range(max(1, round(scenario.duration / self._period))):
-                if not env.agents:
+            steps = max(1, round(scenario.duration / self._period))
+            (observations, _), rewards = broken.reset(seed=seed), ByAgent()
+            while True:
+                for agent, seen in sorted(broken.given.items()):
+                    flat = flatten(env.observation_space(agent), seen)
+                    digest.update(np.asarray(flat).tobytes())
+                digest.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
+                if len(gains) == steps or not env.agents:
                     break
                 actions = player.act(observation_rows(env, agents, observations))
                 observations, rewards, _, _, infos = broken.step(
                     agent_actions(env, agents, actions)
                 )
-                add(broken.given, rewards)
                 gains.append(float(self._gain(env, rewards, infos)))
         # What P counts need be in no observation and no reward.
         digest.update(np.array(gains).tobytes())
-        return self._outcome(gains, digest.hexdigest(), failing(faults))
+        return self._outcome(gains, digest.hexdigest(), failed)
 
     def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
         total = performance_of(gains, self._references)
