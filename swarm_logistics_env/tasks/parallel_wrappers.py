@@ -65,12 +65,13 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
         is_cut = is_over and any(truncations.values())
         last = there if is_over else self.env.agents
         observations, infos = self._padded(last, observations, infos)
-        agents, self.agents = self.agents, [] if is_over else self.agents
+        if is_over:
+            self.agents = []
         return (
             observations,
-            {agent: rewards.get(agent, 0.0) for agent in agents},
-            dict.fromkeys(agents, is_over and not is_cut),
-            dict.fromkeys(agents, is_cut),
+            {agent: rewards.get(agent, 0.0) for agent in observations},
+            dict.fromkeys(observations, is_over and not is_cut),
+            dict.fromkeys(observations, is_cut),
             infos,
         )
 
