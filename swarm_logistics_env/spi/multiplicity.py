@@ -26,11 +26,8 @@ def holm(p_values: ArrayLike) -> Numbers:
         IndicatorError: The input is not one-dimensional, or a p is outside [0, 1].
     """
     p = numbers("p_values", p_values)
-    if p.ndim != 1:
-        raise IndicatorError(f"p_values has shape {p.shape}: should be one p per hypothesis")
-    for value in p.tolist():
-        if not 0.0 <= value <= 1.0:
-            raise IndicatorError(f"p_values holds {value}: should lie in [0, 1]")
+    if p.ndim != 1 or not ((p >= 0.0) & (p <= 1.0)).all():
+        raise IndicatorError(f"p_values = {p_values!r}: should be a p in [0, 1] per hypothesis")
     order = np.argsort(p, kind="stable")
     stepped = np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1))
     adjusted = np.empty_like(p)

@@ -142,7 +142,7 @@ def read_trials(
     rows, others, digest = read_rows(path, columns or {}, ignore, decimal)
     varying = [name for name in others if len({row.cells[name] for row in rows}) > 1]
     trials = [(_trial(row, varying, duration), row) for row in rows]
-    found = _events(path, trials) if "time" in rows[0].names else _runs(trials)
+    found = _events(trials) if "time" in rows[0].names else _runs(trials)
     _check_pairing(path, found)
     _check_durations(path, found)
     counts = Counter(trial.condition for trial in found)
@@ -200,19 +200,13 @@ def _runs(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
     return [replace(trial, performance=row.number("performance", 0.0)) for trial, row in rows]
 
 
-def _events(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
-    names = rows[0][1].names
-    if "performance" in names:
-        raise IndicatorError(
-            f"{path} has a column of times and one of performance: should have one of them; "
-            "ignore the other"
-        )
-    if "trial" not in names and "seed" not in names:
-        raise IndicatorError(
-            f"{path} has no column trial or seed: should say which run a delivery belongs to"
-        )
+def _events(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
     runs: dict[object, tuple[Trial, list[float]]] = {}
     for trial, row in rows:
+        if row.text("performance"):
+            raise row.error("performance", "should not stand beside times: ignore one of them")
+        if not row.text("trial") and trial.seed is None:
+            raise row.error("trial", "should say which run a delivery belongs to, or a seed do")
         time = row.number_or_none("time")
         if time is not None and trial.duration is not None and time > trial.duration:
             raise row.error("time", f"should not be after its duration {trial.duration:g}")

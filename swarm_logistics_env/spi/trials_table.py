@@ -117,12 +117,8 @@ def _lines(path: Path) -> tuple[list[str], str]:
     try:
         content = path.read_bytes()
         text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise IndicatorError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise IndicatorError(
-            f"{path} is not a CSV file in UTF-8 ({error.reason}): save it as CSV UTF-8"
-        ) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise IndicatorError(f"{path} cannot be read as CSV in UTF-8: {error}") from error
     lines = text.splitlines()
     for number, line in enumerate(lines, 1):
         for sign in line.replace("\t", ""):

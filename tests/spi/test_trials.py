@@ -94,7 +94,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
     [
         ("", "is empty: should have a row of column names"),
         (HEAD, "holds no trial"),
-        ("\udcff", "is not a CSV file in UTF-8"),
+        ("\udcff", "cannot be read as CSV in UTF-8"),
         ("robots,p\n4,\x001\n", r"line 2: holds '\x00': should be plain text"),
         ("trial,robots\n1,8\n", "line 2: performance is missing: should be a number, 0 or more"),
         ("robots,fault,broken,p\n4,jam,1,2\n", "--column faulty=NAME, of 'robots', 'fault', 'brok"),
@@ -114,8 +114,11 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         ("robots,seed,p\n4,0,1\n4,0,2\n", "line 3: has seed 0 like line 2"),
         ("robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n8,2,4\n", "line 2: its condition has no run of"),
         ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: is not as long as line 2"),
-        ("robots,time\n4,1\n", "has no column trial or seed"),
-        ("trial,robots,time,p\n1,4,1,1\n", "has a column of times and one of performance"),
+        (
+            "robots,time\n4,1\n",
+            "line 2: trial is missing: should say which run a delivery belongs to",
+        ),
+        ("trial,robots,time,p\n1,4,1,1\n", "column 'p': '1': should not stand beside times"),
         (JAM, "line 2: duration is missing: should say when a trial ends"),
         ("trial,duration,time\n1,60,70\n", "column 'time': '70': should not be after its duration"),
     ],
@@ -146,5 +149,5 @@ def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
         with pytest.raises(spi.IndicatorError) as caught:
             read(tmp_path, HEAD + GOOD, **asked)
         assert words in str(caught.value)
-    with pytest.raises(spi.IndicatorError, match="cannot read"):
+    with pytest.raises(spi.IndicatorError, match="cannot be read"):
         spi.read_trials(tmp_path / "nowhere.csv")
