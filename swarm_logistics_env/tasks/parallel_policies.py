@@ -167,9 +167,7 @@ def performance_of(gains: list[float], references: tuple[float, float] | None) -
         StudyError: P is no number of 0 or more, or without references a step takes from it.
     """
     for step, gain in enumerate(gains, start=1):
-        if not math.isfinite(gain):
-            raise StudyError(f"P: step {step} adds {gain}: should be a finite number")
-        if gain < 0 and references is None:
+        if not math.isfinite(gain) or (gain < 0 and references is None):
             raise StudyError(f"P: step {step} adds {gain:g}: should be 0 or more; {REMEDY}")
     total = math.fsum(gains)
     if references is None:
