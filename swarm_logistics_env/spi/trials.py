@@ -15,12 +15,13 @@ from .trials_table import Row, read_rows
 NO_FAULT = "none"
 REMOVED = "removed"
 REPEATED = "other behaviour"  # no fault, a second time: what chance alone makes of a pair
-_FAULTS = {
-    NO_FAULT: ("", "-", "0", "no", "no fault", "ok", "healthy"),
-    REMOVED: ("absent",),
-    REPEATED: ("none again",),
+_FAULT_NAMES = {
+    "": NO_FAULT,
+    NO_FAULT: NO_FAULT,
+    REMOVED: REMOVED,
+    REPEATED: REPEATED,
+    "none again": REPEATED,
 }
-_FAULT_NAMES = {word: name for name, words in _FAULTS.items() for word in (name, *words)}
 
 
 @dataclass(frozen=True)

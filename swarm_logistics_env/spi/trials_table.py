@@ -15,16 +15,16 @@ from .inputs import IndicatorError
 
 # What a column is, and the words that name it in files; small letters, "_" for all that is none.
 NAMES: dict[str, tuple[str, ...]] = {
-    "performance": ("p", "delivered", "deliveries", "items", "score", "throughput"),
-    "n_robots": ("robots", "n", "swarm_size", "swarmsize"),
-    "fault": ("failure", "mode", "failure_mode", "fault_mode"),
-    "faulty": ("m", "failed", "n_faulty", "faulty_robots"),
-    "onset": ("fault_onset", "fault_time", "fault_at"),
-    "policy": ("controller", "algorithm", "behaviour", "behavior"),
+    "performance": ("p", "delivered", "items", "score"),
+    "n_robots": ("robots", "n", "swarm_size"),
+    "fault": ("failure", "mode"),
+    "faulty": ("m", "failed"),
+    "onset": ("fault_time",),
+    "policy": ("controller",),
     "seed": ("pair", "block"),
-    "trial": ("run", "id", "repetition"),
-    "time": ("t", "delivery_time", "delivered_at"),
-    "duration": ("length", "trial_length"),
+    "trial": ("run", "id"),
+    "time": (),
+    "duration": ("length",),
     "table": (),
 }
 _MEANING = {word: column for column, words in NAMES.items() for word in (column, *words)}
