@@ -204,24 +204,16 @@ class ParallelTask:
         scenario, n_robots = case.scenario, case.scenario.n_robots
         assert isinstance(scenario, ParallelScenario)
         faults = [fault for fault in case.faults if isinstance(fault, RobotFault)]
-        removing = [fault for fault in faults if fault.mode == REMOVED]
         # The sets of one seed are nested: the largest holds them all.
-        absent, failed = (
-            failing_rows(seed, n_robots, max((fault.robots for fault in some), default=0))
-            for some in (removing, faults)
-        )
+        failed = failing_rows(seed, n_robots, max((fault.robots for fault in faults), default=0))
+        absent = failed if any(fault.mode == REMOVED for fault in faults) else ()
         player: Value = case.policy.load(self.policies)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
         with closing(self._made(scenario, absent)) as env:
             agents = agents_by_row(env, n_robots, absent)
-            broken = FailingRobots(
-                env,
-                [fault for fault in faults if fault.mode != REMOVED],
-                self._failures,
-                self._period,
-                {agent: row for row, agent in enumerate(agents) if agent is not None},
-            )
+            # Who is not there cannot fail otherwise.
+            broken = FailingRobots(env, () if absent else faults, self._failures, self._period)
             if hasattr(player, "configure"):
                 player.configure(env, agents)
             if hasattr(player, "reset"):

@@ -200,8 +200,6 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         failures: for each mode what it needs: the no-op action of "silent", the standard deviation
             of "noisy" in the observations' own units, None for the others.
         period: length of a step [s].
-        rows: number of each agent in the whole swarm, by name; None: its place in
-            `possible_agents`.
 
     Attributes:
         given: what the environment itself let each agent observe, before any failure changed it.
@@ -223,12 +221,11 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         faults: Iterable[RobotFault],
         failures: Mapping[str, Value],
         period: float = 1.0,
-        rows: Mapping[str, int] | None = None,
     ) -> None:
         super().__init__(env)
         self._faults = tuple(faults)
         self._failures, self._period = failures, period
-        self._rows = rows or {agent: row for row, agent in enumerate(env.possible_agents)}
+        self._rows = {agent: row for row, agent in enumerate(env.possible_agents)}
         self._seed = -1
         for fault in self._faults:
             if fault.mode == REMOVED or fault.mode not in failures:
@@ -248,9 +245,9 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
             agent: streams.generator(self._seed, "noisy robot", row)
             for agent, row in self._rows.items()
         }
-        size = max(self._rows.values()) + 1
         self._failing = [
-            (fault, set(failing_rows(self._seed, size, fault.robots))) for fault in self._faults
+            (fault, failing_rows(self._seed, len(self._rows), fault.robots))
+            for fault in self._faults
         ]
         observations, infos = self.env.reset(seed=seed, options=options)
         return self._observed(observations), infos
