@@ -74,6 +74,7 @@ def paired_ratio(
     n = num.shape[-1]
     df = n - 1
     value = num.mean(axis=-1) / den.mean(axis=-1)
+    residual = num - value[..., None] * den
 
     null = threshold - offset
     difference = num - null * den
@@ -86,7 +87,7 @@ def paired_ratio(
     p_seen = p_value = 2.0 * stdtr(df, -np.abs(statistic))
     t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + confidence / 2)))
     if n >= MIN_SEEDS:
-        pivots = resampled_pivots(num - value[..., None] * den)
+        pivots = resampled_pivots(residual)
         mirrored = -pivots[::-1]
 
         def larger_p(statistic: Numbers, pivots: Numbers) -> Numbers:
@@ -99,7 +100,7 @@ def paired_ratio(
         p_value = 2.0 * np.minimum(hidden_above, hidden_below)
         t_low = np.maximum(t_low, critical_value(pivots, 1.0 - confidence))
         t_high = np.maximum(t_high, critical_value(mirrored, 1.0 - confidence))
-    low, high = fieller_limits(num, den, t_low, t_high)
+    low, high = fieller_limits(value, residual, den, t_low, t_high)
     return RatioTest(
         value=value + offset,
         low=np.where(degenerate, -np.inf, low + offset),
@@ -114,19 +115,19 @@ def paired_ratio(
 
 
 def fieller_limits(
-    num: Numbers, den: Numbers, t_low: Numbers, t_high: Numbers
+    value: Numbers, residual: Numbers, den: Numbers, t_low: Numbers, t_high: Numbers
 ) -> tuple[Numbers, Numbers]:
-    """Limits of mean(num)/mean(den), -inf and inf where unbounded, from arrays of shape (..., n).
+    """Limits of value = mean(num)/mean(den), -inf and inf where unbounded.
 
     The lower limit solves mean(D) = t_low se(D) for D = num - theta den, the upper one
     mean(D) = -t_high se(D); the critical values, shape (...), are positive, inf for no limit.
+
+    Args:
+        residual: num - value den, shape (..., n) as den. Its mean is 0, so the discriminant of
+            Fieller's quadratic around the estimate is a sum of squares and nothing cancels.
     """
-    n = num.shape[-1]
+    n = den.shape[-1]
     mean_den = den.mean(axis=-1)
-    value = num.mean(axis=-1) / mean_den
-    # Fieller's quadratic around the estimate: with num replaced by num - value den its mean is 0,
-    # so the discriminant is a sum of squares and nothing cancels.
-    residual = num - value[..., None] * den
     den_centred = den - mean_den[..., None]
     scale = n * (n - 1)
     s_rr = np.square(residual).sum(axis=-1) / scale
