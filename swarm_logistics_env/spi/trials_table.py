@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import hashlib
 import math
 import re
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -163,12 +164,10 @@ def _columns(
     """Return the name of each known column, and the columns that are left as parameters."""
     for column in columns:
         if column not in _MEANING:
-            raise IndicatorError(f"--column {column}: should be one of {', '.join(NAMES)}")
+            raise IndicatorError(f"--column {column}: {_one_of(column, _MEANING)}")
     for name in (*columns.values(), *ignore):
         if name not in header:
-            raise IndicatorError(
-                f"{path} has no column {name!r}: should be one of {', '.join(filter(None, header))}"
-            )
+            raise IndicatorError(f"{path} has no column {name!r}: {_one_of(name, header)}")
     names = {_MEANING[column]: name for column, name in columns.items()}
     given, others = {*names}, []
     for name in header:
@@ -176,8 +175,15 @@ def _columns(
             continue
         if header.count(name) > 1:
             raise IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
-        known = _MEANING.get(_word(name))
+        word = _word(name)
+        known = _MEANING.get(word)
         if known is None or (known in given and name not in NAMES):
+            close = difflib.get_close_matches(word, _MEANING, n=1, cutoff=0.75)
+            if close and known is None and len(word) > 3:
+                raise IndicatorError(
+                    f"{path} has a column {name!r}; did you mean {close[0]!r}? Else rename it, or "
+                    f"leave it out by --ignore {name!r}"
+                )
             others.append(name)
         elif known in names:
             raise IndicatorError(
@@ -193,3 +199,9 @@ def _word(name: str) -> str:
     """Return a column's name in small letters, without unit: "Time [s]" is "time"."""
     bare = re.sub(r"\s*[\[(].*?[\])]\s*", " ", name)
     return re.sub(r"\W+", "_", bare.strip().lower()).strip("_")
+
+
+def _one_of(name: str, known: Iterable[str]) -> str:
+    names = [each for each in known if each]
+    close = difflib.get_close_matches(name, names, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"should be one of {', '.join(names)}"
