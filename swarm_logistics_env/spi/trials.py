@@ -142,12 +142,19 @@ def read_trials(
     path = Path(path)
     rows, others, digest = read_rows(path, columns or {}, ignore, decimal)
     varying = [name for name in others if len({row.cells[name] for row in rows}) > 1]
-    trials = [(_trial(row, varying, duration), row) for row in rows]
+    # Each fault in small letters to how its first row has it.
+    faults = dict.fromkeys(row.text("fault") for row in rows)
+    spelled = {name.casefold(): name for name in reversed(faults)}
+    trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
     found = _events(trials) if "time" in rows[0].names else _runs(trials)
     _check_pairing(path, found)
     _check_durations(path, found)
+    notes = [
+        f"The faults {spelled[name.casefold()]} and {name} are taken for one."
+        for name in faults
+        if name not in spelled.values()
+    ]
     counts = Counter(trial.condition for trial in found)
-    notes: list[str] = []
     if varying and min(counts.values()) == 1 < max(counts.values()):
         notes.append(
             f"{len(found)} trials in {len(counts)} conditions, told apart by "
@@ -157,11 +164,13 @@ def read_trials(
     return Trials(path.name, digest, tuple(found), tuple(notes))
 
 
-def _trial(row: Row, varying: Sequence[str], duration: float | None) -> Trial:
+def _trial(
+    row: Row, spelled: Mapping[str, str], varying: Sequence[str], duration: float | None
+) -> Trial:
     """Return the trial of a row, without performance and times."""
     n_robots = row.whole_or_none("n_robots", 1)
     fault, faulty = row.text("fault"), row.whole_or_none("faulty", 0) or 0
-    fault = _FAULT_NAMES.get(fault.lower(), fault)
+    fault = _FAULT_NAMES.get(fault.lower(), spelled[fault.casefold()])
     is_fault = fault not in (NO_FAULT, REPEATED)
     onset = row.number_or_none("onset") or 0.0
     if row.text("duration"):
@@ -214,7 +223,7 @@ def _events(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
         if trial.onset and trial.duration is None:
             raise row.error(
                 "duration",
-                "should say when a trial ends [s], as a fault begins during it, or --duration does",
+                "should say when a trial ends [s], as a fault begins during it, or --duration say so",
             )
         key = (trial.condition, trial.seed, row.text("trial"))
         runs.setdefault(key, (trial, []))[1].extend([] if time is None else [time])

@@ -51,6 +51,12 @@ def test_spellings_of_one_file_read_alike(tmp_path: Path, text: str) -> None:
     assert found == [(8, "none", 0, 10.5), (8, "stuck wheel", 2, 7.0)]
 
 
+def test_a_mode_is_one_mode_however_it_is_typed(tmp_path: Path) -> None:
+    trials = read(tmp_path, "robots,fault,faulty,p\n4,none,0,9\n4,Fm1,1,7\n4,FM1,1,6\n4,fm1,1,5\n")
+    assert [row.fault for row in trials.rows] == ["none", "Fm1", "Fm1", "Fm1"]
+    assert trials.notes[0] == "The faults Fm1 and FM1 are taken for one."
+
+
 def test_columns_of_other_names_are_mapped(tmp_path: Path) -> None:
     columns = {"performance": "boxes", "n_robots": "swarm"}
     text = "swarm,boxes,weather,p\n4,5,sun,.5\n8,9,rain,.7\n"
