@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -142,8 +142,9 @@ def read_trials(
     path = Path(path)
     rows, others, digest = read_rows(path, columns or {}, ignore, decimal)
     varying = [name for name in others if len({row.cells[name] for row in rows}) > 1]
-    # Each fault in small letters to how its first row has it.
     faults = dict.fromkeys(row.text("fault") for row in rows)
+    _check_columns(path, rows[0], faults)
+    # Each fault in small letters to how its first row has it.
     spelled = {name.casefold(): name for name in reversed(faults)}
     trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
     found = _events(trials) if "time" in rows[0].names else _runs(trials)
@@ -162,6 +163,22 @@ def read_trials(
             f"by --ignore {varying[0]!r}."
         )
     return Trials(path.name, digest, tuple(found), tuple(notes))
+
+
+def _check_columns(path: Path, row: Row, faults: Iterable[str]) -> None:
+    """Refuse a file without the columns that no other can stand for, all of them at once."""
+    lacking = {}
+    if not {"performance", "time"} & row.names.keys():
+        lacking["performance"] = "column 'performance', or time, for one delivery a row"
+    fails = any(_FAULT_NAMES.get(one.lower()) not in (NO_FAULT, REPEATED) for one in faults)
+    if fails and "faulty" not in row.names:
+        lacking["faulty"] = "column 'faulty', for how many robots fail"
+    if lacking:
+        options = " ".join(f"--column {name}=NAME" for name in lacking)
+        raise IndicatorError(
+            f"{path} has no {' and no '.join(lacking.values())}: it has "
+            f"{', '.join(map(repr, row.cells))}; say which it is by {options}"
+        )
 
 
 def _trial(
@@ -223,7 +240,8 @@ def _events(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
         if trial.onset and trial.duration is None:
             raise row.error(
                 "duration",
-                "should say when a trial ends [s], as a fault begins during it, or --duration say so",
+                "should say when a trial ends [s], as a fault begins during it; "
+                "a column of it, or --duration SECONDS",
             )
         key = (trial.condition, trial.seed, row.text("trial"))
         runs.setdefault(key, (trial, []))[1].extend([] if time is None else [time])

@@ -80,10 +80,7 @@ class Row(NamedTuple):
         """Return the error that a cell cannot be."""
         name, cell = self.names.get(column, column), self.text(column)
         if name not in self.cells:
-            return IndicatorError(
-                f"{self.place}: {column} is missing: {should}; if a column of another name holds "
-                f"it, --column {column}=NAME, of {', '.join(map(repr, self.cells))}"
-            )
+            return IndicatorError(f"{self.place}: {column} is missing: {should}")
         shown = repr(cell) if cell else "nothing"
         return IndicatorError(f"{self.place}, column {name!r}: {shown}: {should}")
 

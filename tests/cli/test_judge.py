@@ -79,7 +79,7 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     [
         ("lab.csv --column performance", "--column performance: should be NAME=VALUE"),
         ("lab.csv --column performance=boxe", "'boxe': did you mean 'boxes'?"),
-        ("lab.csv", "performance is missing"),
+        ("lab.csv", "has no column 'performance'"),
         ("lab.csv --setup nowhere.toml", "--setup nowhere.toml: should be NAME=VALUE, or"),
         ("lab.csv --seeds 5", "--seeds is not for a file of trials, and 'lab.csv' is one"),
         ("model.zip", "executes the code"),
