@@ -106,19 +106,17 @@ def _posterior(
     normal = (change - centre) / scale
     prior, across = covariance[np.ix_(tried, tried)], covariance[:, tried]
 
-    def factor(noise: float) -> tuple[Matrix, bool]:
-        made: tuple[Matrix, bool] = cho_factor(
-            (prior + noise * np.eye(len(tried))) / (1.0 + noise), lower=True
-        )
-        return made
+    roots = {
+        noise: cho_factor((prior + noise * np.eye(len(tried))) / (1.0 + noise), lower=True)
+        for noise in _NOISES
+    }
 
     def likelihood(noise: float) -> float:
-        root = factor(noise)
-        fit = normal @ cho_solve(root, normal)
-        return float(-0.5 * fit - np.log(np.diag(root[0])).sum())
+        fit = normal @ cho_solve(roots[noise], normal)
+        return float(-0.5 * fit - np.log(np.diag(roots[noise][0])).sum())
 
     noise = max(_NOISES, key=likelihood)
-    root, share = factor(noise), 1.0 / (1.0 + noise)
+    root, share = roots[noise], 1.0 / (1.0 + noise)
     mean = centre + scale * share * across @ cho_solve(root, normal)
     spread = share * covariance - share**2 * across @ cho_solve(root, across.T)
     return mean, scale**2 * spread

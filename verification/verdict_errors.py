@@ -89,10 +89,10 @@ _AROUND: Mapping[str, Callable[[Rng, Floats], Floats]] = {
 }
 
 
-def judged(p_o: Floats, p_new: Floats, threshold: float, confidence: float = 0.95) -> RatioTest:
+def judged(p_o: Floats, p_new: Floats, threshold: float, level: float = 0.95) -> RatioTest[Any]:
     """Return the test of the relative change of P, as studies make it."""
     stakes = at_stake([(1.0, p_new), (-1.0 - threshold, p_o)])
-    told = {"threshold": threshold, "confidence": confidence}
+    told = {"threshold": threshold, "confidence": level}
     return paired_ratio(p_new - p_o, p_o, at_stake=stakes, **told)
 
 
@@ -220,7 +220,7 @@ def planned_power(
         n = spi.seeds_for_power(pilot, truth) or 0
         test = judged(*draw(rng, (25, n), mean_f), threshold)
         planned.append(n)
-        is_right = (test.probability > 0.5) == (distance > 0.0)
+        is_right = (test.mean_difference > 0.0) == (distance > 0.0)
         found.append(float(((test.p_value < 0.05) & is_right).mean()))
     return float(np.median(planned)), float(np.mean(found))
 

@@ -20,7 +20,7 @@ from .inputs import (
     positive_mean,
     same_seeds,
 )
-from .ratio import MIN_SEEDS, Term, over_trainings, paired_ratio, ratio_of_samples, welch
+from .ratio import MIN_SEEDS, RatioTest, Term, over_trainings, paired_ratio, ratio_of_samples, welch
 from .summaries import at_stake, pairing_correlation
 
 # Performances by name, with their weights in numerator and denominator.
@@ -143,22 +143,6 @@ class Estimate:
             return "inconclusive"
         return "supported" if self.probability > 0.5 else "refuted"
 
-    def __str__(self) -> str:
-        """Return sign, value, interval and verdict in one line."""
-        shown = SIGNS["unaffected" if self.identical else self.verdict]
-        limits = ""
-        if self.low is not None and self.high is not None and not self.identical:
-            limits = f" [{self.low:.3f}, {self.high:.3f}]"
-        unit = "paired seed" if self.paired else "run"
-        n = f"{self.n_seeds} {unit}{'' if self.n_seeds == 1 else 's'}"
-        n += "" if self.paired else " a condition"
-        n = n if self.n_trainings is None else f"{self.n_trainings} trainings x {n}"
-        p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
-        return (
-            f"{shown.mark} {self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
-            f"{shown.word} ({n}{p})"
-        )
-
 
 # The two differences of two seeds are close to each other by chance so often, counts being whole
 # numbers, that their spread says nothing.
@@ -223,16 +207,13 @@ def judge(
     mean_den = float(reference.mean())
     mean_num = sum(term.in_num * float(term.sample.mean()) for term in weighted.values())
     n_seeds = min(term.sample.shape[-1] for term in weighted.values())
-    trainings = {len(term.sample) if term.sample.ndim == 2 else None for term in weighted.values()}
-    if len(trainings) > 1:
-        raise IndicatorError(f"{', '.join(weighted)}: should be of the same trainings")
     untested = Estimate(
         indicator=indicator,
         value=mean_num / mean_den + offset,
         threshold=threshold,
         confidence=confidence,
         n_seeds=n_seeds,
-        n_trainings=trainings.pop(),
+        n_trainings=len(reference) if reference.ndim == 2 else None,
         paired=paired,
         mean_denominator=mean_den,
     )
@@ -260,38 +241,40 @@ def _tested(
         den = terms[-1].sample
         taken, added = at_stake([(term.weight(null), term.sample) for term in terms])
         stakes = float(taken), float(added)
-        test = paired_ratio(num, den, **asking, at_stake=stakes)
+        test = RatioTest(*map(float, paired_ratio(num, den, **asking, at_stake=stakes)))
         # Without spread the skewness of D would be one of rounding errors.
-        if not test.degenerate and n_seeds >= LEAST_SEEDS:
+        if test.difference_sd > 0.0 and n_seeds >= LEAST_SEEDS:
             skewness = _skewness(num - null * den)
     else:
         test = ratio_of_samples(terms, welch, **asking)
+    degenerate = test.difference_sd == 0.0
     # The true P of one that is capped is larger, and moves D by the sign of its weight.
-    leaning = float(test.value) - threshold
+    leaning = test.value - threshold
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
     few = asked.n_trainings is not None and asked.n_trainings < LEAST_TRAININGS
-    blocked = capped or bool(test.degenerate) or n_seeds < LEAST_SEEDS or few
+    blocked = capped or degenerate or n_seeds < LEAST_SEEDS or few
     normal = not paired or n_seeds < MIN_SEEDS
-    hidden = bool(test.p_seen < 1.0 - asked.confidence <= test.p_value)
+    hidden = test.p_seen < 1.0 - asked.confidence <= test.p_value
+    p_value = 1.0 if blocked else test.p_value
     flags = {
         "skewed": skewness is not None and _skewed(skewness, n_seeds),
         "too_few_seeds": n_seeds < LEAST_SEEDS,
-        "degenerate": test.degenerate,
+        "degenerate": degenerate,
         "capped": capped,
         "assumes_normal": normal and not blocked,
         "hidden_stalls": hidden and not normal and not blocked,
-        "unbounded": test.unbounded,
+        "unbounded": math.isinf(test.low) and not degenerate,
         "few_trainings": few,
     }
     return replace(
         asked,
-        value=float(test.value),
-        low=None if test.degenerate else float(test.low),
-        high=None if test.degenerate else float(test.high),
-        probability=0.5 if blocked else float(test.probability),
-        p_value=1.0 if blocked else float(test.p_value),
+        value=test.value,
+        low=None if degenerate else test.low,
+        high=None if degenerate else test.high,
+        probability=1.0 - p_value / 2 if test.mean_difference > 0.0 else p_value / 2,
+        p_value=p_value,
         pairing_correlation=correlation,
-        difference_sd=None if asked.n_trainings is not None else float(test.difference_sd),
+        difference_sd=None if asked.n_trainings is not None else test.difference_sd,
         difference_skewness=skewness,
         at_stake=stakes,
         degrees_of_freedom=test.degrees_of_freedom,
@@ -307,24 +290,26 @@ def _checked(
     identical: bool,
 ) -> dict[str, Term]:
     samples = {name: performance(name, p, or_trainings=True) for name, (p, *_) in terms.items()}
-    # A policy that is not trained is the same beside every training.
-    most = max((len(p) for p in samples.values() if p.ndim == 2), default=0)
-    if most:
-        samples = {n: p if p.ndim == 2 else np.tile(p, (most, 1)) for n, p in samples.items()}
+    trainings = {len(p) for p in samples.values() if p.ndim == 2}
+    if trainings:  # a policy that is not trained is the same beside every one
+        every = (max(trainings), 1)
+        samples = {n: p if p.ndim == 2 else np.tile(p, every) for n, p in samples.items()}
     if paired:
         same_seeds(**samples)
+    if len(trainings) > 1:
+        raise IndicatorError(f"{', '.join(samples)}: should be of the same trainings")
     for name in saturated:
         if name not in samples:
             raise IndicatorError(f"saturated = {name!r}: should be among {', '.join(samples)}")
     if identical:
-        first = next(iter(samples))
-        for name in samples:
+        first, *others = samples
+        for name in others:
             if not paired or not np.array_equal(samples[first], samples[name]):
                 raise IndicatorError(
                     f"identical = True, but {first} and {name} differ: should be paired and equal"
                 )
-    *_, (reference_name, reference) = samples.items()
-    positive_mean(reference_name, reference)
+    reference = list(samples)[-1]
+    positive_mean(reference, samples[reference])
     return {name: Term(samples[name], *weights) for name, (_, *weights) in terms.items()}
 
 

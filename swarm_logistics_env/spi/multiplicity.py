@@ -26,11 +26,8 @@ def holm(p_values: ArrayLike) -> Numbers:
         IndicatorError: The input is not one-dimensional, or a p is outside [0, 1].
     """
     p = numbers("p_values", p_values)
-    if p.ndim != 1:
-        raise IndicatorError(f"p_values has shape {p.shape}: should be one p per hypothesis")
-    for value in p.tolist():
-        if not 0.0 <= value <= 1.0:
-            raise IndicatorError(f"p_values holds {value}: should lie in [0, 1]")
+    if p.ndim != 1 or not ((p >= 0.0) & (p <= 1.0)).all():
+        raise IndicatorError(f"p_values = {p_values!r}: should be a p in [0, 1] per hypothesis")
     order = np.argsort(p, kind="stable")
     stepped = np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1))
     adjusted = np.empty_like(p)
@@ -100,38 +97,36 @@ def look_alphas(
 
 @functools.lru_cache(maxsize=256)
 def _boundaries(seeds: tuple[int, ...], alpha: float, spending: Spending) -> tuple[float, ...]:
-    from scipy.optimize import brentq
     from scipy.special import ndtr
 
-    # The sum process is Brownian motion on [0, 1]; `density` is that of paths not stopped so far,
-    # on the points of the last look, where they start.
-    points, density, weights = np.zeros(1), np.ones(1), np.ones(1)
+    # The sum process is Brownian motion on [0, 1]; `mass` is that of paths not stopped so far, on
+    # the points of the last look, where they start.
+    start, mass = np.zeros(1), np.ones(1)
     alphas, information, spent = [], 0.0, 0.0
     for look in seeds:
         now = look / seeds[-1]
         step = math.sqrt(now - information)
         to_spend = _spent(now, alpha, spending) - spent
-
-        def stopped(
-            boundary: float,
-            to_spend: float = to_spend,
-            step: float = step,
-            start: Numbers = points,
-            mass: Numbers = weights * density,
-        ) -> float:
-            """Chance of a first crossing here, over both sides, less what may be spent."""
-            return 2.0 * float((mass * ndtr((start - boundary) / step)).sum()) - to_spend
-
-        reach = _REACH * math.sqrt(now)
-        boundary = reach if stopped(reach) >= 0.0 else float(brentq(stopped, 0.0, reach))
+        boundary = _boundary(start, mass, step, to_spend, _REACH * math.sqrt(now))
         alphas.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
-        start, mass = points, weights * density
         points = np.linspace(-boundary, boundary, _GRID)
         steps = (points[:, None] - start) / step
         density = np.exp(-0.5 * steps**2) @ mass / (step * math.sqrt(2.0 * math.pi))
-        weights = _simpson(points)
+        start, mass = points, _simpson(points) * density
         information, spent = now, spent + to_spend
     return tuple(alphas)
+
+
+def _boundary(start: Numbers, mass: Numbers, step: float, to_spend: float, reach: float) -> float:
+    """Where paths are stopped, so that the chance of it is `to_spend`; `reach` where it is less."""
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    def excess(boundary: float) -> float:
+        """Chance of a first crossing here, over both sides, less what may be spent."""
+        return 2.0 * float((mass * ndtr((start - boundary) / step)).sum()) - to_spend
+
+    return reach if excess(reach) >= 0.0 else float(brentq(excess, 0.0, reach))
 
 
 def _spent(information: float, alpha: float, spending: Spending) -> float:

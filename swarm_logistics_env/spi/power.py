@@ -98,8 +98,7 @@ def seeds_for_equivalence(equivalence: Equivalence, power: float = 0.8) -> int |
         IndicatorError: power outside (0, 1) or not above alpha.
     """
     tests = equivalence.above, equivalence.below
-    for test in tests:
-        _check_power(test, power)
+    _check_power(equivalence.change, power)
     if equivalence.change.difference_sd in (None, 0.0) or any(
         no_plan_because(test, 0.0) is not None for test in tests
     ):
@@ -196,12 +195,13 @@ def _power_at(estimate: Estimate, distance: float, n_seeds: int, confidence: flo
     # Welch's degrees of freedom grow with n - 1, as the paired ones do.
     df = estimate.degrees_of_freedom * (n_seeds - 1) / (estimate.n_seeds - 1)
     standard_error = _spread_limit(estimate, confidence) / math.sqrt(n_seeds)
-    side = 1 if distance > 0.0 else -1
-    critical = _critical(estimate, side, n_seeds, df, standard_error)
     noncentrality = abs(distance) * estimate.mean_denominator / standard_error
-    # Skewness g, on that side, spreads the statistic: mean and spread of the seeds then move
-    # together (as those of gamma variables, whose excess kurtosis is 1.5 g^2).
+    # Skewness g, of a long tail of D on the far side of the threshold, spreads the statistic: mean
+    # and spread of the seeds then move together (as those of gamma variables, whose excess kurtosis
+    # is 1.5 g^2).
+    side = 1 if distance > 0.0 else -1
     g = max(0.0, -side * (estimate.difference_skewness or 0.0))
+    critical = _critical(estimate, side, g, n_seeds, df, standard_error)
     drift = noncentrality / math.sqrt(n_seeds)
     usual = 1.0 + drift**2 / 2.0
     noncentrality = critical + (noncentrality - critical) * math.sqrt(
@@ -214,14 +214,18 @@ def _power_at(estimate: Estimate, distance: float, n_seeds: int, confidence: flo
 
 
 def _critical(
-    estimate: Estimate, side: int, n_seeds: int, df: float, standard_error: float
+    estimate: Estimate, side: int, g: float, n_seeds: int, df: float, standard_error: float
 ) -> float:
-    """Statistic that the verdict on a side (-1: refuted, 1: supported) needs at so many seeds."""
+    """Statistic that the verdict on a side (-1: refuted, 1: supported) needs at so many seeds.
+
+    Args:
+        g: skewness of D away from that side.
+    """
     from scipy.special import ndtri, stdtrit
 
-    # What the bootstrap asks for beyond the t test, where the long tail of D lies on the far side
-    # of the threshold (Hall 1992, The Bootstrap and Edgeworth Expansion, 2.6).
-    tail = max(0.0, -side * (estimate.difference_skewness or 0.0)) / (6.0 * math.sqrt(n_seeds))
+    # What the bootstrap asks for beyond the t test (Hall 1992, The Bootstrap and Edgeworth
+    # Expansion, 2.6).
+    tail = g / (6.0 * math.sqrt(n_seeds))
 
     def quantile(p: Numbers) -> Numbers:
         return np.asarray(stdtrit(df, 1.0 - p) + tail * (2.0 * ndtri(p) ** 2 + 1.0))

@@ -13,10 +13,9 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .inputs import Numbers
 from .summaries import mean_over_trainings, p_with_hidden
@@ -29,19 +28,20 @@ _FLAT = 1e-12
 ROUNDING = 1e-12
 
 
-class RatioTest(NamedTuple):
+Real = TypeVar("Real", float, Numbers)
+
+
+class RatioTest(NamedTuple, Generic[Real]):
     """What the data say about one ratio, or about one ratio per study (arrays of one shape)."""
 
-    value: Numbers
-    low: Numbers
-    high: Numbers
-    probability: Numbers
-    p_value: Numbers
-    difference_sd: Numbers
-    degrees_of_freedom: float
-    degenerate: NDArray[np.bool_]
-    unbounded: NDArray[np.bool_]
-    p_seen: Numbers  # p if no stalled run is hidden
+    value: Real
+    low: Real
+    high: Real
+    mean_difference: Real  # above 0 where theta is estimated to lie above the threshold
+    p_value: Real
+    p_seen: Real  # p if no stalled run is hidden
+    difference_sd: Real  # 0: the differences show no spread
+    degrees_of_freedom: Real
 
 
 def paired_ratio(
@@ -52,7 +52,7 @@ def paired_ratio(
     threshold: float = 0.0,
     confidence: float = 0.95,
     at_stake: tuple[Numbers | float, Numbers | float] = (0.0, 0.0),
-) -> RatioTest:
+) -> RatioTest[Numbers]:
     """Interval and test of theta over paired seeds, for one study or many at once.
 
     Args:
@@ -67,96 +67,83 @@ def paired_ratio(
     Returns:
         Arrays of shape (...). The interval inverts the test of the runs seen: it excludes
         `threshold` exactly where p_seen < 1 - confidence, but where it is unbounded (limits -inf,
-        inf). Differences without spread (`degenerate`) have p = 1 and no limits.
+        inf). Differences without spread have p = 1 and no limits.
     """
     from scipy.special import stdtr, stdtrit
 
     n = num.shape[-1]
-    df, alpha = n - 1, 1.0 - confidence
+    df = n - 1
     value = num.mean(axis=-1) / den.mean(axis=-1)
+    residual = num - value[..., None] * den
 
     null = threshold - offset
     difference = num - null * den
     mean_difference = difference.mean(axis=-1)
-    sd = difference.std(axis=-1, ddof=1)
     rounding = ROUNDING * (np.abs(num).max(axis=-1) + abs(null) * np.abs(den).max(axis=-1))
     degenerate = np.ptp(difference, axis=-1) <= rounding
+    sd = np.where(degenerate, 0.0, difference.std(axis=-1, ddof=1))
     standard_error = np.where(degenerate, 1.0, sd) / np.sqrt(n)
     statistic = mean_difference / standard_error
-    above, below = hidden_above, hidden_below = stdtr(df, -statistic), stdtr(df, statistic)
+    p_seen = p_value = 2.0 * stdtr(df, -np.abs(statistic))
     t_low = t_high = np.full(value.shape, float(stdtrit(df, 0.5 + confidence / 2)))
     if n >= MIN_SEEDS:
-        pivots = resampled_pivots(num - value[..., None] * den)
+        pivots = resampled_pivots(residual)
         mirrored = -pivots[::-1]
 
         def larger_p(statistic: Numbers, pivots: Numbers) -> Numbers:
             return np.asarray(np.maximum(stdtr(df, -statistic), upper_p(pivots, statistic)))
 
-        above, below = larger_p(statistic, pivots), larger_p(-statistic, mirrored)
-        hidden_above, hidden_below = above, below
-        if any(np.any(items) for items in at_stake):
-            taken, added = (np.asarray(items) / standard_error for items in at_stake)
-            hidden_above = p_with_hidden(lambda x: larger_p(x, pivots), statistic, taken, n)
-            hidden_below = p_with_hidden(lambda x: larger_p(x, mirrored), -statistic, added, n)
-        t_low = np.maximum(t_low, critical_value(pivots, alpha))
-        t_high = np.maximum(t_high, critical_value(mirrored, alpha))
-    low, high, unbounded = fieller_limits(num, den, t_low, t_high)
-    # Seeds without spread between them are no evidence: equal counts come about by chance.
-    p_seen, p_value = (
-        np.where(degenerate, 1.0, np.minimum(1.0, 2.0 * np.minimum(*sides)))
-        for sides in ((above, below), (hidden_above, hidden_below))
-    )
+        taken, added = (np.asarray(items) / standard_error for items in at_stake)
+        hidden_above = p_with_hidden(lambda x: larger_p(x, pivots), statistic, taken, n)
+        hidden_below = p_with_hidden(lambda x: larger_p(x, mirrored), -statistic, added, n)
+        p_seen = 2.0 * np.minimum(larger_p(statistic, pivots), larger_p(-statistic, mirrored))
+        p_value = 2.0 * np.minimum(hidden_above, hidden_below)
+        t_low = np.maximum(t_low, critical_value(pivots, 1.0 - confidence))
+        t_high = np.maximum(t_high, critical_value(mirrored, 1.0 - confidence))
+    low, high = fieller_limits(value, residual, den, t_low, t_high)
     return RatioTest(
         value=value + offset,
         low=np.where(degenerate, -np.inf, low + offset),
         high=np.where(degenerate, np.inf, high + offset),
-        probability=probability_of(p_value, mean_difference),
-        p_value=p_value,
-        difference_sd=np.where(degenerate, 0.0, sd),
-        degrees_of_freedom=float(df),
-        degenerate=degenerate,
-        unbounded=unbounded & ~degenerate,
-        p_seen=p_seen,
+        mean_difference=mean_difference,
+        # Seeds without spread between them are no evidence: equal counts come about by chance.
+        p_value=np.where(degenerate, 1.0, np.minimum(1.0, p_value)),
+        p_seen=np.where(degenerate, 1.0, np.minimum(1.0, p_seen)),
+        difference_sd=sd,
+        degrees_of_freedom=np.full(value.shape, float(df)),
     )
 
 
-def probability_of(p_value: Numbers, mean_difference: Numbers) -> Numbers:
-    """Confidence that theta lies above the threshold, from the two-sided p and the side."""
-    return np.where(mean_difference > 0.0, 1.0 - p_value / 2, p_value / 2)
-
-
 def fieller_limits(
-    num: Numbers, den: Numbers, t_low: Numbers, t_high: Numbers
-) -> tuple[Numbers, Numbers, NDArray[np.bool_]]:
-    """Limits of mean(num)/mean(den) and where they are unbounded, from arrays of shape (..., n).
+    value: Numbers, residual: Numbers, den: Numbers, t_low: Numbers, t_high: Numbers
+) -> tuple[Numbers, Numbers]:
+    """Limits of value = mean(num)/mean(den), -inf and inf where unbounded.
 
     The lower limit solves mean(D) = t_low se(D) for D = num - theta den, the upper one
     mean(D) = -t_high se(D); the critical values, shape (...), are positive, inf for no limit.
+
+    Args:
+        residual: num - value den, shape (..., n) as den. Its mean is 0, so the discriminant of
+            Fieller's quadratic around the estimate is a sum of squares and nothing cancels.
     """
-    n = num.shape[-1]
+    n = den.shape[-1]
     mean_den = den.mean(axis=-1)
-    value = num.mean(axis=-1) / mean_den
-    # Fieller's quadratic around the estimate: with num replaced by num - value den its mean is 0,
-    # so the discriminant is a sum of squares and nothing cancels.
-    residual = num - value[..., None] * den
     den_centred = den - mean_den[..., None]
     scale = n * (n - 1)
     s_rr = np.square(residual).sum(axis=-1) / scale
     s_rd = (residual * den_centred).sum(axis=-1) / scale
     s_dd = np.square(den_centred).sum(axis=-1) / scale
 
-    def limit(t: Numbers, side: int) -> tuple[Numbers, NDArray[np.bool_]]:
-        finite = np.where(np.isfinite(t), t, 0.0)
-        a = mean_den**2 - finite**2 * s_dd
-        unbounded = (a <= 0.0) | ~np.isfinite(t)
-        root = np.sqrt((finite**2 * s_rd) ** 2 + np.where(unbounded, 0.0, a) * finite**2 * s_rr)
-        shift = (-(finite**2) * s_rd + side * root) / np.where(unbounded, 1.0, a)
-        return value + shift, unbounded
+    def limit(t: Numbers, side: int) -> Numbers:
+        a = mean_den**2 - t**2 * s_dd
+        root = np.sqrt((t**2 * s_rd) ** 2 + a * t**2 * s_rr)
+        shift = (-(t**2) * s_rd + side * root) / a
+        return np.where(a > 0.0, value + shift, np.inf)
 
-    low, low_unbounded = limit(t_low, -1)
-    high, high_unbounded = limit(t_high, 1)
-    unbounded = low_unbounded | high_unbounded
-    return np.where(unbounded, -np.inf, low), np.where(unbounded, np.inf, high), unbounded
+    with np.errstate(all="ignore"):  # of what is unbounded
+        low, high = limit(t_low, -1), limit(t_high, 1)
+    unbounded = np.isinf(low) | np.isinf(high)
+    return np.where(unbounded, -np.inf, low), np.where(unbounded, np.inf, high)
 
 
 def resampled_pivots(residual: Numbers) -> Numbers:
@@ -236,7 +223,7 @@ def ratio_of_samples(
     offset: float,
     threshold: float,
     confidence: float,
-) -> RatioTest:
+) -> RatioTest[float]:
     """Interval and test of theta = mean(num) / mean(den) + offset by the t test of mean(D).
 
     The interval holds every theta that this test keeps (Fieller), so that verdict and interval
@@ -265,19 +252,16 @@ def ratio_of_samples(
         p_value = 2.0 * float(stdtr(df, -abs(mean) / math.sqrt(variance)))
         low, high = _limits(terms, difference, value, mean_den, 0.5 + confidence / 2)
     n = min(term.sample.size for term in terms)
-    found = {
-        "value": value + offset,
-        "low": low + offset,
-        "high": high + offset,
-        "probability": probability_of(np.asarray(p_value), np.asarray(mean)),
-        "p_value": p_value,
-        "difference_sd": 0.0 if degenerate else math.sqrt(variance * n),
-        "degenerate": degenerate,
-        "unbounded": math.isinf(low) and not degenerate,
-        "p_seen": p_value,
-    }
-    arrays = {name: np.asarray(one) for name, one in found.items()}
-    return RatioTest(**arrays, degrees_of_freedom=df)
+    return RatioTest(
+        value=value + offset,
+        low=low + offset,
+        high=high + offset,
+        mean_difference=mean,
+        p_value=p_value,
+        p_seen=p_value,
+        difference_sd=0.0 if degenerate else math.sqrt(variance * n),
+        degrees_of_freedom=df,
+    )
 
 
 def welch(terms: Sequence[Term], theta: float) -> tuple[float, float, float]:

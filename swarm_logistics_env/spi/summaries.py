@@ -32,13 +32,13 @@ def mean_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     """
     checked = performance("p", p, or_trainings=True)
     if checked.ndim == 1 or checked.shape[1] == 1:
-        return _not_negative(t_interval(checked.ravel(), confidence))
+        return t_interval(checked.ravel(), confidence, least=0.0)
     from scipy.special import stdtrit
 
     between_0_and_1("confidence", confidence)
     mean, variance, df = mean_over_trainings([checked], paired=True)
     half = float(stdtrit(df, 0.5 + confidence / 2)) * math.sqrt(variance)
-    return _not_negative(Interval(mean, mean - half, mean + half))
+    return Interval(mean, max(0.0, mean - half), mean + half)
 
 
 def prediction_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
@@ -50,7 +50,7 @@ def prediction_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     Raises:
         IndicatorError: p empty, negative or not finite; confidence outside (0, 1).
     """
-    return _not_negative(t_interval(performance("p", p), confidence, of_one_run=True))
+    return t_interval(performance("p", p), confidence, of_one_run=True, least=0.0)
 
 
 def interquartile_mean(p: ArrayLike) -> float:
@@ -141,8 +141,17 @@ def pairing_correlation(p_a: ArrayLike, p_b: ArrayLike) -> float | None:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def t_interval(sample: Numbers, confidence: float = 0.95, *, of_one_run: bool = False) -> Interval:
-    """Mean of a sample (n,) of any sign with its t-interval, or with that of one further value.
+def t_interval(
+    sample: Numbers,
+    confidence: float = 0.95,
+    *,
+    of_one_run: bool = False,
+    least: float = -math.inf,
+) -> Interval:
+    """Mean of a sample (n,) with its t-interval, or with that of one further value.
+
+    Args:
+        least: where the interval is cut off, as no value lies below.
 
     Raises:
         IndicatorError: confidence outside (0, 1).
@@ -155,7 +164,7 @@ def t_interval(sample: Numbers, confidence: float = 0.95, *, of_one_run: bool = 
         return Interval(mean, None, None)
     spread = float(sample.std(ddof=1)) * math.sqrt(1 / n + of_one_run)
     half = float(stdtrit(n - 1, 0.5 + confidence / 2)) * spread
-    return Interval(mean, mean - half, mean + half)
+    return Interval(mean, max(least, mean - half), mean + half)
 
 
 def mean_over_trainings(weighted: Sequence[Numbers], *, paired: bool) -> tuple[float, float, float]:
@@ -186,12 +195,6 @@ def mean_over_trainings(weighted: Sequence[Numbers], *, paired: bool) -> tuple[f
     variance = max(of_trainings + without_residual, of_trainings, of_seeds)
     df = max(variance**2 / freedom, 1.0) if freedom else math.inf
     return float(by_training.mean()), variance, df
-
-
-def _not_negative(interval: Interval) -> Interval:
-    if interval.low is None or interval.high is None:
-        return interval
-    return Interval(interval.value, max(0.0, interval.low), interval.high)
 
 
 # A policy that stalls in 5 % of its runs shows none in 36 % of studies of 20 seeds. Their mean is

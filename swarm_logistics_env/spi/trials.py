@@ -15,12 +15,13 @@ from .trials_table import Row, read_rows
 NO_FAULT = "none"
 REMOVED = "removed"
 REPEATED = "other behaviour"  # no fault, a second time: what chance alone makes of a pair
-_FAULTS = {
-    NO_FAULT: ("", "-", "0", "no", "no fault", "ok", "healthy"),
-    REMOVED: ("absent",),
-    REPEATED: ("none again",),
+_FAULT_NAMES = {
+    "": NO_FAULT,
+    NO_FAULT: NO_FAULT,
+    REMOVED: REMOVED,
+    REPEATED: REPEATED,
+    "none again": REPEATED,
 }
-_FAULT_NAMES = {word: name for name, words in _FAULTS.items() for word in (name, *words)}
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ def read_trials(
     # Each fault in small letters to how its first row has it.
     spelled = {name.casefold(): name for name in reversed(faults)}
     trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
-    found = _events(path, trials) if "time" in rows[0].names else _runs(trials)
+    found = _events(trials) if "time" in rows[0].names else _runs(trials)
     _check_pairing(path, found)
     _check_durations(path, found)
     notes = [
@@ -157,8 +158,9 @@ def read_trials(
     counts = Counter(trial.condition for trial in found)
     if varying and min(counts.values()) == 1 < max(counts.values()):
         notes.append(
-            f"{len(found)} trials in {len(counts)} conditions, as {' and '.join(varying)} varies, "
-            f"some of a single trial: --ignore {varying[0]!r} if it was only noted."
+            f"{len(found)} trials in {len(counts)} conditions, told apart by "
+            f"{' and '.join(varying)}, some of a single trial: leave out what was only noted, as "
+            f"by --ignore {varying[0]!r}."
         )
     return Trials(path.name, digest, tuple(found), tuple(notes))
 
@@ -225,19 +227,13 @@ def _runs(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
     return [replace(trial, performance=row.number("performance", 0.0)) for trial, row in rows]
 
 
-def _events(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
-    names = rows[0][1].names
-    if "performance" in names:
-        raise IndicatorError(
-            f"{path} has a column of times and one of performance: should have one of them; "
-            "ignore the other"
-        )
-    if "trial" not in names and "seed" not in names:
-        raise IndicatorError(
-            f"{path} has no column trial or seed: should say which run a delivery belongs to"
-        )
+def _events(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
     runs: dict[object, tuple[Trial, list[float]]] = {}
     for trial, row in rows:
+        if row.text("performance"):
+            raise row.error("performance", "should not stand beside times: ignore one of them")
+        if not row.text("trial") and trial.seed is None:
+            raise row.error("trial", "should say which run a delivery belongs to, or a seed do")
         time = row.number_or_none("time")
         if time is not None and trial.duration is not None and time > trial.duration:
             raise row.error("time", f"should not be after its duration {trial.duration:g}")
@@ -257,17 +253,16 @@ def _events(path: Path, rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
 
 def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
     """Refuse seeds that do not pair the runs of all conditions one to one."""
-    bare = next((row for row in rows if row.seed is None), None)
-    everywhere = {row.seed for row in rows if row.seed is not None}
-    if not everywhere:
+    seeds = {row.seed for row in rows if row.seed is not None}
+    if not seeds:
         return
-    if bare is not None:
-        raise IndicatorError(
-            f"{path}, line {bare.line}: has no seed, as other rows have: give every run one, or "
-            "leave the column out"
-        )
     conditions: dict[object, dict[int | None, Trial]] = {}
     for row in rows:
+        if row.seed is None:
+            raise IndicatorError(
+                f"{path}, line {row.line}: has no seed, as other rows have: give every run one, or "
+                "leave the column out"
+            )
         of_seed = conditions.setdefault(row.condition, {})
         if (first := of_seed.setdefault(row.seed, row)) is not row:
             raise IndicatorError(
@@ -275,7 +270,7 @@ def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
                 "two rows of one seed in one condition: should be one, or leave the column out"
             )
     for of_seed in conditions.values():
-        if lacking := everywhere.difference(of_seed):
+        if lacking := seeds.difference(of_seed):
             raise IndicatorError(
                 f"{path}, line {min(row.line for row in of_seed.values())}: its condition has no "
                 f"run of seed {min(lacking)}: give every condition the same seeds, or leave the "
@@ -286,9 +281,7 @@ def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
 def _check_durations(path: Path, rows: Sequence[Trial]) -> None:
     for row in rows:
         if row.duration != rows[0].duration:
-            told = ("nothing" if r.duration is None else f"{r.duration:g}" for r in (row, rows[0]))
             raise IndicatorError(
-                f"{path}, line {row.line}: has duration {next(told)}, line {rows[0].line} "
-                f"{next(told)}: runs compared should be of one length; else let P be a rate, and "
-                "leave the column out"
+                f"{path}, line {row.line}: is not as long as line {rows[0].line}: runs compared "
+                "should be of one length; else let P be a rate, and leave the column out"
             )

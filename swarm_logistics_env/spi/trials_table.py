@@ -16,16 +16,16 @@ from .inputs import IndicatorError
 
 # What a column is, and the words that name it in files; small letters, "_" for all that is none.
 NAMES: dict[str, tuple[str, ...]] = {
-    "performance": ("p", "delivered", "deliveries", "items", "score", "throughput"),
-    "n_robots": ("robots", "n", "swarm_size", "swarmsize"),
-    "fault": ("failure", "mode", "failure_mode", "fault_mode"),
-    "faulty": ("m", "failed", "n_faulty", "faulty_robots"),
-    "onset": ("fault_onset", "fault_time", "fault_at"),
-    "policy": ("controller", "algorithm", "behaviour", "behavior"),
+    "performance": ("p", "delivered", "items", "score"),
+    "n_robots": ("robots", "n", "swarm_size"),
+    "fault": ("failure", "mode"),
+    "faulty": ("m", "failed"),
+    "onset": ("fault_time",),
+    "policy": ("controller",),
     "seed": ("pair", "block"),
-    "trial": ("run", "id", "repetition"),
-    "time": ("t", "delivery_time", "delivered_at"),
-    "duration": ("length", "trial_length"),
+    "trial": ("run", "id"),
+    "time": (),
+    "duration": ("length",),
     "table": (),
 }
 _MEANING = {word: column for column, words in NAMES.items() for word in (column, *words)}
@@ -115,12 +115,8 @@ def _lines(path: Path) -> tuple[list[str], str]:
     try:
         content = path.read_bytes()
         text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise IndicatorError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise IndicatorError(
-            f"{path} is not a CSV file in UTF-8 ({error.reason}): save it as CSV UTF-8"
-        ) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise IndicatorError(f"{path} cannot be read as CSV in UTF-8: {error}") from error
     lines = text.splitlines()
     for number, line in enumerate(lines, 1):
         for sign in line.replace("\t", ""):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import inspect
 import math
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,21 +38,20 @@ class RandomActions:
         return [None if space is None else space.sample() for space in self._spaces]
 
 
-def agents_by_row(env: Env, n_robots: int, absent: Container[int]) -> list[str | None]:
+def agents_by_row(env: Env, n_robots: int, absent: Collection[int]) -> list[str | None]:
     """Return the name of the agent that each row is, None where the robot is absent.
 
     Raises:
         StudyError: the environment has another number of agents.
     """
-    present = [row for row in range(n_robots) if row not in absent]
-    names = env.possible_agents
-    if len(names) != len(present):
+    present, agents = n_robots - len(absent), env.possible_agents
+    if len(agents) != present:
         raise StudyError(
-            f"the environment of {len(present)} robots has {len(names)} agents: should have as "
+            f"the environment of {present} robots has {len(agents)} agents: should have as "
             "many, see the task's `size`"
         )
-    agents = dict(zip(present, names))
-    return [agents.get(row) for row in range(n_robots)]
+    names = iter(agents)
+    return [None if row in absent else next(names) for row in range(n_robots)]
 
 
 def observation_rows(
@@ -156,7 +155,7 @@ def in_words(gain: Gain, references: tuple[float, float] | None) -> str:
 def name_of(function: Callable[..., Value]) -> str:
     """Return the import path of a function, or how it writes itself."""
     if hasattr(function, "__qualname__"):
-        return f"{getattr(function, '__module__', '')}:{function.__qualname__}"
+        return f"{function.__module__}:{function.__qualname__}"
     return repr(function)
 
 
@@ -167,9 +166,7 @@ def performance_of(gains: list[float], references: tuple[float, float] | None) -
         StudyError: P is no number of 0 or more, or without references a step takes from it.
     """
     for step, gain in enumerate(gains, start=1):
-        if not math.isfinite(gain):
-            raise StudyError(f"P: step {step} adds {gain}: should be a finite number")
-        if gain < 0 and references is None:
+        if not math.isfinite(gain) or (gain < 0 and references is None):
             raise StudyError(f"P: step {step} adds {gain:g}: should be 0 or more; {REMEDY}")
     total = math.fsum(gains)
     if references is None:
@@ -186,6 +183,5 @@ def performance_of(gains: list[float], references: tuple[float, float] | None) -
 
 def _total(values: Iterable[Value], shared: bool) -> float:
     numbers = [float(value) for value in values]
-    if not shared:
-        return math.fsum(numbers)
-    return math.fsum(numbers) / max(len(numbers), 1)
+    total = math.fsum(numbers)
+    return total / max(len(numbers), 1) if shared else total

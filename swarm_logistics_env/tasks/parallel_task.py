@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import replace
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
 from types import MappingProxyType
@@ -40,7 +39,7 @@ from .parallel_wrappers import (
     Value,
     failing_rows,
 )
-from .task import Case, Fields, Outcome, TaskScenario
+from .task import Case, Fields, Outcome, TaskScenario, digest_of
 
 # These files decide what a run in somebody else's environment gives.
 ENVIRONMENT_SOURCES = (
@@ -51,18 +50,6 @@ ENVIRONMENT_SOURCES = (
 )
 _codes: dict[str, str] = {}  # of tasks by their settings: one process answers once
 
-# By failure mode: whether a value is what it needs, and what that is.
-NEEDS: dict[str, tuple[Callable[[Value], bool], str]] = {
-    "silent": (lambda value: value is not None, "the action that counts as none"),
-    "noisy": (
-        lambda value: isinstance(value, int | float) and value > 0,
-        "a standard deviation above 0, in the observations' own units",
-    ),
-    REMOVED: (
-        lambda value: isinstance(value, str),
-        "the name of the factory's argument that takes the numbers of the robots to leave out",
-    ),
-}
 _REWARDS = SumOfRewards()
 
 
@@ -135,20 +122,26 @@ class ParallelTask:
         policies: Makers = NO_MAKERS,
     ) -> None:
         self.name, self._make_env, self._size = name, make_env, size
-        self._parameters, self._failures = dict(parameters), dict(failures)
-        self._gain, self._references, self._period = performance, references, period
+        self._failures, self._gain = dict(failures), performance
+        self._references, self._period = references, period
+        for mode, value in failures.items():
+            _check_failure(mode, value)
+        if references is not None and references[0] == references[1]:
+            raise StudyError(f"references = {references}: should be two different scores")
         self.policies: Makers = {"random": RandomActions, **policies}
-        self._refuse()
         self.removed = REMOVED if REMOVED in failures else None
         self.performance = in_words(performance, references)
         self.failure_modes = {mode: FAILURE_MODES[mode] for mode in failures}
+        self._numbers = {
+            name: type(value)
+            for name, value in parameters.items()
+            if isinstance(value, int | float) and not isinstance(value, bool)
+        }
         self.fields = {
             "duration": "time at which a run ends at the latest [s]",
-            **{name: "argument of the environment" for name in parameters if self._numeric(name)},
+            **dict.fromkeys(self._numbers, "argument of the environment"),
         }
-        self.default = ParallelScenario(
-            n_robots=n_robots, duration=steps * period, **self._parameters
-        )
+        self.default = ParallelScenario(n_robots=n_robots, duration=steps * period, **parameters)
 
     def code(self) -> str:
         """Return a digest of what decides a run: settings, code, and the libraries' versions.
@@ -162,20 +155,17 @@ class ParallelTask:
         ))  # fmt: skip
         if settings not in _codes:
             package = Path(__file__).parents[1]
-            digest = hashlib.sha256(settings.encode())
-            for name in ENVIRONMENT_SOURCES:
-                digest.update(without_prose((package / name).read_text(encoding="utf-8")).encode())
-            for function in (self._make_env, self._gain):
-                digest.update(function_digest(function).encode())
             with closing(self._made(self.default, ())) as env:
                 classes = type(env.unwrapped).__mro__
-            modules = {kind.__module__.partition(".")[0] for kind in classes}
-            modules.discard(package.name)  # its own code is known by its sources
+            # This package's own code is known by its sources.
+            modules = {kind.__module__.partition(".")[0] for kind in classes} - {package.name}
             installed = packages_distributions()
             names = sorted({name for module in modules for name in installed.get(module, ())})
             versions = ", ".join(f"{name} {version(name)}" for name in names)
-            digest.update(versions.encode())
-            _codes[settings] = f"{digest.hexdigest()[:16]} ({versions})"
+            sources = ((package / name).read_text("utf-8") for name in ENVIRONMENT_SOURCES)
+            own = function_digest(self._make_env), function_digest(self._gain)
+            digest = digest_of(settings, versions, *own, *map(without_prose, sources))
+            _codes[settings] = f"{digest[:16]} ({versions})"
         return _codes[settings]
 
     def vary(self, base: TaskScenario, fields: Fields) -> ParallelScenario:
@@ -188,9 +178,7 @@ class ParallelTask:
         for name in fields:
             if name not in (known := base.model_dump()):
                 raise StudyError(f"task {self.name}: no field {name!r}{suggest(name, known)}")
-        return base.replace(
-            **{n: self._number(n, x) if self._numeric(n) else x for n, x in fields.items()}
-        )
+        return base.replace(**{name: self._checked(name, value) for name, value in fields.items()})
 
     def fault(
         self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
@@ -216,63 +204,51 @@ class ParallelTask:
         scenario, n_robots = case.scenario, case.scenario.n_robots
         assert isinstance(scenario, ParallelScenario)
         faults = [fault for fault in case.faults if isinstance(fault, RobotFault)]
-
-        def failing(faults: Iterable[RobotFault]) -> tuple[int, ...]:
-            """Return which robots any of these faults names: the sets of one seed are nested."""
-            return failing_rows(seed, n_robots, max((fault.robots for fault in faults), default=0))
-
-        absent = failing(fault for fault in faults if fault.mode == REMOVED)
+        # The sets of one seed are nested: the largest holds them all.
+        failed = failing_rows(seed, n_robots, max((fault.robots for fault in faults), default=0))
+        absent = failed if any(fault.mode == REMOVED for fault in faults) else ()
         player: Value = case.policy.load(self.policies)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
-
-        def add(observations: ByAgent, rewards: ByAgent) -> None:
-            for agent in sorted(observations):
-                space = env.observation_space(agent)
-                digest.update(np.asarray(flatten(space, observations[agent])).tobytes())
-            digest.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
-
         with closing(self._made(scenario, absent)) as env:
             agents = agents_by_row(env, n_robots, absent)
-            broken = FailingRobots(
-                env,
-                [fault for fault in faults if fault.mode != REMOVED],
-                self._failures,
-                self._period,
-                {agent: row for row, agent in enumerate(agents) if agent is not None},
-            )
+            # Who is not there cannot fail otherwise.
+            broken = FailingRobots(env, () if absent else faults, self._failures, self._period)
             if hasattr(player, "configure"):
                 player.configure(env, agents)
             if hasattr(player, "reset"):
                 player.reset(n_robots, policy_seed)
-            observations, _ = broken.reset(seed=seed)
-            add(broken.given, {})
-            for _ in range(max(1, round(scenario.duration / self._period))):
-                if not env.agents:
+            steps = max(1, round(scenario.duration / self._period))
+            (observations, _), rewards = broken.reset(seed=seed), ByAgent()
+            while True:
+                for agent, seen in sorted(broken.given.items()):
+                    flat = flatten(env.observation_space(agent), seen)
+                    digest.update(np.asarray(flat).tobytes())
+                digest.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
+                if len(gains) == steps or not env.agents:
                     break
                 actions = player.act(observation_rows(env, agents, observations))
                 observations, rewards, _, _, infos = broken.step(
                     agent_actions(env, agents, actions)
                 )
-                add(broken.given, rewards)
                 gains.append(float(self._gain(env, rewards, infos)))
         # What P counts need be in no observation and no reward.
         digest.update(np.array(gains).tobytes())
-        return self._outcome(gains, digest.hexdigest(), failing(faults))
+        return self._outcome(gains, digest.hexdigest(), failed)
 
     def _outcome(self, gains: list[float], digest: str, failed: tuple[int, ...]) -> Outcome:
         total = performance_of(gains, self._references)
-        result = Outcome(
+        # Whole numbers are events, each at the end of its step.
+        are_events = self._references is None and all(gain.is_integer() for gain in gains)
+        ends = np.arange(1, len(gains) + 1) * self._period
+        return Outcome(
+            delivery_times=np.repeat(ends, np.array(gains, np.int64) if are_events else 0),
             ended_at=len(gains) * self._period,
             failed_robots=failed,
             anchoring_seconds=None,
             digest=digest,
+            untimed=None if are_events else total,
         )
-        if self._references is not None or any(not gain.is_integer() for gain in gains):
-            return replace(result, untimed=total)
-        # Whole numbers are events, each at the end of its step.
-        times = np.arange(1, len(gains) + 1) * self._period
-        return replace(result, delivery_times=np.repeat(times, np.array(gains, dtype=np.int64)))
 
     def _made(self, scenario: ParallelScenario, absent: tuple[int, ...]) -> Env:
         arguments = scenario.model_dump()
@@ -282,27 +258,30 @@ class ParallelTask:
             arguments[self._failures[REMOVED]] = absent
         return self._make_env(**arguments)
 
-    def _numeric(self, name: str) -> bool:
-        value = self._parameters.get(name)
-        return isinstance(value, int | float) and not isinstance(value, bool)
-
-    def _number(self, name: str, value: object) -> float:
+    def _checked(self, name: str, value: object) -> object:
+        """Return the value of a field; one that is a number by default has to be one."""
+        kind = self._numbers.get(name)
+        if kind is None:
+            return value
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise StudyError(f"task {self.name}: {name} = {value!r}: should be a number")
-        if not isinstance(self._parameters[name], int):
-            return value
-        if not float(value).is_integer():
+        if kind is int and value % 1:
             raise StudyError(f"task {self.name}: {name} = {value}: should be a whole number")
-        return int(value)
+        return int(value) if kind is int else value
 
-    def _refuse(self) -> None:
-        for mode, value in self._failures.items():
-            if mode not in FAILURE_MODES:
-                raise StudyError(f"failures: no mode {mode!r}{suggest(mode, FAILURE_MODES)}")
-            holds, needed = NEEDS.get(mode, (lambda _: True, ""))
-            if not holds(value):
-                raise StudyError(f"failures[{mode!r}] = {value!r}: should be {needed}")
-        if self._references is not None and self._references[0] == self._references[1]:
-            raise StudyError(f"references = {self._references}: should be two different scores")
-        if not self._period > 0:
-            raise StudyError(f"period = {self._period}: should be above 0 s")
+
+def _check_failure(mode: str, value: Value) -> None:
+    """Raise StudyError unless a failure mode is known and has what it needs."""
+    holds, needed = True, ""
+    if mode not in FAILURE_MODES:
+        raise StudyError(f"failures: no mode {mode!r}{suggest(mode, FAILURE_MODES)}")
+    if mode == "silent":
+        holds, needed = value is not None, "the action that counts as none"
+    elif mode == "noisy":
+        holds = isinstance(value, int | float) and value > 0
+        needed = "a standard deviation above 0, in the observations' own units"
+    elif mode == REMOVED:
+        holds = isinstance(value, str)
+        needed = "the name of the factory's argument that takes the robots to leave out"
+    if not holds:
+        raise StudyError(f"failures[{mode!r}] = {value!r}: should be {needed}")

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import Space
+from gymnasium.spaces import Box
 from gymnasium.wrappers.utils import create_zero_array
 from pettingzoo import ParallelEnv
 from pettingzoo.utils.wrappers import BaseParallelWrapper
@@ -64,12 +65,13 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
         is_cut = is_over and any(truncations.values())
         last = there if is_over else self.env.agents
         observations, infos = self._padded(last, observations, infos)
-        agents, self.agents = self.agents, [] if is_over else self.agents
+        if is_over:
+            self.agents = []
         return (
             observations,
-            {agent: rewards.get(agent, 0.0) for agent in agents},
-            dict.fromkeys(agents, is_over and not is_cut),
-            dict.fromkeys(agents, is_cut),
+            {agent: rewards.get(agent, 0.0) for agent in observations},
+            dict.fromkeys(observations, is_over and not is_cut),
+            dict.fromkeys(observations, is_cut),
             infos,
         )
 
@@ -81,10 +83,9 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
         for agent in self.possible_agents:
             active = agent in there
             told[agent] = {**infos.get(agent, {}), "active": int(active)}
-            if active:
-                seen[agent] = observations[agent]
-            else:
-                seen[agent] = create_zero_array(self.observation_space(agent))
+            seen[agent] = (
+                observations[agent] if active else create_zero_array(self.observation_space(agent))
+            )
         return seen, told
 
 
@@ -115,16 +116,16 @@ class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's
             raise SetupError("sizes: should be one number of agents or more")
         self._sizes = list(sizes)
         self._envs = {size: make_env(size) for size in sorted(set(sizes))}
-        self._largest = self._envs[max(sizes)]
-        super().__init__(self._largest)
-        self.possible_agents = list(self._largest.possible_agents)
+        largest = self._envs[max(sizes)]
+        super().__init__(largest)
+        # In episodes of every size; what else the wrapper has is that of the episode's environment.
+        self.possible_agents = list(largest.possible_agents)
+        self.observation_space, self.action_space = largest.observation_space, largest.action_space
         self._next = int(np.random.default_rng().integers(2**31))
+        spaces = _spaces(largest)
         for size, env in self._envs.items():
-            for agent in env.possible_agents:
-                if agent not in self.possible_agents or any(
-                    getattr(env, space)(agent) != getattr(self._largest, space)(agent)
-                    for space in ("observation_space", "action_space")
-                ):
+            for agent, its_spaces in _spaces(env).items():
+                if spaces.get(agent) != its_spaces:
                     raise SetupError(
                         f"make_env({size}) has {agent}: should be, with the same spaces, among "
                         f"the agents of make_env({max(sizes)})"
@@ -141,20 +142,15 @@ class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's
         observations, infos = self.env.reset(seed=seed, options=options)
         return observations, infos
 
-    def observation_space(self, agent: str) -> Space[Value]:
-        """Return the space of what an agent observes, in episodes of every size."""
-        space: Space[Value] = self._largest.observation_space(agent)
-        return space
-
-    def action_space(self, agent: str) -> Space[Value]:
-        """Return the space of an agent's actions, in episodes of every size."""
-        space: Space[Value] = self._largest.action_space(agent)
-        return space
-
     def close(self) -> None:
         """Close the environments of all sizes."""
         for env in self._envs.values():
             env.close()
+
+
+def _spaces(env: Env) -> dict[str, tuple[Space[Value], Space[Value]]]:
+    """Return what each agent observes and does, by its name."""
+    return {a: (env.observation_space(a), env.action_space(a)) for a in env.possible_agents}
 
 
 REMOVED = "removed"
@@ -204,15 +200,13 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         failures: for each mode what it needs: the no-op action of "silent", the standard deviation
             of "noisy" in the observations' own units, None for the others.
         period: length of a step [s].
-        rows: number of each agent in the whole swarm, by name; None: its place in
-            `possible_agents`.
 
     Attributes:
         given: what the environment itself let each agent observe, before any failure changed it.
 
     Raises:
         FaultError: a fault's mode is not among `failures`, or more robots fail than there are.
-        SetupError: "noisy" meets observations that are no floats.
+        SetupError: "noisy" meets observations that are no array of floats.
 
     Example:
         >>> from pettingzoo.sisl import pursuit_v5
@@ -227,12 +221,11 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         faults: Iterable[RobotFault],
         failures: Mapping[str, Value],
         period: float = 1.0,
-        rows: Mapping[str, int] | None = None,
     ) -> None:
         super().__init__(env)
         self._faults = tuple(faults)
         self._failures, self._period = failures, period
-        self._rows = rows or {agent: row for row, agent in enumerate(env.possible_agents)}
+        self._rows = {agent: row for row, agent in enumerate(env.possible_agents)}
         self._seed = -1
         for fault in self._faults:
             if fault.mode == REMOVED or fault.mode not in failures:
@@ -248,10 +241,13 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         self._seed = self._seed + 1 if seed is None else seed
         self._steps = 0
         self._last: ByAgent = {}
-        self._noise: dict[str, np.random.Generator] = {}
-        size = max(self._rows.values()) + 1
+        self._noise = {
+            agent: streams.generator(self._seed, "noisy robot", row)
+            for agent, row in self._rows.items()
+        }
         self._failing = [
-            (fault, set(failing_rows(self._seed, size, fault.robots))) for fault in self._faults
+            (fault, failing_rows(self._seed, len(self._rows), fault.robots))
+            for fault in self._faults
         ]
         observations, infos = self.env.reset(seed=seed, options=options)
         return self._observed(observations), infos
@@ -283,28 +279,14 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
     def _sensed(self, agent: str, value: Value) -> Value:
         modes = self._modes(agent)
         if "blind" in modes:
-            return _each(value, lambda part: np.zeros_like(part)[()])
-        if "noisy" in modes:
-            if agent not in self._noise:
-                self._noise[agent] = streams.generator(self._seed, "noisy robot", self._rows[agent])
-            return _each(value, lambda part: self._with_noise(agent, part))
-        return value
-
-    def _with_noise(self, agent: str, part: Value) -> Value:
-        clean = np.asarray(part)
-        if not np.issubdtype(clean.dtype, np.floating):
+            return create_zero_array(self.observation_space(agent))
+        if "noisy" not in modes:
+            return value
+        space = self.observation_space(agent)
+        if not (isinstance(space, Box) and np.issubdtype(space.dtype, np.floating)):
             raise SetupError(
-                f"noisy: {agent} observes {clean.dtype}: should be floats; leave 'noisy' out of "
-                "the task's failures"
+                f"noisy: {agent} observes {space}: should be an array of floats; leave 'noisy' out "
+                "of the task's failures"
             )
-        noise = self._noise[agent].normal(0.0, self._failures["noisy"], clean.shape)
-        return (clean + noise).astype(clean.dtype)
-
-
-def _each(value: Value, change: Value) -> Value:
-    """Return an observation with each array or number in it changed."""
-    if isinstance(value, dict):
-        return {name: _each(part, change) for name, part in value.items()}
-    if isinstance(value, tuple):
-        return tuple(_each(part, change) for part in value)
-    return change(value)
+        noise = self._noise[agent].normal(0.0, self._failures["noisy"], space.shape)
+        return (value + noise).astype(space.dtype)

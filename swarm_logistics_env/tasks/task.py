@@ -217,7 +217,7 @@ class Case:
     @cached_property
     def key(self) -> str:
         """Digest of the content, 64 hexadecimal digits."""
-        return _digest(*self.content)
+        return digest_of(*self.content)
 
     @cached_property
     def trainings(self) -> tuple[Case, ...]:
@@ -244,7 +244,7 @@ class Run:
     @cached_property
     def key(self) -> str:
         """Digest of everything that decides its outcome, 64 hexadecimal digits."""
-        return _digest(*self.case.content, self.code, str(self.seed))
+        return digest_of(*self.case.content, self.code, str(self.seed))
 
     @property
     def policy_seed(self) -> int:
@@ -270,7 +270,8 @@ class Run:
         return replace(outcome, wall_seconds=time.perf_counter() - start)
 
 
-def _digest(*parts: str) -> str:
+def digest_of(*parts: str) -> str:
+    """Return the digest of texts, 64 hexadecimal digits."""
     return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
 

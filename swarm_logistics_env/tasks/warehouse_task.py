@@ -39,15 +39,13 @@ class WarehouseTask:
     default = Scenario()
     policies = NO_MAKERS
 
-    @property
-    def fields(self) -> dict[str, str]:
-        """The scenario's numeric fields but `n_robots`, each with unit, meaning and source."""
-        return {
-            name: str(field.description)
-            for name, field in Scenario.model_fields.items()
-            if isinstance(field.default, int | float) and not isinstance(field.default, bool)
-            if name != "n_robots"
-        }
+    # The scenario's numeric fields but `n_robots`, each with unit, meaning and source.
+    fields: Mapping[str, str] = {
+        name: str(field.description)
+        for name, field in Scenario.model_fields.items()
+        if isinstance(field.default, int | float) and not isinstance(field.default, bool)
+        if name != "n_robots"
+    }
 
     @property
     def failure_modes(self) -> dict[str, str]:

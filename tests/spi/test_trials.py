@@ -39,10 +39,10 @@ def test_a_file_with_decimal_commas_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "n_robots\tfailure mode\tfaulty robots\tP\n8\tnone\t0\t10.5\n8\tstuck wheel\t2\t7\n",
-        "\ufeffRobots;Fault;Faulty;Items [box]\r\n8;ok;0;10.5\r\n8;stuck wheel;2;7\r\n",
-        "sep=;\nN;mode;m;p\n8;ok;0;10.5\n8;stuck wheel;2;7\n",
-        'N,mode,m,p\n8,ok,0,"10.5"\n\n8,stuck wheel,2,7\n,,,\n',
+        "n_robots\tfailure\tfailed\tP\n8\tnone\t0\t10.5\n8\tstuck wheel\t2\t7\n",
+        "\ufeffRobots;Fault;Faulty;Items [box]\r\n8;None;0;10.5\r\n8;stuck wheel;2;7\r\n",
+        "sep=;\nN;mode;m;p\n8;;0;10.5\n8;stuck wheel;2;7\n",
+        'N,mode,m,p\n8,none,0,"10.5"\n\n8,stuck wheel,2,7\n,,,\n',
     ],
 )
 def test_spellings_of_one_file_read_alike(tmp_path: Path, text: str) -> None:
@@ -100,7 +100,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
     [
         ("", "is empty: should have a row of column names"),
         (HEAD, "holds no trial"),
-        ("\udcff", "is not a CSV file in UTF-8"),
+        ("\udcff", "cannot be read as CSV in UTF-8"),
         ("robots,p\n4,\x001\n", r"line 2: holds '\x00': should be plain text"),
         ("trial,robots\n1,8\n", "has no column 'performance', or time"),
         ("robots,fault,broken,boxes\n4,jam,1,2\n", "by --column performance=NAME --column faulty="),
@@ -119,9 +119,12 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         ("robots,seed,p\n4,0,1\n8,,2\n", "line 3: has no seed"),
         ("robots,seed,p\n4,0,1\n4,0,2\n", "line 3: has seed 0 like line 2"),
         ("robots,seed,p\n4,0,1\n4,1,2\n8,0,3\n8,2,4\n", "line 2: its condition has no run of"),
-        ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: has duration 90, line 2 60"),
-        ("robots,time\n4,1\n", "has no column trial or seed"),
-        ("trial,robots,time,p\n1,4,1,1\n", "has a column of times and one of performance"),
+        ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: is not as long as line 2"),
+        (
+            "robots,time\n4,1\n",
+            "line 2: trial is missing: should say which run a delivery belongs to",
+        ),
+        ("trial,robots,time,p\n1,4,1,1\n", "column 'p': '1': should not stand beside times"),
         (JAM, "line 2: duration is missing: should say when a trial ends"),
         ("trial,duration,time\n1,60,70\n", "column 'time': '70': should not be after its duration"),
     ],
@@ -139,7 +142,7 @@ def test_a_broken_file_is_refused_by_line_column_and_remedy(
 def test_a_number_that_splits_the_trials_is_named(tmp_path: Path) -> None:
     text = "robots,temperature,p\n4,20,1\n4,20,2\n8,20,2\n8,21,3\n"
     (note,) = read(tmp_path, text).notes
-    assert "4 trials in 3 conditions, as temperature varies" in note
+    assert "4 trials in 3 conditions, told apart by temperature" in note
     assert read(tmp_path, text, ignore=["temperature"]).notes == ()
 
 
@@ -152,5 +155,5 @@ def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
         with pytest.raises(spi.IndicatorError) as caught:
             read(tmp_path, HEAD + GOOD, **asked)
         assert words in str(caught.value)
-    with pytest.raises(spi.IndicatorError, match="cannot read"):
+    with pytest.raises(spi.IndicatorError, match="cannot be read"):
         spi.read_trials(tmp_path / "nowhere.csv")
