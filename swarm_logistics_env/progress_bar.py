@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from time import monotonic
 from typing import Self
 
-from rich.console import Console, Group, RenderableType
-from rich.live import Live
-from rich.progress_bar import ProgressBar as Bar
-from rich.table import Table
-from rich.text import Text
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 LINE_EVERY = 30.0  # seconds between plain lines
 _NOTHING: Mapping[str, int] = {}
@@ -39,28 +36,34 @@ class ProgressBar:
         parts: Mapping[str, int] = _NOTHING,
         console: Console | None = None,
     ) -> None:
-        self._label, self._total, self._unit = label, total, unit
-        self._first = self._done = done
-        self._parts = parts if len(parts) > 1 else {}
-        self._parts_done: Mapping[str, int] = {}
-        self._note = ""
-        self._console = console or Console(stderr=True, highlight=False)
-        self._live: Live | None = None
+        console = console or Console(stderr=True, highlight=False)
+        self._unit, self._first, self._note = unit, done, ""
+        # The bars draw themselves anew twice a second, also while one piece of the work takes long.
+        self._bars = Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(bar_width=20),
+            TextColumn(f"{{task.completed:,}} of {{task.total:,}} {unit}"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=console,
+            refresh_per_second=2,
+            speed_estimate_period=3600.0,
+            disable=not (total and console.is_terminal),
+        )
+        self._whole = self._bars.add_task(label, total=total, completed=done)
+        several = parts if len(parts) > 1 else {}
+        self._parts = {name: self._bars.add_task(name, total=n) for name, n in several.items()}
         self._start = self._last_line = monotonic()
         self._stopped_at: float | None = None
 
     def __enter__(self) -> Self:
         self._start = self._last_line = monotonic()
-        if self._total and self._console.is_terminal:
-            # It draws itself anew twice a second, also while one piece of the work takes long.
-            self._live = Live(self, console=self._console, refresh_per_second=2)
-            self._live.start()
+        self._bars.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._stopped_at = monotonic()
-        if self._live:
-            self._live.stop()
+        self._bars.stop()
 
     @property
     def seconds(self) -> float:
@@ -74,44 +77,26 @@ class ProgressBar:
             note: what plain lines say besides.
             parts: how much is done of each part.
         """
-        self._done, self._note, self._parts_done = done, note, parts
-        if not self._live and monotonic() - self._last_line >= LINE_EVERY:
+        self._note = note
+        self._bars.update(self._whole, completed=done)
+        for name, task in self._parts.items():
+            self._bars.update(task, completed=parts.get(name, 0))
+        if self._bars.disable and monotonic() - self._last_line >= LINE_EVERY:
             self.say()
 
     def say(self, what: str = "") -> None:
         """Print a line: how much is done, and `what`."""
         self._last_line = monotonic()
-        _, *parts = self._shown()
-        reached = f"{self._done:,} of {self._total:,} {self._unit}"
-        if parts:
-            each = (f"{name} {done:,} of {total:,}" for name, done, total in parts)
-            reached += f" ({', '.join(each)})"
-        told = (reached, self._note, self._pace(), what)
-        line = f"{self._label}: {', '.join(part for part in told if part)}"
-        self._console.print(line, soft_wrap=True, markup=False)
-
-    def __rich__(self) -> RenderableType:
-        """Return the bars as they are now; they take 80 columns."""
-        bars = Table.grid(padding=(0, 1))
-        for name, done, total in self._shown():
-            reached = f"{done:,} of {total:,} {self._unit}"
-            bars.add_row(Text(name), Bar(total=total, completed=done, width=20), reached)
-        return Group(bars, f"{self._pace()}, {clock(self.seconds)} so far")
-
-    def _shown(self) -> list[tuple[str, int, int]]:
-        """Return name, what is done and what there is to do: of the whole, then of each part."""
-        parts = [(name, self._parts_done.get(name, 0), n) for name, n in self._parts.items()]
-        return [(self._label, self._done, self._total), *parts]
-
-    def _pace(self) -> str:
-        rate = (self._done - self._first) / max(self.seconds, 1e-9)
-        if not rate:
-            return "just begun"
-        shown = f"{rate:,.2f}" if rate < 10 else f"{rate:,.0f}"
-        left = self._total - self._done
+        whole, *parts = self._bars.tasks
+        count = f"{whole.completed:,} of {whole.total:,} {self._unit}"
+        each = [f"{part.description} {part.completed:,} of {part.total:,}" for part in parts]
+        told = [count, *each, self._note, f"{clock(self.seconds)} so far"]
+        gained = whole.completed - self._first
         # A training ends with a whole round, so that more may be done than was to do.
-        until_end = f", {clock(left / rate)} left" if left > 0 else ""
-        return f"{shown} {self._unit}/s{until_end}"
+        if gained and whole.remaining and whole.remaining > 0:
+            told.append(f"{clock(self.seconds * whole.remaining / gained)} left")
+        line = f"{whole.description}: {', '.join(filter(None, [*told, what]))}"
+        self._bars.console.print(line, soft_wrap=True, markup=False)
 
 
 def clock(seconds: float) -> str:

@@ -27,8 +27,8 @@ def test_lines_tell_each_part_and_what_is_left(monkeypatch: pytest.MonkeyPatch) 
     assert line.endswith(", loss [0.5]")  # alone, as lines are sparse
     monkeypatch.setattr(progress_bar, "LINE_EVERY", 0.0)
     (line,) = shown({"swarm-dt": 3, "central": 2}, TWO, terminal=False).splitlines()
-    assert line.startswith("mine: 5 of 8 runs (swarm-dt 3 of 4, central 2 of 4), 1 failed, ")
-    assert line.endswith(" runs/s, 0:00 left")
+    assert line.startswith("mine: 5 of 8 runs, swarm-dt 3 of 4, central 2 of 4, 1 failed, ")
+    assert line.endswith(", 0:00 so far, 0:00 left")
     # A training ends with a whole round of steps.
     assert "left" not in shown({"central": 5}, {"central": 4}, terminal=False)
 
@@ -41,5 +41,5 @@ def test_bars_of_the_whole_and_of_each_part() -> None:
     told = io.StringIO()  # what was done before is no part of the pace
     with ProgressBar("mine", 100, "rounds", done=99, console=Console(file=told)) as progress:
         progress.say()
-    assert told.getvalue() == "mine: 99 of 100 rounds, just begun\n"
+    assert told.getvalue() == "mine: 99 of 100 rounds, 0:00 so far\n"
     assert [clock(seconds) for seconds in (4.6, 245, 3723)] == ["0:05", "4:05", "1:02:03"]
