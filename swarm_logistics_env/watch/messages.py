@@ -19,7 +19,6 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import columns, unflatten
 from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
 
@@ -32,8 +31,6 @@ _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius",
 )  # fmt: skip
-# Several things stand in each of these blocks; those that are absent come last and are left out.
-_BLOCKS = ("item", "neighbour", "lowest_timer")
 _TIMER_STEPS = 8  # shades of the timer's halo
 
 
@@ -126,26 +123,6 @@ def obey(session: Session, text: str) -> None:
         raise SetupError(f"order {where}: {first['msg']}") from None
 
 
-def observation_parts(
-    row: NDArray[np.float32], scenario: Scenario
-) -> list[tuple[str, str, list[float]]]:
-    """Return name, unit and values of every named part of an observation row (D,).
-
-    Items and neighbours are listed only if present, the nearest first.
-    """
-    parts = unflatten(row, scenario)
-    found = []
-    for column in columns(scenario):
-        values = parts[column.name]
-        block = next((block for block in _BLOCKS if column.name.startswith(block)), None)
-        if block is not None and column.name != f"{block}_present":
-            n_present = int((parts[f"{block}_present"] > 0.5).sum())
-            values = values[: n_present * (len(values) // len(parts[f"{block}_present"]))]
-        # Adding 0.0 turns a negative zero into zero.
-        found.append((column.name, column.unit, [round(float(v), 2) + 0.0 for v in values]))
-    return found
-
-
 def _arena(play: Play) -> Message:
     state, scenario = play.world.state, play.world.scenario
     poses: list[int | None] = []
@@ -181,8 +158,8 @@ def _selected(session: Session) -> Message | None:
     robot = session.selected
     if robot is None:
         return None
-    state, row = session.state, session.run.world.observe()[robot]
-    seen = unflatten(row, session.scenario)
+    state = session.state
+    seen = unflatten(session.run.world.observe()[robot], session.scenario)
     beams = np.min([seen[f"range_{what}"] for what in ("robots", "walls", "items")], axis=0)
     return {
         "robot": robot,
@@ -191,7 +168,11 @@ def _selected(session: Session) -> Message | None:
         "beams": [round(float(reach), 3) for reach in beams],
         "reach": round(float(state.ranger_range[robot]), 3),
         "view": round(float(state.view_range[robot]), 3),
-        "row": observation_parts(row, session.scenario),
+        # Adding 0.0 turns a negative zero into zero.
+        "row": [
+            (part.name, part.unit, [round(value, 2) + 0.0 for value in seen[part.name].tolist()])
+            for part in columns(session.scenario)
+        ],
     }
 
 
