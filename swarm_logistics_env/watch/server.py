@@ -108,12 +108,8 @@ class WatchServer:
             await site.start()
         except OSError as error:
             await self._runner.cleanup()
-            if "in use" in str(error):
-                raise SetupError(
-                    f"port = {self.port}: is in use: should be another one, or --port 0 for any "
-                    "that is free"
-                ) from None
-            raise SetupError(f"host = {self.host}, port = {self.port}: {error.strerror}") from None
+            told = f"{error.strerror}; --port 0 takes any that is free"
+            raise SetupError(f"host = {self.host}, port = {self.port}: {told}") from None
         self.port = self._runner.addresses[0][1]
         shown = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
         shown = f"[{shown}]" if ":" in shown else shown
