@@ -233,22 +233,10 @@ def _performance(results: StudyResults) -> str:
     where = f"N = {scenario.n_robots}"
     where += "" if cell.arm.setting.kind == "size" else f", {cell.arm.setting}"
     several = len(results.policies) > 1
-    baseline = here.get(results.policies[0])
-    told = (
-        f"{one.policy} " * several
-        + _mean(one)
-        + (_multiple(one, baseline) if baseline and results.plan.paired else "")
-        for one in reversed(here.values())
-    )
+    told = (f"{one.policy} " * several + _mean(one) for one in reversed(here.values()))
     is_usual = cell.arm.case.task.name == DEFAULT
     measured = f"P, items in {scenario.duration:g} s," if is_usual else "P"
     return f"{measured} at {where}: {', '.join(told)}."
-
-
-def _multiple(cell: Cell, baseline: Cell) -> str:
-    if cell is baseline or cell.problem or baseline.problem or not baseline.by_seed.any():
-        return ""
-    return f" ({cell.mean.value / baseline.mean.value:.2f} times)"
 
 
 def _mean(cell: Cell) -> str:
