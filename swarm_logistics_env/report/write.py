@@ -187,14 +187,7 @@ def template(name: str) -> Template:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["unbroken"] = _unbroken
     return environment.get_template(name)
-
-
-def _unbroken(text: str) -> str:
-    """Return text whose numbers keep their units, and equations their two sides, on one line."""
-    held = r"(?<=\d) (?=%|s\b)| (?=[=<→] )|(?<=[=<→]) "
-    return re.sub(held, "\N{NO-BREAK SPACE}", text.replace("->", "→"))
 
 
 _ESCAPES = {
