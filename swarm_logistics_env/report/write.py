@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import StudyError, how_to_install
 from swarm_logistics_env.records import becoming, plain
@@ -23,9 +22,6 @@ from .document import Document, document
 from .drawing import INK, PAPER, images
 from .page import axis, page_data
 from .section import WORDS, Section
-
-if TYPE_CHECKING:
-    from jinja2 import Template
 
 
 def write_report(
@@ -159,8 +155,17 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         document: the report.
         drawings: inline SVG of every figure, by name.
     """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("swarm_logistics_env", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     data = page_data(results)
-    return template("page.html.jinja").render(
+    return environment.get_template("page.html.jinja").render(
         document=document,
         paired=results.plan.paired,
         answer=document.answer,
@@ -173,21 +178,6 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
     )
-
-
-def template(name: str) -> Template:
-    """Return a template of this folder, in which all text is escaped."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("swarm_logistics_env", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template(name)
 
 
 _ESCAPES = {
