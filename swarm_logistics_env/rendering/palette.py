@@ -111,4 +111,4 @@ class Event(NamedTuple):
     @property
     def label(self) -> str:
         """The text of the mark."""
-        return "ok" if self.mode is None else MARKS.get(self.mode, self.mode)
+        return "ok" if self.mode is None else mark((self.mode,))
