@@ -40,9 +40,8 @@ def page_data(results: StudyResults) -> Json:
     """Return all that the page's script needs, as JSON holds it."""
     arms = {arm.case.key: arm for _, _, arm in results.plan.cells}
     places = {key: place for place, key in enumerate(arms)}
-    labels = dict.fromkeys((*results.policies, *(a.case.policy.title for a in arms.values())))
     return {
-        "policies": list(labels),
+        "policies": [*results.policies],
         "seeds": [int(seed) for seed in results.plan.seeds],
         "paired": results.plan.paired,
         "conditions": list(_conditions(results, list(arms.values()))),
@@ -105,11 +104,9 @@ def watch_command(arm: Arm) -> str | None:
 def _question(results: StudyResults, test: Verdict, places: dict[str, int]) -> Json:
     told, compared = sentence(results, test), test.compared
     return {
-        "policy": compared.policy,
         "table": compared.table,
         "head": told.head,
         "text": told.text,
-        "verdict": told.verdict,
         "arms": [
             [compared.definition.performances[name], str(arm.setting), places[arm.case.key]]
             for name, arm in compared.arguments.items()
