@@ -258,7 +258,7 @@ function options(select, names) {
 options(at("views"), data.views.map((view) => view.name));
 at("views").addEventListener("change", drawComparison);
 drawComparison();
-choose(data.first);
+choose(0);
 function draw() {
   drawComparison();
   showQuestion();

@@ -47,7 +47,6 @@ def page_data(results: StudyResults) -> Json:
         "conditions": list(_conditions(results, list(arms.values()))),
         "questions": [_question(results, test, places) for test in results.verdicts],
         "views": [*_performance_views(results, places), *_indicator_views(results)],
-        "first": _first(results.verdicts),
     }
 
 
@@ -112,16 +111,6 @@ def _question(results: StudyResults, test: Verdict, places: dict[str, int]) -> J
             for name, arm in compared.arguments.items()
         ],
     }
-
-
-def _first(tests: Sequence[Verdict]) -> int:
-    """Return the question that the page opens with: the lowest value that is refuted, or any."""
-    refuted = (
-        (test.value, number)
-        for number, test in enumerate(tests)
-        if test.answer_holm == "refuted" and test.value is not None
-    )
-    return min(refuted, default=(0.0, 0))[1]
 
 
 def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterator[Json]:
