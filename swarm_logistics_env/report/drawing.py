@@ -1,7 +1,6 @@
 """Drawing with matplotlib, which is loaded only when a figure is drawn.
 
-The colours are those of Okabe and Ito, and every series has a marker of its own as well. Lines and
-letters are drawn in `INK` on `PAPER`, and a page puts its own colours in the place of these two.
+The colours are those of Okabe and Ito, and every series has a marker of its own as well.
 """
 
 from __future__ import annotations
