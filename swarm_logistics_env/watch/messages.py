@@ -88,19 +88,19 @@ _checked = validate_call(
 )
 # Orders by name; the rest of an order is the arguments, which have to be of the right types.
 _ORDERS: dict[str, Callable[..., object]] = {
-    "pause": _checked(Session.pause),
-    "step": _checked(Session.step),
-    "speed": _checked(Session.set_speed),
-    "next": _checked(Session.next_seed),
-    "again": _checked(Session.restart),
-    "compare": _checked(Session.compare),
-    "select": _checked(Session.select),
-    "choose": _checked(Session.choose_mode),
-    "break": _checked(Session.break_robot),
-    "repair": _checked(Session.repair_robot),
-    "toggle": _checked(Session.toggle_robot),
-    "resize": _checked(Session.resize),
-    "widen": _checked(Session.set_delivery_width),
+    "pause": Session.pause,
+    "step": Session.step,
+    "speed": Session.set_speed,
+    "next": Session.next_seed,
+    "again": Session.restart,
+    "compare": Session.compare,
+    "select": Session.select,
+    "choose": Session.choose_mode,
+    "break": Session.break_robot,
+    "repair": Session.repair_robot,
+    "toggle": Session.toggle_robot,
+    "resize": Session.resize,
+    "widen": Session.set_delivery_width,
 }
 
 
@@ -118,7 +118,7 @@ def obey(session: Session, text: str) -> None:
             f'order: should be a JSON object whose "do" is one of {", ".join(_ORDERS)}'
         ) from None
     try:
-        act(session, **arguments)
+        _checked(act)(session, **arguments)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
         where = ".".join(str(part) for part in first["loc"])
