@@ -253,7 +253,7 @@ def _mean(cell: Cell) -> str:
 
 def _last(results: StudyResults) -> str:
     """Return what the symbols mean, how to read the verdicts, and what limits them, in one line."""
-    tests = results.verdicts
+    tests, reference = results.verdicts, results.reference
     runs = "seeds" if results.plan.paired else "trials a condition"
     asked = {test.compared.indicator for test in tests} - {"change"}
     named = [one.heading for symbol, one in DEFINITIONS.items() if symbol in asked]
@@ -277,8 +277,14 @@ def _last(results: StudyResults) -> str:
         parts.append(
             f"so many more {runs} would tell such a value from the threshold in 4 of 5 studies"
         )
-    if claims := [said(test.claim_verdict_holm) for test in tests if test.claim]:
-        parts.append(f"of {section.plural(len(claims), 'claim')} {section.counted(claims)}")
+    claims = [test for test in tests if test.claim]
+    told = reference.claims if reference else {}
+    of_text = [test for test in claims if test.compared.question in told]
+    of_others = [test for test in claims if test not in of_text]
+    for where, here in ((" in the paper's text", of_text), (" beside it" * bool(told), of_others)):
+        if here:
+            found = section.counted(said(test.claim_verdict_holm) for test in here)
+            parts.append(f"of {section.plural(len(here), 'claim')}{where} {found}")
     line = "; ".join(parts)
     return f"{line[0].upper()}{line[1:]}."
 
