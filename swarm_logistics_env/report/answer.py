@@ -277,6 +277,13 @@ def _last(results: StudyResults) -> str:
         parts.append(
             f"so many more {runs} would tell such a value from the threshold in 4 of 5 studies"
         )
+    beside = [test for test in tests if test.conclusion == "inconclusive" and _on_one_side(test)]
+    reasons = {
+        "so few seeds may hide stalls": any("hidden_stalls" in test.flags for test in beside),
+        "Holm counts all questions": any(test.plain in section.DECIDED for test in beside),
+    }
+    if why := " or ".join(reason for reason, holds in reasons.items() if holds):
+        parts.append(f"open beside an interval on one side of it: {why}")
     claims = [test for test in tests if test.claim]
     told = reference.claims if reference else {}
     of_text = [test for test in claims if test.compared.question in told]
@@ -287,6 +294,13 @@ def _last(results: StudyResults) -> str:
             parts.append(f"of {section.plural(len(here), 'claim')}{where} {found}")
     line = "; ".join(parts)
     return f"{line[0].upper()}{line[1:]}."
+
+
+def _on_one_side(test: Verdict) -> bool:
+    """Return whether an interval leaves out the threshold."""
+    _, low, high = test.interval or (None, None, None)
+    threshold = test.compared.threshold
+    return low is not None and high is not None and not low <= threshold <= high
 
 
 def in_a_sentence(results: StudyResults) -> str:
