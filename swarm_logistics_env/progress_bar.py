@@ -5,11 +5,8 @@ from __future__ import annotations
 from time import monotonic
 from typing import Self
 
-from rich.console import Console, Group, RenderableType
-from rich.live import Live
-from rich.progress_bar import ProgressBar as Bar
-from rich.table import Table
-from rich.text import Text
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 LINE_EVERY = 30.0  # seconds between plain lines
 
@@ -34,26 +31,32 @@ class ProgressBar:
         done: int = 0,
         console: Console | None = None,
     ) -> None:
-        self._label, self._total, self._unit = label, total, unit
-        self._first = self._done = done
-        self._note = ""
-        self._console = console or Console(stderr=True, highlight=False)
-        self._live: Live | None = None
+        console = console or Console(stderr=True, highlight=False)
+        self._unit, self._first, self._note = unit, done, ""
+        # It draws itself anew twice a second, also while one piece of the work takes long.
+        self._bar = Progress(
+            TextColumn("{task.description}", markup=False),
+            BarColumn(bar_width=20),
+            TextColumn(f"{{task.completed:,}} of {{task.total:,}} {unit}"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=console,
+            refresh_per_second=2,
+            speed_estimate_period=3600.0,
+            disable=not (total and console.is_terminal),
+        )
+        self._task = self._bar.add_task(label, total=total, completed=done)
         self._start = self._last_line = monotonic()
         self._stopped_at: float | None = None
 
     def __enter__(self) -> Self:
         self._start = self._last_line = monotonic()
-        if self._total and self._console.is_terminal:
-            # It draws itself anew twice a second, also while one piece of the work takes long.
-            self._live = Live(self, console=self._console, refresh_per_second=2)
-            self._live.start()
+        self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._stopped_at = monotonic()
-        if self._live:
-            self._live.stop()
+        self._bar.stop()
 
     @property
     def seconds(self) -> float:
@@ -66,36 +69,23 @@ class ProgressBar:
         Args:
             note: what plain lines say besides.
         """
-        self._done, self._note = done, note
-        if not self._live and monotonic() - self._last_line >= LINE_EVERY:
+        self._note = note
+        self._bar.update(self._task, completed=done)
+        if self._bar.disable and monotonic() - self._last_line >= LINE_EVERY:
             self.say()
 
     def say(self, what: str = "") -> None:
         """Print a line: how much is done, and `what`."""
         self._last_line = monotonic()
-        told = (self._reached(), self._note, self._pace(), what)
-        line = f"{self._label}: {', '.join(part for part in told if part)}"
-        self._console.print(line, soft_wrap=True, markup=False)
-
-    def __rich__(self) -> RenderableType:
-        """Return the bar as it is now; it takes 80 columns."""
-        shown = Table.grid(padding=(0, 1))
-        bar = Bar(total=self._total, completed=self._done, width=20)
-        shown.add_row(Text(self._label), bar, self._reached())
-        return Group(shown, f"{self._pace()}, {clock(self.seconds)} so far")
-
-    def _reached(self) -> str:
-        return f"{self._done:,} of {self._total:,} {self._unit}"
-
-    def _pace(self) -> str:
-        rate = (self._done - self._first) / max(self.seconds, 1e-9)
-        if not rate:
-            return "just begun"
-        shown = f"{rate:,.2f}" if rate < 10 else f"{rate:,.0f}"
-        left = self._total - self._done
+        (task,) = self._bar.tasks
+        count = f"{task.completed:,} of {task.total:,} {self._unit}"
+        told = [count, self._note, f"{clock(self.seconds)} so far"]
+        gained = task.completed - self._first
         # A training ends with a whole round, so that more may be done than was to do.
-        until_end = f", {clock(left / rate)} left" if left > 0 else ""
-        return f"{shown} {self._unit}/s{until_end}"
+        if gained and task.remaining and task.remaining > 0:
+            told.append(f"{clock(self.seconds * task.remaining / gained)} left")
+        line = f"{task.description}: {', '.join(filter(None, [*told, what]))}"
+        self._bar.console.print(line, soft_wrap=True, markup=False)
 
 
 def clock(seconds: float) -> str:

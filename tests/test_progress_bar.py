@@ -26,7 +26,7 @@ def test_lines_tell_what_is_done_and_what_is_left(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(progress_bar, "LINE_EVERY", 0.0)
     (line,) = shown(5, 8, terminal=False).splitlines()
     assert line.startswith("mine: 5 of 8 runs, 1 failed, ")
-    assert line.endswith(" runs/s, 0:00 left")
+    assert line.endswith(", 1 failed, 0:00 so far, 0:00 left")
     # A training ends with a whole round of steps.
     assert "left" not in shown(5, 4, terminal=False)
 
@@ -38,5 +38,5 @@ def test_a_bar_tells_what_is_done() -> None:
     told = io.StringIO()  # what was done before is no part of the pace
     with ProgressBar("mine", 100, "rounds", done=99, console=Console(file=told)) as progress:
         progress.say()
-    assert told.getvalue() == "mine: 99 of 100 rounds, just begun\n"
+    assert told.getvalue() == "mine: 99 of 100 rounds, 0:00 so far\n"
     assert [clock(seconds) for seconds in (4.6, 245, 3723)] == ["0:05", "4:05", "1:02:03"]

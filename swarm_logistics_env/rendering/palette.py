@@ -59,25 +59,17 @@ RUN_NAMES = (("REQUESTED", 3.0), ("SHUFFLING", 1.5))
 # The mark on a robot that fails in a mode. A removed robot is not drawn, so it has none.
 MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}
 
-# Pairs of colours with smooth edges between them, and the number of steps in between.
-_EDGES = (
-    (FLOOR, TIMER, 8), (DELIVERY_AREA, TIMER, 6), (DELIVERY_AREA, DELIVERY_HATCH, 3),
-    (FLOOR, INK, 6), (INK, SEARCHING, 3),
-    (INK, SHUFFLING, 3), (INK, DELIVERING, 3), (INK, REQUESTED, 2), (FLOOR, REQUESTED, 3),
-    (FLOOR, SHUFFLING, 2), (FLOOR, LINK, 3), (DELIVERY_AREA, LINK, 2), (FLOOR, BEAM, 2),
-)  # fmt: skip
+# What lies behind, and what stands before it; smooth edges between the two take four steps.
+_BEHIND = (FLOOR, DELIVERY_AREA, INK)
+_BEFORE = (INK, SEARCHING, SHUFFLING, DELIVERING, TIMER, REQUESTED, LINK)
 
 
 def film_colours() -> list[RGB]:
     """Return the colours of pictures that may have only a few: under 128, each once."""
-    smooth = [
-        (red, green, blue)
-        for one, other, steps in _EDGES
-        for red, green, blue in np.rint(np.linspace(one, other, steps + 2)[1:-1])
-        .astype(int)
-        .tolist()
-    ]
-    return list(dict.fromkeys([*COLOURS.values(), *smooth]))
+    edges = [np.linspace(one, other, 6)[1:-1] for one in _BEHIND for other in _BEFORE]
+    smooth = np.rint(np.concatenate(edges)).astype(int).tolist()
+    found = [*COLOURS.values(), *((red, green, blue) for red, green, blue in smooth)]
+    return list(dict.fromkeys(found))
 
 
 def mark(modes: tuple[str, ...]) -> str:
@@ -119,4 +111,4 @@ class Event(NamedTuple):
     @property
     def label(self) -> str:
         """The text of the mark."""
-        return "ok" if self.mode is None else MARKS.get(self.mode, self.mode)
+        return "ok" if self.mode is None else mark((self.mode,))

@@ -162,27 +162,12 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     ]
     order, policies = list(DEFINITIONS), results.policies
     lines.sort(key=lambda line: (policies.index(line.policy), order.index(line.indicator)))
-    shown = lines if most is None else _undefined_together(lines)
-    return Answer(_asked(results), _performance(results), tuple(shown), _last(results))
+    return Answer(_asked(results), _performance(results), tuple(lines), _last(results))
 
 
 def _part_of_title(table: str) -> str:
     """Return what stands in brackets at the end of a table's title, or else the title."""
     return table.rstrip(")").rpartition(" (")[2]
-
-
-def _undefined_together(lines: Sequence[Line]) -> Iterator[Line]:
-    """Yield the lines; several questions of a policy that are all undefined share one."""
-    undefined = [line for line in lines if not any(test.estimate for test in line.tests)]
-    for policy, here in grouped(undefined, lambda line: line.policy).items():
-        if len(here) < 2:
-            yield from here
-            continue
-        tests = tuple(test for line in here for test in line.tests)
-        symbols = ", ".join(dict.fromkeys(line.indicator for line in here))
-        numbers = tuple(number for line in here for number in line.numbers)
-        yield Line(policy, symbols, f"({len(tests)} questions)", tests, numbers)
-    yield from (line for line in lines if line not in undefined)
 
 
 def _alike(shared: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
@@ -248,22 +233,10 @@ def _performance(results: StudyResults) -> str:
     where = f"N = {scenario.n_robots}"
     where += "" if cell.arm.setting.kind == "size" else f", {cell.arm.setting}"
     several = len(results.policies) > 1
-    baseline = here.get(results.policies[0])
-    told = (
-        f"{one.policy} " * several
-        + _mean(one)
-        + (_multiple(one, baseline) if baseline and results.plan.paired else "")
-        for one in reversed(here.values())
-    )
+    told = (f"{one.policy} " * several + _mean(one) for one in reversed(here.values()))
     is_usual = cell.arm.case.task.name == DEFAULT
     measured = f"P, items in {scenario.duration:g} s," if is_usual else "P"
     return f"{measured} at {where}: {', '.join(told)}."
-
-
-def _multiple(cell: Cell, baseline: Cell) -> str:
-    if cell is baseline or cell.problem or baseline.problem or not baseline.by_seed.any():
-        return ""
-    return f" ({cell.mean.value / baseline.mean.value:.2f} times)"
 
 
 def _mean(cell: Cell) -> str:

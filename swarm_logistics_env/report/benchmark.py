@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
@@ -110,6 +109,8 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
     Args:
         entries: name to scores, (K, n) or (n,), each over the same n seeds.
     """
+    from scipy.stats import rankdata
+
     scores = [np.atleast_2d(one) for one in entries.values()]
     rng = np.random.Generator(np.random.Philox(key=len(entries)))
     n_seeds = min(one.shape[1] for one in scores)
@@ -118,8 +119,9 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
         seeds = rng.integers(n_seeds, size=n_seeds)
         resampled = (one[rng.integers(len(one), size=len(one))][:, seeds] for one in scores)
         drawn.append([one.mean() for one in resampled])
-    (found,) = _ranks(np.array([[one.mean() for one in scores]]))
-    ranks = _ranks(np.array(drawn))
+    # 1 + how many entries score higher.
+    found = rankdata([-one.mean() for one in scores], method="min")
+    ranks = rankdata(-np.array(drawn), method="min", axis=1)
     best, worst = np.percentile(ranks, (2.5, 97.5), axis=0, method="nearest").astype(int)
     same = (ranks == found).mean(axis=0)
     named = list(entries.items())
@@ -141,8 +143,3 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
             f"Limits of a rank, and how often it is the same: of {RESAMPLES} resamples of both.",
         ),
     )
-
-
-def _ranks(scores: Numbers) -> NDArray[np.int64]:
-    """Return 1 + how many entries score higher, of every row."""
-    return np.asarray(1 + (scores[:, None, :] > scores[:, :, None]).sum(axis=2))

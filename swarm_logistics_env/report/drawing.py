@@ -1,13 +1,11 @@
 """Drawing with matplotlib, which is loaded only when a figure is drawn.
 
-The colours are those of Okabe and Ito, and every series has a marker of its own as well. Lines and
-letters are drawn in `INK` on `PAPER`, and a page puts its own colours in the place of these two.
+The colours are those of Okabe and Ito, and every series has a marker of its own as well.
 """
 
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -36,6 +34,8 @@ _STYLE: Any = {  # matplotlib types each of its names
     "axes.spines.right": False, "axes.spines.top": False,
     "axes.titlelocation": "left", "axes.titlesize": "medium",
     "font.family": "DejaVu Sans", "font.size": 9.5, "lines.linewidth": 1.6,
+    "xtick.labelsize": 8.0, "ytick.labelsize": 8.0, "errorbar.capsize": 3.0,
+    "lines.markersize": 5.0,
     "legend.columnspacing": 1.2, "legend.fontsize": 9.0, "legend.frameon": False,
     "legend.handletextpad": 0.5,
     "svg.fonttype": "none", "svg.hashsalt": "swarm-logistics-env", "text.parse_math": False,
@@ -106,82 +106,61 @@ def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
     for axes, panel in zip(grid[:, 0], panels):
         _panel(axes, panel)
     if len({point.style for point in panels[0].points}) > 1:
-        _legend(canvas, grid[0, 0], lines=False)
+        _legend(canvas, grid[0, 0])
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
     categories = list(dict.fromkeys(point.category for point in panel.points))
-    bottom, top = _range(panel)
-    for threshold in panel.thresholds:
-        if bottom <= threshold <= top:
-            axes.axhline(threshold, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     styles = sorted({point.style for point in panel.points})
+    for threshold in panel.thresholds:
+        axes.axhline(threshold, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     spread = min(0.8, 0.24 * len(styles))
-    named: set[int] = set()
     for point in panel.points:
         index = styles.index(point.style)
         x = categories.index(point.category) + spread * ((index + 0.5) / len(styles) - 0.5)
-        colour = COLOURS[point.style % len(COLOURS)]
         if point.published is not None:  # beside the mark, which would hide it
-            axes.plot(x + 0.1, point.published, "x", color=INK, markersize=4.5, zorder=4)
-        if point.value is None:
-            continue
-        _bar(axes, x, point, (bottom, top), colour)
-        (mark,) = axes.plot(x, point.value, MARKERS[point.style % len(MARKERS)], color=colour)
-        mark.set(markerfacecolor=colour if point.decided else PAPER, zorder=3)
-        if point.style not in named:
-            mark.set_label(point.series)
-            named.add(point.style)
-        if point.saturated:
+            axes.plot(x + 0.1, point.published, "x", color=INK, zorder=4)
+        _mark(axes, x, point)
+        if point.value is not None and point.saturated:
             axes.annotate("†", (x, point.value), (-9, 3), textcoords="offset points", fontsize=9)
     axes.set_xticks(range(len(categories)), categories)
-    if len(categories) > 6:
-        axes.tick_params(axis="x", labelsize=8.0)
     if sum(len(category) + 2 for category in categories) > 80:
         axes.tick_params(axis="x", rotation=40)
-    axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=(bottom, top))
+    axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=_limits(panel.points))
     axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
 
 
-def _range(panel: Panel) -> tuple[float, float]:
-    """Axis limits: all values and thresholds, and intervals up to twice their span beyond."""
-    values = [x for p in panel.points for x in (p.value, p.published) if x is not None]
-    inner = [*values, *panel.thresholds[:1]]
-    if values and max(values) > 0.5 * panel.thresholds[-1]:
-        inner.append(panel.thresholds[-1])
-    return _around(inner, panel.points, least=1.5)
-
-
-def _around(inner: Sequence[float], points: Sequence[Point], least: float) -> tuple[float, float]:
-    low, high = min(inner), max(inner)
-    reach = max(2.0 * (high - low), least)
-    limits = [x for p in points for x in (p.low, p.high) if x is not None and math.isfinite(x)]
-    low = max(low - reach, min([low, *limits]))
-    high = min(high + reach, max([high, *limits]))
+def _limits(points: Sequence[Point]) -> tuple[float, float]:
+    """Return axis limits: 0, all values, and intervals up to twice the values' span beyond."""
+    values = [0.0, *(x for p in points for x in (p.value, p.published) if x is not None)]
+    ends = [*values, *(x for p in points for x in (p.low, p.high) if x is not None)]
+    reach = max(2.0 * (max(values) - min(values)), 1.0)
+    low = max(min(ends), min(values) - reach)
+    high = min(max(ends), max(values) + reach)
     margin = 0.06 * max(high - low, 0.5)
     return low - margin, high + margin
 
 
-def _bar(
-    axes: Axes,
-    at: float,
-    point: Point,
-    within: tuple[float, float],
-    colour: str,
-    *,
-    level: bool = False,
-) -> None:
-    """Draw an interval, upright or level; an arrow where it leaves the axis limits."""
-    if point.low is None or point.high is None:
+def _mark(axes: Axes, at: float, point: Point, *, level: bool = False) -> None:
+    """Draw a value, if there is one, with its interval, upright or level."""
+    value, low, high = point.value, point.low, point.high
+    if value is None:
         return
-    bottom, top = within
-    ends = max(point.low, bottom), min(point.high, top)
-    lines = axes.hlines if level else axes.vlines
-    lines(at, *ends, color=colour, linewidth=1.4, zorder=2)
-    for limit, end, arrow in zip((point.low, point.high), ends, "<>" if level else "v^"):
-        sign = arrow if limit != end else "|" if level else "_"
-        place = (end, at) if level else (at, end)
-        axes.plot(*place, sign, color=colour, markersize=5, clip_on=limit == end)
+    place = point.style % len(COLOURS)
+    colour, error = COLOURS[place], None
+    if low is not None and high is not None:
+        # An infinite end is drawn far outside.
+        error = np.clip([[value - low], [high - value]], 0.0, 1e3)
+    axes.errorbar(
+        value if level else at,
+        at if level else value,
+        xerr=error if level else None,
+        yerr=None if level else error,
+        fmt="o" if level else MARKERS[place],
+        color=colour,
+        markerfacecolor=colour if point.decided else PAPER,
+        label=point.series,
+    )
 
 
 def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
@@ -192,26 +171,17 @@ def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
         rows: the label of each, and its points; a point's `published` is its threshold.
     """
     axes = canvas.subplots()
-    points = [point for _, here in rows for point in here]
-    known = [x for p in points for x in (p.value, p.published) if x is not None]
-    within = _around([0.0, *known], points, least=0.5)
     for place, (_, here) in enumerate(rows):
         for index, point in enumerate(here):
-            at = place + 0.6 * ((index + 0.5) / len(here) - 0.5)
+            _mark(axes, place + 0.6 * ((index + 0.5) / len(here) - 0.5), point, level=True)
             if point.published:
                 axes.vlines(point.published, place - 0.4, place + 0.4, color=INK, linewidth=0.8)
-            if point.value is None:
-                continue
-            colour = COLOURS[point.style % len(COLOURS)]
-            _bar(axes, at, point, within, colour, level=True)
-            fill = colour if point.decided else PAPER
-            axes.plot(point.value, at, "o", color=colour, markersize=4, markerfacecolor=fill)
     axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     axes.set_yticks(range(len(rows)), [label for label, _ in rows])
-    axes.tick_params(axis="y", labelsize=8.0)
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
-    axes.set(ylim=(len(rows) - 0.4, -0.6), xlim=within, xlabel="indicator")
+    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="indicator")
+    axes.set_xlim(_limits([point for _, here in rows for point in here]))
 
 
 def rates(
@@ -232,19 +202,25 @@ def rates(
             if not np.isnan(curve.low).any():
                 band = curve.seconds, curve.low.clip(0.0), curve.high
                 axes.fill_between(*band, color=colour, alpha=0.16, linewidth=0)
-            (line,) = axes.plot(curve.seconds, curve.deliveries, color=colour, label=curve.runs)
-            line.set(linestyle=LINES[index % len(LINES)], marker=MARKERS[index % len(MARKERS)])
-            line.set(markevery=(index * 4, 12), markersize=4.5)
+            axes.plot(
+                curve.seconds,
+                curve.deliveries,
+                LINES[index % len(LINES)],
+                color=colour,
+                label=curve.runs,
+                marker=MARKERS[index % len(MARKERS)],
+                markevery=(index * 4, 12),
+            )
         axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
         axes.set(ylabel=y_label, title=title)
     grid[-1, 0].set_xlabel("end of the window [s]")
-    _legend(canvas, grid[0, 0], lines=True)
+    _legend(canvas, grid[0, 0])
     # After the last panel, as this fixes the scale, which all panels share.
     axes.set_ylim(bottom=0.0)
 
 
-def _legend(canvas: Canvas, axes: Axes, *, lines: bool) -> None:
-    """Put the legend of one pair of axes above all of them."""
+def _legend(canvas: Canvas, axes: Axes) -> None:
+    """Put the legend of one pair of axes above all of them, each series once."""
     handles, labels = axes.get_legend_handles_labels()
-    columns, length = min(len(labels), 3), 2.6 if lines else 1.0
-    canvas.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=length)
+    series = dict(zip(labels, handles))
+    canvas.legend(series.values(), series, loc="outside upper left", ncols=min(len(series), 3))

@@ -21,8 +21,8 @@ _COLUMNS = [
     "verdict_holm", "published", "saturated",
 ]  # fmt: skip
 _MARKS = (
-    "Filled: the Holm-adjusted verdict is decided; hollow: open; bars: 95 % intervals, an arrow "
-    "where a bar leaves the axis; dashed: thresholds"
+    "Filled: the Holm-adjusted verdict is decided; hollow: open; bars: 95 % intervals, without an "
+    "end where they leave the axis; dashed: thresholds"
 )
 
 

@@ -44,10 +44,10 @@ function put(place, width, height, drawn, name) {
 
 const known = (values) => values.filter((value) => value !== null && value !== undefined);
 
-// The comparison: every policy over the same categories, on one axis
+// The comparison: every policy over the same categories, on one axis; P also seed by seed
 
 function dotsOf(point) {
-  return point.seeds || data.conditions[point.condition].p;
+  return point.condition === undefined ? [] : data.conditions[point.condition].p;
 }
 
 function rangeOf(view) {
@@ -118,7 +118,7 @@ function drawComparison() {
   at("policies").innerHTML = shown.map((policy) => {
     const c = data.policies.indexOf(policy);
     return `<span><svg width="12" height="12" viewBox="-6 -6 12 12" style="display:inline"><path d="${MARKS[c % 6](0, 0)}" fill="${colour(c)}"/></svg> ${escaped(policy)}</span>`;
-  }).join("") + `<span>bar: 95 % interval</span><span>dot: one ${repeat}, click it</span>` + (crosses.length ? "<span>×: published</span>" : "");
+  }).join("") + `<span>bar: 95 % interval</span>${view.thresholds.length ? "" : `<span>dot: one ${repeat}, click it</span>`}` + (crosses.length ? "<span>×: published</span>" : "");
 }
 
 // One question: paired slopes, delivery curves, and one run
@@ -258,7 +258,7 @@ function options(select, names) {
 options(at("views"), data.views.map((view) => view.name));
 at("views").addEventListener("change", drawComparison);
 drawComparison();
-choose(data.first);
+choose(0);
 function draw() {
   drawComparison();
   showQuestion();

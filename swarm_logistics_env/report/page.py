@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
-from swarm_logistics_env import spi
-from swarm_logistics_env.studies.comparison import Arm, Comparison
+from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT, Outcome
@@ -41,15 +40,13 @@ def page_data(results: StudyResults) -> Json:
     """Return all that the page's script needs, as JSON holds it."""
     arms = {arm.case.key: arm for _, _, arm in results.plan.cells}
     places = {key: place for place, key in enumerate(arms)}
-    labels = dict.fromkeys((*results.policies, *(a.case.policy.title for a in arms.values())))
     return {
-        "policies": list(labels),
+        "policies": [*results.policies],
         "seeds": [int(seed) for seed in results.plan.seeds],
         "paired": results.plan.paired,
         "conditions": list(_conditions(results, list(arms.values()))),
         "questions": [_question(results, test, places) for test in results.verdicts],
         "views": [*_performance_views(results, places), *_indicator_views(results)],
-        "first": _first(results.verdicts),
     }
 
 
@@ -106,26 +103,14 @@ def watch_command(arm: Arm) -> str | None:
 def _question(results: StudyResults, test: Verdict, places: dict[str, int]) -> Json:
     told, compared = sentence(results, test), test.compared
     return {
-        "policy": compared.policy,
         "table": compared.table,
         "head": told.head,
         "text": told.text,
-        "verdict": told.verdict,
         "arms": [
             [compared.definition.performances[name], str(arm.setting), places[arm.case.key]]
             for name, arm in compared.arguments.items()
         ],
     }
-
-
-def _first(tests: Sequence[Verdict]) -> int:
-    """Return the question that the page opens with: the lowest value that is refuted, or any."""
-    refuted = (
-        (test.value, number)
-        for number, test in enumerate(tests)
-        if test.answer_holm == "refuted" and test.value is not None
-    )
-    return min(refuted, default=(0.0, 0))[1]
 
 
 def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterator[Json]:
@@ -155,7 +140,7 @@ def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterato
 
 
 def _indicator_views(results: StudyResults) -> Iterator[Json]:
-    """Yield every pair of axes of the figures, each value with that of every single seed."""
+    """Yield every pair of axes of the figures."""
     numbers = {test.compared: number for number, test in enumerate(results.verdicts)}
     for where, panel in indicator_panels(results):
         categories = list(dict.fromkeys(point.category for point in panel.points))
@@ -171,32 +156,11 @@ def _indicator_views(results: StudyResults) -> Iterator[Json]:
                     **_limits(point.value, point.low, point.high),
                     "published": _number(point.published),
                     "question": numbers[test.compared],
-                    "seeds": _seed_by_seed(results, test.compared),
                 }
                 for point, test in zip(panel.points, panel.tests)
                 if point.value is not None
             ],
         }
-
-
-def _seed_by_seed(results: StudyResults, compared: Comparison) -> list[JsonValue]:
-    """Return an indicator's value from each seed alone; None where it is undefined."""
-    if not results.plan.paired:
-        return []
-    # Of several trainings the mean at each seed.
-    samples = {
-        arm: np.atleast_2d(cell.by_seed).mean(axis=0)
-        for arm, cell in results.cells_of(compared).items()
-    }
-    values: list[JsonValue] = []
-    for place in range(len(results.plan.seeds)):
-        try:
-            one = compared.estimate({arm: p[place : place + 1] for arm, p in samples.items()})
-        except spi.IndicatorError:
-            values.append(None)
-        else:
-            values.append(_number(one.value))
-    return values
 
 
 def _limits(*limits: float | None) -> Json:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -44,7 +44,6 @@ FLAGS = {
     "its level says",
 }
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
-Row = TypeVar("Row")
 Texts = tuple[str, ...]
 
 
@@ -84,22 +83,6 @@ class Section(NamedTuple):
     lines: Texts = ()
     sentences: tuple[Sentence, ...] = ()
     figures: tuple[Figure, ...] = ()
-
-    @classmethod
-    def table(
-        cls,
-        title: str,
-        records: Iterable[Row],
-        columns: Sequence[tuple[str, Callable[[Row], str]]],
-        *lines: str,
-    ) -> Section:
-        """Return a table with a row for each record, and lines of text below it.
-
-        Args:
-            columns: heading of each, and what stands there for a record.
-        """
-        rows = tuple(tuple(text(record) for _, text in columns) for record in records)
-        return cls(title, tuple(heading for heading, _ in columns), rows, lines)
 
 
 def slug(*parts: object) -> str:

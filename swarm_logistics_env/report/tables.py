@@ -11,7 +11,6 @@ from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.measures import (
     Agreement,
     RepairCurve,
-    Resilience,
     agreements,
     resiliences,
 )
@@ -45,7 +44,9 @@ def tables(results: StudyResults) -> Iterator[Section]:
         asked_here = tests.get(place, ())
         for indicator, asked in grouped(asked_here, lambda test: test.compared.indicator).items():
             answers = _answers(indicator, asked, published=published)
-            yield Section.table(title, rows, [*columns, *answers])
+            shown = [*columns, *answers]
+            lines = tuple(tuple(text(cell) for _, text in shown) for cell in rows)
+            yield Section(title, tuple(heading for heading, _ in shown), lines)
             # P is printed once: the tables of further indicators hold what was asked alone.
             changed = {test.compared.changed for test in asked}
             rows = [cell for cell in rows if cell.arm in changed]
@@ -137,18 +138,18 @@ def _on_claim(test: Verdict) -> str:
 
 def _times_to_clear(results: StudyResults) -> Iterator[Section]:
     """Yield the time until all items were delivered, where a run delivered all of them."""
-    cells = [c for c in results.cells if any(run.all_delivered for run in c.outcomes)]
-    if cells:
-        yield Section.table(
-            "Time until all items are delivered",
-            cells,
-            [
-                ("", lambda cell: f"{cell.policy}: {cell.words}"),
-                ("median [s], 95 %", section.time_to_clear),
-            ],
-            'No number of items caps it. "x of y": so many runs were not done when the time was '
-            "up; ∞: nor was the median.",
-        )
+    rows = tuple(
+        (f"{cell.policy}: {cell.words}", section.time_to_clear(cell))
+        for cell in results.cells
+        if any(run.all_delivered for run in cell.outcomes)
+    )
+    line = (
+        'No number of items caps it. "x of y": so many runs were not done when the time was up; '
+        "∞: nor was the median."
+    )
+    if rows:
+        columns = "", "median [s], 95 %"
+        yield Section("Time until all items are delivered", columns, rows, (line,))
 
 
 def _agreement(found: Agreement) -> Section:
@@ -215,61 +216,49 @@ def fault_sections(results: StudyResults) -> Iterator[Section]:
     found = list(resiliences(results))
     if not found:
         return
-    who: list[tuple[str, Callable[[Resilience], str]]] = [
-        ("policy", lambda one: one.compared.policy),
-        ("fault", lambda one: str(one.compared.changed.setting)),
-    ]
-    yield Section.table(
-        "Resilience: deliveries after the onset",
-        found,
-        [
-            *who,
-            ("over the removed robots' [95 %]", lambda r: section.bracketed(r.against_removed, 3)),
-            ("above 1", lambda one: _verdict(one.against_removed)),
-            ("over the whole swarm's [95 %]", lambda one: section.bracketed(one.against_whole, 3)),
-            ("above 1 - m/N", lambda one: _verdict(one.against_whole)),
-        ],
+    who = [(one.compared.policy, str(one.compared.changed.setting)) for one in found]
+    columns = (
+        "policy", "fault", "over the removed robots' [95 %]", "above 1",
+        "over the whole swarm's [95 %]", "above 1 - m/N",
+    )  # fmt: skip
+    rows = tuple(
+        (*whose, *_index(one.against_removed), *_index(one.against_whole))
+        for whose, one in zip(who, found)
+    )
+    line = (
         "Deliveries after the onset over those of the paired reference. Reference with the robots "
         "removed at the onset: fault tolerance local in time; whole swarm: robustness local in "
-        f"time. Verdicts unadjusted; {section.seeds_text(results)}.",
+        f"time. Verdicts unadjusted; {section.seeds_text(results)}."
     )
+    yield Section("Resilience: deliveries after the onset", columns, rows, (line,))
     figures = tuple(rate_figures(results))
     if figures:
         yield Section("", figures=figures)
-    single = [one for one in found if one.single]
+    columns = ("policy", "fault", "median [s]", "not back", "null's median [s]", "null not back")
+    rows = tuple(
+        (*whose, *_back(one.single[0]), *_back(one.single[1]))
+        for whose, one in zip(who, found)
+        if one.single
+    )
     problems = [
-        f"{one.compared.policy}, {one.compared.changed.setting}: no time to come back: "
-        f"{one.problem}."
-        for one in found
+        f"{policy}, {fault}: no time to come back: {one.problem}."
+        for (policy, fault), one in zip(who, found)
         if one.problem
     ]
-    yield Section.table(
-        "Time until single runs are back",
-        single,
-        [
-            *who,
-            ("median [s]", lambda one: _median(one.single[0])),
-            ("not back", lambda one: _not_back(one.single[0])),
-            ("null's median [s]", lambda one: _median(one.single[1])),
-            ("null not back", lambda one: _not_back(one.single[1])),
-        ],
-        _SINGLE_TEXT,
-        *problems,
-    )
+    yield Section("Time until single runs are back", columns, rows, (_SINGLE_TEXT, *problems))
 
 
-def _verdict(estimate: Estimate | None) -> str:
+def _index(estimate: Estimate | None) -> Texts:
+    """Return an index with its interval, and its verdict."""
     if estimate is None:
-        return "undefined"
-    if estimate.identical:
-        return section.UNAFFECTED
-    return section.said(estimate.verdict) + section.SATURATED * ("capped" in estimate.flags)
+        return NOTHING, "undefined"
+    said = section.UNAFFECTED if estimate.identical else section.said(estimate.verdict)
+    capped = section.SATURATED * ("capped" in estimate.flags)
+    return section.bracketed(estimate, 3), said + capped
 
 
-def _median(found: RepairCurve) -> str:
+def _back(found: RepairCurve) -> Texts:
+    """Return the median time until runs are back, and how many never are."""
     median = found.curve.median()
-    return "not reached" if median is None else f"{median:g}"
-
-
-def _not_back(found: RepairCurve) -> str:
-    return f"{np.count_nonzero(~found.back)} of {found.back.size} runs"
+    told = "not reached" if median is None else f"{median:g}"
+    return told, f"{np.count_nonzero(~found.back)} of {found.back.size} runs"

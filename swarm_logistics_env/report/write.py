@@ -5,13 +5,13 @@ Equal rows give equal bytes.
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import StudyError, how_to_install
 from swarm_logistics_env.records import becoming, plain
@@ -20,12 +20,9 @@ from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS, S
 from swarm_logistics_env.studies.runs import write_csv
 
 from .document import Document, document
-from .drawing import INK, PAPER, images
+from .drawing import images
 from .page import axis, page_data
 from .section import WORDS, Section
-
-if TYPE_CHECKING:
-    from jinja2 import Template
 
 
 def write_report(
@@ -57,7 +54,7 @@ def write_report(
             write_text(pictures / f"{figure.name}.svg", svg)
             with becoming(pictures / f"{figure.name}.png", StudyError) as part:
                 part.write_bytes(png)
-            drawings[figure.name] = _inline_svg(figure.name, svg)
+            drawings[figure.name] = base64.b64encode(svg.encode()).decode()
         write_text(paths[0], markdown(whole, pictures=pictures.name))
         write_text(page, html(results, whole, drawings))
     except OSError as error:
@@ -73,19 +70,6 @@ def write_text(path: Path, text: str) -> None:
     """
     with becoming(path, StudyError) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
-
-
-def _inline_svg(name: str, svg: str) -> str:
-    """Return an SVG drawing as part of a page: its ink, its paper, its width, ids of its own."""
-    drawing = svg[svg.index("<svg") :]
-    drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.DOTALL)
-    head, rest = drawing.split(">", 1)
-    box = re.search(r'viewBox="[^"]*"', head)
-    assert box is not None
-    rest = rest.replace(INK, "currentColor").replace(PAPER, "var(--paper)")
-    rest = re.sub(r'\bid="', f'id="{name}-', rest)
-    rest = re.sub(r'(href="|url\()#', rf"\1#{name}-", rest)
-    return f'<svg {box.group(0)} role="img" aria-label="{name}">{rest}'
 
 
 def missing_packages() -> tuple[str, ...]:
@@ -157,10 +141,19 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
     Args:
         results: what its script draws.
         document: the report.
-        drawings: inline SVG of every figure, by name.
+        drawings: SVG of every figure in base64, by name.
     """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("swarm_logistics_env", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     data = page_data(results)
-    return template("page.html.jinja").render(
+    return environment.get_template("page.html.jinja").render(
         document=document,
         paired=results.plan.paired,
         answer=document.answer,
@@ -173,28 +166,6 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
     )
-
-
-def template(name: str) -> Template:
-    """Return a template of this folder, in which all text is escaped."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("swarm_logistics_env", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["unbroken"] = _unbroken
-    return environment.get_template(name)
-
-
-def _unbroken(text: str) -> str:
-    """Return text whose numbers keep their units, and equations their two sides, on one line."""
-    held = r"(?<=\d) (?=%|s\b)| (?=[=<→] )|(?<=[=<→]) "
-    return re.sub(held, "\N{NO-BREAK SPACE}", text.replace("->", "→"))
 
 
 _ESCAPES = {

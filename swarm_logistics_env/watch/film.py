@@ -78,16 +78,15 @@ class Film:
         Raises:
             PolicyError: a policy returned commands of the wrong shape, or not finite.
         """
-        frame, count, time = self._draw(), 0, 0.0
-        yield frame
-        while time < self._until and not all(take.play.is_over for take in self._takes):
-            count += 1
+        for count in range(self.n_frames - self._n_last):
             time = min(count * self._period, self._until)
             for take in self._takes:
                 while not take.play.is_over and take.play.world.state.time < time - 5e-7:
                     take.play.step()
             frame = self._draw()
             yield frame
+            if all(take.play.is_over for take in self._takes):
+                break
         for _ in range(self._n_last):
             yield frame
 

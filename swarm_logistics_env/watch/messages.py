@@ -19,7 +19,6 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import columns, unflatten
 from swarm_logistics_env.rendering import palette
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
 
@@ -32,8 +31,6 @@ _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius",
 )  # fmt: skip
-# Several things stand in each of these blocks; those that are absent come last and are left out.
-_BLOCKS = ("item", "neighbour", "lowest_timer")
 _TIMER_STEPS = 8  # shades of the timer's halo
 
 
@@ -86,22 +83,24 @@ def encode(message: Message) -> str:
     return json.dumps(message, separators=(",", ":"), allow_nan=False)
 
 
-_checked = validate_call(config=ConfigDict(strict=True, arbitrary_types_allowed=True))
+_checked = validate_call(
+    config=ConfigDict(strict=True, arbitrary_types_allowed=True, allow_inf_nan=False)
+)
 # Orders by name; the rest of an order is the arguments, which have to be of the right types.
 _ORDERS: dict[str, Callable[..., object]] = {
-    "pause": _checked(Session.pause),
-    "step": _checked(Session.step),
-    "speed": _checked(Session.set_speed),
-    "next": _checked(Session.next_seed),
-    "again": _checked(Session.restart),
-    "compare": _checked(Session.compare),
-    "select": _checked(Session.select),
-    "choose": _checked(Session.choose_mode),
-    "break": _checked(Session.break_robot),
-    "repair": _checked(Session.repair_robot),
-    "toggle": _checked(Session.toggle_robot),
-    "resize": _checked(Session.resize),
-    "widen": _checked(Session.set_delivery_width),
+    "pause": Session.pause,
+    "step": Session.step,
+    "speed": Session.set_speed,
+    "next": Session.next_seed,
+    "again": Session.restart,
+    "compare": Session.compare,
+    "select": Session.select,
+    "choose": Session.choose_mode,
+    "break": Session.break_robot,
+    "repair": Session.repair_robot,
+    "toggle": Session.toggle_robot,
+    "resize": Session.resize,
+    "widen": Session.set_delivery_width,
 }
 
 
@@ -112,38 +111,18 @@ def obey(session: Session, text: str) -> None:
         SwarmLogisticsError: it says nothing that can be done.
     """
     try:
-        arguments = json.loads(text, parse_constant=_refuse)
+        arguments = json.loads(text)
         act = _ORDERS[arguments.pop("do")]
     except (ValueError, RecursionError, LookupError, TypeError, AttributeError):
         raise SetupError(
             f'order: should be a JSON object whose "do" is one of {", ".join(_ORDERS)}'
         ) from None
     try:
-        act(session, **arguments)
+        _checked(act)(session, **arguments)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise SetupError(f"order {where}: {first['msg']}") from None
-
-
-def observation_parts(
-    row: NDArray[np.float32], scenario: Scenario
-) -> list[tuple[str, str, list[float]]]:
-    """Return name, unit and values of every named part of an observation row (D,).
-
-    Items and neighbours are listed only if present, the nearest first.
-    """
-    parts = unflatten(row, scenario)
-    found = []
-    for column in columns(scenario):
-        values = parts[column.name]
-        block = next((block for block in _BLOCKS if column.name.startswith(block)), None)
-        if block is not None and column.name != f"{block}_present":
-            n_present = int((parts[f"{block}_present"] > 0.5).sum())
-            values = values[: n_present * (len(values) // len(parts[f"{block}_present"]))]
-        # Adding 0.0 turns a negative zero into zero.
-        found.append((column.name, column.unit, [round(float(v), 2) + 0.0 for v in values]))
-    return found
 
 
 def _arena(play: Play) -> Message:
@@ -181,8 +160,8 @@ def _selected(session: Session) -> Message | None:
     robot = session.selected
     if robot is None:
         return None
-    state, row = session.state, session.run.world.observe()[robot]
-    seen = unflatten(row, session.scenario)
+    state = session.state
+    seen = unflatten(session.run.world.observe()[robot], session.scenario)
     beams = np.min([seen[f"range_{what}"] for what in ("robots", "walls", "items")], axis=0)
     return {
         "robot": robot,
@@ -191,17 +170,17 @@ def _selected(session: Session) -> Message | None:
         "beams": [round(float(reach), 3) for reach in beams],
         "reach": round(float(state.ranger_range[robot]), 3),
         "view": round(float(state.view_range[robot]), 3),
-        "row": observation_parts(row, session.scenario),
+        # Adding 0.0 turns a negative zero into zero.
+        "row": [
+            (part.name, part.unit, [round(value, 2) + 0.0 for value in seen[part.name].tolist()])
+            for part in columns(session.scenario)
+        ],
     }
 
 
 def _millimetres(places: NDArray[np.float64]) -> list[list[int]]:
     whole: list[list[int]] = np.rint(1000.0 * places).astype(int).tolist()
     return whole
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no JSON")
 
 
 _SPACING = 0.5  # [s] between frames; the page draws what lies between

@@ -6,14 +6,12 @@ import asyncio
 import contextlib
 import hmac
 import logging
-import os
 import re
 import secrets
 import threading
 import time
 from collections.abc import Callable
 from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, how_to_install
@@ -29,7 +27,6 @@ LOOPBACK = "127.0.0.1"
 _OWN_NAMES = ("localhost", LOOPBACK, "::1")
 _ADDRESS = re.compile(r"[\d.]+|[\da-f.]*:[\da-f:.]*")  # what is written so is no name
 _HOST = re.compile(r"([^\s:/@\[\]]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
-_TOKEN = re.compile(r"[\w-]{24}")
 FILES = {
     "page.html": "text/html",
     "page.css": "text/css",
@@ -58,7 +55,6 @@ class WatchServer:
     Args:
         session: the session to show.
         port: the port; 0 takes any that is free.
-        token: 24 letters, digits, - or _; None: random ones.
         host: the name or address of this machine to listen on; "0.0.0.0" or "::" are all.
 
     Attributes:
@@ -68,16 +64,14 @@ class WatchServer:
         SetupError: aiohttp is not installed.
     """
 
-    def __init__(
-        self, session: Session, port: int, token: str | None = None, host: str = LOOPBACK
-    ) -> None:
+    def __init__(self, session: Session, port: int, host: str = LOOPBACK) -> None:
         try:
             from aiohttp import web
         except ImportError as error:
             raise SetupError(f"watch needs aiohttp ({error}): {how_to_install('watch')}") from None
         self._web = web
         self.session, self.port, self.host = session, port, host
-        self.token = token or secrets.token_urlsafe(18)
+        self.token = secrets.token_urlsafe(18)
         self.recording = Recording(session)
         self.address = ""
         self._pages: dict[web.WebSocketResponse, Message] = {}
@@ -108,12 +102,8 @@ class WatchServer:
             await site.start()
         except OSError as error:
             await self._runner.cleanup()
-            if "in use" in str(error):
-                raise SetupError(
-                    f"port = {self.port}: is in use: should be another one, or --port 0 for any "
-                    "that is free"
-                ) from None
-            raise SetupError(f"host = {self.host}, port = {self.port}: {error.strerror}") from None
+            told = f"{error.strerror}; --port 0 takes any that is free"
+            raise SetupError(f"host = {self.host}, port = {self.port}: {told}") from None
         self.port = self._runner.addresses[0][1]
         shown = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
         shown = f"[{shown}]" if ":" in shown else shown
@@ -217,25 +207,6 @@ async def _add_headers(request: web.Request, response: web.StreamResponse) -> No
     response.headers.update(_HEADERS)
 
 
-def kept_token() -> str | None:
-    """Return this user's token, so that an open page finds the server again; None if it can't be.
-
-    It is kept in a file that only the user can read, in the folder for the state of programs.
-    """
-    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-    file = Path(state) / "swarm-logistics" / "watch-token"
-    try:
-        with contextlib.suppress(FileExistsError):
-            file.parent.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with os.fdopen(descriptor, "w") as opened:
-                opened.write(secrets.token_urlsafe(18))
-        token = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return None
-    return token if _TOKEN.fullmatch(token) else None
-
-
 def serve(
     session: Session,
     port: int,
@@ -256,7 +227,7 @@ def serve(
     """
 
     async def run() -> None:
-        server = WatchServer(session, port, kept_token(), host)
+        server = WatchServer(session, port, host)
         await server.start()
         announce(
             f"Open {server.address} in a browser on this machine (from another one: "

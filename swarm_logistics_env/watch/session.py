@@ -173,7 +173,7 @@ class Session:
         fault = Fault(self.mode, [robot], onset=now)
         self._set_faults([*self.run.world.faults, fault])
         self._look_after_selection()
-        self._log(robot, self.mode)
+        self.events.append(Event(self.state.time, robot, self.mode))
         self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
 
     def repair_robot(self, robot: int | None = None) -> None:
@@ -191,7 +191,7 @@ class Session:
             else:
                 kept.append(fault)
         self._set_faults(kept)
-        self._log(robot, None)
+        self.events.append(Event(self.state.time, robot, None))
         self.note = f"robot {robot} is repaired"
 
     def toggle_robot(self, robot: int) -> None:
@@ -248,9 +248,6 @@ class Session:
         robot, present = self.selected, self.state.robot_present
         if robot is not None and not (robot < len(present) and present[robot]):
             self.selected = None
-
-    def _log(self, robot: int, mode: str | None) -> None:
-        self.events.append(Event(self.state.time, robot, mode))
 
     def _meant(self, robot: int | None) -> int:
         if robot is None:

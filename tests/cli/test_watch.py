@@ -41,13 +41,13 @@ sys.exit(app.run(["watch", "--port", "0", "--set", "n_robots=5"]))
 """
 
 
-def test_page_is_served_until_ctrl_c_without_pygame(tmp_path: Path) -> None:
+def test_page_is_served_until_ctrl_c_without_pygame() -> None:
     started = subprocess.Popen(
         [sys.executable, "-u", "-c", SCRIPT],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONWARNINGS": "error", "XDG_STATE_HOME": str(tmp_path)},
+        env={**os.environ, "PYTHONWARNINGS": "error"},
     )
     assert started.stdout
     found = re.search(r"http://127\.0\.0\.1:(\d+)(/\S+/) in a browser", started.stdout.readline())

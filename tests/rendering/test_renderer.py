@@ -37,10 +37,10 @@ def frame(state: WarehouseState, scenario: Scenario, size: int = 400) -> Frame:
 
 def arena(state: WarehouseState, scenario: Scenario, size: int = 400) -> Frame:
     """The part of a picture that shows the warehouse: no caption, no margin."""
-    from swarm_logistics_env.rendering.picture import Projection  # loads pygame
+    from swarm_logistics_env.rendering.picture import Picture  # loads pygame
 
-    place = Projection.fitting(scenario, size, 0)
-    return frame(state, scenario, size)[place.top : place.bottom, place.left : place.right]
+    floor = Picture(scenario, size).floor
+    return frame(state, scenario, size)[floor.top : floor.bottom, floor.left : floor.right]
 
 
 def count(picture: Frame, colour: palette.RGB) -> int:

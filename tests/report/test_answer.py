@@ -85,7 +85,7 @@ def test_words_for_what_is_no_plain_verdict() -> None:
     assert "provisional" not in same.last
 
 
-def test_policies_stand_one_below_the_other_with_p_as_a_multiple(compared: StudyResults) -> None:
+def test_policies_stand_one_below_the_other_each_with_its_p(compared: StudyResults) -> None:
     text = digest(answer(compared), 80)
-    assert re.search(r"at N = 25, no fault: swarm-dt 39\.\d \[[\d., ]+\],\s+swarm-dt-f", text)
-    assert re.search(r"\(0\.5\d\s+times\)", text)
+    assert re.search(r"at N = 25, no fault: swarm-dt 39\.\d \[[\d., ]+\],\s+swarm-dt-follow", text)
+    assert re.search(r"swarm-dt-follow\s+20\.\d \[[\d., ]+\]\.", text)

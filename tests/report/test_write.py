@@ -62,7 +62,7 @@ def test_equal_rows_give_equal_bytes(few: StudyResults, directory: Path, tmp_pat
 
 def test_page_needs_nothing_but_itself(directory: Path) -> None:
     page = (directory / "report.html").read_text()
-    assert not re.search(r"https?:|\bsrc=|<(link|img|iframe|object)\b|@import|url\((?!#)", page)
+    assert not re.search(r"https?:|\bsrc=(?!\"data:)|<(link|iframe|object)\b|@import|url\(", page)
     # The browser itself refuses what would be loaded all the same.
     assert "default-src 'none'" in page
     beside = set(re.findall(r'href="([^#"][^"]*)"', page))
@@ -70,7 +70,7 @@ def test_page_needs_nothing_but_itself(directory: Path) -> None:
     assert all((directory / name).is_file() for name in beside)
     ids = re.findall(r'\bid="([^"]+)"', page)
     assert len(ids) == len(set(ids))
-    assert set(re.findall(r'(?:href="|url\()#([^")]+)', page)) <= set(ids)
+    assert set(re.findall(r'href="#([^"]+)', page)) <= set(ids)
 
 
 def test_every_figure_comes_as_drawing_and_data(few: StudyResults, directory: Path) -> None:
@@ -83,10 +83,10 @@ def test_every_figure_comes_as_drawing_and_data(few: StudyResults, directory: Pa
         drawing = file.with_suffix(".svg").read_text()
         assert ElementTree.fromstring(drawing).tag.endswith("svg")
         assert len(file.with_suffix(".csv").read_text().splitlines()) > 1
-        assert f'aria-label="{name}"' in page
+        assert f'alt="{name}"' in page
         assert f"](figures/{name}.png)" in text
     # At the narrow warehouse every item was delivered.
-    assert "† marks a P that is capped" in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "† marks a P that is capped" in page
     for name in few.plan.specification.scenario.model_dump():
         assert f'<th scope="row">{name}</th>' in page
 

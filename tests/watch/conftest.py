@@ -20,8 +20,8 @@ SMALL = Scenario(
 class Served:
     """A server that plays in a thread; its session is changed by orders alone."""
 
-    def __init__(self, port: int = 0, token: str | None = None, host: str = LOOPBACK) -> None:
-        self.server = WatchServer(Session(SMALL, speed=8.0), port, token, host)
+    def __init__(self, host: str = LOOPBACK) -> None:
+        self.server = WatchServer(Session(SMALL, speed=8.0), 0, host)
         self._started = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()))
         self._thread.start()

@@ -10,10 +10,8 @@ import os
 import random
 import signal
 import socket
-import stat
 import urllib.request
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -22,7 +20,7 @@ import pytest
 
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.server import WatchServer, kept_token, serve
+from swarm_logistics_env.watch.server import WatchServer, serve
 from tests.watch.conftest import SMALL, Served
 
 
@@ -131,8 +129,7 @@ def test_serves_on_the_host_that_was_asked_for(host: str, shown: str, statuses: 
     assert found == statuses
 
 
-def test_the_page_is_shown_once_it_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("swarm_logistics_env.watch.server.kept_token", lambda: None)
+def test_the_page_is_shown_once_it_is_served() -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     pages = []
 
@@ -241,18 +238,7 @@ def test_malformed_requests_neither_stop_it_nor_leak_a_path(
 
 
 def test_where_it_cannot_listen_is_told_in_a_sentence(asked: Served) -> None:
-    with pytest.raises(SetupError, match="is in use: should be another one"):
+    with pytest.raises(SetupError, match="in use; --port 0 takes any that is free"):
         asyncio.run(WatchServer(Session(SMALL), asked.server.port).start())
     with pytest.raises(SetupError, match=r"host = 192\.0\.2\.7, port = 0: "):
         asyncio.run(WatchServer(Session(SMALL), 0, host="192.0.2.7").start())
-
-
-def test_token_is_kept_for_this_user_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    token = kept_token()
-    assert token is not None
-    assert kept_token() == token
-    file = tmp_path / "swarm-logistics" / "watch-token"
-    assert stat.S_IMODE(file.stat().st_mode) == 0o600
-    file.write_text("no token")
-    assert kept_token() is None

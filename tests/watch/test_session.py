@@ -12,7 +12,7 @@ import pytest
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.messages import Recording, frame, observation_parts
+from swarm_logistics_env.watch.messages import Recording, frame
 
 SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
 
@@ -159,21 +159,20 @@ def test_policies_are_compared_with_the_same_faults() -> None:
     assert session.run.world.state.time == 0.0
 
 
-def test_observation_has_all_parts_and_only_what_is_present() -> None:
+def test_what_the_selected_robot_senses_is_shown() -> None:
     scenario = SMALL.replace(message_size=2)
     session = Session(scenario)
     session.play(3.0)
     for robot in range(8):
-        row = session.run.world.observe()[robot]
-        found = {name: values for name, _, values in observation_parts(row, scenario)}
-        parts = observations.unflatten(row, scenario)
-        assert list(found) == list(parts)
-        assert found["range_walls"] == pytest.approx(parts["range_walls"].tolist(), abs=0.0051)
-        assert len(found["item_x"]) == int(parts["item_present"].sum())
         session.select(robot)
+        shown = frame(session)["selected"]
+        parts = observations.unflatten(session.run.world.observe()[robot], scenario)
+        assert [name for name, _, _ in shown["row"]] == list(parts)
+        for name, _, values in shown["row"]:
+            assert values == pytest.approx(parts[name].tolist(), abs=0.0051)
         beams = [parts[f"range_{what}"] for what in ("robots", "walls", "items")]
         nearest = np.min(beams, axis=0).tolist()
-        assert frame(session)["selected"]["beams"] == pytest.approx(nearest, abs=0.00051)
+        assert shown["beams"] == pytest.approx(nearest, abs=0.00051)
 
 
 def test_a_recording_begins_anew_with_each_episode() -> None:

@@ -41,7 +41,7 @@ function connect() {
   socket.onmessage = ({ data }) => receive(JSON.parse(data));
   socket.onopen = () => { retries = 0; frames = []; latest = null; };
   socket.onclose = () => {
-    tell("The server has gone. Start swarm-logistics watch again: this page then goes on by itself.");
+    tell("The server has gone. Start swarm-logistics watch again and open the address that it prints.");
     setTimeout(connect, Math.min(2000, 250 * 2 ** retries++));
   };
 }
