@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 import typer
-from rich.markup import escape
 from typer import Exit, Option, echo
 
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
@@ -60,13 +59,12 @@ class Application:
         # so that its modules hide no installed ones.
         if "" not in sys.path:
             sys.path.append("")
-        typed = sys.argv[1:] if arguments is None else arguments
+        typed = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
         try:
             command = command_line({*typed[:1]} & {*COMMANDS} or COMMANDS)
-            _show_help_well(command)
             # What made a file is recorded in it: the command line is the context's object.
             words = shlex.join(["swarm-logistics", *typed])
-            code = command(arguments, standalone_mode=False, obj=words)
+            code = command(typed, standalone_mode=False, obj=words)
             sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
             return _complain("stopped", 130)
@@ -74,8 +72,6 @@ class Application:
             sentence = _sentence(error)
             if sentence is None:
                 raise
-            if not sentence:  # no command was named: the help has been printed
-                return 2
             return _complain(sentence, 2)
         return code if isinstance(code, int) else 0
 
@@ -88,9 +84,9 @@ def command_line(names: Iterable[str] = COMMANDS) -> Any:
     found = typer.Typer(
         name="swarm-logistics",
         help="A warehouse for robot swarms, and the measure of how they cope.",
-        no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # Rich would read `[px]` in a help text as a style
     )
     found.callback()(_options)
     for name in names:
@@ -117,17 +113,6 @@ def _options(
     ] = False,
 ) -> None:
     """Take the options that stand before a command."""
-
-
-def _show_help_well(command: Any) -> None:
-    """Escape the help of a command and of those below it: Rich reads `[px]` as a style."""
-    command.help = escape(command.help or "")
-    for parameter in command.get_params(typer.Context(command)):
-        parameter.help = escape(getattr(parameter, "help", None) or "")
-        if getattr(parameter, "is_flag", False):
-            parameter.metavar = " "  # a flag takes no value, though Typer shows its type
-    for below in getattr(command, "commands", {}).values():
-        _show_help_well(below)
 
 
 def _sentence(error: Exception) -> str | None:

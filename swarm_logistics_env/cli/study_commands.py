@@ -59,7 +59,7 @@ ClearingOption = Annotated[
     ),
 ]
 
-study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
+study = typer.Typer(name="study", help="Judge a swarm by its indicators.")
 
 
 @study.command("run")

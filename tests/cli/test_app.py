@@ -69,13 +69,12 @@ def command_lines(command: Any, *names: str) -> Iterator[tuple[list[str], Any]]:
 
 @pytest.mark.parametrize(("words", "parsed"), list(command_lines(command_line())))
 def test_a_help_page_shows_each_help_text_in_full(
-    words: list[str], parsed: Any, monkeypatch: pytest.MonkeyPatch, command: Command
+    words: list[str], parsed: Any, command: Command
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "400")
-    page = " ".join(command(" ".join(words)).split())
+    page = "".join(command(" ".join(words)).split())
     for text in [parsed.help, *(getattr(one, "help", "") for one in parsed.params)]:
-        assert " ".join((text or "").split()) in page
-    assert words != ["study", "run", "--help"] or ", ".join(PRESETS) in page
+        assert "".join((text or "").split()) in page
+    assert words != ["study", "run", "--help"] or ",".join(PRESETS) in page
 
 
 OWN = """
@@ -158,7 +157,7 @@ def test_run_prints_what_the_episode_gave(command: Command) -> None:
 def test_version_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["--version"]) == 0
     assert capsys.readouterr().out.strip() == swarm_logistics_env.__version__
-    assert app.run([]) == 2  # it prints its help and nothing else
+    assert app.run([]) == 0
     printed = capsys.readouterr()
     assert "Commands" in printed.out
     assert printed.err == ""
