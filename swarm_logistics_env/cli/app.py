@@ -10,7 +10,6 @@ import shlex
 import sys
 import traceback
 from collections.abc import Iterable
-from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
@@ -122,8 +121,6 @@ def _sentence(error: Exception) -> str | None:
     # These are Typer's own errors of usage, whichever click they come from.
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
-        if known := getattr(error, "possibilities", None):
-            error.possibilities = get_close_matches(error.option_name, known, 1)  # type: ignore[attr-defined]
         return str(format_message())
     if isinstance(error, SwarmLogisticsError | IndicatorError):
         return str(error)
