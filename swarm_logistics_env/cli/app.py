@@ -8,7 +8,6 @@ import json
 import os
 import shlex
 import sys
-import traceback
 from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
@@ -115,7 +114,7 @@ def _options(
 
 
 def _sentence(error: Exception) -> str | None:
-    """Return what to tell the user, or None for a bug of ours, whose traceback should be seen."""
+    """Return what to tell the user, or None for a bug, whose traceback should be seen."""
     from swarm_logistics_env.spi import IndicatorError
 
     # These are Typer's own errors of usage, whichever click they come from.
@@ -128,27 +127,7 @@ def _sentence(error: Exception) -> str | None:
         return f"{str(error.filename)[:40]}...: {error.strerror}: should be a shorter path"
     if isinstance(error, OSError) and error.errno in _NO_ROOM:
         return f"cannot write {error.filename or 'the output'}: {error.strerror}"
-    return _of_a_policy(error)
-
-
-def _of_a_policy(error: Exception) -> str | None:
-    """Return what a user's own policy raised, and where; None if the error came from elsewhere."""
-    from swarm_logistics_env.policies import policy
-
-    frames = traceback.extract_tb(error.__traceback__)
-    calls = [number for number, frame in enumerate(frames) if frame.filename == policy.__file__]
-    if not calls:
-        return None
-    beyond = frames[calls[-1] + 1 :]
-    where = ""
-    if beyond:
-        its_file = beyond[0].filename
-        if Path(its_file).is_relative_to(Path(policy.__file__).parents[1]):
-            return None
-        line = [frame.lineno for frame in beyond if frame.filename == its_file][-1]
-        where = f" ({its_file}, line {line})"
-    said = " ".join(str(error).split())
-    return f"the policy raised {type(error).__name__}: {said}{where}"
+    return None
 
 
 def _complain(sentence: str, code: int) -> int:
