@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import gc
 import json
 import os
@@ -31,8 +30,6 @@ COMMANDS = {
     "list": ("playing", "list_command"),
     "study": ("study_commands", "study"),
 }
-# A disk, a quota or a file that is full; a pipe that nobody reads.
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EPIPE)
 
 
 class Application:
@@ -121,12 +118,9 @@ def _sentence(error: Exception) -> str | None:
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
         return str(format_message())
-    if isinstance(error, SwarmLogisticsError | IndicatorError):
+    # The operating system refuses for reasons of its own: a disk that is full, a name too long.
+    if isinstance(error, SwarmLogisticsError | IndicatorError | OSError):
         return str(error)
-    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
-        return f"{str(error.filename)[:40]}...: {error.strerror}: should be a shorter path"
-    if isinstance(error, OSError) and error.errno in _NO_ROOM:
-        return f"cannot write {error.filename or 'the output'}: {error.strerror}"
     return None
 
 
