@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
 
@@ -43,33 +43,16 @@ def show(section: Section) -> None:
         console.out(section_markdown(section), highlight=False)
         return
     console.rule(escape(plain(section.title)), align="left")
-    for shown in _beside(section, console.width):
-        table = Table(box=None, pad_edge=False, header_style="bold")
-        for place in shown:
-            # Folded where a terminal is narrow: a number that is cut is another number.
-            table.add_column(escape(plain(section.columns[place])), overflow="fold")
-        for row in section.rows:
-            table.add_row(*(escape(plain(row[place])) for place in shown))
-        console.print(table)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for column in section.columns:
+        # Folded where a terminal is narrow: a number that is cut is another number.
+        table.add_column(escape(plain(column)), overflow="fold")
+    for row in section.rows:
+        table.add_row(*(escape(plain(cell)) for cell in row))
+    console.print(table)
     for line in section.lines:
         console.print(escape(plain(line)))
     console.print()
-
-
-def _beside(section: Section, width: int) -> Iterator[list[int]]:
-    """Yield which columns stand side by side: the first, and as many others as fit beside it."""
-    columns = zip(section.columns, *section.rows)
-    # A long heading is folded.
-    widths = [max(min(len(head), 12), *map(len, cells), 1) for head, *cells in columns]
-    shown: list[int] = []
-    for place in range(len(widths)):
-        taken = sum(widths[one] + 2 for one in shown) + widths[place]
-        if len(shown) > 1 and taken > width:
-            yield shown
-            shown = shown[:1]
-        shown.append(place)
-    if shown:
-        yield shown
 
 
 def say(text: str, command: str = "") -> None:
