@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -11,28 +10,24 @@ from shlex import quote
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 from typer import echo
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import NOTHING, WORDS, Section, Texts, number
+from swarm_logistics_env.report.section import NOTHING, Section, Texts, number
 from swarm_logistics_env.report.write import (
     how_to_get_figures,
     missing_packages,
     section_markdown,
     write_report,
 )
-from swarm_logistics_env.spi.estimate import SIGNS
 from swarm_logistics_env.studies.play import Tally
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, Verdict
 
 _PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
-_COLOURS = {word: SIGNS[verdict].colour for verdict, word in WORDS.items()}
-_VERDICTS = re.compile(rf"(?<=  )({'|'.join(_COLOURS)})\b")
 
 
 def show(section: Section) -> None:
@@ -85,13 +80,10 @@ def show_report(
     for section in whole.summary if full else ():
         show(section)
     # Printed first: what was found is told even where no file can be written.
-    console = Console(highlight=False)
+    console = Console()
     width = console.width if console.is_terminal else _PLAIN_WIDTH
     found, most = (answer(results, most=None), None) if full else (whole.answer, MOST_LINES)
-    shown = Text("\n".join(map(plain, digest(found, width, most).split("\n"))))
-    for word in _VERDICTS.finditer(shown.plain):
-        shown.stylize(_COLOURS[word[1]], *word.span())
-    console.print(shown, soft_wrap=True)
+    echo("\n".join(map(plain, digest(found, width, most).split("\n"))))
     if out:
         echo(f"Report: {write_report(results, out, whole)[0]}")
         if missing := missing_packages():
