@@ -91,9 +91,6 @@ def show_report(
         else:
             echo(f"Figure: {out / 'figures' / 'answer.svg'}")
             echo(f"Tables: {out / 'tables.tex'}")
-        if not full and any(len(line.tests) > 1 for line in whole.answer.lines):
-            again = f"swarm-logistics study report {quote(str(out))} --full"
-            say("Each question on a line of its own:", again)
     if any(test.estimate for test in results.verdicts) and not unfinished:
         say(f"For a paper: {plain(in_a_sentence(results))}")
 
