@@ -217,7 +217,7 @@ def report_command(
     stored = Study.stored(directory, trust_code=trust_code)
     say(str(stored.plan()))
     echo()
-    show_report(stored.findings(), stored.out, full=full)
+    show_report(stored.findings(), directory, full=full)
 
 
 @study.command("compare")

@@ -66,7 +66,7 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Texts], *lines
 
 
 def show_report(
-    results: StudyResults, out: Path | None, *, full: bool = False, unfinished: str = ""
+    results: StudyResults, out: Path, *, full: bool = False, unfinished: str = ""
 ) -> None:
     """Print the answer of a study and a sentence for a paper, and write its report into `out`.
 
@@ -84,13 +84,12 @@ def show_report(
     width = console.width if console.is_terminal else _PLAIN_WIDTH
     found, most = (answer(results, most=None), None) if full else (whole.answer, MOST_LINES)
     echo("\n".join(map(plain, digest(found, width, most).split("\n"))))
-    if out:
-        echo(f"Report: {write_report(results, out, whole)[0]}")
-        if missing := missing_packages():
-            echo(how_to_get_figures(missing))
-        else:
-            echo(f"Figure: {out / 'figures' / 'answer.svg'}")
-            echo(f"Tables: {out / 'tables.tex'}")
+    echo(f"Report: {write_report(results, out, whole)[0]}")
+    if missing := missing_packages():
+        echo(how_to_get_figures(missing))
+    else:
+        echo(f"Figure: {out / 'figures' / 'answer.svg'}")
+        echo(f"Tables: {out / 'tables.tex'}")
     if any(test.estimate for test in results.verdicts) and not unfinished:
         say(f"For a paper: {plain(in_a_sentence(results))}")
 
