@@ -13,8 +13,8 @@ import typer
 from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.policies import SUFFIXES, PolicySpec, called, load
-from swarm_logistics_env.records import plain, read_table
+from swarm_logistics_env.policies import SUFFIXES, PolicySpec
+from swarm_logistics_env.records import read_table
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, slug
@@ -24,7 +24,7 @@ from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
 from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.play import Engine, Tally, engine_named
+from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
@@ -141,15 +141,42 @@ def judge_command(
         option = "--seeds" if seeds else "--clearing"
         raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
     if is_policy:
+        policy = PolicySpec.of(asked).replace(trusted=trust_code)
+        for one in policy.trainings or (policy,):
+            one.load()  # what is wrong with it is said before anything is written
         count = processes or os.cpu_count() or 1
         engine = engine_named("process" if count > 1 else "local", count)
         if plays_benchmark:
-            tally, place = _play_benchmark(asked, out, engine, minutes, trust_code)
+            place = out or Path("results", "benchmark", slug(policy.title))
+            study = study_of(benchmark.STUDY, place, None, [asked], trust_code)
         else:
-            tally, place = _judge_policy(
-                asked, out, engine, minutes, trust_code, seeds or JUDGE_SEEDS,
-                until_clear=until_clear, clearing=clearing, full=full, command=str(context.obj),
-            )  # fmt: skip
+            place = out or Path("results", "judged", slug(policy.title) + "-clearing" * clearing)
+            most = seeds or JUDGE_SEEDS
+            looks = until_clear and most > FIRST_LOOK
+            study = study_of(STUDY, place, most, [asked], trust_code, until_clear=looks)
+        if clearing:
+            until_cleared(study)
+        say(f"{study.plan()}, kept in {place}")
+        echo()
+        tell_what_a_pilot_shows(study)
+        tally = run_study(study, engine, minutes=minutes)
+        results = study.findings()
+        if plays_benchmark and not (tally.left or tally.failed):
+            _show_benchmark(results, place)
+        else:
+            left = f"{tally.left} runs are left." if tally.left else ""
+            show_report(results, place, full=full, unfinished=left)
+        if not (plays_benchmark or clearing) and (rank := _rank(results)):
+            say(rank)
+        if tally.left:
+            say(f"Stopped after {minutes:g} min; the same command goes on:", str(context.obj))
+        elif not plays_benchmark and any(v.conclusion == "inconclusive" for v in results.verdicts):
+            more = max(JUDGE_SEEDS, 2 * most)
+            say(
+                "What is open needs more seeds, from the start:",
+                f"swarm-logistics judge {quote(asked)}{' --clearing' * clearing} --seeds {more} "
+                f"--out {quote(f'{place}-{more}')}",
+            )
         say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", place)
         raise Exit(1 if tally.failed else 0)
 
@@ -211,78 +238,17 @@ def names_policy(asked: str) -> bool:
     return ":" in asked or not suffix
 
 
-def _judge_policy(
-    asked: str,
-    out: Path | None,
-    engine: Engine,
-    minutes: float | None,
-    trust_code: bool,
-    seeds: int,
-    *,
-    until_clear: bool,
-    clearing: bool,
-    full: bool,
-    command: str,
-) -> tuple[Tally, Path]:
-    """Play the study `scorecard` with a policy until it is clear; return what, and where it is.
-
-    Every run is kept at once, so that the same command goes on after an interruption.
-    """
-    load(asked, trust_code=trust_code)  # what is wrong with it is said before anything is written
-    out = out or Path("results", "judged", slug(called(asked)) + "-clearing" * clearing)
-    looks = until_clear and seeds > FIRST_LOOK
-    study = study_of(STUDY, out, seeds, [asked], trust_code, until_clear=looks)
-    if clearing:
-        until_cleared(study)
-    say(f"{study.plan()}, kept in {out}")
-    echo()
-    tell_what_a_pilot_shows(study)
-    tally = run_study(study, engine, minutes=minutes)
-    results = study.findings()
-    if tally.error:
-        say(f"{tally.failed} runs failed, the first with {plain(tally.error)}")
-    left = f"{tally.left} runs are left." if tally.left else ""
-    show_report(results, out, full=full, unfinished=left)
-    if not clearing and (rank := _rank(results)):
-        say(rank)
-    if tally.left:
-        say(f"Stopped after {minutes:g} min; the same command goes on:", command)
-    elif any(test.conclusion == "inconclusive" for test in results.verdicts):
-        more = max(JUDGE_SEEDS, 2 * seeds)
-        say(
-            "What is open needs more seeds, from the start:",
-            f"swarm-logistics judge {quote(asked)}{' --clearing' * clearing} --seeds {more} "
-            f"--out {quote(f'{out}-{more}')}",
-        )
-    return tally, out
-
-
 # Scores of the shipped policies in the benchmark; `docs/play_tables.py` writes it.
 ENTRIES = Path(__file__).parents[1] / "report" / "benchmark_entries.json"
 
 
-def _play_benchmark(
-    asked: str, out: Path | None, engine: Engine, minutes: float | None, trust_code: bool
-) -> tuple[Tally, Path]:
-    """Play the benchmark with a policy, or all its trainings; return what, and where it is."""
-    policy = PolicySpec.of(asked).replace(trusted=trust_code)
-    for one in policy.trainings or (policy,):
-        one.load()
-    out = out or Path("results", "benchmark", slug(policy.title))
-    study = study_of(benchmark.STUDY, out, None, [asked], trust_code)
-    say(f"{study.plan()}, kept in {out}")
-    echo()
-    tally = run_study(study, engine, minutes=minutes)
-    results = study.findings()
-    if tally.left or tally.failed:
-        show_report(results, out)
-        return tally, out
+def _show_benchmark(results: StudyResults, out: Path) -> None:
+    """Print the table of a policy in the benchmark and its place, and write the report."""
     show(benchmark.table(results))
     entries = {name: np.array(one) for name, one in json.loads(ENTRIES.read_text()).items()}
-    entries[policy.title] = benchmark.score(results)
+    entries[results.policies[0]] = benchmark.score(results)
     show(benchmark.leaderboard(entries))
     echo(f"Report: {write_report(results, out, document(results))[0]}")
-    return tally, out
 
 
 # P of the shipped policies in the study `scorecard`; `docs/play_tables.py` writes it.
