@@ -151,9 +151,9 @@ def judge_command(
             study = study_of(benchmark.STUDY, place, None, [asked], trust_code)
         else:
             place = out or Path("results", "judged", slug(policy.title) + "-clearing" * clearing)
-            most = seeds or JUDGE_SEEDS
-            looks = until_clear and most > FIRST_LOOK
-            study = study_of(STUDY, place, most, [asked], trust_code, until_clear=looks)
+            seeds = seeds or JUDGE_SEEDS
+            looks = until_clear and seeds > FIRST_LOOK
+            study = study_of(STUDY, place, seeds, [asked], trust_code, until_clear=looks)
         if clearing:
             until_cleared(study)
         say(f"{study.plan()}, kept in {place}")
@@ -170,13 +170,6 @@ def judge_command(
             say(rank)
         if tally.left:
             say(f"Stopped after {minutes:g} min; the same command goes on:", str(context.obj))
-        elif not plays_benchmark and any(v.conclusion == "inconclusive" for v in results.verdicts):
-            more = max(JUDGE_SEEDS, 2 * most)
-            say(
-                "What is open needs more seeds, from the start:",
-                f"swarm-logistics judge {quote(asked)}{' --clearing' * clearing} --seeds {more} "
-                f"--out {quote(f'{place}-{more}')}",
-            )
         say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", place)
         raise Exit(1 if tally.failed else 0)
 
