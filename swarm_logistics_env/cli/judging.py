@@ -19,7 +19,6 @@ from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, slug
 from swarm_logistics_env.report.write import write_report
-from swarm_logistics_env.spi import mean_interval
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
@@ -166,8 +165,6 @@ def judge_command(
         else:
             left = f"{tally.left} runs are left." if tally.left else ""
             show_report(results, place, full=full, unfinished=left)
-        if not (plays_benchmark or clearing) and (rank := _rank(results)):
-            say(rank)
         if tally.left:
             say(f"Stopped after {minutes:g} min; the same command goes on:", str(context.obj))
         say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", place)
@@ -242,26 +239,6 @@ def _show_benchmark(results: StudyResults, out: Path) -> None:
     entries[results.policies[0]] = benchmark.score(results)
     show(benchmark.leaderboard(entries))
     echo(f"Report: {write_report(results, out, document(results))[0]}")
-
-
-# P of the shipped policies in the study `scorecard`; `docs/play_tables.py` writes it.
-RECORDED = Path(__file__).parents[1] / "report" / "shipped_score_cards.json"
-
-
-def _rank(results: StudyResults) -> str | None:
-    """Return the place of the policy among the shipped ones, where the intervals allow one."""
-    mine = next(cell for cell in results.cells if cell.arm.setting.name == "none").mean
-    told = json.loads(RECORDED.read_text(encoding="utf-8"))["policies"]
-    beside = {name: mean_interval(one["p"]) for name, one in told.items()}
-    beside.pop(results.policies[0], None)
-    if mine.low is None or mine.high is None or not any(v.estimate for v in results.verdicts):
-        return None
-    above = sum(p.low is not None and p.low > mine.high for p in beside.values())
-    below = sum(p.high is not None and p.high < mine.low for p in beside.values())
-    ordered = sorted(beside.items(), key=lambda one: -one[1].value)
-    others = ", ".join(f"{name} {p.value:.0f}" for name, p in ordered)
-    rank = f"; rank {above + 1} of {len(beside) + 1}" if above + below == len(beside) else ""
-    return f"P of the shipped policies here: {others}{rank}."
 
 
 def attack_command(
