@@ -115,7 +115,6 @@ def watch_command(
     port: Annotated[
         int, Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free.")
     ] = 8765,
-    host: Annotated[str, Option(help="Address to listen on; 0.0.0.0: all.")] = "127.0.0.1",
     no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
     save: Annotated[
         Path | None, Option(help="Play to the end and write a page that replays it; serve nothing.")
@@ -130,7 +129,7 @@ def watch_command(
 
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.messages import recorded_page
-    from swarm_logistics_env.watch.server import is_loopback, serve
+    from swarm_logistics_env.watch.server import serve
 
     if until is not None and (save is None or not until > 0.0):
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
@@ -148,11 +147,8 @@ def watch_command(
         lambda name: load(given.get(name, name), trust_code=trust_code),
     )
     if save is None:
-        if not is_loopback(host):
-            told = "whoever learns the address can watch and steer; nothing is encrypted"
-            echo(f"Warning: --host {host}: {told}.", err=True)
         shows = not no_open and sys.stdout.isatty() and _has_screen()
-        serve(session, port, echo, host, webbrowser.open if shows else None)
+        serve(session, port, echo, show=webbrowser.open if shows else None)
         return
     page = recorded_page(session, session.scenario.duration if until is None else until)
     with becoming(save, SetupError) as part:
