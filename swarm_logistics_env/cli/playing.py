@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +12,7 @@ from typer import Argument, Option, echo
 
 from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.policies import Policy, called, known_policies, load
+from swarm_logistics_env.policies import called, known_policies, load
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.scenario import SOURCES, Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
@@ -33,7 +32,6 @@ from .app import (
 )
 
 FRAME_RATE = 25.0  # frames a second
-FILM_SIZE = 480  # longer side of each warehouse [px]
 
 
 def run_command(
@@ -71,10 +69,14 @@ def run_command(
     scheduled = faults_of(faults, scenario)
     names = policies or ["swarm-dt"]
     if film is not None:
-        write_film_of(
-            film, scenario, names, seed, scheduled, until, speed,
-            twin=twin, load=lambda name: load(name, trust_code=trust_code),
-        )  # fmt: skip
+        runs = [(faults or [], scheduled)]
+        if twin:
+            if not scheduled:
+                raise SetupError(
+                    "--twin: shows a run without its faults: --fault should be given"
+                )
+            runs.insert(0, (["no fault"], []))
+        _write_film(film, scenario, names, seed, runs, until, speed, trust_code)
         return
     if twin or until is not None or len(names) > 1:
         raise SetupError("--twin, --until, several --policy: are for a film, with --film FILE.mp4")
@@ -161,61 +163,45 @@ def _has_screen() -> bool:
     return sys.platform in ("darwin", "win32") or any(map(os.environ.get, names))
 
 
-def write_film_of(
+def _write_film(
     out: Path,
     scenario: Scenario,
-    policies: Sequence[str],
+    policies: list[str],
     seed: int,
-    faults: Sequence[Fault],
+    runs: list[tuple[list[str], list[Fault]]],
     until: float | None,
     speed: float,
-    *,
-    twin: bool,
-    load: Callable[[str], Policy],
+    trust_code: bool,
 ) -> None:
-    """Write episodes as a film, one policy, or with and without faults, beside the other.
+    """Write episodes as a film, one beside the other.
+
+    Args:
+        runs: of each policy, the words above it and its faults.
 
     Raises:
-        SetupError: the file's name or the extra for films does not do, or there is no fault.
+        SetupError: the file's name or the extra for films does not do.
     """
     from rich.console import Console
     from rich.progress import Progress
 
-    from swarm_logistics_env.rendering.renderer import check_film, load_pygame, write_film
+    from swarm_logistics_env.rendering.renderer import load_pygame, write_film
 
-    if twin and not faults:
-        raise SetupError("--twin: shows the run without its faults, so --fault should be given")
-    check_film(out)
     load_pygame()
     from swarm_logistics_env.watch.film import Film, Take
 
     takes = []
     for name in policies:
-        for these in ((), faults) if twin else (faults,):
-            title = _title(name, these) if faults else _short(name)
-            takes.append(Take(title, Play(scenario, load(name), seed, these)))
+        for words, faults in runs:
+            play = Play(scenario, load(name, trust_code=trust_code), seed, faults)
+            takes.append(Take(", ".join([called(name)[-24:], *words]), play))
     end = scenario.duration if until is None else until
-    film = Film(takes, end, speed, FRAME_RATE, FILM_SIZE)
+    film = Film(takes, end, speed, FRAME_RATE)
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
         frames = progress.track(film.frames(), total=film.n_frames, description=out.name)
         count = write_film(out, frames, FRAME_RATE)
     size = out.stat().st_size / 1e6
     echo(f"{out}: {count} frames, {count / FRAME_RATE:.1f} s, {size:.2f} MB")
-
-
-def _short(policy: str) -> str:
-    policy = called(policy)
-    # A long path of a user's own policy is cut at its beginning.
-    return policy if len(policy) <= 24 else f"…{policy[-23:]}"
-
-
-def _title(policy: str, faults: Sequence[Fault]) -> str:
-    counts = [
-        f"{fault.mode} × {fault.robots if isinstance(fault.robots, int) else len(fault.robots)}"
-        for fault in faults
-    ]
-    return f"{_short(policy)}, {', '.join(counts) or 'no fault'}"
 
 
 LISTED = ("policies", "trainings", "faults", "studies", "scenario")
