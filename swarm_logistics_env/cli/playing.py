@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from typer import Argument, Option, echo
 
@@ -72,9 +72,7 @@ def run_command(
         runs = [(faults or [], scheduled)]
         if twin:
             if not scheduled:
-                raise SetupError(
-                    "--twin: shows a run without its faults: --fault should be given"
-                )
+                raise SetupError("--twin: shows a run without its faults: --fault should be given")
             runs.insert(0, (["no fault"], []))
         _write_film(film, scenario, names, seed, runs, until, speed, trust_code)
         return
@@ -204,11 +202,11 @@ def _write_film(
     echo(f"{out}: {count} frames, {count / FRAME_RATE:.1f} s, {size:.2f} MB")
 
 
-LISTED = ("policies", "trainings", "faults", "studies", "scenario")
-
-
 def list_command(
-    what: Annotated[str, Argument(metavar="|".join(LISTED), help="What to list.")],
+    what: Annotated[
+        Literal["policies", "trainings", "faults", "studies", "scenario"],
+        Argument(help="What to list."),
+    ],
     preset: PresetOption = "paper",
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
@@ -222,8 +220,6 @@ def list_command(
 
     from .terminal import show_table
 
-    if what not in LISTED:
-        raise SetupError(f"list {what}: should be {', '.join(LISTED[:-1])} or {LISTED[-1]}")
     if what == "scenario":
         chosen = scenario_of(preset, scenario_file, changes)
         if as_json:

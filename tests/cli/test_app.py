@@ -39,7 +39,7 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
         ("run --twin", "are for a film, with --film"),
         ("watch --until 5", "--until 5: should be above 0 s, together with --save"),
         ("watch --save nowhere/x.html", "should be a file in a folder that can be"),
-        ("list robots", "list robots: should be policies, trainings, faults, studies"),
+        ("list robots", "'robots' is not one of 'policies', 'trainings', 'faults', 'studies'"),
         ("study plan quick --policy nobody", "'nobody'"),
         ("study report nowhere", "no study in nowhere"),
     ],
