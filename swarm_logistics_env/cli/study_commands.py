@@ -21,7 +21,6 @@ from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers
 from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.runs import Runs, export
-from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
 from .app import Repeated
@@ -105,12 +104,8 @@ def run_command(
 ) -> None:
     """Play the runs that are missing, then print the answer and write the report."""
     part = Shard.parse(shard) if shard else None
-    if until_clear:
-        seeds = MOST_SEEDS if seeds is None else seeds
-        if seeds <= FIRST_LOOK:
-            raise StudyError(
-                f"--most {seeds}: should be more than {FIRST_LOOK} seeds, where the first look is"
-            )
+    if until_clear and seeds is None:
+        seeds = MOST_SEEDS
     looks = until_clear or None
     chosen = study_of(
         asked, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
