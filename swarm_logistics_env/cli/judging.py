@@ -166,7 +166,7 @@ def judge_command(
             show_report(results, place, full=full, unfinished=left)
         if tally.left:
             say(f"Stopped after {minutes:g} min; the same command goes on:", str(context.obj))
-        say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", place)
+        say_what_was_played(tally)
         raise Exit(1 if tally.failed else 0)
 
     usual = Path("results", "judged", Path(asked).stem)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -139,10 +138,8 @@ def run_command(
             f"When all {part.count} shards are done:",
             f"swarm-logistics study merge {out}/shard-*-of-{part.count} --out {out}",
         )
-    count = f"{processes or os.cpu_count() or 1} processes"
-    players = {"local": "1 process", "ray": "Ray"}.get(engine, count)
     # The last line: where it is looked for after a report of many pages.
-    say_what_was_played(tally, players, chosen.out)
+    say_what_was_played(tally)
     raise Exit(1 if tally.failed else 0)
 
 

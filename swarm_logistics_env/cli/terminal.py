@@ -125,15 +125,11 @@ def _power(test: Verdict, effect: float | None) -> Texts:
     )
 
 
-def say_what_was_played(tally: Tally, players: str, out: Path) -> None:
-    """Print how many runs `players` have played, in which time; they are kept in `out`."""
+def say_what_was_played(tally: Tally) -> None:
+    """Print how many runs were played, in which time, and what failed."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
-    error = plain(tally.error or "")
-    place, to = quote(str(out)), quote(str(out / "runs.csv"))
-    export = f"swarm-logistics study export {place} --to {to}"
-    why = f", the first with {error}. Each traceback, column error:" if error else ""
+    why = f", the first with {plain(tally.error)}" if tally.error else ""
     say(
-        f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
-        f"were kept from before; {tally.failed} failed{why}",
-        export if error else "",
+        f"{tally.played} runs played in {tally.seconds:.1f} s{rate}; {tally.kept} were kept from "
+        f"before; {tally.failed} failed{why}"
     )

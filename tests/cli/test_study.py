@@ -62,7 +62,7 @@ def test_study_run_prints_and_writes_the_report(file: Path, command: Command) ->
         "undefined: it delivers nothing",
     ):
         assert words in printed
-    told = r"8 runs played in [\d.]+ s by 1 process, [\d.]+ episodes/s; 0 were kept from before; "
+    told = r"8 runs played in [\d.]+ s, [\d.]+ episodes/s; 0 were kept from before; "
     assert re.fullmatch(told + "0 failed", printed.splitlines()[-1])
     report = Path("out", "report.md").read_text()
     assert "episodes/s" not in report
@@ -149,8 +149,7 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     assert Path("results/mine-homing/report.html").exists()
     Path("broken_policy.py").write_text(BROKEN)
     printed = command(f"{RUN} --policy broken_policy:Broken --restock --out broken", code=1)
-    told = "4 failed, the first with RuntimeError: a wheel came off. Each traceback, column error: "
-    assert told in printed
+    assert "4 failed, the first with RuntimeError: a wheel came off" in printed
     assert "2 of 2 runs failed" in Path("broken", "report.md").read_text()
 
 
