@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -142,8 +141,7 @@ def judge_command(
         policy = PolicySpec.of(asked).replace(trusted=trust_code)
         for one in policy.trainings or (policy,):
             one.load()  # what is wrong with it is said before anything is written
-        count = processes or os.cpu_count() or 1
-        engine = engine_named("process" if count > 1 else "local", count)
+        engine = engine_named("local" if processes == 1 else "process", processes)
         if plays_benchmark:
             place = out or Path("results", "benchmark", slug(policy.title))
             study = study_of(benchmark.STUDY, place, None, [asked], trust_code)
@@ -162,10 +160,10 @@ def judge_command(
         if plays_benchmark and not (tally.left or tally.failed):
             _show_benchmark(results, place)
         else:
-            left = f"{tally.left} runs are left." if tally.left else ""
-            show_report(results, place, full=full, unfinished=left)
+            show_report(results, place, full=full, is_finished=not tally.left)
         if tally.left:
-            say(f"Stopped after {minutes:g} min; the same command goes on:", str(context.obj))
+            why = f"Stopped after {minutes:g} min, {tally.left} runs are left"
+            say(f"{why}; the same command goes on:", str(context.obj))
         say_what_was_played(tally)
         raise Exit(1 if tally.failed else 0)
 

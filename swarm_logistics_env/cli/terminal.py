@@ -66,16 +66,14 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Texts], *lines
 
 
 def show_report(
-    results: StudyResults, out: Path, *, full: bool = False, unfinished: str = ""
+    results: StudyResults, out: Path, *, full: bool = False, is_finished: bool = True
 ) -> None:
     """Print the answer of a study and a sentence for a paper, and write its report into `out`.
 
     Args:
         full: print every table, and a line a question.
-        unfinished: what is left to play; no sentence is for a paper then.
+        is_finished: whether all is played; else no sentence is for a paper.
     """
-    if unfinished:
-        say(f"Unfinished: {unfinished}")
     whole = document(results)
     for section in whole.summary if full else ():
         show(section)
@@ -90,7 +88,7 @@ def show_report(
     else:
         echo(f"Figure: {out / 'figures' / 'answer.svg'}")
         echo(f"Tables: {out / 'tables.tex'}")
-    if any(test.estimate for test in results.verdicts) and not unfinished:
+    if is_finished and any(test.estimate for test in results.verdicts):
         say(f"For a paper: {plain(in_a_sentence(results))}")
 
 
