@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
 
-from .wrapper import Distribution, Sampler, Wrapper
+from .wrapper import Wrapper, drawn, listed
 
 
 class FaultInjection(Wrapper):
@@ -66,7 +66,7 @@ class FaultInjection(Wrapper):
         env: SwarmLogisticsEnv | Wrapper,
         mode: str,
         robots: int | Sequence[int] = 1,
-        onset: ArrayLike | Distribution = 0.0,
+        onset: ArrayLike | Callable[[np.random.Generator], ArrayLike] = 0.0,
         duration: float | None = None,
         factor: float | None = None,
     ) -> None:
@@ -116,7 +116,7 @@ class FaultInjection(Wrapper):
         if callable(self._onset):
             onsets = sorted(_times(self._onset(rng)))
         else:
-            onsets = [self._onset[int(rng.integers(len(self._onset)))]]
+            onsets = [drawn(self._onset, rng)]
         if isinstance(self._fault.robots, tuple):
             return self._anew(onsets)
         return self._one_group_after_another(onsets, self._fault.robots, seed, n_robots)
@@ -166,12 +166,10 @@ class ParameterChange(Wrapper):
     Args:
         env: the environment, or a wrapper of one.
         name: a field of `Scenario`, e.g. "delivery_width".
-        values: the new value; a list to draw from in each episode (a tuple is one value, as
-            `speed_mix` has them); or a function of a numpy Generator.
+        values: the new value, or a list to draw from in each episode (a tuple is one value, as
+            `speed_mix` has them).
         at: the time of the change [s], given like `values`; the value holds from the first step
             that begins then or later. None means that it holds throughout the episode.
-        within: (least, greatest) value that a function returns; required with a function.
-        at_within: (earliest, latest) time that a function returns; required with a function.
 
     Attributes:
         value: the value that the parameter has, or will have, in this episode.
@@ -180,7 +178,7 @@ class ParameterChange(Wrapper):
     Raises:
         ScenarioError: there is no such parameter, it cannot change during a run, or its value or
             time is not allowed.
-        SetupError: a function comes without its bounds, or the spaces have no room for a value.
+        SetupError: a list is empty, or the spaces have no room for a value.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0
@@ -198,8 +196,6 @@ class ParameterChange(Wrapper):
         values: Any,
         *,
         at: Any = None,
-        within: tuple[Any, Any] | None = None,
-        at_within: tuple[float, float] | None = None,
     ) -> None:
         super().__init__(env)
         if not isinstance(name, str) or name not in Scenario.model_fields:
@@ -213,17 +209,16 @@ class ParameterChange(Wrapper):
                 f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
             )
         self.name = name
-        self._values = Sampler(name, values, within)
-        self._times = None if at is None else Sampler("at", at, at_within)
-        if self._times is not None:
-            for time in self._times.ends:
-                if not isinstance(time, int | float) or not time >= 0:
-                    raise ScenarioError(f"at = {time!r}: should be a time of at least 0 s")
+        self._values = listed(name, values)
+        self._times = () if at is None else listed("at", at)
+        for time in self._times:
+            if not isinstance(time, int | float) or not time >= 0:
+                raise ScenarioError(f"at = {time!r}: should be a time of at least 0 s")
         self.value: Any = None
         self.time: float | None = None
         self._is_due = False
         before = () if at is None else self.env.scenarios
-        after = self._declared(name, self._values.ends)
+        after = self._declared(name, self._values)
         self.scenarios: tuple[Scenario, ...] = tuple(dict.fromkeys((*before, *after)))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
@@ -252,5 +247,5 @@ class ParameterChange(Wrapper):
 
     def _drawn(self, seed: int) -> tuple[Any, float | None]:
         rng = generator(seed, f"change of {self.name}", self._place())
-        value = self._values.sample(rng)
-        return value, None if self._times is None else float(self._times.sample(rng))
+        value = drawn(self._values, rng)
+        return value, float(drawn(self._times, rng)) if self._times else None

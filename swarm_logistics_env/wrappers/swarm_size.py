@@ -17,7 +17,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 
-from .wrapper import Distribution, Sampler, Wrapper
+from .wrapper import Wrapper, drawn, listed
 
 
 class FixedAgents(Wrapper):
@@ -112,15 +112,13 @@ class SwarmSize(Wrapper):
 
     Args:
         env: the environment, or a wrapper of one.
-        sizes: the swarm size N, a list to draw from in each episode, or a function of a numpy
-            Generator.
-        within: (smallest, largest) size that a function returns; required with a function.
+        sizes: the swarm size N, or a list to draw from in each episode.
         leave: pairs (robots, time [s]): at each time that many more robots leave.
 
     Raises:
         ScenarioError: a swarm of such a size is not allowed.
-        SetupError: a function comes without `within`, more robots leave than there are, or all of
-            them leave at 0 s.
+        SetupError: no size is listed, more robots leave than there are, or all of them leave at
+            0 s.
         FaultError: a time of leaving is not allowed.
 
     Example:
@@ -134,15 +132,12 @@ class SwarmSize(Wrapper):
     def __init__(
         self,
         env: SwarmLogisticsEnv | Wrapper,
-        sizes: int | Sequence[int] | Distribution,
+        sizes: int | Sequence[int],
         *,
-        within: tuple[int, int] | None = None,
         leave: Sequence[tuple[int, float]] = (),
     ) -> None:
         super().__init__(env)
-        if isinstance(sizes, tuple | range):
-            sizes = list(sizes)
-        self._size = Sampler("n_robots", sizes, within)
+        self._sizes = listed("n_robots", list(sizes) if isinstance(sizes, Sequence) else sizes)
         pairs = _departures(leave)
         self._leaving = sum(robots for robots, _ in pairs)
         self._absent = sum(robots for robots, time in pairs if time == 0.0)
@@ -151,13 +146,13 @@ class SwarmSize(Wrapper):
         self._departures = tuple(
             Fault("removed", count, onset=time) for count, (_, time) in zip(in_all, pairs)
         )
-        self.scenarios: tuple[Scenario, ...] = self._declared("n_robots", self._size.ends)
+        self.scenarios: tuple[Scenario, ...] = self._declared("n_robots", self._sizes)
         largest = max(self.unwrapped.max_robots or 0, *(each.n_robots for each in self.scenarios))
         self.unwrapped.possible_agents = agent_names(range(largest))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's size and departures among them."""
-        size = self._size.sample(generator(seed, "swarm size", self._place()))
+        size = drawn(self._sizes, generator(seed, "swarm size", self._place()))
         faults = (*faults_among(options, self.unwrapped.faults), *self._departures)
         scenario = {"n_robots": size, **scenario_fields(options)}
         return {**options, "scenario": scenario, "faults": faults}
