@@ -34,7 +34,8 @@ class FaultInjection(Wrapper):
             for every mode.
         onset: the time of the failure [s]; a list to draw from in each episode; or a function of
             a numpy Generator that returns one time or an array of times. At each further time
-            as many robots more fail, as long as there are any; robots given by number fail anew.
+            as many robots more fail, as long as there are any; robots given by number fail once
+            more, which in `motor_slow` makes them slower still while both failures last.
         duration: how long a failure lasts [s]; None means until the end.
         factor: the part of speed (`motor_slow`) or of view (`view_reduced`) that is left, in
             [0, 1).
@@ -118,7 +119,7 @@ class FaultInjection(Wrapper):
         else:
             onsets = [drawn(self._onset, rng)]
         if isinstance(self._fault.robots, tuple):
-            return self._anew(onsets)
+            return tuple(self._fault.replace(onset=onset) for onset in onsets)
         return self._one_group_after_another(onsets, self._fault.robots, seed, n_robots)
 
     def _one_group_after_another(
@@ -132,18 +133,6 @@ class FaultInjection(Wrapper):
             if more := tuple(sorted(chosen - before)):
                 faults.append(self._fault.replace(robots=more, onset=onset))
             before = chosen
-        return tuple(faults)
-
-    def _anew(self, onsets: list[float]) -> tuple[Fault, ...]:
-        faults: list[Fault] = []
-        for onset in onsets:
-            last = faults[-1] if faults else None
-            if last is None or (last.duration and onset > last.onset + last.duration):
-                faults.append(self._fault.replace(onset=onset))
-            elif last.duration and self._fault.duration:
-                # The robot has still failed; two faults of motor_slow would make it slower still.
-                until = onset + self._fault.duration
-                faults[-1] = last.replace(duration=until - last.onset)
         return tuple(faults)
 
 
