@@ -82,7 +82,7 @@ class FaultInjection(Wrapper):
         self._onset = onset
         self.injected: tuple[Fault, ...] = ()
         for scenario in self.env.scenarios:
-            self._check(scenario)
+            failed_robots(self._fault, 0, scenario.n_robots)
 
     @property
     def failed_robots(self) -> tuple[int, ...]:
@@ -106,11 +106,8 @@ class FaultInjection(Wrapper):
         Raises:
             FaultError: `scenario` has fewer robots than are to fail.
         """
-        self._check(scenario)
-        self.env.declare_spaces(scenario)
-
-    def _check(self, scenario: Scenario) -> None:
         failed_robots(self._fault, 0, scenario.n_robots)
+        self.env.declare_spaces(scenario)
 
     def _drawn(self, seed: int, n_robots: int) -> tuple[Fault, ...]:
         rng = generator(seed, "fault onsets", self._place())
@@ -120,12 +117,8 @@ class FaultInjection(Wrapper):
             onsets = [drawn(self._onset, rng)]
         if isinstance(self._fault.robots, tuple):
             return tuple(self._fault.replace(onset=onset) for onset in onsets)
-        return self._one_group_after_another(onsets, self._fault.robots, seed, n_robots)
-
-    def _one_group_after_another(
-        self, onsets: list[float], size: int, seed: int, n_robots: int
-    ) -> tuple[Fault, ...]:
         faults, before = [], set[int]()
+        size = self._fault.robots
         for number, onset in enumerate(onsets, start=1):
             # The first group has to exist; later groups are drawn from the robots that are left.
             so_many = self._fault.replace(robots=max(size, min(number * size, n_robots)))
