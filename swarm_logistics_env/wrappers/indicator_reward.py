@@ -105,7 +105,7 @@ class IndicatorReward(Wrapper):
         Worlds that share their means, every other one with faults; `SwarmVecEnv(make_env=...)`:
 
         >>> from swarm_logistics_env.wrappers import FaultInjection
-        >>> means = RunningMeans(window=20, initial=33.0)
+        >>> means = RunningMeans(window=20)
         >>> def make_env(world):
         ...     env = swarm_logistics_v0.parallel_env(n_robots=25)
         ...     env = FaultInjection(env, "FM1", robots=2) if world % 2 else env

@@ -133,7 +133,7 @@ STACKS: dict[str, Callable[[Any], Any]] = {
     "size": lambda env: SwarmSize(env, [5, 6], leave=[(1, 5.0)]),
     "change": lambda env: ParameterChange(env, "delivery_width", [1.0, 3.0]),
     "reward": lambda env: rewarded(
-        {"R": 1.0, "FT": 0.5, "S": 0.25, "A": 2.0, "P": 0.01}, RunningMeans(initial=20.0), env
+        {"R": 1.0, "FT": 0.5, "S": 0.25, "A": 2.0, "P": 0.01}, RunningMeans(), env
     ),
 }
 
@@ -213,7 +213,7 @@ def test_a_reference_episode_stands_for_as_many_as_it_serves() -> None:
 
 
 def test_means_that_are_not_there_yet_or_too_small() -> None:
-    env = rewarded({"R": 1.0, "FT": 1.0}, RunningMeans(initial=8.0))
+    env = rewarded({"R": 1.0, "FT": 1.0}, RunningMeans(least=8.0))
     assert env.payments_of(FAULTY)["R"].share == 1 / 8
     assert env.payments_of(FAULTY)["FT"].constant == 0
     assert env.payments_of(OWN)["R"].share == 0
