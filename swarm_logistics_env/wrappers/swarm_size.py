@@ -10,12 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import faults_among, numbers_of, scenario_fields
+from swarm_logistics_env.environment.requests import (
+    check_somebody_is_there,
+    faults_among,
+    numbers_of,
+    scenario_fields,
+)
 from swarm_logistics_env.environment.spaces import ArrayStep, Infos, agent_names
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.warehouse.faults import failed_robots
 
 from .wrapper import Wrapper, drawn, listed
 
@@ -117,9 +123,8 @@ class SwarmSize(Wrapper):
 
     Raises:
         ScenarioError: a swarm of such a size is not allowed.
-        SetupError: no size is listed, more robots leave than there are, or all of them leave at
-            0 s.
-        FaultError: a time of leaving is not allowed.
+        SetupError: no size is listed, or all robots leave at 0 s.
+        FaultError: a time of leaving is not allowed, or more robots leave than there are.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0
@@ -139,8 +144,6 @@ class SwarmSize(Wrapper):
         super().__init__(env)
         self._sizes = listed("n_robots", list(sizes) if isinstance(sizes, Sequence) else sizes)
         pairs = _departures(leave)
-        self._leaving = sum(robots for robots, _ in pairs)
-        self._absent = sum(robots for robots, time in pairs if time == 0.0)
         # The sets are nested: the first m + k robots contain the m that have left.
         in_all = np.cumsum([robots for robots, _ in pairs], dtype=np.int64).tolist()
         self._departures = tuple(
@@ -161,18 +164,12 @@ class SwarmSize(Wrapper):
         """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
 
         Raises:
-            SetupError: more robots are to leave than `scenario` has, or all of them at 0 s.
+            FaultError: more robots are to leave than `scenario` has.
+            SetupError: all of them are to leave at 0 s.
         """
-        if self._absent >= scenario.n_robots:
-            raise SetupError(
-                f"leave: {self._absent} robots at 0 s, should be fewer than n_robots = "
-                f"{scenario.n_robots}, or the episode would begin with nobody"
-            )
-        if self._leaving > scenario.n_robots:
-            raise SetupError(
-                f"leave: {self._leaving} robots in all, should be at most n_robots = "
-                f"{scenario.n_robots}"
-            )
+        for fault in self._departures:
+            failed_robots(fault, 0, scenario.n_robots)
+        check_somebody_is_there(self._departures, 0, scenario.n_robots)
         self.env.declare_spaces(scenario)
 
 
