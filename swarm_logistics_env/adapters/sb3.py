@@ -105,7 +105,6 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     ) -> None:
         n_worlds = checked_count("n_worlds", n_worlds)
         threads = checked_count("threads", threads)
-        own = make_env
         if make_env is None:
             make_env = maker(scenario, n_worlds, n_robots, fields)
         elif scenario is not None or n_robots is not None or fields:
@@ -113,12 +112,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
                 "make_env and conditions: should be one or the other; make_env decides what its "
                 "environments are like"
             )
-        try:
-            self._worlds = Worlds(make_env, n_worlds, threads)
-        except Exception as error:
-            if own is not None:
-                error.add_note("make_env is called with the number of a world: lambda world: ...")
-            raise
+        self._worlds = Worlds(make_env, n_worlds, threads)
         self.worlds = self._worlds.envs
         # What the next infos are copies of, unless a world has something to tell.
         self._abouts: Infos = [{} for _ in range(self._worlds.n_rows)]
