@@ -249,21 +249,9 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             lambda env: any(isinstance(layer, wrapper_class) for layer in layers_of(env)), indices
         )
 
-    def get_images(self) -> list[NDArray[np.uint8]]:
-        """Return a picture (H, W, 3) of each world; all have the size of the largest."""
-        shown = [p for env in self.worlds if (p := env.render()) is not None]
-        height, width = np.max([picture.shape[:2] for picture in shown], axis=0)
-        return [
-            np.pad(p, ((0, height - p.shape[0]), (0, width - p.shape[1]), (0, 0))) for p in shown
-        ]
-
-    def render(self, mode: str | None = None) -> NDArray[np.uint8] | None:
-        """Return a picture of all worlds, as tiles; in mode "human" show world 0 in its window."""
-        if self.render_mode == "human":
-            self.worlds[0].render()
-            return None
-        picture: NDArray[np.uint8] | None = super().render(mode)
-        return picture
+    def get_images(self) -> list[NDArray[np.uint8] | None]:
+        """Return a picture (H, W, 3) of each world."""
+        return [env.render() for env in self.worlds]
 
     def close(self) -> None:
         """Release threads and what rendering holds; harmless when called twice."""
