@@ -148,22 +148,12 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     def set_options(self, options: Mapping[str, Any] | Sequence[Any] | None = None) -> None:
         """Set the options of the next `reset`: a dict for all worlds, or a list with one for each.
 
-        stable-baselines3 passes a list of length `num_envs`; in it all rows of a world have to
-        have the same options.
-
         Raises:
-            SetupError: the list has another length, or different options for rows of one world.
+            SetupError: the list has another length.
         """
         if options is None or isinstance(options, Mapping):
-            self._options = [dict(options or {})] * self.num_envs
-            return
-        if len(options) == len(self.worlds):
-            options = [options[world] for world in self._worlds.world_of.tolist()]
-        firsts = [rows.start for rows in self._worlds.rows]
-        if len(options) != self.num_envs or any(
-            options[row] != options[firsts[world]]
-            for row, world in enumerate(self._worlds.world_of)
-        ):
+            options = [options] * len(self.worlds)
+        if len(options) != len(self.worlds):
             raise SetupError(
                 f"{len(options)} options: should be one dict, or a dict for each of the "
                 f"{len(self.worlds)} worlds"
@@ -175,8 +165,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         observations = self._worlds.blank()
         self._returns[:], self._begun[:] = 0.0, self._n_steps
         for world, rows in enumerate(self._worlds.rows):
-            options = self._options[rows.start] or None
-            self._worlds.begin(world, observations, self._seeds[rows.start], options)
+            seed = self._seeds[rows.start]
+            self._worlds.begin(world, observations, seed, self._options[world])
             self._note(world)
         self.reset_infos = list(map(dict.copy, self._abouts))
         self._reset_seeds()
