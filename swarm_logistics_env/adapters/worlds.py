@@ -120,12 +120,8 @@ class Worlds:
         given = numbers_of(commands, "actions", self._commands.shape)
         self._commands[:] = given
         if not np.isfinite(self._commands).all():
-            row = int(np.argwhere(~np.isfinite(self._commands))[0, 0])
-            world = int(self.world_of[row])
-            raise CommandError(
-                f"actions[{row}] = {given[row]} (world {world}, robot_"
-                f"{row - self.rows[world].start}): should be finite"
-            )
+            row = np.argwhere(~np.isfinite(self._commands))[0, 0]
+            raise CommandError(f"actions[{row}] = {given[row]}: should be finite")
 
     def step(self) -> RowsStep:
         """Take one control period in every world, with the commands that were given."""
