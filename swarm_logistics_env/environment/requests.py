@@ -25,18 +25,14 @@ def as_array(given: ArrayLike, name: str) -> NDArray[Any]:
         name: the name of the value, for errors.
 
     Raises:
-        CommandError: NumPy cannot read it, as a tensor of bfloat16, on a GPU or with a gradient;
-            names its type, dtype and device.
+        CommandError: NumPy cannot read it, as a tensor of bfloat16, on a GPU or with a gradient.
     """
     try:
         return np.asarray(given)
     except Exception as error:  # tensors raise TypeError, RuntimeError, NotImplementedError, ...
-        traits = [f"{trait} {getattr(given, trait)}" for trait in _TRAITS if hasattr(given, trait)]
-        kind = ", ".join([f"type {type(given).__name__}", *traits])
-        reason = str(error).strip().partition("\n")[0]
         raise CommandError(
-            f"{name} ({kind}) cannot be read: should be numbers that numpy.asarray takes, which "
-            f"says: {reason}"
+            f"{name} of type {type(given).__name__} cannot be read: should be numbers that "
+            f"numpy.asarray takes, which says: {error}"
         ) from error
 
 
@@ -106,9 +102,6 @@ def _check_names(
     for agent in agents:
         if agent not in actions:
             raise CommandError(f"no command for {agent!r}: should be one for every agent")
-
-
-_TRAITS = ("dtype", "device", "requires_grad")
 
 
 OPTIONS = ("faults", "scenario")
