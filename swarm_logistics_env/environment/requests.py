@@ -73,8 +73,13 @@ def gathered(
             f"actions of type {type(actions).__name__}: should be a dict of one command for every "
             "agent; step_arrays takes an array"
         )
-    if actions.keys() != set(agents):
-        _check_names(actions, agents, possible_agents)
+    if missing := set(agents) - actions.keys():
+        raise CommandError(f"no command for {min(missing)!r}: should be one for every agent")
+    if len(actions) > len(agents) and (unknown := actions.keys() - set(possible_agents)):
+        raise CommandError(
+            f"a command for {min(map(str, unknown))!r}, who is not there: should be among "
+            f"{len(possible_agents)} possible agents"
+        )
     rows: list[Any] = [actions[agent] for agent in agents]
     if not all(type(row) is np.ndarray and row.shape == wanted for row in rows):  # seldom
         rows = [as_array(row, f"command of {agent!r}") for agent, row in zip(agents, rows)]
@@ -87,21 +92,6 @@ def gathered(
     except TypeError as error:
         raise CommandError(f"commands should be numbers: {error}") from error
     return given.reshape(len(rows), *wanted)
-
-
-def _check_names(
-    actions: Mapping[str, ArrayLike], agents: Sequence[str], possible_agents: Sequence[str]
-) -> None:
-    possible = set(possible_agents)
-    for agent in actions:
-        if agent not in possible:
-            raise CommandError(
-                f"a command for {agent!r}, who is not there: should be among {len(possible)} "
-                f"possible agents, {possible_agents[0]} to {possible_agents[-1]}"
-            )
-    for agent in agents:
-        if agent not in actions:
-            raise CommandError(f"no command for {agent!r}: should be one for every agent")
 
 
 OPTIONS = ("faults", "scenario")
