@@ -62,7 +62,8 @@ def judge_command(
     ] = None,
     seeds: Annotated[
         int | None,
-        Option(help=f"Seeds of a policy at most, 3 or more; {JUDGE_SEEDS} if not given."),
+        # With fewer runs are alike by chance.
+        Option(min=LEAST_SEEDS, help=f"Seeds of a policy at most; {JUDGE_SEEDS} if not given."),
     ] = None,
     until_clear: Annotated[
         bool,
@@ -130,10 +131,6 @@ def judge_command(
         if given:
             kind = "a policy" if is_policy else "a file of trials"
             raise StudyError(f"{option} is not for {kind}, and {asked!r} is one")
-    if seeds is not None and seeds < LEAST_SEEDS:
-        raise StudyError(
-            f"--seeds {seeds}: should be {LEAST_SEEDS} or more, as fewer runs are alike by chance"
-        )
     if plays_benchmark and (seeds or clearing):
         option = "--seeds" if seeds else "--clearing"
         raise StudyError(f"{option}: the benchmark has the same conditions for everybody")

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from typer import Argument, Option, echo
 
 from swarm_logistics_env.episode import Play, run_episode
@@ -91,7 +92,7 @@ def run_command(
         f"by {scenario.n_robots} robots with {called(names[0])}, seed {seed}"
     )
     if len(times):
-        wait = max(after - before for before, after in zip([0.0, *times], times))
+        wait = np.diff(times, prepend=0.0).max()
         echo(f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, longest wait {wait:.1f} s")
     if episode.failed_robots:
         echo(
