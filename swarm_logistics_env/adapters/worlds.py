@@ -230,10 +230,7 @@ def maker(
     Raises:
         SetupError: there are no sizes, or more than worlds.
     """
-    if isinstance(n_robots, Sequence | np.ndarray):
-        sizes: list[Any] = [int(size) for size in n_robots]
-    else:
-        sizes = [n_robots]
+    sizes = [None] if n_robots is None else np.atleast_1d(n_robots).tolist()
     if not 1 <= len(sizes) <= n_worlds:
         raise SetupError(
             f"n_robots = {n_robots!r}: should be 1 to {n_worlds} sizes, as there are {n_worlds} "
