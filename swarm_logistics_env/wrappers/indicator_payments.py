@@ -142,7 +142,7 @@ class Payment:
 
     share: float = 0.0
     constant: float = 0.0
-    performances: Mapping[str, tuple[Condition, float]] = field(default_factory=dict)
+    performances: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -211,10 +211,10 @@ def indicator_of(
     if compared is None:
         return None
     p_o = p_against = references.divisor(compared.reference)
-    performances = {"P_N" if name == "S" else "P_o": (compared.reference, p_o)}
+    performances = {"P_N" if name == "S" else "P_o": p_o}
     if compared.against != compared.reference:
         p_against = references.performance(compared.against)
-        performances["P_S"] = (compared.against, p_against)
+        performances["P_S"] = p_against
     share = compared.scale / p_o
     return Payment(share, compared.offset - share * p_against, performances)
 
