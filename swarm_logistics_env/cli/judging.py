@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -26,7 +25,7 @@ from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
-from swarm_logistics_env.warehouse.faults import Fault, text_of
+from swarm_logistics_env.warehouse.faults import text_of
 
 from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
 from .study_commands import (
@@ -274,29 +273,22 @@ def attack_command(
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
     rows = [
-        (found.by, _in_words(found.fault), bracketed(found.robustness, 3), str(found.runs))
+        (found.by, str(text_of(found.fault)), bracketed(found.robustness, 3), str(found.runs))
         for found in result.found
     ]
     worst = min(result.found, key=lambda found: found.robustness.value)
-    text = text_of(worst.fault)
-    played = f" `run` and `watch` play it with --fault {quote(text)}." if text else ""
     capped = (
         "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
         "shown. --set restock=true has no cap."
     )
     show_table(
         f"{policy}: worst faults found",
-        ("found by", "fault", "R [95 %]", "runs"),
+        ("found by", "--fault", "R [95 %]", "runs"),
         rows,
-        f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
-        f"{worst.robustness.value:.3f} on {fresh} seeds that the search has not met.{played}",
+        f"Worst fault of {robots} robots found: {text_of(worst.fault)}, R = "
+        f"{worst.robustness.value:.3f} on {fresh} seeds that the search has not met. `run` and "
+        "`watch` play it with --fault.",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
         *([capped] if result.is_capped else ()),
     )
-
-
-def _in_words(fault: Fault) -> str:
-    who = "by the seed" if fault.role is None else fault.role.replace("_", " ")
-    until = "" if fault.duration is None else f" for {fault.duration:g} s"
-    return f"{fault.mode} of {fault.robots} ({who}) from {fault.onset:g} s{until}"
