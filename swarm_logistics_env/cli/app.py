@@ -157,8 +157,12 @@ PolicyOption = Annotated[
     str, Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
 ]
 SeedOption = Annotated[int, Option(help="Decides everything random.")]
-TrustPolicyOption = Annotated[
-    bool, Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
+TrustOption = Annotated[
+    bool,
+    Option(
+        "--trust-code",
+        help="Let a file run code: a .zip policy, or what a study names as package.mod:NAME.",
+    ),
 ]
 
 

@@ -27,7 +27,7 @@ from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.warehouse.faults import text_of
 
-from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
+from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustOption, scenario_of
 from .study_commands import (
     ClearingOption,
     FullOption,
@@ -105,7 +105,7 @@ def judge_command(
     ] = None,
     processes: ProcessesOption = None,
     full: FullOption = False,
-    trust_code: TrustPolicyOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Judge trials of real robots or of another simulator; or a policy, until it is clear.
 

@@ -27,7 +27,7 @@ from .app import (
     ScenarioOption,
     SeedOption,
     SetOption,
-    TrustPolicyOption,
+    TrustOption,
     faults_of,
     scenario_of,
 )
@@ -63,7 +63,7 @@ def run_command(
         float | None, Option(help="Where the film ends [s]; with the episode if not given.")
     ] = None,
     speed: Annotated[float, Option(help="How many times real time the film plays.")] = 4.0,
-    trust_code: TrustPolicyOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Play one episode and print what it delivered, or write it as a film."""
     scenario = scenario_of(preset, scenario_file, changes)
@@ -122,7 +122,7 @@ def watch_command(
     until: Annotated[
         float | None, Option(help="With --save: time at which the replay ends [s].")
     ] = None,
-    trust_code: TrustPolicyOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Watch two runs side by side in the browser; inspect, break and repair robots."""
     import webbrowser

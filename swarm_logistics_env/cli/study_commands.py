@@ -22,7 +22,7 @@ from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
-from .app import Repeated
+from .app import Repeated, TrustOption
 from .terminal import say_what_was_played, show_power, show_report, show_table
 
 StudyArgument = Annotated[
@@ -42,9 +42,6 @@ FirstSeedOption = Annotated[
 ]
 PolicyOption = Annotated[
     Repeated, Option("--policy", help="Policy to judge (`list policies`); may be repeated.")
-]
-TrustCodeOption = Annotated[
-    bool, Option("--trust-code", help="Let a study name its task and policies as package.mod:NAME.")
 ]
 ProcessesOption = Annotated[
     int | None, Option(min=1, help="Worker processes; all cores if not given.")
@@ -99,7 +96,7 @@ def run_command(
         str | None, Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N.")
     ] = None,
     full: FullOption = False,
-    trust_code: TrustCodeOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Play the runs that are missing, then print the answer and write the report."""
     part = Shard.parse(shard) if shard else None
@@ -179,7 +176,7 @@ def plan_command(
         float | None,
         Option(help="Of a study that was run: assumed indicator; the paper's if not given."),
     ] = None,
-    trust_code: TrustCodeOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Print the conditions and count the runs; of a study that was run, the seeds that it needs."""
     if Path(asked).is_dir():
@@ -201,7 +198,7 @@ def plan_command(
 
 @study.command("report")
 def report_command(
-    directory: DirectoryArgument, full: FullOption = False, trust_code: TrustCodeOption = False
+    directory: DirectoryArgument, full: FullOption = False, trust_code: TrustOption = False
 ) -> None:
     """Print the answer and write the report of a study again, from its store alone."""
     stored = Study.stored(directory, trust_code=trust_code)
@@ -224,7 +221,7 @@ def compare_command(
             "chance; possibly: where that is not ruled out.",
         ),
     ] = None,
-    trust_code: TrustCodeOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Compare two studies, condition by condition; end with 1 if a gate fails."""
     gates = [Gate.parse(text) for text in fail_if or []]
