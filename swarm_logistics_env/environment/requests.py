@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError, SetupError, suggest
+from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
@@ -110,12 +110,11 @@ def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
         raise SetupError(f"options = {options!r}: should be None or a dict with keys {OPTIONS}")
     for unknown in map(str, options.keys() - set(OPTIONS)):
         # Other libraries pass options of their own, which have no such name.
-        if get_close_matches(unknown.casefold(), OPTIONS, cutoff=0.8):
-            raise SetupError(f"there is no reset option {unknown!r}{suggest(unknown, OPTIONS)}")
-        if unknown in Scenario.model_fields:
+        is_near = get_close_matches(unknown.casefold(), OPTIONS, cutoff=0.8)
+        if is_near or unknown in Scenario.model_fields:
             raise SetupError(
-                f"there is no reset option {unknown!r}: should be in the option 'scenario', as "
-                f"options={{'scenario': {{{unknown!r}: {options[unknown]!r}}}}}"
+                f"there is no reset option {unknown!r}: should be 'faults', or 'scenario' with "
+                "fields, as options={'scenario': {'n_robots': 40}}"
             )
     return dict(options)
 
