@@ -73,13 +73,14 @@ def gathered(
             f"actions of type {type(actions).__name__}: should be a dict of one command for every "
             "agent; step_arrays takes an array"
         )
-    if missing := set(agents) - actions.keys():
-        raise CommandError(f"no command for {min(missing)!r}: should be one for every agent")
-    if len(actions) > len(agents) and (unknown := actions.keys() - set(possible_agents)):
-        raise CommandError(
-            f"a command for {min(map(str, unknown))!r}, who is not there: should be among "
-            f"{len(possible_agents)} possible agents"
-        )
+    if actions.keys() != set(agents):
+        if missing := set(agents) - actions.keys():
+            raise CommandError(f"no command for {min(missing)!r}: should be one for every agent")
+        if unknown := actions.keys() - set(possible_agents):
+            raise CommandError(
+                f"a command for {min(map(str, unknown))!r}, who is not there: should be among "
+                f"{len(possible_agents)} possible agents"
+            )
     rows: list[Any] = [actions[agent] for agent in agents]
     if not all(type(row) is np.ndarray and row.shape == wanted for row in rows):  # seldom
         rows = [as_array(row, f"command of {agent!r}") for agent, row in zip(agents, rows)]
