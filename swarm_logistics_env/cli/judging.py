@@ -61,7 +61,7 @@ def judge_command(
     ] = None,
     seeds: Annotated[
         int | None,
-        # With fewer runs are alike by chance.
+        # Fewer runs are alike by chance.
         Option(min=LEAST_SEEDS, help=f"Seeds of a policy at most; {JUDGE_SEEDS} if not given."),
     ] = None,
     until_clear: Annotated[
