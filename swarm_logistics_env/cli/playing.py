@@ -204,7 +204,10 @@ def _write_film(
 
 
 def list_command(
-    what: Annotated[Literal["policies", "faults", "scenario"], Argument(help="What to list.")],
+    what: Annotated[
+        Literal["policies", "trainings", "faults", "studies", "scenario"],
+        Argument(help="What to list."),
+    ],
     preset: PresetOption = "paper",
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
@@ -212,7 +215,10 @@ def list_command(
         bool, Option("--json", help="Of a scenario: JSON, which --scenario reads.")
     ] = False,
 ) -> None:
-    """List policies, failure modes, or the conditions of a scenario."""
+    """List policies, trainings, failure modes, studies, or the conditions of a scenario."""
+    from swarm_logistics_env.studies import Study
+    from swarm_logistics_env.studies.presets import PRESETS
+
     from .terminal import show_table
 
     if what == "scenario":
@@ -230,7 +236,13 @@ def list_command(
     elif what == "policies":
         line = "Your own is package.module:Class, or the path of a file that `train` wrote."
         show_table("Policies", ("name", "kind", "about"), known_policies(), line)
-    else:
+    elif what == "trainings":
+        from swarm_logistics_env.train.training import load_training, preset_names
+
+        presets = [(name, load_training(name)) for name in preset_names()]
+        trained = ((name, f"{one.agent_steps / 1e6:g}", one.about) for name, one in presets)
+        show_table("Trainings", ("name", "million agent-steps", "about"), trained)
+    elif what == "faults":
         rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
         line = (
             "As --fault takes one: MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM4:2@200: two "
@@ -238,3 +250,11 @@ def list_command(
             f"{', '.join(ROLES)}"
         )
         show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)
+    else:
+        found = []
+        for name in PRESETS:
+            plan = Study.preset(name).plan()
+            tables = "; ".join(dict.fromkeys(table for _, table, _ in plan.cells))
+            found.append((name, str(len(plan.seeds)), str(len(plan.runs)), tables))
+        line = "swarm-logistics study plan NAME prints its conditions; study run NAME plays it."
+        show_table("Studies", ("name", "seeds", "runs", "tables"), found, line)

@@ -16,6 +16,7 @@ from swarm_logistics_env.cli.app import command_line
 from swarm_logistics_env.cli.terminal import show
 from swarm_logistics_env.report.section import Section
 from swarm_logistics_env.studies.presets import PRESETS
+from swarm_logistics_env.train import preset_names
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from tests.cli.conftest import Command
 
@@ -38,7 +39,7 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
         ("run --twin", "are for a film, with --film"),
         ("watch --until 5", "--until 5: should be above 0 s, together with --save"),
         ("watch --save nowhere/x.html", "should be a file in a folder that can be"),
-        ("list robots", "'robots' is not one of 'policies', 'faults', 'scenario'"),
+        ("list robots", "'robots' is not one of 'policies', 'trainings', 'faults', 'studies'"),
         ("study plan quick --policy nobody", "'nobody'"),
         ("study report nowhere", "no study in nowhere"),
     ],
@@ -127,10 +128,13 @@ def test_a_scenario_is_read_from_a_file(command: Command) -> None:
     assert found == Scenario.preset("dots").replace(n_robots=7, n_items=8)
 
 
-def test_scenario_faults_and_policies_are_listed(command: Command) -> None:
+def test_scenario_faults_studies_policies_and_trainings_are_listed(command: Command) -> None:
     assert "| n_robots | 40 (default 25) |" in command("list scenario --set n_robots=40")
+    assert "| paper | 20 | 680 | Table I: scalability; " in command("list studies")
     for what, names in (
         ("faults", [*FAILURE_MODES]),
+        ("trainings", [*preset_names()]),
+        ("studies", [*PRESETS]),
         ("policies", [*policies.NAMES]),
     ):
         printed = command(f"list {what}")
