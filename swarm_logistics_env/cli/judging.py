@@ -36,7 +36,7 @@ from .study_commands import (
     tell_what_a_pilot_shows,
     until_cleared,
 )
-from .terminal import say_what_was_played, show, show_report, show_table
+from .terminal import say, say_what_was_played, show, show_report, show_table
 
 if TYPE_CHECKING:
     from swarm_logistics_env.attack import AttackResult
@@ -148,7 +148,7 @@ def judge_command(
             study = study_of(STUDY, place, seeds, [asked], trust_code, until_clear=looks)
         if clearing:
             until_cleared(study)
-        echo(f"{study.plan()}, kept in {place}")
+        say(f"{study.plan()}, kept in {place}")
         echo()
         tell_what_a_pilot_shows(study)
         tally = study.run(engine, minutes=minutes)
@@ -159,7 +159,7 @@ def judge_command(
             show_report(results, place, full=full, is_finished=not tally.left)
         if tally.left:
             why = f"Stopped after {minutes:g} min, {tally.left} runs are left"
-            echo(f"{why}; the same command goes on: {context.obj}")
+            say(f"{why}; the same command goes on:", str(context.obj))
         say_what_was_played(tally)
         raise Exit(1 if tally.failed else 0)
 

@@ -23,7 +23,7 @@ from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
 from .app import Repeated, TrustOption
-from .terminal import say_what_was_played, show_power, show_report, show_table
+from .terminal import say, say_what_was_played, show_power, show_report, show_table
 
 StudyArgument = Annotated[
     str,
@@ -120,10 +120,10 @@ def run_command(
     chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address)
-    echo(chosen.plan())
+    say(str(chosen.plan()))
     echo()
     if warning := chosen.exploratory_because():
-        echo(warning)
+        say(f"{warning}\n")
     if policies:
         tell_what_a_pilot_shows(chosen)
     tally = chosen.run(player, shard=part)
@@ -131,9 +131,9 @@ def run_command(
         results = chosen.findings()
         show_report(results, chosen.out, full=full)
     else:
-        echo(
-            f"When all {part.count} shards are done: swarm-logistics study merge "
-            f"{out}/shard-*-of-{part.count} --out {out}"
+        say(
+            f"When all {part.count} shards are done:",
+            f"swarm-logistics study merge {out}/shard-*-of-{part.count} --out {out}",
         )
     # The last line: where it is looked for after a report of many pages.
     say_what_was_played(tally)
@@ -151,16 +151,16 @@ def tell_what_a_pilot_shows(asked: Study) -> None:
     for title, case in whole.items():
         first = [one.run(plan.code, plan.seeds[0]).play() for one in case.trainings]
         if any(outcome.capped for outcome in first):
-            echo(
+            say(
                 f"{title} delivers every item before the end, so that P is capped and most "
                 "verdicts will be open. Nothing is capped where items come back, or where P is the "
                 "rate until all are delivered: add --restock or --clearing"
             )
         elif errors := [outcome.error for outcome in first if outcome.error]:
             why = plain(errors[0].strip().splitlines()[-1])
-            echo(f"{title} fails in a first run: {why}. Ctrl-C stops; finished runs are kept.")
+            say(f"{title} fails in a first run: {why}. Ctrl-C stops; finished runs are kept.")
         elif not any(outcome.delivered for outcome in first):
-            echo(f"{title} delivers nothing in a first run. Ctrl-C stops; finished runs are kept.")
+            say(f"{title} delivers nothing in a first run. Ctrl-C stops; finished runs are kept.")
 
 
 @study.command("plan")
@@ -202,7 +202,7 @@ def report_command(
 ) -> None:
     """Print the answer and write the report of a study again, from its store alone."""
     stored = Study.stored(directory, trust_code=trust_code)
-    echo(stored.plan())
+    say(str(stored.plan()))
     echo()
     show_report(stored.findings(), directory, full=full)
 

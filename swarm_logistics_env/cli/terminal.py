@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
@@ -34,7 +35,7 @@ def show(section: Section) -> None:
     console = Console(highlight=False)
     if not console.is_terminal:
         # No wrapping: whatever reads this knows no terminal width.
-        echo(section_markdown(section))
+        console.out(section_markdown(section), highlight=False)
         return
     console.rule(escape(plain(section.title)), align="left")
     table = Table(box=None, pad_edge=False, header_style="bold")
@@ -47,6 +48,16 @@ def show(section: Section) -> None:
     for line in section.lines:
         console.print(escape(plain(line)))
     console.print()
+
+
+def say(text: str, command: str = "") -> None:
+    """Print text, folded between words at a terminal, and a command to paste on its own line."""
+    console = Console()
+    if console.is_terminal:
+        text = textwrap.fill(text, console.width, break_long_words=False, break_on_hyphens=False)
+        echo(f"{text}\n{command}" if command else text)
+    else:
+        echo(f"{text} {command}".rstrip())
 
 
 def show_table(title: str, columns: Sequence[str], rows: Iterable[Texts], *lines: str) -> None:
@@ -78,7 +89,7 @@ def show_report(
         echo(f"Figure: {out / 'figures' / 'answer.svg'}")
         echo(f"Tables: {out / 'tables.tex'}")
     if is_finished and any(test.estimate for test in results.verdicts):
-        echo(f"For a paper: {plain(in_a_sentence(results))}")
+        say(f"For a paper: {plain(in_a_sentence(results))}")
 
 
 def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
@@ -116,7 +127,7 @@ def say_what_was_played(tally: Tally) -> None:
     """Print how many runs were played, in which time, and what failed."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
     why = f", the first with {plain(tally.error)}" if tally.error else ""
-    echo(
+    say(
         f"{tally.played} runs played in {tally.seconds:.1f} s{rate}; {tally.kept} were kept from "
         f"before; {tally.failed} failed{why}"
     )
