@@ -187,6 +187,15 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         """
         return self.env.episode_info
 
+    @property
+    def max_cycles(self) -> int | None:
+        """The number of steps after which an episode is truncated, or None."""
+        return self.env.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int | None) -> None:
+        self.unwrapped.max_cycles = cycles
+
     def _declared(self, name: str, values: Iterable[Any]) -> tuple[Scenario, ...]:
         """Declare the spaces of all scenarios with one of these values of a field; return them."""
         known = self.env.scenarios
