@@ -61,14 +61,13 @@ class Application:
             words = shlex.join(["swarm-logistics", *typed])
             code = command(typed, standalone_mode=False, obj=words)
             sys.stdout.flush()
+        except (KeyboardInterrupt, typer.Abort):
+            return _complain("stopped", 130)
         except Exception as error:
             sentence = _sentence(error)
             if sentence is None:
                 raise
             return _complain(sentence, 2)
-        if code == 130:  # Typer's, after Ctrl-C
-            echo(err=True)  # below a bar of progress
-            _complain("stopped; the same command goes on with a study, search or training", 130)
         return code if isinstance(code, int) else 0
 
 

@@ -32,6 +32,7 @@ from .study_commands import (
     ClearingOption,
     FullOption,
     ProcessesOption,
+    run_study,
     study_of,
     tell_what_a_pilot_shows,
     until_cleared,
@@ -151,7 +152,7 @@ def judge_command(
         say(f"{study.plan()}, kept in {place}")
         echo()
         tell_what_a_pilot_shows(study)
-        tally = study.run(engine, minutes=minutes)
+        tally = run_study(study, engine, minutes=minutes)
         results = study.findings()
         if plays_benchmark and not (tally.left or tally.failed):
             _show_benchmark(results, place)
@@ -268,7 +269,12 @@ def attack_command(
     )
     engine = engine_named("local" if processes == 1 else "process", processes)
     place = out or Path("results") / f"attack-{Path(policy).stem}"
-    _show_attack(attack(asked, engine, place), policy, robots, fresh)
+    try:
+        found = attack(asked, engine, place)
+    except KeyboardInterrupt:
+        echo(f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True)
+        raise Exit(130) from None
+    _show_attack(found, policy, robots, fresh)
 
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:

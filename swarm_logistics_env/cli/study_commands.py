@@ -18,7 +18,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
 from swarm_logistics_env.studies.plan import Shard
-from swarm_logistics_env.studies.play import engine_named
+from swarm_logistics_env.studies.play import Engine, Tally, engine_named
 from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
@@ -126,7 +126,7 @@ def run_command(
         say(f"{warning}\n")
     if policies:
         tell_what_a_pilot_shows(chosen)
-    tally = chosen.run(player, shard=part)
+    tally = run_study(chosen, player, part)
     if part is None:
         results = chosen.findings()
         show_report(results, chosen.out, full=full)
@@ -319,3 +319,22 @@ def until_cleared(asked: Study) -> None:
     scenario = task.vary(given.scenario, times)
     # What is published is of another P.
     asked.specification = given.replace(task="clearing", scenario=scenario, reference=None)
+
+
+def run_study(
+    asked: Study, engine: Engine, shard: Shard | None = None, minutes: float | None = None
+) -> Tally:
+    """Run a study; Ctrl-C ends the command and says how to go on."""
+    try:
+        return asked.run(engine, shard=shard, minutes=minutes)
+    except KeyboardInterrupt:
+        done, total = asked.finished(shard)
+        left = f"the other {total - done}"
+        if asked.specification.until_clear:
+            left += ", and with what later looks need"
+        echo(
+            f"\nStopped. {done} of {total} runs are finished and kept in {asked.out}; the same "
+            f"command goes on with {left}.",
+            err=True,
+        )
+        raise Exit(130) from None

@@ -8,7 +8,7 @@ from shlex import quote
 from typing import Annotated
 
 import typer
-from typer import Argument, Option, echo
+from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import TrainingError, how_to_install
 from swarm_logistics_env.policies import read_card
@@ -44,7 +44,11 @@ def train_command(
         raise TrainingError(f"training needs more ({error}): {how_to_install('train')}") from error
     out = out or Path("results/train", training.name)
     echo(f"To follow it: tensorboard --logdir {quote(str(out / 'tensorboard'))}")
-    path = train(training, out, command=str(context.obj), device=device)
+    try:
+        path = train(training, out, command=str(context.obj), device=device)
+    except KeyboardInterrupt:
+        echo("\nStopped. The same command goes on.", err=True)
+        raise Exit(130) from None
     _show_training(path)
     echo(f"Written: {path}")
     echo(f"Watch it: swarm-logistics watch --policy {quote(str(path))}")

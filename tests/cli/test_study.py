@@ -111,8 +111,10 @@ def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
     assert process.returncode == 130
     kept = stored("out")
     assert 0 < kept < 60
-    assert errors.strip().startswith("swarm-logistics: stopped; the same command")
-    assert len(errors.strip().splitlines()) == 1
+    assert errors.strip() == (
+        f"Stopped. {kept} of 60 runs are finished and kept in out; the same command goes "
+        f"on with the other {60 - kept}."
+    )
 
 
 def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says_so(
