@@ -158,6 +158,8 @@ def tell_what_a_pilot_shows(asked: Study) -> None:
             )
         elif errors := [outcome.error for outcome in first if outcome.error]:
             why = plain(errors[0].strip().splitlines()[-1])
+            if "of shape" in why:  # it will be so in every run
+                raise StudyError(f"{title} fails in a first run: {why.partition(': ')[2]}")
             say(f"{title} fails in a first run: {why}. Ctrl-C stops; finished runs are kept.")
         elif not any(outcome.delivered for outcome in first):
             say(f"{title} delivers nothing in a first run. Ctrl-C stops; finished runs are kept.")

@@ -26,6 +26,8 @@ class Mine:
     def act(self, observations): return np.zeros((len(observations), 4))
 class Failing(Mine):
     def act(self, observations): raise RuntimeError("no more")
+class Short(Mine):
+    def act(self, observations): return np.zeros((len(observations), 3))
 """
 
 
@@ -130,6 +132,9 @@ def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(command:
     assert "12 failed, the first with RuntimeError: no more" in printed.splitlines()[-1]
     assert "3 of 3 runs failed" in Path("card", "report.md").read_text()
     assert "failed" in command("judge judged_policy:Failing --benchmark --processes 1", code=1)
+    said = command("judge judged_policy:Short --processes 1 --out short", code=2)
+    assert "commands of shape (4, 3): should be (4, 4)" in said
+    assert not Path("short").exists()
 
 
 def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(command: Command) -> None:
