@@ -116,6 +116,7 @@ def watch_command(
     port: Annotated[
         int, Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free.")
     ] = 8765,
+    no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
     save: Annotated[
         Path | None, Option(help="Play to the end and write a page that replays it; serve nothing.")
     ] = None,
@@ -147,7 +148,7 @@ def watch_command(
         lambda name: load(given.get(name, name), trust_code=trust_code),
     )
     if save is None:
-        shows = sys.stdout.isatty() and _has_screen()
+        shows = not no_open and sys.stdout.isatty() and _has_screen()
         serve(session, port, echo, show=webbrowser.open if shows else None)
         return
     page = recorded_page(session, session.scenario.duration if until is None else until)

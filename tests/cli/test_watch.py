@@ -65,11 +65,16 @@ def test_page_is_served_until_ctrl_c_without_pygame(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("at_terminal", "screen", "opens"),
-    [(True, ":0", True), (False, ":0", False), (True, "", False)],
+    ("words", "at_terminal", "screen", "opens"),
+    [
+        ("watch", True, ":0", True),
+        ("watch", False, ":0", False),
+        ("watch", True, "", False),
+        ("watch --no-open", True, ":0", False),
+    ],
 )
 def test_the_browser_opens_at_a_terminal_with_a_screen(
-    at_terminal: bool, screen: str, opens: bool, monkeypatch: pytest.MonkeyPatch
+    words: str, at_terminal: bool, screen: str, opens: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     served: list[Any] = []
     monkeypatch.setattr(server, "serve", lambda *given, show: served.append((*given, show)))
@@ -78,7 +83,7 @@ def test_the_browser_opens_at_a_terminal_with_a_screen(
     for name in ("WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("DISPLAY", screen)
-    assert app.run(["watch"]) == 0
+    assert app.run(words.split()) == 0
     ((session, port, _, show),) = served
     assert (session.policy, port) == ("ppo-delivery", 8765)
     assert show is (webbrowser.open if opens else None)
