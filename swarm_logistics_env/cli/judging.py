@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -144,9 +145,9 @@ def judge_command(
             study = study_of(benchmark.STUDY, place, None, [asked], trust_code)
         else:
             place = out or Path("results", "judged", slug(policy.title) + "-clearing" * clearing)
-            seeds = seeds or JUDGE_SEEDS
-            looks = until_clear and seeds > FIRST_LOOK
-            study = study_of(STUDY, place, seeds, [asked], trust_code, until_clear=looks)
+            most = seeds or JUDGE_SEEDS
+            looks = until_clear and most > FIRST_LOOK
+            study = study_of(STUDY, place, most, [asked], trust_code, until_clear=looks)
         if clearing:
             until_cleared(study)
         say(f"{study.plan()}, kept in {place}")
@@ -161,6 +162,13 @@ def judge_command(
         if tally.left:
             why = f"Stopped after {minutes:g} min, {tally.left} runs are left"
             say(f"{why}; the same command goes on:", str(context.obj))
+        elif not plays_benchmark and any(v.conclusion == "inconclusive" for v in results.verdicts):
+            more = max(JUDGE_SEEDS, 2 * most)
+            say(
+                "What is open needs more seeds, from the start:",
+                f"swarm-logistics judge {quote(asked)}{' --clearing' * clearing} --seeds {more} "
+                f"--out {quote(f'{place}-{more}')}",
+            )
         say_what_was_played(tally)
         raise Exit(1 if tally.failed else 0)
 

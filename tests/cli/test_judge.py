@@ -108,6 +108,7 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     cells = study.performance()
     p = cells[cells["factor"] == "none"]["mean"].iloc[0]
     assert f"For a paper: homing: P, items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
+    assert "from the start: swarm-logistics judge homing --seeds" in printed
     last = printed.splitlines()[-1]
     assert last.startswith(f"{5 * len(study.plan().cases) - 1} runs played in ")
     assert "1 were kept" in last
