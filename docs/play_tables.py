@@ -16,12 +16,10 @@ from play_paper import draw_figures, paper_block, paper_studies, sentences_block
 from tables import ROOT, asked, by_policy, example, rewrite, seeds_from, table
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.cli.judging import ENTRIES, RECORDED, STUDY
-from swarm_logistics_env.policies import NAMES, load
+from swarm_logistics_env.cli.judging import ENTRIES
 from swarm_logistics_env.report import benchmark, drawing, section
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import NO_FAULT
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import UNAFFECTED, Cell, grouped
 
@@ -305,22 +303,8 @@ def benchmark_block(found: Sequence[StudyResults]) -> str:
     )
 
 
-def record_scores(out: Path) -> None:
-    """Record P of the shipped swarms in the study of `judge`; one that needs the state is none."""
-    loaded = {name: load(name) for name in NAMES if "@" not in name}
-    names = [name for name, one in loaded.items() if not getattr(one, "needs_state", False)]
-    # Of that study the sound swarm alone is recorded, so one fault is enough.
-    fields: dict[str, Any] = {"faults": [{"modes": ["FM1"], "robots": [1]}]}
-    fields |= {"policies": names, "sizes": (), "parameters": ()}
-    (found,) = play([Study.preset(STUDY, out=out / STUDY, **fields)])
-    p = {c.policy: {"p": c.by_seed.tolist()} for c in found.cells if c.arm.setting == NO_FAULT}
-    seeds = [found.plan.seeds[0], found.plan.seeds[-1]]
-    recorded = {"command": "python docs/play_tables.py", "seeds": seeds, "policies": p}
-    RECORDED.write_text(json.dumps(recorded) + "\n", encoding="utf-8")
-
-
 def main() -> None:
-    """Play, rewrite the page of results, then the README, and record P of the shipped swarms."""
+    """Play, rewrite the page of results, then the README."""
     paper = play(paper_studies(OUT, FIRST_SEED))
     draw_figures(paper, MEDIA)
     cleared, restocked, leans = play(ladder_studies(OUT))
@@ -341,7 +325,6 @@ def main() -> None:
         blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))
     rewrite(PAGE, blocks)
     front_page.main()
-    record_scores(OUT)
 
 
 if __name__ == "__main__":

@@ -45,36 +45,24 @@ __all__ = [
     "wrappers",
 ]
 
-GYMNASIUM_ID = "SwarmLogistics-v0"
-PETTINGZOO_ID = "swarm_logistics_v0"
-
 # The module of each name, imported when the name is first asked for: the world imports the compiler
 # of its kernels, and a training script does not pay for a study's machinery.
-_MODULES = dict.fromkeys(("Episode", "run_episode"), "episode") | {
+_MODULES = {
+    "Episode": "episode",
     "FAILURE_MODES": "warehouse",
     "Fault": "warehouse",
     "SCENARIO_PRESETS": "scenario",
     "Scenario": "scenario",
     "Warehouse": "warehouse",
+    "run_episode": "episode",
 }
 
-
-def _register() -> None:
-    """Register the names; modules are imported when an environment is made."""
-    if GYMNASIUM_ID not in gymnasium.registry:
-        gymnasium.register(GYMNASIUM_ID, "swarm_logistics_env.adapters.central_env:CentralEnv")
-    if not hasattr(pettingzoo, "register"):
-        return  # PettingZoo has a registry since 1.27
-    module = "swarm_logistics_env.swarm_logistics_v0"
-    for form, registry, maker in (
-        ("aec", pettingzoo.aec_registry, "env"),
-        ("parallel", pettingzoo.parallel_registry, "parallel_env"),
-    ):
-        if PETTINGZOO_ID.replace("_v", "-v") not in registry:
-            pettingzoo.register(form, PETTINGZOO_ID, entry_point=f"{module}:{maker}")
-
-
-_register()
+# Modules are imported when an environment is made.
+gymnasium.register("SwarmLogistics-v0", f"{__name__}.adapters.central_env:CentralEnv")
+if hasattr(pettingzoo, "register"):  # since 1.27
+    _house = f"{__name__}.swarm_logistics_v0"
+    pettingzoo.register("aec", "swarm_logistics_v0", entry_point=f"{_house}:env")
+    pettingzoo.register("parallel", "swarm_logistics_v0", entry_point=f"{_house}:parallel_env")
 
 
 def __getattr__(name: str) -> object:

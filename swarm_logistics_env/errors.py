@@ -54,13 +54,10 @@ def suggest(name: str, known: Iterable[str]) -> str:
     """Return the end of an error message about an unknown `name`.
 
     "; did you mean 'x'?" where one of `known` is close to it; "; did you mean 'x' or 'y'?" where
-    several are equally close, or one to eight of them contain it, whatever its case; else the list
-    of what is known.
+    one to eight of them contain it, whatever its case; else the list of what is known.
     """
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=6)
-    likeness = {near: difflib.SequenceMatcher(None, near, name).ratio() for near in close}
-    meant = sorted(near for near in likeness if likeness[near] == max(likeness.values()))
+    meant = difflib.get_close_matches(name, names, n=1)
     if not meant and name:
         meant = [known for known in names if name.casefold() in known.casefold()]
     if 1 <= len(meant) <= 8:

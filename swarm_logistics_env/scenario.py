@@ -5,22 +5,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import (
-    Field,
-    NonNegativeFloat,
-    NonNegativeInt,
-    PositiveFloat,
-    PositiveInt,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from swarm_logistics_env.errors import ScenarioError, suggest
 from swarm_logistics_env.records import Record
 
 # Discs may cover this part of the floor; random sequential addition ends at 0.547.
 DENSEST_COVER = 0.4
-# Numbers beyond these do not survive in float32 observations, or vanish when squared.
-SMALLEST, LARGEST = 1e-9, 1e9
 # In a physics step a robot may drive this part of its radius; a crowd presses a faster one
 # through walls.
 LONGEST_STRIDE = 0.8
@@ -39,6 +30,11 @@ SOURCES = {
 # Where `demand` is "zipf", item i is asked for with a weight of 1 / (i + 1) ** ZIPF_EXPONENT.
 ZIPF_EXPONENT = 1.0
 
+# Numbers beyond these do not survive in float32 observations, or vanish when squared.
+SMALLEST, LARGEST = 1e-9, 1e9
+Positive = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
+NonNegative = Annotated[float, Field(ge=0, le=LARGEST)]
+Count = Annotated[int, Field(ge=1, le=LARGEST)]
 Probability = Annotated[float, Field(ge=0, le=1)]
 Mix = Annotated[tuple[Annotated[float, Field(gt=0, le=1)], ...], Field(min_length=1)]
 
@@ -85,19 +81,19 @@ class Scenario(Record):
 
     error_type = ScenarioError
 
-    n_robots: PositiveInt = Field(25, description="swarm size N [robots]; source: paper")
-    n_items: PositiveInt = Field(60, description="items in storage at the start; source: paper")
-    warehouse_width: PositiveFloat = Field(10.0, description="along x [m]; source: paper")
-    warehouse_height: PositiveFloat = Field(10.0, description="along y [m]; source: paper")
-    delivery_width: PositiveFloat = Field(
+    n_robots: Count = Field(25, description="swarm size N [robots]; source: paper")
+    n_items: Count = Field(60, description="items in storage at the start; source: paper")
+    warehouse_width: Positive = Field(10.0, description="along x [m]; source: paper")
+    warehouse_height: Positive = Field(10.0, description="along y [m]; source: paper")
+    delivery_width: Positive = Field(
         2.0,
         description="delivery area: strip along the wall at the highest x [m]; source: simulator",
     )
-    duration: PositiveFloat = Field(500.0, description="episode [s]; source: paper")
+    duration: Positive = Field(500.0, description="episode [s]; source: paper")
     restock: bool = Field(
         False, description="a delivered item returns to storage and requests never end; off"
     )
-    n_requests: PositiveInt = Field(
+    n_requests: Count = Field(
         1, description="items asked for at a time, delivered in any order; source: paper"
     )
     demand: Literal["closed", "independent", "zipf"] = Field(
@@ -106,37 +102,37 @@ class Scenario(Record):
         "request is a uniform draw of its own; zipf: as that, but item i is (i + 1) times as rare "
         "as item 0; source: simulator",
     )
-    dock_capacity: PositiveFloat | None = Field(
+    dock_capacity: Positive | None = Field(
         None,
         description="deliveries that the delivery area takes [1/s], the oldest request first; the "
         "others wait; none: any number at once; off",
     )
-    handling_time: NonNegativeFloat = Field(
+    handling_time: NonNegative = Field(
         0.0, description="a robot stands so long to lift, to put down and to deliver [s]; off"
     )
-    n_obstacles: NonNegativeInt = Field(0, description="static discs; off")
-    obstacle_radius: PositiveFloat = Field(0.3, description="[m], if there are any; off")
+    n_obstacles: Annotated[int, Field(ge=0, le=LARGEST)] = Field(0, description="static discs; off")
+    obstacle_radius: Positive = Field(0.3, description="[m], if there are any; off")
 
-    robot_radius: PositiveFloat = Field(0.125, description="[m]; source: DOTS, simulator")
-    robot_mass: PositiveFloat = Field(3.0, description="[kg]; source: DOTS")
-    max_speed: PositiveFloat = Field(
+    robot_radius: Positive = Field(0.125, description="[m]; source: DOTS, simulator")
+    robot_mass: Positive = Field(3.0, description="[kg]; source: DOTS")
+    max_speed: Positive = Field(
         2.0, description="[m/s], DOTS drive 1; source: simulator, descendant"
     )
-    max_acceleration: PositiveFloat = Field(20.0, description="[m/s^2], nearly at once; fitted")
-    max_turn_rate: PositiveFloat = Field(6.0, description="[rad/s]; source: DOTS")
-    ranger_range: PositiveFloat = Field(2.0, description="16 laser rangers [m]; source: DOTS")
-    view_range: PositiveFloat = Field(
+    max_acceleration: Positive = Field(20.0, description="[m/s^2], nearly at once; fitted")
+    max_turn_rate: Positive = Field(6.0, description="[rad/s]; source: DOTS")
+    ranger_range: Positive = Field(2.0, description="16 laser rangers [m]; source: DOTS")
+    view_range: Positive = Field(
         1.0, description="items and robots in view of the cameras [m]; source: DOTS"
     )
-    radio_range: PositiveFloat = Field(4.0, description="how far a robot is heard [m]; fitted")
-    pickup_range: PositiveFloat = Field(
+    radio_range: Positive = Field(4.0, description="how far a robot is heard [m]; fitted")
+    pickup_range: Positive = Field(
         0.25,
         description="lifts an item this near, centre to centre [m]; source: simulator, descendant",
     )
     drive: Literal["holonomic", "differential"] = Field(
         "holonomic", description="differential: no sideways motion, `left` is ignored; source: DOTS"
     )
-    heading_drift: NonNegativeFloat = Field(
+    heading_drift: NonNegative = Field(
         0.02,
         description="every robot's body turns at a constant rate that nobody tells it, normal with "
         "this standard deviation [rad/s]: a poor gyro; chosen",
@@ -150,17 +146,17 @@ class Scenario(Record):
     memory_size: Annotated[int, Field(ge=0, le=16)] = Field(
         2, description="items last put down, not lifted again until a delivery; source: simulator"
     )
-    timer_limit: PositiveFloat = Field(
+    timer_limit: Positive = Field(
         10.0, description="timer since the delivery area falls silent at [s]; source: paper"
     )
     relay: Literal["none", "gossip"] = Field(
         "none", description="robots tell their own timer, or the lowest heard, aged; source: paper"
     )
 
-    ranger_noise: NonNegativeFloat = Field(
+    ranger_noise: NonNegative = Field(
         0.0, description="standard deviation of every beam [m]; not published, so 0; off"
     )
-    position_noise: NonNegativeFloat = Field(
+    position_noise: NonNegative = Field(
         0.0, description="standard deviation of x and of y of neighbours and items [m]; off"
     )
     sensor_dropout: Probability = Field(
@@ -173,9 +169,9 @@ class Scenario(Record):
         0, description="numbers in [-1, 1] that each robot broadcasts as it likes; off"
     )
 
-    item_radius: PositiveFloat = Field(0.125, description="[m]; source: simulator, descendant")
-    control_period: PositiveFloat = Field(0.1, description="one command per [s]; fitted")
-    physics_period: PositiveFloat = Field(0.02, description="one physics step per [s]; fitted")
+    item_radius: Positive = Field(0.125, description="[m]; source: simulator, descendant")
+    control_period: Positive = Field(0.1, description="one command per [s]; fitted")
+    physics_period: Positive = Field(0.02, description="one physics step per [s]; fitted")
 
     @property
     def storage_width(self) -> float:
@@ -224,7 +220,6 @@ class Scenario(Record):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
-        self._check_sizes()
         self._check_periods()
         self._check_storage()
         self._check_requests()
@@ -244,14 +239,6 @@ class Scenario(Record):
                     f"{max(fit, 0)} (discs may cover {DENSEST_COVER:.0%} of it)"
                 )
         return self
-
-    def _check_sizes(self) -> None:
-        for name in type(self).model_fields:
-            value = getattr(self, name)
-            if isinstance(value, int | float) and not value <= LARGEST:
-                raise ValueError(f"{name} = {value}: should be at most {LARGEST:g}")
-            if isinstance(value, float) and 0.0 < value < SMALLEST:
-                raise ValueError(f"{name} = {value}: should be at least {SMALLEST:g}")
 
     def _check_periods(self) -> None:
         if self.physics_period > LONGEST_PHYSICS_PERIOD:

@@ -78,7 +78,7 @@ from tests.tasks.lane import LANE
     "lane": "swarm_logistics_env.tasks.lane_task:LANE",
 ### A scenario parameter READER=warehouse/sensing
 @ scenario.py @    item_radius:
-    odometry_scale: PositiveFloat = Field(1.0, description="factor of velocities; off")
+    odometry_scale: Positive = Field(1.0, description="factor of velocities; off")
 @ warehouse/structs.py @    n_substeps:
     odometry_scale: float
 @ warehouse/sensing.py @    limit = parameters.max_speed

@@ -69,7 +69,6 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         monkeypatch.setattr(tables, name, tmp_path / name)
     for name, value in {"PAGE": page, "MEDIA": tmp_path, "PROCESSES": 1}.items():
         monkeypatch.setattr(tables, name, value)
-    monkeypatch.setattr(tables, "record_scores", lambda out: None)
     monkeypatch.setattr(tables.front_page, "main", lambda: None)
     return page
 

@@ -105,7 +105,6 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     ) -> None:
         n_worlds = checked_count("n_worlds", n_worlds)
         threads = checked_count("threads", threads)
-        own = make_env
         if make_env is None:
             make_env = maker(scenario, n_worlds, n_robots, fields)
         elif scenario is not None or n_robots is not None or fields:
@@ -113,12 +112,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
                 "make_env and conditions: should be one or the other; make_env decides what its "
                 "environments are like"
             )
-        try:
-            self._worlds = Worlds(make_env, n_worlds, threads)
-        except Exception as error:
-            if own is not None:
-                error.add_note("make_env is called with the number of a world: lambda world: ...")
-            raise
+        self._worlds = Worlds(make_env, n_worlds, threads)
         self.worlds = self._worlds.envs
         # What the next infos are copies of, unless a world has something to tell.
         self._abouts: Infos = [{} for _ in range(self._worlds.n_rows)]
@@ -154,22 +148,12 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     def set_options(self, options: Mapping[str, Any] | Sequence[Any] | None = None) -> None:
         """Set the options of the next `reset`: a dict for all worlds, or a list with one for each.
 
-        stable-baselines3 passes a list of length `num_envs`; in it all rows of a world have to
-        have the same options.
-
         Raises:
-            SetupError: the list has another length, or different options for rows of one world.
+            SetupError: the list has another length.
         """
         if options is None or isinstance(options, Mapping):
-            self._options = [dict(options or {})] * self.num_envs
-            return
-        if len(options) == len(self.worlds):
-            options = [options[world] for world in self._worlds.world_of.tolist()]
-        firsts = [rows.start for rows in self._worlds.rows]
-        if len(options) != self.num_envs or any(
-            options[row] != options[firsts[world]]
-            for row, world in enumerate(self._worlds.world_of)
-        ):
+            options = [options] * len(self.worlds)
+        if len(options) != len(self.worlds):
             raise SetupError(
                 f"{len(options)} options: should be one dict, or a dict for each of the "
                 f"{len(self.worlds)} worlds"
@@ -181,8 +165,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         observations = self._worlds.blank()
         self._returns[:], self._begun[:] = 0.0, self._n_steps
         for world, rows in enumerate(self._worlds.rows):
-            options = self._options[rows.start] or None
-            self._worlds.begin(world, observations, self._seeds[rows.start], options)
+            seed = self._seeds[rows.start]
+            self._worlds.begin(world, observations, seed, self._options[world])
             self._note(world)
         self.reset_infos = list(map(dict.copy, self._abouts))
         self._reset_seeds()
@@ -255,21 +239,9 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             lambda env: any(isinstance(layer, wrapper_class) for layer in layers_of(env)), indices
         )
 
-    def get_images(self) -> list[NDArray[np.uint8]]:
-        """Return a picture (H, W, 3) of each world; all have the size of the largest."""
-        shown = [p for env in self.worlds if (p := env.render()) is not None]
-        height, width = np.max([picture.shape[:2] for picture in shown], axis=0)
-        return [
-            np.pad(p, ((0, height - p.shape[0]), (0, width - p.shape[1]), (0, 0))) for p in shown
-        ]
-
-    def render(self, mode: str | None = None) -> NDArray[np.uint8] | None:
-        """Return a picture of all worlds, as tiles; in mode "human" show world 0 in its window."""
-        if self.render_mode == "human":
-            self.worlds[0].render()
-            return None
-        picture: NDArray[np.uint8] | None = super().render(mode)
-        return picture
+    def get_images(self) -> list[NDArray[np.uint8] | None]:
+        """Return a picture (H, W, 3) of each world."""
+        return [env.render() for env in self.worlds]
 
     def close(self) -> None:
         """Release threads and what rendering holds; harmless when called twice."""

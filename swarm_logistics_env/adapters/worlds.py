@@ -120,12 +120,8 @@ class Worlds:
         given = numbers_of(commands, "actions", self._commands.shape)
         self._commands[:] = given
         if not np.isfinite(self._commands).all():
-            row = int(np.argwhere(~np.isfinite(self._commands))[0, 0])
-            world = int(self.world_of[row])
-            raise CommandError(
-                f"actions[{row}] = {given[row]} (world {world}, robot_"
-                f"{row - self.rows[world].start}): should be finite"
-            )
+            row = np.argwhere(~np.isfinite(self._commands))[0, 0]
+            raise CommandError(f"actions[{row}] = {given[row]}: should be finite")
 
     def step(self) -> RowsStep:
         """Take one control period in every world, with the commands that were given."""
@@ -234,10 +230,7 @@ def maker(
     Raises:
         SetupError: there are no sizes, or more than worlds.
     """
-    if isinstance(n_robots, Sequence | np.ndarray):
-        sizes: list[Any] = [int(size) for size in n_robots]
-    else:
-        sizes = [n_robots]
+    sizes = [None] if n_robots is None else np.atleast_1d(n_robots).tolist()
     if not 1 <= len(sizes) <= n_worlds:
         raise SetupError(
             f"n_robots = {n_robots!r}: should be 1 to {n_worlds} sizes, as there are {n_worlds} "

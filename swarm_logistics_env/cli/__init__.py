@@ -1,10 +1,5 @@
 """The command line, `swarm-logistics`. Commands import what they use when they run."""
 
-import gc
-
-gc.disable()  # nothing that an import makes is garbage
-from .app import app  # noqa: E402 - see above
-
-gc.enable()
+from .app import app
 
 __all__ = ["app"]

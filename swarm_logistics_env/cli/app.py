@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import errno
 import gc
 import json
 import os
 import shlex
 import sys
-import traceback
 from collections.abc import Iterable
-from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 import typer
-from rich.markup import escape
 from typer import Exit, Option, echo
 
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
@@ -34,8 +30,6 @@ COMMANDS = {
     "list": ("playing", "list_command"),
     "study": ("study_commands", "study"),
 }
-# A disk, a quota or a file that is full; a pipe that nobody reads.
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EPIPE)
 
 
 class Application:
@@ -60,13 +54,12 @@ class Application:
         # so that its modules hide no installed ones.
         if "" not in sys.path:
             sys.path.append("")
-        typed = sys.argv[1:] if arguments is None else arguments
+        typed = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
         try:
             command = command_line({*typed[:1]} & {*COMMANDS} or COMMANDS)
-            _show_help_well(command)
             # What made a file is recorded in it: the command line is the context's object.
             words = shlex.join(["swarm-logistics", *typed])
-            code = command(arguments, standalone_mode=False, obj=words)
+            code = command(typed, standalone_mode=False, obj=words)
             sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
             return _complain("stopped", 130)
@@ -74,8 +67,6 @@ class Application:
             sentence = _sentence(error)
             if sentence is None:
                 raise
-            if not sentence:  # no command was named: the help has been printed
-                return 2
             return _complain(sentence, 2)
         return code if isinstance(code, int) else 0
 
@@ -88,9 +79,9 @@ def command_line(names: Iterable[str] = COMMANDS) -> Any:
     found = typer.Typer(
         name="swarm-logistics",
         help="A warehouse for robot swarms, and the measure of how they cope.",
-        no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # Rich would read `[px]` in a help text as a style
     )
     found.callback()(_options)
     for name in names:
@@ -119,54 +110,18 @@ def _options(
     """Take the options that stand before a command."""
 
 
-def _show_help_well(command: Any) -> None:
-    """Escape the help of a command and of those below it: Rich reads `[px]` as a style."""
-    command.help = escape(command.help or "")
-    for parameter in command.get_params(typer.Context(command)):
-        parameter.help = escape(getattr(parameter, "help", None) or "")
-        if getattr(parameter, "is_flag", False):
-            parameter.metavar = " "  # a flag takes no value, though Typer shows its type
-    for below in getattr(command, "commands", {}).values():
-        _show_help_well(below)
-
-
 def _sentence(error: Exception) -> str | None:
-    """Return what to tell the user, or None for a bug of ours, whose traceback should be seen."""
+    """Return what to tell the user, or None for a bug, whose traceback should be seen."""
     from swarm_logistics_env.spi import IndicatorError
 
     # These are Typer's own errors of usage, whichever click they come from.
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
-        if known := getattr(error, "possibilities", None):
-            error.possibilities = get_close_matches(error.option_name, known, 1)  # type: ignore[attr-defined]
         return str(format_message())
-    if isinstance(error, SwarmLogisticsError | IndicatorError):
+    # The operating system refuses for reasons of its own: a disk that is full, a name too long.
+    if isinstance(error, SwarmLogisticsError | IndicatorError | OSError):
         return str(error)
-    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
-        return f"{str(error.filename)[:40]}...: {error.strerror}: should be a shorter path"
-    if isinstance(error, OSError) and error.errno in _NO_ROOM:
-        return f"cannot write {error.filename or 'the output'}: {error.strerror}"
-    return _of_a_policy(error)
-
-
-def _of_a_policy(error: Exception) -> str | None:
-    """Return what a user's own policy raised, and where; None if the error came from elsewhere."""
-    from swarm_logistics_env.policies import policy
-
-    frames = traceback.extract_tb(error.__traceback__)
-    calls = [number for number, frame in enumerate(frames) if frame.filename == policy.__file__]
-    if not calls:
-        return None
-    beyond = frames[calls[-1] + 1 :]
-    where = ""
-    if beyond:
-        its_file = beyond[0].filename
-        if Path(its_file).is_relative_to(Path(policy.__file__).parents[1]):
-            return None
-        line = [frame.lineno for frame in beyond if frame.filename == its_file][-1]
-        where = f" ({its_file}, line {line})"
-    said = " ".join(str(error).split())
-    return f"the policy raised {type(error).__name__}: {said}{where}"
+    return None
 
 
 def _complain(sentence: str, code: int) -> int:
@@ -201,8 +156,12 @@ PolicyOption = Annotated[
     str, Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
 ]
 SeedOption = Annotated[int, Option(help="Decides everything random.")]
-TrustPolicyOption = Annotated[
-    bool, Option("--trust-code", help="Read a .zip policy, which executes the code in it.")
+TrustOption = Annotated[
+    bool,
+    Option(
+        "--trust-code",
+        help="Let a file run code: a .zip policy, or what a study names as package.mod:NAME.",
+    ),
 ]
 
 

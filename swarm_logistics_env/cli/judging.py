@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -13,24 +12,24 @@ import typer
 from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.policies import SUFFIXES, PolicySpec, called, load
-from swarm_logistics_env.records import plain, read_table
+from swarm_logistics_env.policies import SUFFIXES, PolicySpec
+from swarm_logistics_env.records import read_table
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, slug
 from swarm_logistics_env.report.write import write_report
-from swarm_logistics_env.spi import mean_interval, read_trials
+from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
 from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.play import Engine, Tally, engine_named
+from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME
 from swarm_logistics_env.studies.specification import FIRST_LOOK
-from swarm_logistics_env.warehouse.faults import Fault, text_of
+from swarm_logistics_env.warehouse.faults import text_of
 
-from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustPolicyOption, scenario_of
+from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustOption, scenario_of
 from .study_commands import (
     ClearingOption,
     FullOption,
@@ -65,7 +64,8 @@ def judge_command(
     ] = None,
     seeds: Annotated[
         int | None,
-        Option(help=f"Seeds of a policy at most, 3 or more; {JUDGE_SEEDS} if not given."),
+        # Fewer runs are alike by chance.
+        Option(min=LEAST_SEEDS, help=f"Seeds of a policy at most; {JUDGE_SEEDS} if not given."),
     ] = None,
     until_clear: Annotated[
         bool,
@@ -108,7 +108,7 @@ def judge_command(
     ] = None,
     processes: ProcessesOption = None,
     full: FullOption = False,
-    trust_code: TrustPolicyOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Judge trials of real robots or of another simulator; or a policy, until it is clear.
 
@@ -133,24 +133,44 @@ def judge_command(
         if given:
             kind = "a policy" if is_policy else "a file of trials"
             raise StudyError(f"{option} is not for {kind}, and {asked!r} is one")
-    if seeds is not None and seeds < LEAST_SEEDS:
-        raise StudyError(
-            f"--seeds {seeds}: should be {LEAST_SEEDS} or more, as fewer runs are alike by chance"
-        )
     if plays_benchmark and (seeds or clearing):
         option = "--seeds" if seeds else "--clearing"
         raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
     if is_policy:
-        count = processes or os.cpu_count() or 1
-        engine = engine_named("process" if count > 1 else "local", count)
+        policy = PolicySpec.of(asked).replace(trusted=trust_code)
+        for one in policy.trainings or (policy,):
+            one.load()  # what is wrong with it is said before anything is written
+        engine = engine_named("local" if processes == 1 else "process", processes)
         if plays_benchmark:
-            tally, place = _play_benchmark(asked, out, engine, minutes, trust_code)
+            place = out or Path("results", "benchmark", slug(policy.title))
+            study = study_of(benchmark.STUDY, place, None, [asked], trust_code)
         else:
-            tally, place = _judge_policy(
-                asked, out, engine, minutes, trust_code, seeds or JUDGE_SEEDS,
-                until_clear=until_clear, clearing=clearing, full=full, command=str(context.obj),
-            )  # fmt: skip
-        say_what_was_played(tally, f"{count} process{'es' if count > 1 else ''}", place)
+            place = out or Path("results", "judged", slug(policy.title) + "-clearing" * clearing)
+            most = seeds or JUDGE_SEEDS
+            looks = until_clear and most > FIRST_LOOK
+            study = study_of(STUDY, place, most, [asked], trust_code, until_clear=looks)
+        if clearing:
+            until_cleared(study)
+        say(f"{study.plan()}, kept in {place}")
+        echo()
+        tell_what_a_pilot_shows(study)
+        tally = run_study(study, engine, minutes=minutes)
+        results = study.findings()
+        if plays_benchmark and not (tally.left or tally.failed):
+            _show_benchmark(results, place)
+        else:
+            show_report(results, place, full=full, is_finished=not tally.left)
+        if tally.left:
+            why = f"Stopped after {minutes:g} min, {tally.left} runs are left"
+            say(f"{why}; the same command goes on:", str(context.obj))
+        elif not plays_benchmark and any(v.conclusion == "inconclusive" for v in results.verdicts):
+            more = max(JUDGE_SEEDS, 2 * most)
+            say(
+                "What is open needs more seeds, from the start:",
+                f"swarm-logistics judge {quote(asked)}{' --clearing' * clearing} --seeds {more} "
+                f"--out {quote(f'{place}-{more}')}",
+            )
+        say_what_was_played(tally)
         raise Exit(1 if tally.failed else 0)
 
     usual = Path("results", "judged", Path(asked).stem)
@@ -211,98 +231,17 @@ def names_policy(asked: str) -> bool:
     return ":" in asked or not suffix
 
 
-def _judge_policy(
-    asked: str,
-    out: Path | None,
-    engine: Engine,
-    minutes: float | None,
-    trust_code: bool,
-    seeds: int,
-    *,
-    until_clear: bool,
-    clearing: bool,
-    full: bool,
-    command: str,
-) -> tuple[Tally, Path]:
-    """Play the study `scorecard` with a policy until it is clear; return what, and where it is.
-
-    Every run is kept at once, so that the same command goes on after an interruption.
-    """
-    load(asked, trust_code=trust_code)  # what is wrong with it is said before anything is written
-    out = out or Path("results", "judged", slug(called(asked)) + "-clearing" * clearing)
-    looks = until_clear and seeds > FIRST_LOOK
-    study = study_of(STUDY, out, seeds, [asked], trust_code, until_clear=looks)
-    if clearing:
-        until_cleared(study)
-    say(f"{study.plan()}, kept in {out}")
-    echo()
-    tell_what_a_pilot_shows(study)
-    tally = run_study(study, engine, minutes=minutes)
-    results = study.findings()
-    if tally.error:
-        say(f"{tally.failed} runs failed, the first with {plain(tally.error)}")
-    left = f"{tally.left} runs are left." if tally.left else ""
-    show_report(results, out, full=full, unfinished=left)
-    if not clearing and (rank := _rank(results)):
-        say(rank)
-    if tally.left:
-        say(f"Stopped after {minutes:g} min; the same command goes on:", command)
-    elif any(test.conclusion == "inconclusive" for test in results.verdicts):
-        more = max(JUDGE_SEEDS, 2 * seeds)
-        say(
-            "What is open needs more seeds, from the start:",
-            f"swarm-logistics judge {quote(asked)}{' --clearing' * clearing} --seeds {more} "
-            f"--out {quote(f'{out}-{more}')}",
-        )
-    return tally, out
-
-
 # Scores of the shipped policies in the benchmark; `docs/play_tables.py` writes it.
 ENTRIES = Path(__file__).parents[1] / "report" / "benchmark_entries.json"
 
 
-def _play_benchmark(
-    asked: str, out: Path | None, engine: Engine, minutes: float | None, trust_code: bool
-) -> tuple[Tally, Path]:
-    """Play the benchmark with a policy, or all its trainings; return what, and where it is."""
-    policy = PolicySpec.of(asked).replace(trusted=trust_code)
-    for one in policy.trainings or (policy,):
-        one.load()
-    out = out or Path("results", "benchmark", slug(policy.title))
-    study = study_of(benchmark.STUDY, out, None, [asked], trust_code)
-    say(f"{study.plan()}, kept in {out}")
-    echo()
-    tally = run_study(study, engine, minutes=minutes)
-    results = study.findings()
-    if tally.left or tally.failed:
-        show_report(results, out)
-        return tally, out
+def _show_benchmark(results: StudyResults, out: Path) -> None:
+    """Print the table of a policy in the benchmark and its place, and write the report."""
     show(benchmark.table(results))
     entries = {name: np.array(one) for name, one in json.loads(ENTRIES.read_text()).items()}
-    entries[policy.title] = benchmark.score(results)
+    entries[results.policies[0]] = benchmark.score(results)
     show(benchmark.leaderboard(entries))
     echo(f"Report: {write_report(results, out, document(results))[0]}")
-    return tally, out
-
-
-# P of the shipped policies in the study `scorecard`; `docs/play_tables.py` writes it.
-RECORDED = Path(__file__).parents[1] / "report" / "shipped_score_cards.json"
-
-
-def _rank(results: StudyResults) -> str | None:
-    """Return the place of the policy among the shipped ones, where the intervals allow one."""
-    mine = next(cell for cell in results.cells if cell.arm.setting.name == "none").mean
-    told = json.loads(RECORDED.read_text(encoding="utf-8"))["policies"]
-    beside = {name: mean_interval(one["p"]) for name, one in told.items()}
-    beside.pop(results.policies[0], None)
-    if mine.low is None or mine.high is None or not any(v.estimate for v in results.verdicts):
-        return None
-    above = sum(p.low is not None and p.low > mine.high for p in beside.values())
-    below = sum(p.high is not None and p.high < mine.low for p in beside.values())
-    ordered = sorted(beside.items(), key=lambda one: -one[1].value)
-    others = ", ".join(f"{name} {p.value:.0f}" for name, p in ordered)
-    rank = f"; rank {above + 1} of {len(beside) + 1}" if above + below == len(beside) else ""
-    return f"P of the shipped policies here: {others}{rank}."
 
 
 def attack_command(
@@ -349,29 +288,22 @@ def attack_command(
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
     rows = [
-        (found.by, _in_words(found.fault), bracketed(found.robustness, 3), str(found.runs))
+        (found.by, str(text_of(found.fault)), bracketed(found.robustness, 3), str(found.runs))
         for found in result.found
     ]
     worst = min(result.found, key=lambda found: found.robustness.value)
-    text = text_of(worst.fault)
-    played = f" `run` and `watch` play it with --fault {quote(text)}." if text else ""
     capped = (
         "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
         "shown. --set restock=true has no cap."
     )
     show_table(
         f"{policy}: worst faults found",
-        ("found by", "fault", "R [95 %]", "runs"),
+        ("found by", "--fault", "R [95 %]", "runs"),
         rows,
-        f"Worst fault of {robots} robots found: {_in_words(worst.fault)}, R = "
-        f"{worst.robustness.value:.3f} on {fresh} seeds that the search has not met.{played}",
+        f"Worst fault of {robots} robots found: {text_of(worst.fault)}, R = "
+        f"{worst.robustness.value:.3f} on {fresh} seeds that the search has not met. `run` and "
+        "`watch` play it with --fault.",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
         *([capped] if result.is_capped else ()),
     )
-
-
-def _in_words(fault: Fault) -> str:
-    who = "by the seed" if fault.role is None else fault.role.replace("_", " ")
-    until = "" if fault.duration is None else f" for {fault.duration:g} s"
-    return f"{fault.mode} of {fault.robots} ({who}) from {fault.onset:g} s{until}"

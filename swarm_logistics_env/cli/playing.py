@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
+import numpy as np
 from typer import Argument, Option, echo
 
 from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.policies import Policy, called, known_policies, load
+from swarm_logistics_env.policies import called, known_policies, load
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.scenario import SOURCES, Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
@@ -27,13 +27,12 @@ from .app import (
     ScenarioOption,
     SeedOption,
     SetOption,
-    TrustPolicyOption,
+    TrustOption,
     faults_of,
     scenario_of,
 )
 
 FRAME_RATE = 25.0  # frames a second
-FILM_SIZE = 480  # longer side of each warehouse [px]
 
 
 def run_command(
@@ -64,17 +63,19 @@ def run_command(
         float | None, Option(help="Where the film ends [s]; with the episode if not given.")
     ] = None,
     speed: Annotated[float, Option(help="How many times real time the film plays.")] = 4.0,
-    trust_code: TrustPolicyOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Play one episode and print what it delivered, or write it as a film."""
     scenario = scenario_of(preset, scenario_file, changes)
     scheduled = faults_of(faults, scenario)
     names = policies or ["swarm-dt"]
     if film is not None:
-        write_film_of(
-            film, scenario, names, seed, scheduled, until, speed,
-            twin=twin, load=lambda name: load(name, trust_code=trust_code),
-        )  # fmt: skip
+        runs = [(faults or [], scheduled)]
+        if twin:
+            if not scheduled:
+                raise SetupError("--twin: shows a run without its faults: --fault should be given")
+            runs.insert(0, (["no fault"], []))
+        _write_film(film, scenario, names, seed, runs, until, speed, trust_code)
         return
     if twin or until is not None or len(names) > 1:
         raise SetupError("--twin, --until, several --policy: are for a film, with --film FILE.mp4")
@@ -91,7 +92,7 @@ def run_command(
         f"by {scenario.n_robots} robots with {called(names[0])}, seed {seed}"
     )
     if len(times):
-        wait = max(after - before for before, after in zip([0.0, *times], times))
+        wait = np.diff(times, prepend=0.0).max()
         echo(f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, longest wait {wait:.1f} s")
     if episode.failed_robots:
         echo(
@@ -115,7 +116,6 @@ def watch_command(
     port: Annotated[
         int, Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free.")
     ] = 8765,
-    host: Annotated[str, Option(help="Address to listen on; 0.0.0.0: all.")] = "127.0.0.1",
     no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
     save: Annotated[
         Path | None, Option(help="Play to the end and write a page that replays it; serve nothing.")
@@ -123,14 +123,14 @@ def watch_command(
     until: Annotated[
         float | None, Option(help="With --save: time at which the replay ends [s].")
     ] = None,
-    trust_code: TrustPolicyOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Watch two runs side by side in the browser; inspect, break and repair robots."""
     import webbrowser
 
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.messages import recorded_page
-    from swarm_logistics_env.watch.server import is_loopback, serve
+    from swarm_logistics_env.watch.server import serve
 
     if until is not None and (save is None or not until > 0.0):
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
@@ -148,11 +148,8 @@ def watch_command(
         lambda name: load(given.get(name, name), trust_code=trust_code),
     )
     if save is None:
-        if not is_loopback(host):
-            told = "whoever learns the address can watch and steer; nothing is encrypted"
-            echo(f"Warning: --host {host}: {told}.", err=True)
         shows = not no_open and sys.stdout.isatty() and _has_screen()
-        serve(session, port, echo, host, webbrowser.open if shows else None)
+        serve(session, port, echo, show=webbrowser.open if shows else None)
         return
     page = recorded_page(session, session.scenario.duration if until is None else until)
     with becoming(save, SetupError) as part:
@@ -166,41 +163,39 @@ def _has_screen() -> bool:
     return sys.platform in ("darwin", "win32") or any(map(os.environ.get, names))
 
 
-def write_film_of(
+def _write_film(
     out: Path,
     scenario: Scenario,
-    policies: Sequence[str],
+    policies: list[str],
     seed: int,
-    faults: Sequence[Fault],
+    runs: list[tuple[list[str], list[Fault]]],
     until: float | None,
     speed: float,
-    *,
-    twin: bool,
-    load: Callable[[str], Policy],
+    trust_code: bool,
 ) -> None:
-    """Write episodes as a film, one policy, or with and without faults, beside the other.
+    """Write episodes as a film, one beside the other.
+
+    Args:
+        runs: of each policy, the words above it and its faults.
 
     Raises:
-        SetupError: the file's name or the extra for films does not do, or there is no fault.
+        SetupError: the file's name or the extra for films does not do.
     """
     from rich.console import Console
     from rich.progress import Progress
 
-    from swarm_logistics_env.rendering.renderer import check_film, load_pygame, write_film
+    from swarm_logistics_env.rendering.renderer import load_pygame, write_film
 
-    if twin and not faults:
-        raise SetupError("--twin: shows the run without its faults, so --fault should be given")
-    check_film(out)
     load_pygame()
     from swarm_logistics_env.watch.film import Film, Take
 
     takes = []
     for name in policies:
-        for these in ((), faults) if twin else (faults,):
-            title = _title(name, these) if faults else _short(name)
-            takes.append(Take(title, Play(scenario, load(name), seed, these)))
+        for words, faults in runs:
+            play = Play(scenario, load(name, trust_code=trust_code), seed, faults)
+            takes.append(Take(", ".join([called(name)[-24:], *words]), play))
     end = scenario.duration if until is None else until
-    film = Film(takes, end, speed, FRAME_RATE, FILM_SIZE)
+    film = Film(takes, end, speed, FRAME_RATE)
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
         frames = progress.track(film.frames(), total=film.n_frames, description=out.name)
@@ -209,25 +204,11 @@ def write_film_of(
     echo(f"{out}: {count} frames, {count / FRAME_RATE:.1f} s, {size:.2f} MB")
 
 
-def _short(policy: str) -> str:
-    policy = called(policy)
-    # A long path of a user's own policy is cut at its beginning.
-    return policy if len(policy) <= 24 else f"…{policy[-23:]}"
-
-
-def _title(policy: str, faults: Sequence[Fault]) -> str:
-    counts = [
-        f"{fault.mode} × {fault.robots if isinstance(fault.robots, int) else len(fault.robots)}"
-        for fault in faults
-    ]
-    return f"{_short(policy)}, {', '.join(counts) or 'no fault'}"
-
-
-LISTED = ("policies", "trainings", "faults", "studies", "scenario")
-
-
 def list_command(
-    what: Annotated[str, Argument(metavar="|".join(LISTED), help="What to list.")],
+    what: Annotated[
+        Literal["policies", "trainings", "faults", "studies", "scenario"],
+        Argument(help="What to list."),
+    ],
     preset: PresetOption = "paper",
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
@@ -241,8 +222,6 @@ def list_command(
 
     from .terminal import show_table
 
-    if what not in LISTED:
-        raise SetupError(f"list {what}: should be {', '.join(LISTED[:-1])} or {LISTED[-1]}")
     if what == "scenario":
         chosen = scenario_of(preset, scenario_file, changes)
         if as_json:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -21,10 +20,9 @@ from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers
 from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.play import Engine, Tally, engine_named
 from swarm_logistics_env.studies.runs import Runs, export
-from swarm_logistics_env.studies.specification import FIRST_LOOK
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 
-from .app import Repeated
+from .app import Repeated, TrustOption
 from .terminal import say, say_what_was_played, show_power, show_report, show_table
 
 StudyArgument = Annotated[
@@ -45,9 +43,6 @@ FirstSeedOption = Annotated[
 PolicyOption = Annotated[
     Repeated, Option("--policy", help="Policy to judge (`list policies`); may be repeated.")
 ]
-TrustCodeOption = Annotated[
-    bool, Option("--trust-code", help="Let a study name its task and policies as package.mod:NAME.")
-]
 ProcessesOption = Annotated[
     int | None, Option(min=1, help="Worker processes; all cores if not given.")
 ]
@@ -59,7 +54,7 @@ ClearingOption = Annotated[
     ),
 ]
 
-study = typer.Typer(name="study", help="Judge a swarm by its indicators.", no_args_is_help=True)
+study = typer.Typer(name="study", help="Judge a swarm by its indicators.")
 
 
 @study.command("run")
@@ -101,16 +96,12 @@ def run_command(
         str | None, Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N.")
     ] = None,
     full: FullOption = False,
-    trust_code: TrustCodeOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Play the runs that are missing, then print the answer and write the report."""
     part = Shard.parse(shard) if shard else None
-    if until_clear:
-        seeds = MOST_SEEDS if seeds is None else seeds
-        if seeds <= FIRST_LOOK:
-            raise StudyError(
-                f"--most {seeds}: should be more than {FIRST_LOOK} seeds, where the first look is"
-            )
+    if until_clear and seeds is None:
+        seeds = MOST_SEEDS
     looks = until_clear or None
     chosen = study_of(
         asked, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
@@ -147,10 +138,8 @@ def run_command(
             f"When all {part.count} shards are done:",
             f"swarm-logistics study merge {out}/shard-*-of-{part.count} --out {out}",
         )
-    count = f"{processes or os.cpu_count() or 1} processes"
-    players = {"local": "1 process", "ray": "Ray"}.get(engine, count)
     # The last line: where it is looked for after a report of many pages.
-    say_what_was_played(tally, players, chosen.out)
+    say_what_was_played(tally)
     raise Exit(1 if tally.failed else 0)
 
 
@@ -192,7 +181,7 @@ def plan_command(
         float | None,
         Option(help="Of a study that was run: assumed indicator; the paper's if not given."),
     ] = None,
-    trust_code: TrustCodeOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Print the conditions and count the runs; of a study that was run, the seeds that it needs."""
     if Path(asked).is_dir():
@@ -214,13 +203,13 @@ def plan_command(
 
 @study.command("report")
 def report_command(
-    directory: DirectoryArgument, full: FullOption = False, trust_code: TrustCodeOption = False
+    directory: DirectoryArgument, full: FullOption = False, trust_code: TrustOption = False
 ) -> None:
     """Print the answer and write the report of a study again, from its store alone."""
     stored = Study.stored(directory, trust_code=trust_code)
     say(str(stored.plan()))
     echo()
-    show_report(stored.findings(), stored.out, full=full)
+    show_report(stored.findings(), directory, full=full)
 
 
 @study.command("compare")
@@ -237,7 +226,7 @@ def compare_command(
             "chance; possibly: where that is not ruled out.",
         ),
     ] = None,
-    trust_code: TrustCodeOption = False,
+    trust_code: TrustOption = False,
 ) -> None:
     """Compare two studies, condition by condition; end with 1 if a gate fails."""
     gates = [Gate.parse(text) for text in fail_if or []]

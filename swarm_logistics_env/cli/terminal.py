@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 from typer import echo
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import NOTHING, WORDS, Section, Texts, number
+from swarm_logistics_env.report.section import NOTHING, Section, Texts, number
 from swarm_logistics_env.report.write import (
     how_to_get_figures,
     missing_packages,
     section_markdown,
     write_report,
 )
-from swarm_logistics_env.spi.estimate import SIGNS
 from swarm_logistics_env.studies.play import Tally
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, Verdict
 
 _PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
-_COLOURS = {word: SIGNS[verdict].colour for verdict, word in WORDS.items()}
-_VERDICTS = re.compile(rf"(?<=  )({'|'.join(_COLOURS)})\b")
 
 
 def show(section: Section) -> None:
@@ -43,33 +38,16 @@ def show(section: Section) -> None:
         console.out(section_markdown(section), highlight=False)
         return
     console.rule(escape(plain(section.title)), align="left")
-    for shown in _beside(section, console.width):
-        table = Table(box=None, pad_edge=False, header_style="bold")
-        for place in shown:
-            # Folded where a terminal is narrow: a number that is cut is another number.
-            table.add_column(escape(plain(section.columns[place])), overflow="fold")
-        for row in section.rows:
-            table.add_row(*(escape(plain(row[place])) for place in shown))
-        console.print(table)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for column in section.columns:
+        # Folded where a terminal is narrow: a number that is cut is another number.
+        table.add_column(escape(plain(column)), overflow="fold")
+    for row in section.rows:
+        table.add_row(*(escape(plain(cell)) for cell in row))
+    console.print(table)
     for line in section.lines:
         console.print(escape(plain(line)))
     console.print()
-
-
-def _beside(section: Section, width: int) -> Iterator[list[int]]:
-    """Yield which columns stand side by side: the first, and as many others as fit beside it."""
-    columns = zip(section.columns, *section.rows)
-    # A long heading is folded.
-    widths = [max(min(len(head), 12), *map(len, cells), 1) for head, *cells in columns]
-    shown: list[int] = []
-    for place in range(len(widths)):
-        taken = sum(widths[one] + 2 for one in shown) + widths[place]
-        if len(shown) > 1 and taken > width:
-            yield shown
-            shown = shown[:1]
-        shown.append(place)
-    if shown:
-        yield shown
 
 
 def say(text: str, command: str = "") -> None:
@@ -88,38 +66,29 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Texts], *lines
 
 
 def show_report(
-    results: StudyResults, out: Path | None, *, full: bool = False, unfinished: str = ""
+    results: StudyResults, out: Path, *, full: bool = False, is_finished: bool = True
 ) -> None:
     """Print the answer of a study and a sentence for a paper, and write its report into `out`.
 
     Args:
         full: print every table, and a line a question.
-        unfinished: what is left to play; no sentence is for a paper then.
+        is_finished: whether all is played; else no sentence is for a paper.
     """
-    if unfinished:
-        say(f"Unfinished: {unfinished}")
     whole = document(results)
     for section in whole.summary if full else ():
         show(section)
     # Printed first: what was found is told even where no file can be written.
-    console = Console(highlight=False)
+    console = Console()
     width = console.width if console.is_terminal else _PLAIN_WIDTH
     found, most = (answer(results, most=None), None) if full else (whole.answer, MOST_LINES)
-    shown = Text("\n".join(map(plain, digest(found, width, most).split("\n"))))
-    for word in _VERDICTS.finditer(shown.plain):
-        shown.stylize(_COLOURS[word[1]], *word.span())
-    console.print(shown, soft_wrap=True)
-    if out:
-        echo(f"Report: {write_report(results, out, whole)[0]}")
-        if missing := missing_packages():
-            echo(how_to_get_figures(missing))
-        else:
-            echo(f"Figure: {out / 'figures' / 'answer.svg'}")
-            echo(f"Tables: {out / 'tables.tex'}")
-        if not full and any(len(line.tests) > 1 for line in whole.answer.lines):
-            again = f"swarm-logistics study report {quote(str(out))} --full"
-            say("Each question on a line of its own:", again)
-    if any(test.estimate for test in results.verdicts) and not unfinished:
+    echo("\n".join(map(plain, digest(found, width, most).split("\n"))))
+    echo(f"Report: {write_report(results, out, whole)[0]}")
+    if missing := missing_packages():
+        echo(how_to_get_figures(missing))
+    else:
+        echo(f"Figure: {out / 'figures' / 'answer.svg'}")
+        echo(f"Tables: {out / 'tables.tex'}")
+    if is_finished and any(test.estimate for test in results.verdicts):
         say(f"For a paper: {plain(in_a_sentence(results))}")
 
 
@@ -154,15 +123,11 @@ def _power(test: Verdict, effect: float | None) -> Texts:
     )
 
 
-def say_what_was_played(tally: Tally, players: str, out: Path) -> None:
-    """Print how many runs `players` have played, in which time; they are kept in `out`."""
+def say_what_was_played(tally: Tally) -> None:
+    """Print how many runs were played, in which time, and what failed."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
-    error = plain(tally.error or "")
-    place, to = quote(str(out)), quote(str(out / "runs.csv"))
-    export = f"swarm-logistics study export {place} --to {to}"
-    why = f", the first with {error}. Each traceback, column error:" if error else ""
+    why = f", the first with {plain(tally.error)}" if tally.error else ""
     say(
-        f"{tally.played} runs played in {tally.seconds:.1f} s by {players}{rate}; {tally.kept} "
-        f"were kept from before; {tally.failed} failed{why}",
-        export if error else "",
+        f"{tally.played} runs played in {tally.seconds:.1f} s{rate}; {tally.kept} were kept from "
+        f"before; {tally.failed} failed{why}"
     )

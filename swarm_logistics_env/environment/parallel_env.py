@@ -31,16 +31,6 @@ from .spaces import ArrayStep, DictView, Spaces, agent_names, global_state
 if TYPE_CHECKING:
     from swarm_logistics_env.rendering import Renderer
 
-# Names that other environments give to an argument of this one.
-_OTHER_NAMES = {
-    "num_agents": "n_robots",
-    "n_agents": "n_robots",
-    "num_robots": "n_robots",
-    "width": "warehouse_width",
-    "height": "warehouse_height",
-    "max_steps": "max_cycles",
-}
-
 
 class SwarmLogisticsEnv(DictView):
     """A swarm fetches requested items in a warehouse; each robot uses only its own sensors.
@@ -287,10 +277,9 @@ def _scenario_of(scenario: Scenario | None, fields: Mapping[str, Any]) -> Scenar
             f"scenario = {scenario!r}: should be a Scenario; its fields are arguments of their "
             "own, as n_robots=40"
         )
-    own = ("scenario", "faults", "rewards", "render_mode", "max_cycles", "max_robots")
     for name in fields:
         if name not in Scenario.model_fields:
-            hint = suggest(_OTHER_NAMES.get(name, name), (*Scenario.model_fields, *own))
+            hint = suggest(name, Scenario.model_fields)
             raise ArgumentError(
                 f"the environment got an unexpected keyword argument {name!r}{hint}"
             )

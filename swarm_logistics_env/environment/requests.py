@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError, SetupError, suggest
+from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
@@ -25,18 +25,14 @@ def as_array(given: ArrayLike, name: str) -> NDArray[Any]:
         name: the name of the value, for errors.
 
     Raises:
-        CommandError: NumPy cannot read it, as a tensor of bfloat16, on a GPU or with a gradient;
-            names its type, dtype and device.
+        CommandError: NumPy cannot read it, as a tensor of bfloat16, on a GPU or with a gradient.
     """
     try:
         return np.asarray(given)
     except Exception as error:  # tensors raise TypeError, RuntimeError, NotImplementedError, ...
-        traits = [f"{trait} {getattr(given, trait)}" for trait in _TRAITS if hasattr(given, trait)]
-        kind = ", ".join([f"type {type(given).__name__}", *traits])
-        reason = str(error).strip().partition("\n")[0]
         raise CommandError(
-            f"{name} ({kind}) cannot be read: should be numbers that numpy.asarray takes, which "
-            f"says: {reason}"
+            f"{name} of type {type(given).__name__} cannot be read: should be numbers that "
+            f"numpy.asarray takes, which says: {error}"
         ) from error
 
 
@@ -78,7 +74,13 @@ def gathered(
             "agent; step_arrays takes an array"
         )
     if actions.keys() != set(agents):
-        _check_names(actions, agents, possible_agents)
+        if missing := set(agents) - actions.keys():
+            raise CommandError(f"no command for {min(missing)!r}: should be one for every agent")
+        if unknown := actions.keys() - set(possible_agents):
+            raise CommandError(
+                f"a command for {min(map(str, unknown))!r}, who is not there: should be among "
+                f"{len(possible_agents)} possible agents"
+            )
     rows: list[Any] = [actions[agent] for agent in agents]
     if not all(type(row) is np.ndarray and row.shape == wanted for row in rows):  # seldom
         rows = [as_array(row, f"command of {agent!r}") for agent, row in zip(agents, rows)]
@@ -91,24 +93,6 @@ def gathered(
     except TypeError as error:
         raise CommandError(f"commands should be numbers: {error}") from error
     return given.reshape(len(rows), *wanted)
-
-
-def _check_names(
-    actions: Mapping[str, ArrayLike], agents: Sequence[str], possible_agents: Sequence[str]
-) -> None:
-    possible = set(possible_agents)
-    for agent in actions:
-        if agent not in possible:
-            raise CommandError(
-                f"a command for {agent!r}, who is not there: should be among {len(possible)} "
-                f"possible agents, {possible_agents[0]} to {possible_agents[-1]}"
-            )
-    for agent in agents:
-        if agent not in actions:
-            raise CommandError(f"no command for {agent!r}: should be one for every agent")
-
-
-_TRAITS = ("dtype", "device", "requires_grad")
 
 
 OPTIONS = ("faults", "scenario")
@@ -127,12 +111,11 @@ def checked_options(options: Mapping[str, Any] | None) -> dict[str, Any]:
         raise SetupError(f"options = {options!r}: should be None or a dict with keys {OPTIONS}")
     for unknown in map(str, options.keys() - set(OPTIONS)):
         # Other libraries pass options of their own, which have no such name.
-        if get_close_matches(unknown.casefold(), OPTIONS, cutoff=0.8):
-            raise SetupError(f"there is no reset option {unknown!r}{suggest(unknown, OPTIONS)}")
-        if unknown in Scenario.model_fields:
+        is_near = get_close_matches(unknown.casefold(), OPTIONS, cutoff=0.8)
+        if is_near or unknown in Scenario.model_fields:
             raise SetupError(
-                f"there is no reset option {unknown!r}: should be in the option 'scenario', as "
-                f"options={{'scenario': {{{unknown!r}: {options[unknown]!r}}}}}"
+                f"there is no reset option {unknown!r}: should be 'faults', or 'scenario' with "
+                "fields, as options={'scenario': {'n_robots': 40}}"
             )
     return dict(options)
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import motion
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import as_array, numbers_of
+from swarm_logistics_env.environment.requests import numbers_of
 from swarm_logistics_env.environment.spaces import ArrayStep
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
@@ -78,13 +78,9 @@ class MotionFrame(Wrapper):
         Raises:
             CommandError: wrong shape, not readable or not finite; nothing has happened then.
         """
-        given = as_array(outputs, "outputs")
-        wanted = (self.warehouse.state.n_robots, len(OUTPUTS))
-        if given.shape != wanted or not np.isfinite(given).all():
-            raise CommandError(
-                f"outputs of shape {given.shape}: should be {wanted} finite numbers, "
-                f"{', '.join(OUTPUTS)}"
-            )
+        given = numbers_of(outputs, "outputs", (self.n_rows, len(OUTPUTS)))
+        if not np.isfinite(given).all():
+            raise CommandError(f"outputs = {given}: should be finite")
         outcome = self.env.step_arrays(self._frame.command(given))
         return (self._read(outcome[0]), *outcome[1:])
 

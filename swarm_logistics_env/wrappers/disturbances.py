@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
 
-from .wrapper import Distribution, Sampler, Wrapper
+from .wrapper import Wrapper, drawn, listed
 
 
 class FaultInjection(Wrapper):
@@ -34,7 +34,8 @@ class FaultInjection(Wrapper):
             for every mode.
         onset: the time of the failure [s]; a list to draw from in each episode; or a function of
             a numpy Generator that returns one time or an array of times. At each further time
-            as many robots more fail, as long as there are any; robots given by number fail anew.
+            as many robots more fail, as long as there are any; robots given by number fail once
+            more, which in `motor_slow` makes them slower still while both failures last.
         duration: how long a failure lasts [s]; None means until the end.
         factor: the part of speed (`motor_slow`) or of view (`view_reduced`) that is left, in
             [0, 1).
@@ -66,7 +67,7 @@ class FaultInjection(Wrapper):
         env: SwarmLogisticsEnv | Wrapper,
         mode: str,
         robots: int | Sequence[int] = 1,
-        onset: ArrayLike | Distribution = 0.0,
+        onset: ArrayLike | Callable[[np.random.Generator], ArrayLike] = 0.0,
         duration: float | None = None,
         factor: float | None = None,
     ) -> None:
@@ -81,7 +82,7 @@ class FaultInjection(Wrapper):
         self._onset = onset
         self.injected: tuple[Fault, ...] = ()
         for scenario in self.env.scenarios:
-            self._check(scenario)
+            failed_robots(self._fault, 0, scenario.n_robots)
 
     @property
     def failed_robots(self) -> tuple[int, ...]:
@@ -105,26 +106,19 @@ class FaultInjection(Wrapper):
         Raises:
             FaultError: `scenario` has fewer robots than are to fail.
         """
-        self._check(scenario)
-        self.env.declare_spaces(scenario)
-
-    def _check(self, scenario: Scenario) -> None:
         failed_robots(self._fault, 0, scenario.n_robots)
+        self.env.declare_spaces(scenario)
 
     def _drawn(self, seed: int, n_robots: int) -> tuple[Fault, ...]:
         rng = generator(seed, "fault onsets", self._place())
         if callable(self._onset):
             onsets = sorted(_times(self._onset(rng)))
         else:
-            onsets = [self._onset[int(rng.integers(len(self._onset)))]]
+            onsets = [drawn(self._onset, rng)]
         if isinstance(self._fault.robots, tuple):
-            return self._anew(onsets)
-        return self._one_group_after_another(onsets, self._fault.robots, seed, n_robots)
-
-    def _one_group_after_another(
-        self, onsets: list[float], size: int, seed: int, n_robots: int
-    ) -> tuple[Fault, ...]:
+            return tuple(self._fault.replace(onset=onset) for onset in onsets)
         faults, before = [], set[int]()
+        size = self._fault.robots
         for number, onset in enumerate(onsets, start=1):
             # The first group has to exist; later groups are drawn from the robots that are left.
             so_many = self._fault.replace(robots=max(size, min(number * size, n_robots)))
@@ -132,18 +126,6 @@ class FaultInjection(Wrapper):
             if more := tuple(sorted(chosen - before)):
                 faults.append(self._fault.replace(robots=more, onset=onset))
             before = chosen
-        return tuple(faults)
-
-    def _anew(self, onsets: list[float]) -> tuple[Fault, ...]:
-        faults: list[Fault] = []
-        for onset in onsets:
-            last = faults[-1] if faults else None
-            if last is None or (last.duration and onset > last.onset + last.duration):
-                faults.append(self._fault.replace(onset=onset))
-            elif last.duration and self._fault.duration:
-                # The robot has still failed; two faults of motor_slow would make it slower still.
-                until = onset + self._fault.duration
-                faults[-1] = last.replace(duration=until - last.onset)
         return tuple(faults)
 
 
@@ -166,12 +148,10 @@ class ParameterChange(Wrapper):
     Args:
         env: the environment, or a wrapper of one.
         name: a field of `Scenario`, e.g. "delivery_width".
-        values: the new value; a list to draw from in each episode (a tuple is one value, as
-            `speed_mix` has them); or a function of a numpy Generator.
+        values: the new value, or a list to draw from in each episode (a tuple is one value, as
+            `speed_mix` has them).
         at: the time of the change [s], given like `values`; the value holds from the first step
             that begins then or later. None means that it holds throughout the episode.
-        within: (least, greatest) value that a function returns; required with a function.
-        at_within: (earliest, latest) time that a function returns; required with a function.
 
     Attributes:
         value: the value that the parameter has, or will have, in this episode.
@@ -180,7 +160,7 @@ class ParameterChange(Wrapper):
     Raises:
         ScenarioError: there is no such parameter, it cannot change during a run, or its value or
             time is not allowed.
-        SetupError: a function comes without its bounds, or the spaces have no room for a value.
+        SetupError: a list is empty, or the spaces have no room for a value.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0
@@ -198,8 +178,6 @@ class ParameterChange(Wrapper):
         values: Any,
         *,
         at: Any = None,
-        within: tuple[Any, Any] | None = None,
-        at_within: tuple[float, float] | None = None,
     ) -> None:
         super().__init__(env)
         if not isinstance(name, str) or name not in Scenario.model_fields:
@@ -213,17 +191,16 @@ class ParameterChange(Wrapper):
                 f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
             )
         self.name = name
-        self._values = Sampler(name, values, within)
-        self._times = None if at is None else Sampler("at", at, at_within)
-        if self._times is not None:
-            for time in self._times.ends:
-                if not isinstance(time, int | float) or not time >= 0:
-                    raise ScenarioError(f"at = {time!r}: should be a time of at least 0 s")
+        self._values = listed(name, values)
+        self._times = () if at is None else listed("at", at)
+        for time in self._times:
+            if not isinstance(time, int | float) or not time >= 0:
+                raise ScenarioError(f"at = {time!r}: should be a time of at least 0 s")
         self.value: Any = None
         self.time: float | None = None
         self._is_due = False
         before = () if at is None else self.env.scenarios
-        after = self._declared(name, self._values.ends)
+        after = self._declared(name, self._values)
         self.scenarios: tuple[Scenario, ...] = tuple(dict.fromkeys((*before, *after)))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
@@ -252,5 +229,5 @@ class ParameterChange(Wrapper):
 
     def _drawn(self, seed: int) -> tuple[Any, float | None]:
         rng = generator(seed, f"change of {self.name}", self._place())
-        value = self._values.sample(rng)
-        return value, None if self._times is None else float(self._times.sample(rng))
+        value = drawn(self._values, rng)
+        return value, float(drawn(self._times, rng)) if self._times else None

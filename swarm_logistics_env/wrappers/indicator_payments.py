@@ -78,11 +78,11 @@ class RunningMeans:
     Args:
         window: the number of last episodes of a condition that its mean is over; it is limited
             because the policy changes.
-        least: a divisor is at least this [items]; at the start of a training a mean may be 0.
-        initial: the divisor of a condition that was not played yet [items]; None means `least`.
+        least: a divisor is at least this [items]; at the start of a training a mean may be 0, or
+            there is none. `add` notes what is known before.
 
     Raises:
-        SetupError: `window` is below 1, or `least` or `initial` is not positive.
+        SetupError: `window` is below 1, or `least` is not positive.
 
     Example:
         >>> means = RunningMeans(window=2)
@@ -92,16 +92,11 @@ class RunningMeans:
         (35.0, 3)
     """
 
-    def __init__(
-        self, window: int = 50, *, least: float = 1.0, initial: float | None = None
-    ) -> None:
+    def __init__(self, window: int = 50, *, least: float = 1.0) -> None:
         self.window = checked_count("window", window)
         self.least = least
-        self.initial = least if initial is None else initial
-        for name in ("least", "initial"):
-            value = getattr(self, name)
-            if not isinstance(value, int | float | np.number) or not 0 < value < np.inf:
-                raise SetupError(f"{name} = {value!r}: should be a positive number of items")
+        if not isinstance(least, int | float | np.number) or not 0 < least < np.inf:
+            raise SetupError(f"least = {least!r}: should be a positive number of items")
         self._last: dict[Condition, deque[int]] = {}
         self._counts: Counter[Condition] = Counter()
 
@@ -129,9 +124,8 @@ class RunningMeans:
         return self.mean(condition) or 0.0
 
     def divisor(self, condition: Condition) -> float:
-        """Return its mean P as a divisor: at least `least`, and `initial` if it was not played."""
-        mean = self.mean(condition)
-        return max(self.initial if mean is None else mean, self.least)
+        """Return its mean P as a divisor: `least` or more."""
+        return max(self.performance(condition), self.least)
 
 
 # The performances that each indicator is relative to.
@@ -148,7 +142,7 @@ class Payment:
 
     share: float = 0.0
     constant: float = 0.0
-    performances: Mapping[str, tuple[Condition, float]] = field(default_factory=dict)
+    performances: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -217,10 +211,10 @@ def indicator_of(
     if compared is None:
         return None
     p_o = p_against = references.divisor(compared.reference)
-    performances = {"P_N" if name == "S" else "P_o": (compared.reference, p_o)}
+    performances = {"P_N" if name == "S" else "P_o": p_o}
     if compared.against != compared.reference:
         p_against = references.performance(compared.against)
-        performances["P_S"] = (compared.against, p_against)
+        performances["P_S"] = p_against
     share = compared.scale / p_o
     return Payment(share, compared.offset - share * p_against, performances)
 

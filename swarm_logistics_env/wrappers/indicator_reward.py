@@ -52,8 +52,8 @@ class IndicatorReward(Wrapper):
     episodes with other parameters as well, or a performance for each condition, for instance the
     means of a study. Then episodes without faults and changes pay
     nothing (except P). Beware: **R, FT, S and A rise when P_o falls**, and nothing in such a
-    reward holds P_o up. So infos report P_o beside them: the value given and, if such episodes are
-    played, the value measured. Look at both, or add P to the weights.
+    reward holds P_o up. So `measured` has P_o of the episodes that are played beside it. Look at
+    both, or add P to the weights.
 
     *References as running means.* Give a `RunningMeans` to measure references in episodes of the
     policy in training, which are played in between. Its means at the start of an episode hold for
@@ -105,7 +105,7 @@ class IndicatorReward(Wrapper):
         Worlds that share their means, every other one with faults; `SwarmVecEnv(make_env=...)`:
 
         >>> from swarm_logistics_env.wrappers import FaultInjection
-        >>> means = RunningMeans(window=20, initial=33.0)
+        >>> means = RunningMeans(window=20)
         >>> def make_env(world):
         ...     env = swarm_logistics_v0.parallel_env(n_robots=25)
         ...     env = FaultInjection(env, "FM1", robots=2) if world % 2 else env
@@ -169,8 +169,7 @@ class IndicatorReward(Wrapper):
         "n_robots", "n_failed" and "n_removed" are those of `condition`. Each indicator but P has
         these entries, here for R: "R" is its value so far, constant included. "R_tested" is 1 if
         the episode tests it; otherwise it and the following are 0. "R_P_o" is the reference
-        [items], "R_P_o_measured" its running mean [items], and "R_P_o_episodes" the number of
-        episodes of that condition so far. FT has the same for P_S, and S has P_N instead of P_o.
+        [items]. FT has the same for P_S, and S has P_N instead of P_o.
         """
         condition = self.condition
         info = {
@@ -187,11 +186,7 @@ class IndicatorReward(Wrapper):
             info[name] = test.share * delivered + test.constant if test else 0.0
             info[f"{name}_tested"] = int(test is not None)
             for role in PERFORMANCES[name]:
-                reference, given = test.performances[role] if test else (None, 0.0)
-                mean = self.measured.mean(reference) if reference else None
-                info[f"{name}_{role}"] = given
-                info[f"{name}_{role}_measured"] = 0.0 if mean is None else mean
-                info[f"{name}_{role}_episodes"] = self.measured.count(reference) if reference else 0
+                info[f"{name}_{role}"] = test.performances[role] if test else 0.0
         return info
 
     def begun(self, seed: int) -> None:

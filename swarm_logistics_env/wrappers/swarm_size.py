@@ -10,14 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import faults_among, numbers_of, scenario_fields
+from swarm_logistics_env.environment.requests import (
+    check_somebody_is_there,
+    faults_among,
+    numbers_of,
+    scenario_fields,
+)
 from swarm_logistics_env.environment.spaces import ArrayStep, Infos, agent_names
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.warehouse.faults import failed_robots
 
-from .wrapper import Distribution, Sampler, Wrapper
+from .wrapper import Wrapper, drawn, listed
 
 
 class FixedAgents(Wrapper):
@@ -112,16 +118,13 @@ class SwarmSize(Wrapper):
 
     Args:
         env: the environment, or a wrapper of one.
-        sizes: the swarm size N, a list to draw from in each episode, or a function of a numpy
-            Generator.
-        within: (smallest, largest) size that a function returns; required with a function.
+        sizes: the swarm size N, or a list to draw from in each episode.
         leave: pairs (robots, time [s]): at each time that many more robots leave.
 
     Raises:
         ScenarioError: a swarm of such a size is not allowed.
-        SetupError: a function comes without `within`, more robots leave than there are, or all of
-            them leave at 0 s.
-        FaultError: a time of leaving is not allowed.
+        SetupError: no size is listed, or all robots leave at 0 s.
+        FaultError: a time of leaving is not allowed, or more robots leave than there are.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0
@@ -134,30 +137,25 @@ class SwarmSize(Wrapper):
     def __init__(
         self,
         env: SwarmLogisticsEnv | Wrapper,
-        sizes: int | Sequence[int] | Distribution,
+        sizes: int | Sequence[int],
         *,
-        within: tuple[int, int] | None = None,
         leave: Sequence[tuple[int, float]] = (),
     ) -> None:
         super().__init__(env)
-        if isinstance(sizes, tuple | range):
-            sizes = list(sizes)
-        self._size = Sampler("n_robots", sizes, within)
+        self._sizes = listed("n_robots", list(sizes) if isinstance(sizes, Sequence) else sizes)
         pairs = _departures(leave)
-        self._leaving = sum(robots for robots, _ in pairs)
-        self._absent = sum(robots for robots, time in pairs if time == 0.0)
         # The sets are nested: the first m + k robots contain the m that have left.
         in_all = np.cumsum([robots for robots, _ in pairs], dtype=np.int64).tolist()
         self._departures = tuple(
             Fault("removed", count, onset=time) for count, (_, time) in zip(in_all, pairs)
         )
-        self.scenarios: tuple[Scenario, ...] = self._declared("n_robots", self._size.ends)
+        self.scenarios: tuple[Scenario, ...] = self._declared("n_robots", self._sizes)
         largest = max(self.unwrapped.max_robots or 0, *(each.n_robots for each in self.scenarios))
         self.unwrapped.possible_agents = agent_names(range(largest))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's size and departures among them."""
-        size = self._size.sample(generator(seed, "swarm size", self._place()))
+        size = drawn(self._sizes, generator(seed, "swarm size", self._place()))
         faults = (*faults_among(options, self.unwrapped.faults), *self._departures)
         scenario = {"n_robots": size, **scenario_fields(options)}
         return {**options, "scenario": scenario, "faults": faults}
@@ -166,18 +164,12 @@ class SwarmSize(Wrapper):
         """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
 
         Raises:
-            SetupError: more robots are to leave than `scenario` has, or all of them at 0 s.
+            FaultError: more robots are to leave than `scenario` has.
+            SetupError: all of them are to leave at 0 s.
         """
-        if self._absent >= scenario.n_robots:
-            raise SetupError(
-                f"leave: {self._absent} robots at 0 s, should be fewer than n_robots = "
-                f"{scenario.n_robots}, or the episode would begin with nobody"
-            )
-        if self._leaving > scenario.n_robots:
-            raise SetupError(
-                f"leave: {self._leaving} robots in all, should be at most n_robots = "
-                f"{scenario.n_robots}"
-            )
+        for fault in self._departures:
+            failed_robots(fault, 0, scenario.n_robots)
+        check_somebody_is_there(self._departures, 0, scenario.n_robots)
         self.env.declare_spaces(scenario)
 
 

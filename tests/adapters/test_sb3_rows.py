@@ -185,7 +185,7 @@ def test_wrong_actions_are_refused_before_anything_happens() -> None:
     env.reset()
     with pytest.raises(CommandError, match=r"actions of shape \(5, 4\)"):
         env.step(np.zeros((5, 4)))
-    with pytest.raises(CommandError, match=r"actions\[0\] .* \(world 0, robot_0\)"):
+    with pytest.raises(CommandError, match=r"actions\[0\] .* finite"):
         env.step(np.full((6, 4), np.nan))
     assert [world.warehouse.state.step for world in env.worlds] == [0, 0]
 

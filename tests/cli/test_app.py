@@ -39,7 +39,7 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
         ("run --twin", "are for a film, with --film"),
         ("watch --until 5", "--until 5: should be above 0 s, together with --save"),
         ("watch --save nowhere/x.html", "should be a file in a folder that can be"),
-        ("list robots", "list robots: should be policies, trainings, faults, studies"),
+        ("list robots", "'robots' is not one of 'policies', 'trainings', 'faults', 'studies'"),
         ("study plan quick --policy nobody", "'nobody'"),
         ("study report nowhere", "no study in nowhere"),
     ],
@@ -69,13 +69,12 @@ def command_lines(command: Any, *names: str) -> Iterator[tuple[list[str], Any]]:
 
 @pytest.mark.parametrize(("words", "parsed"), list(command_lines(command_line())))
 def test_a_help_page_shows_each_help_text_in_full(
-    words: list[str], parsed: Any, monkeypatch: pytest.MonkeyPatch, command: Command
+    words: list[str], parsed: Any, command: Command
 ) -> None:
-    monkeypatch.setenv("COLUMNS", "400")
-    page = " ".join(command(" ".join(words)).split())
+    page = "".join(command(" ".join(words)).split())
     for text in [parsed.help, *(getattr(one, "help", "") for one in parsed.params)]:
-        assert " ".join((text or "").split()) in page
-    assert words != ["study", "run", "--help"] or ", ".join(PRESETS) in page
+        assert "".join((text or "").split()) in page
+    assert words != ["study", "run", "--help"] or ",".join(PRESETS) in page
 
 
 OWN = """
@@ -85,26 +84,22 @@ class Lazy:
     def reset(self, n_robots, seed): ...
     def act(self, observations): return np.zeros((len(observations), 4))
 class Torn(Lazy):
-    def act(self, observations):
-        raise ZeroDivisionError('the motor\\nis gone')
-class Short(Lazy):
-    def reset(self, n_robots): ...
+    def act(self, observations): raise ZeroDivisionError('the motor is gone')
 class Unmade(Lazy):
     def __init__(self): {}['gain']
 """
 
 
-def test_what_is_wrong_with_a_policy_of_ones_own_is_one_sentence(command: Command) -> None:
+def test_a_policy_of_ones_own_that_cannot_be_made_is_one_sentence(command: Command) -> None:
     Path("own_policy.py").write_text(OWN)
     for name, said in (
-        ("own_policy:Torn", "ZeroDivisionError: the motor is gone ("),
-        ("own_policy:Torn", "own_policy.py, line 9)"),
-        ("own_policy:Short", "TypeError: Short.reset() takes 2 positional arguments but 3 were"),
         ("own_policy:Unmade", "'own_policy:Unmade' cannot be made: KeyError: 'gain'"),
         ("own_policy:Laxy", "module 'own_policy' has no attribute 'Laxy'"),
         ("own_policy", "no policy 'own_policy' (a name, 'package.module:Class' or a "),
     ):
         assert said in command(f"run --policy {name} {SMALL}", code=2)
+    with pytest.raises(ZeroDivisionError, match="the motor is gone"):  # its traceback says where
+        command(f"run --policy own_policy:Torn {SMALL}")
 
 
 def test_policy_of_ones_own_is_found_where_the_command_is_run(
@@ -158,7 +153,7 @@ def test_run_prints_what_the_episode_gave(command: Command) -> None:
 def test_version_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["--version"]) == 0
     assert capsys.readouterr().out.strip() == swarm_logistics_env.__version__
-    assert app.run([]) == 2  # it prints its help and nothing else
+    assert app.run([]) == 0
     printed = capsys.readouterr()
     assert "Commands" in printed.out
     assert printed.err == ""

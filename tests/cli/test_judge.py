@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
-from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.cli.judging import RECORDED
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.presets import PRESETS
 from tests.cli.conftest import Command
@@ -102,18 +99,15 @@ def test_what_cannot_be_judged_ends_in_one_sentence_before_anything_is_written(
 def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Command) -> None:
     words = "judge homing --processes 1 --seeds 5"
     printed = command(f"{words} --minutes 0")
-    again = f"the same command goes on: swarm-logistics {words} --minutes 0\n"
-    assert f"Stopped after 0 min; {again}" in printed
+    again = f"runs are left; the same command goes on: swarm-logistics {words} --minutes 0\n"
+    assert "Stopped after 0 min, " in printed
+    assert again in printed
     assert "1 runs played" in printed.splitlines()[-1]
     printed = command(words)
     study = Study.stored("results/judged/homing")
     cells = study.performance()
     p = cells[cells["factor"] == "none"]["mean"].iloc[0]
     assert f"For a paper: homing: P, items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
-    shipped = printed.split("P of the shipped policies here: ")[1].splitlines()[0]
-    assert " homing " not in shipped  # not ranked by itself
-    others = set(json.loads(RECORDED.read_text())["policies"]) - {"homing"}
-    assert shipped.endswith(f"; rank {len(others) + 1} of {len(others) + 1}.")
     assert "from the start: swarm-logistics judge homing --seeds" in printed
     last = printed.splitlines()[-1]
     assert last.startswith(f"{5 * len(study.plan().cases) - 1} runs played in ")
@@ -142,16 +136,6 @@ def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(command:
     said = command("judge judged_policy:Short --processes 1 --out short", code=2)
     assert "commands of shape (4, 3): should be (4, 4)" in said
     assert not Path("short").exists()
-
-
-def test_recorded_p_is_that_of_the_shipped_policies() -> None:
-    recorded = json.loads(RECORDED.read_text(encoding="utf-8"))
-    first = recorded["seeds"][0]
-    assert first == Study.preset("scorecard", seeds=60).plan().seeds[0]
-    for name in ("swarm-dt", "homing"):
-        # If this fails, run `make tables`.
-        episode = run_episode(Scenario(restock=True), policies.load(name), seed=first)
-        assert recorded["policies"][name]["p"][0] == episode.delivered
 
 
 def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(command: Command) -> None:

@@ -62,7 +62,7 @@ def test_study_run_prints_and_writes_the_report(file: Path, command: Command) ->
         "undefined: it delivers nothing",
     ):
         assert words in printed
-    told = r"8 runs played in [\d.]+ s by 1 process, [\d.]+ episodes/s; 0 were kept from before; "
+    told = r"8 runs played in [\d.]+ s, [\d.]+ episodes/s; 0 were kept from before; "
     assert re.fullmatch(told + "0 failed", printed.splitlines()[-1])
     report = Path("out", "report.md").read_text()
     assert "episodes/s" not in report
@@ -143,8 +143,6 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
 ) -> None:
     command(f"{RUN} --restock")
     assert Study.stored("results/mine-restock").specification.scenario.restock  # type: ignore[attr-defined]
-    said = command(f"{RUN} --until-clear --most 20", code=2)
-    assert "--most 20: should be more than 20 seeds" in said
     file.write_text(FILE.replace("n_items = 8, duration = 2", "n_items = 1, duration = 60"))
     printed = command(f"{RUN} --policy homing --seeds 1")
     assert "homing delivers every item before the end" in printed
@@ -152,8 +150,7 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     assert Path("results/mine-homing/report.html").exists()
     Path("broken_policy.py").write_text(BROKEN)
     printed = command(f"{RUN} --policy broken_policy:Broken --restock --out broken", code=1)
-    told = "4 failed, the first with RuntimeError: a wheel came off. Each traceback, column error: "
-    assert told in printed
+    assert "4 failed, the first with RuntimeError: a wheel came off" in printed
     assert "2 of 2 runs failed" in Path("broken", "report.md").read_text()
 
 

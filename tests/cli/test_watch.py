@@ -77,25 +77,16 @@ def test_the_browser_opens_at_a_terminal_with_a_screen(
     words: str, at_terminal: bool, screen: str, opens: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     served: list[Any] = []
-    monkeypatch.setattr(server, "serve", lambda *given: served.append(given))
+    monkeypatch.setattr(server, "serve", lambda *given, show: served.append((*given, show)))
     monkeypatch.setattr("sys.stdout.isatty", lambda: at_terminal)
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("DISPLAY", screen)
     assert app.run(words.split()) == 0
-    ((session, port, _, host, show),) = served
-    assert (session.policy, port, host) == ("ppo-delivery", 8765, "127.0.0.1")
+    ((session, port, _, show),) = served
+    assert (session.policy, port) == ("ppo-delivery", 8765)
     assert show is (webbrowser.open if opens else None)
-
-
-@pytest.mark.parametrize(("host", "is_open"), [("0.0.0.0", True), ("::1", False)])
-def test_a_host_that_others_reach_is_warned_of(
-    host: str, is_open: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(server, "serve", lambda *_: None)
-    assert app.run(["watch", "--host", host]) == 0
-    assert (f"Warning: --host {host}" in capsys.readouterr().err) is is_open
 
 
 def test_replay_is_written_without_a_server(command: Command) -> None:

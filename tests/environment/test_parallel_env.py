@@ -96,25 +96,25 @@ def tensor(dtype: str = "float32", **arguments: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("make", "kind"),
+    ("make", "said"),
     [
-        (lambda: tensor("bfloat16"), "type Tensor, dtype torch.bfloat16, device cpu"),
-        (lambda: tensor(requires_grad=True), "type Tensor, .*, device cpu, requires_grad True"),
-        (OnGPU, "type OnGPU, dtype torch.float32, device cuda:0"),
+        (lambda: tensor("bfloat16"), "Tensor cannot be read.* BFloat16"),
+        (lambda: tensor(requires_grad=True), "Tensor cannot be read.* requires grad"),
+        (OnGPU, "OnGPU cannot be read.* cuda:0"),
     ],
 )
-def test_what_cannot_be_read_is_refused(make: Callable[[], Any], kind: str) -> None:
+def test_what_cannot_be_read_is_refused(make: Callable[[], Any], said: str) -> None:
     env, central = parallel_env(n_robots=2), CentralEnv(n_robots=1)
     env.reset(seed=0)
     central.reset(seed=0)
     actions: dict[str, Any] = {"robot_0": np.zeros(4), "robot_1": make()}
-    with pytest.raises(CommandError, match=rf"command of 'robot_1' \({kind}.*\) cannot be read"):
+    with pytest.raises(CommandError, match=f"command of 'robot_1' of type {said}"):
         list(map(env.step, [actions] * 3))
     with pytest.raises(CommandError, match="cannot be read"):
         list(env.step(actions) for _ in range(3))  # noqa: C400  # no loop swallows it
-    with pytest.raises(CommandError, match=rf"commands \({kind}.*\) cannot be read"):
+    with pytest.raises(CommandError, match=f"commands of type {said}"):
         env.step_arrays(make())
-    with pytest.raises(CommandError, match=rf"action \({kind}.*\) cannot be read"):
+    with pytest.raises(CommandError, match=f"action of type {said}"):
         central.step(make())
     assert env.warehouse.state.step == 0
 
@@ -135,7 +135,7 @@ def test_a_name_among_many_is_told() -> None:
         ({"n_robot": 3}, ScenarioError, "did you mean 'n_robots'"),
         ({"render_mode": "hologram"}, SetupError, "render_mode = 'hologram': should be"),
         ({"scenario": {"n_robots": 3}}, SetupError, "scenario = .*: should be a Scenario"),
-        ({"num_agents": 3}, ArgumentError, "'num_agents'; did you mean 'n_robots'"),
+        ({"num_agents": 3}, ArgumentError, "'num_agents'; known: control_period, "),
         ({"max_robots": 24}, SetupError, "max_robots = 24: should be .* of at least 25"),
         ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be a whole number"),
         ({"rewards": ["delivery"]}, SetupError, r"rewards = \[.*\]: should be None or a dict"),
@@ -234,12 +234,10 @@ def test_unknown_options_are_ignored_with_a_warning_unless_a_known_one_is_nearly
     env = parallel_env(n_robots=2)
     with pytest.warns(UserWarning, match="reset option 'default' is ignored"):
         assert len(env.reset(seed=0, options={"default": [Fault("removed", 1)]})[0]) == 2
-    for name, meant in (("fault", "faults"), ("FAULTS", "faults"), ("senario", "scenario")):
+    for name in ("fault", "FAULTS", "senario", "n_robots"):
         for each in (env, FaultInjection(env, "FM1")):
-            with pytest.raises(SetupError, match=f"no reset option '{name}'; .* mean '{meant}'"):
+            with pytest.raises(SetupError, match=f"no reset option '{name}': should be 'faults'"):
                 each.reset(seed=0, options={name: ()})
-    with pytest.raises(SetupError, match=r"as options={'scenario': {'n_robots': 3}}"):
-        env.reset(seed=0, options={"n_robots": 3})
 
 
 def test_a_removed_robot_terminates_once_and_leaves() -> None:

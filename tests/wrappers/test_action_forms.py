@@ -53,7 +53,7 @@ def test_a_robot_fetches_an_item_by_numbers_alone() -> None:
         (DiscreteActions, [0.5, 1, 2, 3], "robot_0 = 0.5"),
         (DiscreteActions, np.zeros((4, 4)), r"of shape \(4, 4\)"),
         (MotionFrame, np.zeros((4, 4)), r"of shape \(4, 4\)"),
-        (MotionFrame, np.full((4, 3), np.nan), "finite numbers"),
+        (MotionFrame, np.full((4, 3), np.nan), "should be finite"),
     ],
 )
 def test_what_is_no_action_is_refused_before_anything_moves(

@@ -24,12 +24,6 @@ def test_sizes_are_drawn_by_the_seed() -> None:
     assert set(sizes) == {2, 5, 9}
     assert sizes_of(SwarmSize(small(), (2, 5, 9)), 20) == sizes
     assert env.possible_agents == [f"robot_{row}" for row in range(9)]
-    drawn = SwarmSize(small(), lambda rng: rng.integers(3, 8), within=(3, 7))
-    assert set(sizes_of(drawn, 40)) == {3, 4, 5, 6, 7}
-    assert len(drawn.possible_agents) == 7
-    beyond = SwarmSize(small(), lambda rng: 8, within=(3, 7))
-    with pytest.raises(SetupError, match="n_robots = 8"):
-        beyond.reset(seed=0)
 
 
 def test_a_smaller_swarm_is_that_swarm() -> None:
@@ -69,10 +63,14 @@ def test_who_leaves_terminates_and_is_gone_for_the_rest_of_the_episode() -> None
     ("arguments", "error", "complaint"),
     [
         ({"sizes": [5, 4000]}, ScenarioError, "n_robots = 4000 of radius"),
-        ({"sizes": lambda rng: 4}, SetupError, "within = None"),
-        ({"sizes": 4, "within": (3, 5)}, SetupError, r"within = \(3, 5\)"),
-        ({"sizes": [3, 9], "leave": [(4, 1.0)]}, SetupError, "leave: 4 robots in all"),
-        ({"sizes": [3, 9], "leave": [(2, 0.0), (1, 0.0)]}, SetupError, "leave: 3 robots at 0 s"),
+        ({"sizes": []}, SetupError, r"n_robots = \[\]"),
+        ({"sizes": lambda rng: 4}, ScenarioError, "n_robots"),
+        ({"sizes": [3, 9], "leave": [(4, 1.0)]}, FaultError, "at most n_robots = 3"),
+        (
+            {"sizes": [3, 9], "leave": [(2, 0.0), (1, 0.0)]},
+            SetupError,
+            "remove all 3 robots at 0 s",
+        ),
         ({"sizes": 9, "leave": [(4, -1.0)]}, FaultError, "Fault.onset = -1.0"),
         ({"sizes": 9, "leave": [4]}, SetupError, r"leave = \[4\]"),
     ],
