@@ -36,6 +36,10 @@ BENCHMARK = ROOT / "results" / "benchmark" / "benchmark.json"
 # seeds from 0 on, trainings evaluate on those from 1,000,000 on.
 FIRST_SEED = 20_000
 PROCESSES = os.cpu_count() or 1
+# Studies in examples/ that are tables of the page.
+EXAMPLES = (
+    "clearing", "ladder", "ladder_restocked", "leans", "shipped_policies", "robust_policy",
+)  # fmt: skip
 
 
 def play(studies: Iterable[Study]) -> list[StudyResults]:
@@ -50,11 +54,6 @@ def play(studies: Iterable[Study]) -> list[StudyResults]:
 
 
 _EXACT = " ="
-
-
-def policy_studies(out: Path) -> tuple[Study, ...]:
-    """Return the studies of the shipped policies, and of `ppo-robust` under three failed robots."""
-    return example(out, "shipped_policies"), example(out, "robust_policy")
 
 
 def policies_block(results: StudyResults) -> str:
@@ -99,11 +98,6 @@ def robust_block(results: StudyResults) -> str:
     )
 
 
-def clearing_study(out: Path) -> Study:
-    """Return the study of how fast the shipped swarms clear the paper's warehouse."""
-    return example(out, "clearing")
-
-
 def clearing_block(results: StudyResults) -> str:
     """Return the time to clear of every policy and condition: a row a policy."""
     settings = list(dict.fromkeys(cell.arm.setting for cell in results.cells if cell.n_seeds))
@@ -118,11 +112,10 @@ def clearing_block(results: StudyResults) -> str:
         f"is 25; {seeds_from(results)}; of several trainings the mean. "
         f'"x of y": so many runs were not done after {limit:g} s.'
     )
-    cells = {policy: by_place[policy, settings[0]] for policy in results.policies}
-    medians = {
-        policy: spi.median_interval([run.time_to_clear for run in cell.outcomes]).value
-        for policy, cell in cells.items()
-    }
+    medians = {}
+    for policy in results.policies:
+        times = [run.time_to_clear for run in by_place[policy, settings[0]].outcomes]
+        medians[policy] = spi.median_interval(times).value
     fastest = min(medians, key=lambda policy: medians[policy])
     if not fastest.startswith("ppo-"):
         text += (
@@ -140,11 +133,6 @@ def clearing_block(results: StudyResults) -> str:
             "deliveries where items come back they reach [less](#what-the-scripts-owe-to-what)."
         )
     return f"{table(('', *settings), rows)}\n\n{text}"
-
-
-def ladder_studies(out: Path) -> tuple[Study, ...]:
-    """Return the studies of both tables."""
-    return tuple(example(out, name) for name in ("ladder", "ladder_restocked", "leans"))
 
 
 def _worlds(found: StudyResults) -> dict[str, dict[str, Cell]]:
@@ -259,14 +247,12 @@ def costs_block(found: Mapping[str, Any]) -> str:
     ]
     machine = found["machine"]
     head = "", "agent-steps per s", "us per step", "cost per agent-step"
-    text = (
+    return (
         f"{table(head, rows)}\n\n"
         "Cost: less is better; the median over rounds of the ratio in each.\n"
-        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}."
+        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}.\n"
+        f"A second process takes its first step after {found['seconds']['first_step']:.1f} s."
     )
-    if seconds := found.get("seconds", {}).get("first_step"):
-        text += f"\nA second process takes its first step after {seconds:.1f} s."
-    return text
 
 
 ENTRANTS = (
@@ -281,12 +267,11 @@ def benchmark_studies(out: Path) -> tuple[Study, ...]:
     """Return the benchmark's study of each entrant, each in a directory of its own."""
     trained = ROOT / "results" / "interop"
     there = [one for one in LEARNERS if (trained / f"{one}@0.safetensors").exists()]
-    names = [*ENTRANTS, *(f"{trained / one}@all.safetensors" for one in there)]
-    folders = [out / "benchmark" / section.slug(Path(name).stem) for name in names]
-    return tuple(
-        Study.preset(benchmark.STUDY, out=folder, policies=[name])
-        for name, folder in zip(names, folders)
-    )
+    studies = []
+    for name in (*ENTRANTS, *(f"{trained / one}@all.safetensors" for one in there)):
+        folder = out / "benchmark" / section.slug(Path(name).stem)
+        studies.append(Study.preset(benchmark.STUDY, out=folder, policies=[name]))
+    return tuple(studies)
 
 
 def benchmark_block(found: Sequence[StudyResults]) -> str:
@@ -323,12 +308,13 @@ def main() -> None:
     """Play, rewrite the page of results, then the README, and record P of the shipped swarms."""
     paper = play(paper_studies(OUT, FIRST_SEED))
     draw_figures(paper, MEDIA)
-    cleared, restocked, leans = play(ladder_studies(OUT))
+    clearing, cleared, restocked, leans, policies, robust = play(
+        example(OUT, name) for name in EXAMPLES
+    )
     draw_ladder(restocked, MEDIA / "ladder.svg")
-    policies, robust = play(policy_studies(OUT))
     entered = play(benchmark_studies(OUT))
     blocks = {
-        "clearing": clearing_block(*play([clearing_study(OUT)])),
+        "clearing": clearing_block(clearing),
         "paper": paper_block(paper),
         "sentences": sentences_block(paper),
         "ladder": ladder_block(cleared, restocked),
