@@ -92,8 +92,9 @@ _AROUND: Mapping[str, Callable[[Rng, Floats], Floats]] = {
 def judged(p_o: Floats, p_new: Floats, threshold: float, confidence: float = 0.95) -> RatioTest:
     """Return the test of the relative change of P, as studies make it."""
     stakes = at_stake([(1.0, p_new), (-1.0 - threshold, p_o)])
-    told = {"threshold": threshold, "confidence": confidence}
-    return paired_ratio(p_new - p_o, p_o, at_stake=stakes, **told)
+    return paired_ratio(
+        p_new - p_o, p_o, at_stake=stakes, threshold=threshold, confidence=confidence
+    )
 
 
 def _p_values(
@@ -201,28 +202,6 @@ def planned_seeds(model: str) -> int:
     draw, mean_o, _ = _ALL[model]
     pilot = draw(np.random.default_rng(0), (1_000,), mean_o)
     return spi.seeds_for_equivalence(spi.equivalence(*pilot)) or 0
-
-
-def planned_power(
-    model: str, distance: float, pilot_seeds: int, pilots: int
-) -> tuple[float, float]:
-    """Return the seeds that pilots plan for a verdict on the change, and the power of these.
-
-    `distance` is from the threshold to the true change; below 0: the verdict is "refuted". 25
-    studies follow each pilot.
-    """
-    draw, mean_o, mean_f = _ALL[model]
-    rng, truth = np.random.default_rng(pilot_seeds), mean_f / mean_o - 1
-    threshold = truth - distance
-    planned, found = [], []
-    for _ in range(pilots):
-        pilot = spi.relative_change(*draw(rng, (pilot_seeds,), mean_f), threshold=threshold)
-        n = spi.seeds_for_power(pilot, truth) or 0
-        test = judged(*draw(rng, (25, n), mean_f), threshold)
-        planned.append(n)
-        is_right = (test.probability > 0.5) == (distance > 0.0)
-        found.append(float(((test.p_value < 0.05) & is_right).mean()))
-    return float(np.median(planned)), float(np.mean(found))
 
 
 def until_clear_rows() -> Iterator[Row]:
