@@ -6,7 +6,6 @@
 Ends with 1 at the first broken promise, naming the world that shows it.
 """
 
-import argparse
 import contextlib
 import random
 import sys
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
@@ -199,32 +199,22 @@ def towards(world: Warehouse, target: NDArray[np.float64], width: int) -> NDArra
     return commands
 
 
-def main() -> int:
-    """Play worlds until the time is over."""
-    parser = argparse.ArgumentParser(description="Random worlds, every invariant at every step.")
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--first", type=int, default=0, help="number of the first world")
-    parser.add_argument("--worlds", type=int, default=sys.maxsize, help="at most so many")
-    parser.add_argument("--steps", type=int, default=400, help="of each world")
-    asked = parser.parse_args()
-    said, tally = time.monotonic(), Tally()
-    until = said + 60.0 * asked.minutes
-    for number in range(asked.first, asked.first + asked.worlds):
+def main(
+    minutes: float = 10.0, first: int = 0, worlds: int = sys.maxsize, steps: int = 400
+) -> None:
+    """Play at most so many random worlds of so many steps until the time is over."""
+    tally, until = Tally(), time.monotonic() + 60.0 * minutes
+    for number in range(first, first + worlds):
         try:
-            play(random.Random(number), asked.steps, tally)
+            play(random.Random(number), steps, tally)
         except BrokenPromiseError as error:
             again = f"python -m verification.soak --first {number} --worlds 1"
             print(f"world {number}: {error} ({again})")
-            return 1
-        now = time.monotonic()
-        if now - said > 60.0:
-            said = now
-            print(tally, flush=True)
-        if now > until:
+            raise SystemExit(1) from None
+        if time.monotonic() > until:
             break
     print(f"no promise broken: {tally}")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)
