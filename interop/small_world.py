@@ -7,7 +7,6 @@ Each learner writes results/interop/NAME.csv, its curve, NAME.safetensors, a pol
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import torch
 from numpy.typing import NDArray
 
@@ -132,13 +132,8 @@ class Learning:
         minutes = round(self._seconds / 60, 2)
         self._curve.append({"agent_steps": agent_steps, "cpu_minutes": minutes, "P": float(p)})
         RESULTS.mkdir(parents=True, exist_ok=True)
-        with (
-            becoming(RESULTS / f"{self.name}.csv", SetupError) as part,
-            part.open("w", newline="", encoding="utf-8") as file,
-        ):
-            writer = csv.DictWriter(file, self._curve[0])
-            writer.writeheader()
-            writer.writerows(self._curve)
+        with becoming(RESULTS / f"{self.name}.csv", SetupError) as part:
+            pd.DataFrame(self._curve).to_csv(part, index=False, lineterminator="\r\n")
         print(f"{self.name}: {agent_steps:,} agent-steps, {minutes} CPU minutes, P {p:.1f}")
         self._since = time.process_time()
 
