@@ -6,7 +6,6 @@ What results/interop has already is not trained again. One training more of a ro
 
 from __future__ import annotations
 
-import contextlib
 import json
 import subprocess
 import sys
@@ -20,7 +19,6 @@ import typer
 
 from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning, robustness
 from swarm_logistics_env import policies, spi
-from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, images
 from swarm_logistics_env.report.section import Section, bracketed
 from swarm_logistics_env.report.write import section_markdown
@@ -106,15 +104,11 @@ def train(world: str, runs: list[tuple[str, int]], processes: int) -> None:
 
 
 def references() -> Beside:
-    """Return P of the shipped policies on the same seeds, by world; some may not be there."""
-    path = RESULTS / "references.json"
-    found: Beside = json.loads(path.read_text("utf-8")) if path.exists() else {}
+    """Return P of the shipped policies on the same seeds, by world."""
+    found: Beside = {world: {} for world in WORLDS}
     for world, name in product(WORLDS, REFERENCES):
-        if name not in found.setdefault(world, {}):
-            with contextlib.suppress(PolicyError):
-                p = performances(policies.load(name), WORLDS[world], [()], SEEDS)[0]
-                found[world][name] = p.tolist()
-    path.write_text(json.dumps(found) + "\n", encoding="utf-8")
+        p = performances(policies.load(name), WORLDS[world], [()], SEEDS)[0]
+        found[world][name] = p.tolist()
     return found
 
 
@@ -135,9 +129,8 @@ def table(beside: Beside) -> str:
                 *(robustness(p, [row["P_F"][mode] for row in kept], world) for mode in MODES),
             ))  # fmt: skip
     for world, name in product(WORLDS, REFERENCES):
-        if name in beside[world]:
-            p_of = bracketed(spi.mean_interval(beside[world][name]), 1)
-            lines.append((name, world, "", "", p_of, *[""] * (len(head) - 5)))
+        p_of = bracketed(spi.mean_interval(beside[world][name]), 1)
+        lines.append((name, world, "", "", p_of, *[""] * (len(head) - 5)))
     return section_markdown(Section("", tuple(head), tuple(lines)))
 
 
