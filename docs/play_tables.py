@@ -23,7 +23,7 @@ from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import NO_FAULT
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import UNAFFECTED, Cell, grouped
+from swarm_logistics_env.studies.verdict import Cell, grouped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,28 +53,18 @@ def play(studies: Iterable[Study]) -> list[StudyResults]:
     return found
 
 
-_EXACT = " ="
-
-
 def policies_block(results: StudyResults) -> str:
     """Return P and the indicators of every policy."""
     rows: dict[str, dict[str, str]] = {}
     for cell in results.cells:
         if cell.arm.setting.kind in ("size", "parameter"):
             rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
-    exact = ""
     for test in results.verdicts:
-        mark = _EXACT if test.plain == UNAFFECTED else ""
-        rows.setdefault(asked(test), {})[test.compared.policy] = section.ratio(test) + mark
-        if mark:
-            exact = (
-                f"\nThe sign{_EXACT} marks what is {section.UNAFFECTED}: equal runs, an exact "
-                "value, and no evidence."
-            )
+        rows.setdefault(asked(test), {})[test.compared.policy] = section.ratio(test)
     return (
         f"{by_policy(rows, results.policies)}\n\n{seeds_from(results)}, of each training. Each "
         "interval is of 95 % by itself; verdicts are not shown. A divides by the relative change "
-        "of the parameter, which is 4 from 0.02 to 0.1: there A = 0.96 is 16 % fewer items." + exact
+        "of the parameter, which is 4 from 0.02 to 0.1: there A = 0.96 is 16 % fewer items."
     )
 
 
