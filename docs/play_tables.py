@@ -13,7 +13,7 @@ from typing import Any
 
 import front_page
 from play_paper import draw_figures, paper_block, paper_studies, sentences_block
-from tables import ROOT, asked, by_policy, example, rewrite, seeds_from, table
+from tables import ROOT, by_policy, example, rewrite, seeds_from, table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.judging import ENTRIES, RECORDED, STUDY
@@ -52,14 +52,10 @@ def play(studies: Iterable[Study]) -> list[StudyResults]:
 
 def policies_block(results: StudyResults) -> str:
     """Return P and the indicators of every policy."""
-    rows: dict[str, dict[str, str]] = {}
-    for cell in results.cells:
-        if cell.arm.setting.kind in ("size", "parameter"):
-            rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
-    for test in results.verdicts:
-        rows.setdefault(asked(test), {})[test.compared.policy] = section.ratio(test)
+    cells = (cell for cell in results.cells if cell.arm.setting.kind in ("size", "parameter"))
+    found = by_policy(results.policies, cells, results.verdicts, section.ratio)
     return (
-        f"{by_policy(rows, results.policies)}\n\n{seeds_from(results)}, of each training. Each "
+        f"{found}\n\n{seeds_from(results)}, of each training. Each "
         "interval is of 95 % by itself; verdicts are not shown. A divides by the relative change "
         "of the parameter, which is 4 from 0.02 to 0.1: there A = 0.96 is 16 % fewer items."
     )

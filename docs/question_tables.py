@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from tables import asked, by_policy, seeds_from, table
+from tables import by_policy, seeds_from, table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
@@ -59,18 +59,14 @@ def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], flo
 
 def side_by_side(found: StudyResults) -> str:
     """Return P and the indicators of every policy, a column a policy."""
-    rows: dict[str, dict[str, str]] = {}
     cells = [c for c in found.cells if c.arm.setting.kind != "policy" and not c.arm.case.faults]
-    known: set[str] = set()
-    for cell in sorted(cells, key=lambda one: one.arm.setting.kind != "size"):
-        if cell.arm.case.key not in known:  # a case may stand in several tables
-            known.add(cell.arm.case.key)
-            rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
+    # A case may stand in several tables; that of sizes names it.
+    cells.sort(key=lambda one: one.arm.setting.kind != "size")
+    once = [alike[0] for alike in grouped(cells, lambda cell: cell.arm.case.key).values()]
     compared = [one for one in found.verdicts if one.after.kind != "policy"]
-    for own in grouped(compared, lambda v: (v.compared.table, v.compared.question)).values():
-        if len(own) > 1:  # asked of all policies
-            rows[asked(own[0])] = {test.compared.policy: with_verdict(test) for test in own}
-    return f"{by_policy(rows, found.policies)}\n\n{_over(found)}; {LEGEND}."
+    questions = grouped(compared, lambda v: (v.compared.table, v.compared.question)).values()
+    of_all = [test for own in questions if len(own) > 1 for test in own]
+    return f"{by_policy(found.policies, once, of_all, with_verdict)}\n\n{_over(found)}; {LEGEND}."
 
 
 def by_size(found: StudyResults) -> str:
