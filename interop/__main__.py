@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import typer
 
-from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning, robustness
+from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning
 from swarm_logistics_env import policies, spi
 from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, images
 from swarm_logistics_env.report.section import Section, bracketed
@@ -132,6 +132,13 @@ def table(beside: Beside) -> str:
         p_of = bracketed(spi.mean_interval(beside[world][name]), 1)
         lines.append((name, world, "", "", p_of, *[""] * (len(head) - 5)))
     return section_markdown(Section("", tuple(head), tuple(lines)))
+
+
+def robustness(p_o: list[list[float]], p_f: list[list[float]], world: str) -> str:
+    """Return R over trainings and seeds with its interval; "-": nothing was delivered."""
+    if not np.any(p_o):
+        return "-"
+    return bracketed(spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY), 2)
 
 
 def each_training(found: list[dict[str, Any]]) -> str:

@@ -156,12 +156,7 @@ class Learning:
         }
         with becoming(RESULTS / f"{self.name}.json", SetupError) as part:
             part.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
-        r = ", ".join(f"{mode} {robustness(p_o, p, self.world)}" for mode, p in row["P_F"].items())
-        print(
-            f"{self.name}: {self.agent_steps:,} agent-steps, {row['cpu_minutes']} CPU minutes, "
-            f"P {bracketed(spi.mean_interval(p_o), 1)} on {len(SEEDS)} new seeds; "
-            f"R with {FAULTY} of {self.scenario.n_robots} robots: {r}"
-        )
+        print(f"{self.name}: P {bracketed(spi.mean_interval(p_o), 1)} on {len(SEEDS)} new seeds")
         return row
 
     def _played(
@@ -182,13 +177,6 @@ class Learning:
             seed=self.seed,
             agent_steps=self.agent_steps,
         )
-
-
-def robustness(p_o: Sequence[Any], p_f: Sequence[Any], world: str = "small") -> str:
-    """Return R with its interval from (seeds,) or (trainings, seeds); "-": nothing delivered."""
-    if not np.any(p_o):
-        return "-"
-    return bracketed(spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY), 2)
 
 
 def main(learn: Callable[[Learning], Tensors], learners: Sequence[str]) -> None:
