@@ -130,14 +130,6 @@ def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> l
     return faults
 
 
-def drawn_change(source: random.Random, scenario: Scenario) -> dict[str, Any]:
-    """Return one or two fields for `Warehouse.change`; what cannot be is refused there."""
-    fields = _fields(source)
-    fields["delivery_width"] = scenario.warehouse_width * source.uniform(0.05, 0.6)
-    fields["max_speed"] = scenario.max_speed * source.uniform(0.3, 1.0)
-    return {name: fields[name] for name in source.sample(CHANGEABLE, source.randint(1, 2))}
-
-
 def play(source: random.Random, steps: int, tally: Tally) -> None:
     """Play one random world and look at it after every step."""
     scenario = some_scenario(source)
@@ -169,11 +161,16 @@ def play(source: random.Random, steps: int, tally: Tally) -> None:
 
 
 def _disturb(source: random.Random, world: Warehouse, seconds: float) -> None:
-    if source.random() < 0.5:
-        with contextlib.suppress(ScenarioError):
-            world.change(**drawn_change(source, world.scenario))
-    else:
+    """Set other faults, or change one or two fields; what these cannot be is refused."""
+    if source.random() >= 0.5:
         world.set_faults(drawn_faults(source, world.scenario, seconds))
+        return
+    fields = _fields(source)
+    fields["delivery_width"] = world.scenario.warehouse_width * source.uniform(0.05, 0.6)
+    fields["max_speed"] = world.scenario.max_speed * source.uniform(0.3, 1.0)
+    names = source.sample(CHANGEABLE, source.randint(1, 2))
+    with contextlib.suppress(ScenarioError):
+        world.change(**{name: fields[name] for name in names})
 
 
 def _steered(name: str, scenario: Scenario, seed: int) -> Steer:
