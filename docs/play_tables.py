@@ -217,20 +217,17 @@ def costs_block(found: Mapping[str, Any]) -> str:
     )
 
 
-ENTRANTS = (
-    "swarm-dt", "swarm-dt-follow", "homing", "homing-stock", "central", "central-stock",
-    "ppo-delivery@all", "ppo-robust@all", "ppo-indicator@all",
-)  # fmt: skip
 # Other people's learners, where `make interop` has trained them; each in its largest world.
 LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "benchmarl-mappo-small")
 
 
 def benchmark_studies(out: Path) -> tuple[Study, ...]:
-    """Return the benchmark's study of each entrant, each in a directory of its own."""
+    """Return the benchmark's study of each policy that clears and of the learners, in folders."""
     trained = ROOT / "results" / "interop"
     there = [one for one in LEARNERS if (trained / f"{one}@0.safetensors").exists()]
+    shipped = [one.name for one in example(out, "clearing").specification.policies]
     studies = []
-    for name in (*ENTRANTS, *(f"{trained / one}@all.safetensors" for one in there)):
+    for name in (*shipped, *(f"{trained / one}@all.safetensors" for one in there)):
         folder = out / "benchmark" / section.slug(Path(name).stem)
         studies.append(Study.preset(benchmark.STUDY, out=folder, policies=[name]))
     return tuple(studies)
