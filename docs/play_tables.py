@@ -90,32 +90,12 @@ def clearing_block(results: StudyResults) -> str:
         for policy in results.policies
     ]
     limit = results.plan.cases[0].scenario.duration
-    text = (
+    return (
+        f"{table(('', *settings), rows)}\n\n"
         "Median time until all items are delivered [s], with its 95 % interval: less is better; N "
         f"is 25; {seeds_from(results)}; of several trainings the mean. "
         f'"x of y": so many runs were not done after {limit:g} s.'
     )
-    medians = {}
-    for policy in results.policies:
-        times = [run.time_to_clear for run in by_place[policy, settings[0]].outcomes]
-        medians[policy] = spi.median_interval(times).value
-    fastest = min(medians, key=lambda policy: medians[policy])
-    if not fastest.startswith("ppo-"):
-        text += (
-            f"\nWithout a failure the script `{fastest}` is the fastest, "
-            f"with {medians[fastest]:.0f} s."
-        )
-    learned = [policy for policy in medians if policy.startswith("ppo-robust")]
-    if learned and {"swarm-dt", "homing", "homing-stock"} <= medians.keys():
-        slow, fast = medians["swarm-dt"], medians[learned[0]]
-        saved = {one: slow - medians[one] for one in ("homing", "homing-stock")}
-        shares = [f"`{one}` {s:.0f} s ({s / (slow - fast):.0%})" for one, s in saved.items()]
-        text += (
-            f"\n`ppo-robust` is {slow - fast:.0f} s faster than `swarm-dt`. Two "
-            f"scripts, which learned nothing, save most of that: {' and '.join(shares)}. Of the "
-            "deliveries where items come back they reach [less](#what-the-scripts-owe-to-what)."
-        )
-    return f"{table(('', *settings), rows)}\n\n{text}"
 
 
 def _worlds(found: StudyResults) -> dict[str, dict[str, Cell]]:
@@ -169,31 +149,13 @@ def leans_block(found: StudyResults) -> str:
         f"{table(head, rows)}\n\n"
         f"P, items delivered in 500 s by 25 robots, with 95 % intervals; {seeds_from(found)}, of "
         f"each training. {section.SATURATED}: in at least one run every item was delivered. "
-        "Stalled: so many of the runs delivered less than a quarter of the median.\n"
-        + _shares(next(iter(worlds.values())))
+        "Stalled: so many of the runs delivered less than a quarter of the median."
     )
 
 
 def _p_and_stalls(cell: Cell) -> str:
     stalled = spi.share_stalled(cell.by_seed.ravel())
     return section.mean_p(cell) + (f"; {stalled:.0%} stalled" if stalled else "")
-
-
-def _shares(cells: dict[str, Cell]) -> str:
-    """Return in a sentence how much of the networks' gains a script reaches."""
-    p = {one: cell.mean.value for one, cell in cells.items()}
-    told = []
-    for network in (one for one in p if one.startswith("ppo-")):
-        shares = [
-            f"{(p[script] - p['swarm-dt']) / (p[network] - p['swarm-dt']):.0%}"
-            for script in ("homing", "homing-stock")
-        ]
-        told.append(
-            f"`homing` has {shares[0]} and `homing-stock` {shares[1]} of those of `{network}`"
-        )
-    if not told:
-        return ""
-    return f"As it is, of the deliveries that a network has over `swarm-dt`: {'; '.join(told)}."
 
 
 def costs_block(found: Mapping[str, Any]) -> str:
