@@ -165,16 +165,9 @@ def sentences_block(parts: Sequence[StudyResults]) -> str:
         *claims("(P falls without taxis)", beside),
         *claims("(the same of FM3_send)", other),
     ]
-    return f"""\
-"Up to m robots" is read as "and not with m + 1".
-
-FT and R have {len(parts[1].plan.seeds)} seeds, all else {len(parts[0].plan.seeds)}, the
-same ones in all conditions; N is 25 but for S. Intervals are of 95 % each and hold one
-by one; verdicts hold for all claims on one indicator together (Holm). So a claim may be
-open although its interval lies on one side: "leans for" or "leans against" says which.
-"change" is that of P without taxis, relative to P with it.
-
-{table(("the paper's text", "claim", "ours [95 %]", "verdict"), rows)}"""
+    seeds = f"FT and R: {len(parts[1].plan.seeds)} seeds, all else {len(parts[0].plan.seeds)}."
+    head = "the paper's text", "claim", "ours [95 %]", "verdict"
+    return f"{table(head, rows)}\n\n{seeds}"
 
 
 def _summary(parts: Sequence[StudyResults]) -> str:

@@ -54,11 +54,7 @@ def policies_block(results: StudyResults) -> str:
     """Return P and the indicators of every policy."""
     cells = (cell for cell in results.cells if cell.arm.setting.kind in ("size", "parameter"))
     found = by_policy(results.policies, cells, results.verdicts, section.ratio)
-    return (
-        f"{found}\n\n{seeds_from(results)}, of each training. Each "
-        "interval is of 95 % by itself; verdicts are not shown. A divides by the relative change "
-        "of the parameter, which is 4 from 0.02 to 0.1: there A = 0.96 is 16 % fewer items."
-    )
+    return f"{found}\n\n{seeds_from(results)}, of each training."
 
 
 def robust_block(results: StudyResults) -> str:
@@ -117,13 +113,7 @@ def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
             row += [section.time_to_clear(times[name][rung]), _gain(gains[name], rung, before)]
         rows.append(row)
     head = ["", *(f"{kind}, {name}" for name in times for kind in kinds)]
-    return (
-        f"{table(head, rows)}\n\n"
-        f"{seeds_from(cleared)}. Times are medians with 95 % intervals: less is "
-        "better; those of networks are means over their trainings and seeds. P is the items "
-        "delivered in 500 s, and in brackets the gain over the rung above, seed by seed; that of "
-        "`central`, which has no stock, is over `homing`."
-    )
+    return f"{table(head, rows)}\n\n{seeds_from(cleared)}."
 
 
 def _gain(cells: dict[str, Cell], rung: str, before: str) -> str:
