@@ -17,16 +17,13 @@ README, RESULTS = ROOT / "README.md", ROOT / "docs" / "results.md"
 _LEARNED = "ppo-"
 _NUMBER = r"-?(?:[\d.,]+|∞)"
 _VALUE = re.compile(rf"({_NUMBER}) \[({_NUMBER}), ({_NUMBER})\]")
-_MODES = {
-    "FM1": "tells a false timer",
-    "FM2": "lifts nothing",
-    "FM3": "radio dead",
-    "FM4": "delivers nothing",
-}
 _PANELS = {
     "P, N = 25": "P, N = 25\n[items in 500 s]",
     "S, N 25 -> 100": "S, scalability\nN 25 → 100",
-    **{f"R, {mode}, m = 2": f"R, {mode}\n{what}" for mode, what in _MODES.items()},
+    "R, FM1, m = 2": "R, FM1\ntells a false timer",
+    "R, FM2, m = 2": "R, FM2\nlifts nothing",
+    "R, FM3, m = 2": "R, FM3\nradio dead",
+    "R, FM4, m = 2": "R, FM4\ndelivers nothing",
 }
 
 
@@ -150,10 +147,8 @@ def draw(rows: Rows, path: Path) -> None:
         figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
 
 
-def with_address(text: str, address: str | None) -> str:
-    """Return the README with absolute links to a repository, "https://.."; None: as it is."""
-    if address is None:
-        return text
+def with_address(text: str, address: str) -> str:
+    """Return the README with absolute links to a repository, "https://.."."""
     text = re.sub(r'(src="|!\[[^]]*\]\()(?=docs/)', rf"\g<1>{address}/raw/main/", text)
     links = rf"\g<1>{address}/blob/main/"
     return re.sub(r"(?<!!)(\[[^]]+\]\()(?!https://)", links, text)
@@ -165,7 +160,8 @@ def written() -> str:
     address = project.get("urls", {}).get("Repository")
     page, readme = RESULTS.read_text(encoding="utf-8"), README.read_text(encoding="utf-8")
     blocks = {"findings": findings(page), "speed": speed(page)}
-    return with_address(rewritten(readme, blocks), address and address.rstrip("/"))
+    text = rewritten(readme, blocks)
+    return with_address(text, address.rstrip("/")) if address else text
 
 
 def main() -> None:

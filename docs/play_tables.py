@@ -63,11 +63,12 @@ def robust_block(results: StudyResults) -> str:
     for label, tests in grouped(results.verdicts, lambda one: one.compared.label).items():
         cell = results.cells_of(tests[0].compared)[tests[0].compared.changed]
         by_symbol = {test.compared.indicator: test for test in tests}
-        words = {one: section.said(by_symbol[one].conclusion) for one in ("R", "FT")}
-        said = [f"{section.ratio(by_symbol[one])}, {word}" for one, word in words.items()]
-        rows.append((label, section.mean_p(cell), *said))
-        for symbol, word in words.items():
+        row = [label, section.mean_p(cell)]
+        for symbol in ("R", "FT"):
+            word = section.said(by_symbol[symbol].conclusion)
+            row.append(f"{section.ratio(by_symbol[symbol])}, {word}")
             told.setdefault(word, []).append(f"{symbol} under {label}")
+        rows.append(row)
     found = "; ".join(f"{words}: {section.listed(what)}" for words, what in told.items())
     head = "", "P", "R above 0?", "FT above 0?"
     return (
@@ -109,19 +110,15 @@ def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
     for rung, above in zip(rungs, ("", *rungs)):
         before = "" if rung.startswith("ppo-") else "homing" if rung == "central" else above
         row = [f"`{rung}`"]
-        for name in times:
-            row += [section.time_to_clear(times[name][rung]), _gain(gains[name], rung, before)]
+        for name, cells in gains.items():
+            told = section.mean_p(cells[rung])
+            if before:
+                more = t_interval(cells[rung].by_seed - cells[before].by_seed)
+                told += f" (+{section.bracketed(more, 1)})".replace("+-", "-")
+            row += [section.time_to_clear(times[name][rung]), told]
         rows.append(row)
     head = ["", *(f"{kind}, {name}" for name in times for kind in kinds)]
     return f"{table(head, rows)}\n\n{seeds_from(cleared)}."
-
-
-def _gain(cells: dict[str, Cell], rung: str, before: str) -> str:
-    told = section.mean_p(cells[rung])
-    if not before:
-        return told
-    more = t_interval(cells[rung].by_seed - cells[before].by_seed)
-    return f"{told} (+{section.bracketed(more, 1)})".replace("+-", "-")
 
 
 def leans_block(found: StudyResults) -> str:
@@ -206,9 +203,11 @@ def record_scores(out: Path) -> None:
     loaded = {name: load(name) for name in NAMES if "@" not in name}
     names = [name for name, one in loaded.items() if not getattr(one, "needs_state", False)]
     # Of that study the sound swarm alone is recorded, so one fault is enough.
-    fields: dict[str, Any] = {"faults": [{"modes": ["FM1"], "robots": [1]}]}
-    fields |= {"policies": names, "sizes": (), "parameters": ()}
-    (found,) = play([Study.preset(STUDY, out=out / STUDY, **fields)])
+    fault = [{"modes": ["FM1"], "robots": [1]}]
+    study = Study.preset(
+        STUDY, out=out / STUDY, policies=names, faults=fault, sizes=(), parameters=()
+    )
+    (found,) = play([study])
     p = {c.policy: {"p": c.by_seed.tolist()} for c in found.cells if c.arm.setting == NO_FAULT}
     seeds = [found.plan.seeds[0], found.plan.seeds[-1]]
     recorded = {"command": "python docs/play_tables.py", "seeds": seeds, "policies": p}
