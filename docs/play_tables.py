@@ -135,8 +135,7 @@ def leans_block(found: StudyResults) -> str:
     return (
         f"{table(head, rows)}\n\n"
         f"P, items delivered in 500 s by 25 robots, with 95 % intervals; {seeds_from(found)}, of "
-        f"each training. {section.SATURATED}: in at least one run every item was delivered. "
-        "Stalled: so many of the runs delivered less than a quarter of the median."
+        "each training."
     )
 
 

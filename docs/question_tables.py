@@ -13,10 +13,6 @@ from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 
-LEGEND = (
-    "supported: above the threshold; refuted: below it; equivalent: open there, but P within a "
-    "tenth of P_o; under Holm"
-)
 Counts = NDArray[np.float64]  # of every seed, or of every training and seed
 
 
@@ -26,7 +22,7 @@ def with_verdict(test: Verdict) -> str:
 
 
 def _over(found: StudyResults) -> str:
-    return f"{seeds_from(found, 'paired seeds')}. [95 %]"
+    return f"{seeds_from(found, 'paired seeds')}. [95 %]."
 
 
 def _change(before: Counts, after: Counts) -> str:
@@ -66,7 +62,7 @@ def side_by_side(found: StudyResults) -> str:
     compared = [one for one in found.verdicts if one.after.kind != "policy"]
     questions = grouped(compared, lambda v: (v.compared.table, v.compared.question)).values()
     of_all = [test for own in questions if len(own) > 1 for test in own]
-    return f"{by_policy(found.policies, once, of_all, with_verdict)}\n\n{_over(found)}; {LEGEND}."
+    return f"{by_policy(found.policies, once, of_all, with_verdict)}\n\n{_over(found)}"
 
 
 def by_size(found: StudyResults) -> str:
@@ -79,8 +75,8 @@ def by_size(found: StudyResults) -> str:
     for (policy, mode), own in tests.items():
         more = section.bracketed(difference(found, own[-1], own[0]), 3)
         body.append((f"`{policy}`", mode, *map(with_verdict, own), more))
-    note = f"{_over(found)}; the last column is paired by seed and unadjusted. {LEGEND}."
-    return f"{table(head, body)}\n\n{note}"
+    note = "The last column is paired by seed and unadjusted."
+    return f"{table(head, body)}\n\n{_over(found)} {note}"
 
 
 def performances_by_size(found: StudyResults) -> str:
@@ -132,7 +128,7 @@ def after_repairs(found: StudyResults) -> str:
         back = section.said(spi.equivalence(whole, after[1], margin=margin).verdict)
         body.append((policy, mode, *(_change(whole, counts) for counts in after), back))
     head = ("policy", "mode", "not repaired [%]", "repaired [%]", "all back")
-    return f"{table(head, body)}\n\n{_over(found)}. {LEGEND}."
+    return f"{table(head, body)}\n\n{_over(found)}"
 
 
 def wear(found: StudyResults) -> str:

@@ -176,7 +176,7 @@ def test_page_quotes_what_was_played(
     page = Path(shutil.copy(ANSWERS, tmp_path / ANSWERS.parent.name))
     questions = script("play_questions")
     monkeypatch.setattr(questions, "DOCS", tmp_path)
-    monkeypatch.setattr(questions, "study", lambda *_, **__: study)
+    monkeypatch.setattr(questions, "example", lambda *_, **__: study)
     monkeypatch.setattr(tables, "PROCESSES", 1)
     questions.main([name])
     text, found = page.read_text(encoding="utf-8"), study.findings()
