@@ -63,13 +63,9 @@ def browser_view(name: str) -> None:
 
 def films() -> None:
     """Film a learned swarm without and with faults, each failure mode, and each kind of policy."""
-    takes = [
-        Take("25 robots, no fault", run("ppo-delivery", RESTOCKED, 0)),
-        Take(
-            "two of them deliver nothing (FM4)",
-            run("ppo-delivery", RESTOCKED, 0, [Fault("FM4", 2)]),
-        ),
-    ]
+    sound = run("ppo-delivery", RESTOCKED, 0)
+    faulty = run("ppo-delivery", RESTOCKED, 0, [Fault("FM4", 2)])
+    takes = [Take("25 robots, no fault", sound), Take("two of them deliver nothing (FM4)", faulty)]
     film = Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400)
     write_film(MEDIA / "fm4.gif", film.frames(), 12.5)
     for mode in FAILURE_MODES:

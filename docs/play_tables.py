@@ -220,7 +220,6 @@ def main() -> None:
     clearing, cleared, restocked, leans, policies, robust = play(
         example(OUT, name) for name in EXAMPLES
     )
-    entered = play(benchmark_studies(OUT))
     blocks = {
         "clearing": clearing_block(clearing),
         "paper": paper_block(paper),
@@ -229,7 +228,7 @@ def main() -> None:
         "leans": leans_block(leans),
         "policies": policies_block(policies),
         "robust": robust_block(robust),
-        "benchmark": benchmark_block(entered),
+        "benchmark": benchmark_block(play(benchmark_studies(OUT))),
     }
     if BENCHMARK.exists():
         blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))
