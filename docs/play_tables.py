@@ -9,7 +9,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import front_page
 from play_paper import draw_figures, paper_block, paper_studies, sentences_block
@@ -18,12 +18,15 @@ from tables import ROOT, by_policy, example, rewrite, seeds_from, table
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.judging import ENTRIES, RECORDED, STUDY
 from swarm_logistics_env.policies import NAMES, load
-from swarm_logistics_env.report import benchmark, section
+from swarm_logistics_env.report import benchmark, drawing, section
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import NO_FAULT
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, grouped
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE = ROOT / "docs" / "results.md"
 MEDIA = ROOT / "docs" / "media"
@@ -144,6 +147,27 @@ def _p_and_stalls(cell: Cell) -> str:
     return section.mean_p(cell) + (f"; {stalled:.0%} stalled" if stalled else "")
 
 
+def draw_ladder(restocked: StudyResults, path: Path) -> None:
+    """Draw P of each rung with its interval, without and with a handling time."""
+
+    def draw(canvas: "Figure") -> None:
+        axes = canvas.subplots()
+        places = range(len(restocked.policies), 0, -1)
+        worlds = zip(_worlds(restocked).items(), drawing.COLOURS, drawing.MARKERS)
+        for shift, ((name, cells), colour, marker) in enumerate(worlds):
+            for place, rung in zip(places, restocked.policies):
+                value, low, high = cells[rung].mean
+                at = place + 0.14 - 0.28 * shift
+                axes.plot([low or value, high or value], [at, at], color=colour)
+                axes.plot(value, at, marker, color=colour)
+            axes.plot([], [], marker, color=colour, label=name)
+        axes.set_yticks(list(places), restocked.policies)
+        axes.set(xlabel="P, items delivered in 500 s where items come back", xlim=(0.0, None))
+        axes.legend(loc="upper right")
+
+    path.write_text(drawing.images(draw, 2.9)[0], encoding="utf-8")
+
+
 def costs_block(found: Mapping[str, Any]) -> str:
     """Return the table of what `make benchmark` measured: its benchmark.json."""
     rows = [
@@ -220,6 +244,7 @@ def main() -> None:
     clearing, cleared, restocked, leans, policies, robust = play(
         example(OUT, name) for name in EXAMPLES
     )
+    draw_ladder(restocked, MEDIA / "ladder.svg")
     blocks = {
         "clearing": clearing_block(clearing),
         "paper": paper_block(paper),
