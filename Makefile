@@ -19,7 +19,7 @@ TASKS     := .venvs/tasks
 
 INSTALLED := .venvs/lowest .venvs/newest
 
-.PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark interop interop-calls tasks docs dist absolute-links format clean
+.PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark interop interop-calls tasks docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -36,6 +36,7 @@ help:
 	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make docs            the documentation site, site/index.html"
+	@echo "make docs-check      every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
@@ -106,6 +107,10 @@ tasks: $(TASKS)/installed
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate.py
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
+
+# What the pages print is held by `make test`; this runs what they do not show.
+docs-check: $(DEV)/installed
+	$(DEV)/bin/python docs/blocks.py --small
 
 # Each distribution is installed in an environment of its own and plays an episode, away from this tree.
 dist: $(DEV)/installed

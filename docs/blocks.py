@@ -6,16 +6,17 @@ The blocks of a page are run in their order, in one folder and one Python namesp
     toml      becomes the file that its first line names, `# name.toml`
     console   each `$ swarm-logistics ...`, `| head -N`, `| tail -N` and `|| echo WORDS` included
     text      directly below one of them: what it prints; recorded, and held by the tests
-    sh        is neither run nor recorded; the tests read its commands with --help
+    sh        is not recorded; `python docs/blocks.py --small` runs it with few seeds and steps
 """
 
 import contextlib
 import io
 import re
 import shlex
+import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -84,9 +85,9 @@ def comparable(text: str) -> str:
     )
 
 
-def commands(text: str) -> list[list[str]]:
-    """Return the arguments of every `swarm-logistics` command in the blocks of a page."""
-    code = "\n".join(b.code for b in blocks(text) if b.language in LANGUAGES)
+def commands(text: str, languages: Sequence[str] = ("console", "sh")) -> list[list[str]]:
+    """Return the arguments of every `swarm-logistics` command in blocks of these languages."""
+    code = "\n".join(b.code for b in blocks(text) if b.language in languages)
     calls = re.findall(r"^(?:\$ )?swarm-logistics (.*)$", code.replace("\\\n", " "), re.MULTILINE)
     return [shlex.split(call.split(" |")[0], comments=True) for call in calls]
 
@@ -143,7 +144,43 @@ def _printed_by_command(line: str) -> str:
     return printed + (" ".join(shlex.split(otherwise)) + "\n" if code else "")
 
 
+# What makes a command small; of an option that is given twice the last one counts.
+SMALL = {
+    "judge": ["--seeds", "3", "--all-seeds"],
+    "study": ["--seeds", "1"],
+    "train": ["--steps", "1"],
+}
+
+
+def run_in_small(texts: Mapping[str, str]) -> None:
+    """Run the shell commands of the pages one after another in a folder with all their files.
+
+    Not run is what serves a page until somebody stops it, and what takes other numbers of seeds.
+    """
+    with _folder() as folder:
+        for path in (ROOT / "examples").glob("*.py"):
+            shutil.copy(path, folder)
+        for block in (block for text in texts.values() for block in blocks(text)):
+            if file := _FILE.match(block.code):
+                (folder / file[1]).write_text(block.code, encoding="utf-8")
+        for name, text in texts.items():
+            for arguments in commands(text, ("sh", "")):
+                command = f"{name}: swarm-logistics {shlex.join(arguments)}"
+                is_served = arguments[0] == "watch" and "--save" not in arguments
+                if is_served or {"--until-clear", "--shard"} & set(arguments):
+                    print(f"{command}: is not run", flush=True)
+                    continue
+                print(command, flush=True)
+                if app.run([*arguments, *SMALL.get(arguments[0], [])]):
+                    raise SystemExit(f"{command} failed")
+
+
 if __name__ == "__main__":
+    if sys.argv[1:] == ["--small"]:
+        run_in_small(
+            {page.name: page.read_text("utf-8") for page in [*pages(), ROOT / "README.md"]}
+        )
+        raise SystemExit
     for page in [Path(name) for name in sys.argv[1:]] or pages():
         text = page.read_text(encoding="utf-8")
         said = recorded(text)

@@ -57,7 +57,7 @@ def test_what_a_page_names_exists_and_its_files_can_be_read(name: str, tmp_path:
             load_training(str(file))
         elif "seeds" in fields and "task" not in fields:  # a page's own task is run with it
             read_study_file(file, trust_code=True)
-    for arguments in BLOCKS["commands"](text):
+    for arguments in BLOCKS["commands"](text, BLOCKS["LANGUAGES"]):
         assert app.run([*arguments, "--help"]) == 0, arguments
     for target in re.findall(r"(?:^|`)make ([\w-]+)", text, flags=re.MULTILINE):
         assert re.search(rf"^[\w -]*\b{target}\b[\w -]*:(?!=)", MAKEFILE, flags=re.MULTILINE)
