@@ -3,28 +3,26 @@
 python -m benchmarks --out results/benchmark
 """
 
+import argparse
 from pathlib import Path
 
-import typer
-
-from benchmarks.ours import contestants, seconds_to_first_step
+from benchmarks.ours import contestants, start_up
 from benchmarks.results import in_turns, rows, save, shown
 
-
-def main(repeats: int = 15, out: Path | None = None) -> None:
-    """Measure in so many turns of everybody; the folder `out` gets benchmark.json."""
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
+    parser.add_argument("--repeats", type=int, default=15, help="turns of everybody")
+    parser.add_argument("--out", type=Path, help="folder for benchmark.json")
+    given = parser.parse_args()
     found = contestants()
     in_turns(found, 1)  # compiles and warms
     for contestant in found:
         contestant.seconds.clear()
-    in_turns(found, repeats)
-    print(f"Medians of {repeats} interleaved runs; N = 25 unless said\n{shown(rows(found))}")
-    seconds = {"first_step": seconds_to_first_step()}
-    print(f"first_step: {seconds['first_step']:.2f} s")
-    if out:
-        save(out, rows(found), seconds)
-        print(f"written to {out}")
-
-
-if __name__ == "__main__":
-    typer.run(main)
+    in_turns(found, given.repeats)
+    print(f"Medians of {given.repeats} interleaved runs; N = 25 unless said\n{shown(rows(found))}")
+    seconds = start_up()
+    for what, took in seconds.items():
+        print(f"{what}: {took:.2f} s")
+    if given.out:
+        save(given.out, rows(found), seconds)
+        print(f"written to {given.out}")

@@ -2,9 +2,11 @@
 what a process pays before its first step.
 """
 
+import os
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -22,13 +24,11 @@ FLOOR, ARRAYS = "force floor", "env.step_arrays"
 SENSES = "all sensors, logistics, timers"
 _STEPS, _AGENT_STEPS_OF_MANY, _WORLDS = 1000, 40_000, 8
 
+_TIMED = "import time; began = time.{0}()\n{1}\nprint(time.{0}() - began)"
 _FIRST_STEP = """
-import time
-began = time.perf_counter()
 from swarm_logistics_env import swarm_logistics_v0
 env = swarm_logistics_v0.parallel_env(); env.reset(seed=0)
 env.step({agent: env.action_space(agent).sample() for agent in env.agents})
-print(time.perf_counter() - began)
 """
 
 
@@ -101,6 +101,7 @@ def vec_env(threads: int) -> Contestant:
         env.num_envs * _STEPS,
         _STEPS,
         ARRAYS,
+        timed_by="wall",
     )
 
 
@@ -115,12 +116,30 @@ def _timed(
     return clock() - began
 
 
-def seconds_to_first_step() -> float:
-    """Return the wall time from the start to the first step, where nothing has to be compiled."""
-    took = []
-    for _ in range(6):
-        done = subprocess.run(
-            [sys.executable, "-c", _FIRST_STEP], capture_output=True, text=True, check=True
-        )
-        took.append(float(done.stdout))
-    return statistics.median(took[1:])  # the first may compile
+def start_up() -> dict[str, float]:
+    """Return the seconds before the first step, of the processor and in the end of the wall.
+
+    To import the package, and what it stands on alone; to the first step where all has to be
+    compiled, and where nothing has to be.
+    """
+    with tempfile.TemporaryDirectory() as cache:
+        compiling = _seconds(_FIRST_STEP, NUMBA_CACHE_DIR=cache)
+    _seconds(_FIRST_STEP)  # warms the cache
+    return {
+        "import": _median("import swarm_logistics_env"),
+        "import_of_needed": _median("import pettingzoo, pymunk, numba"),
+        "first_step, empty cache": compiling,
+        "first_step": _median(_FIRST_STEP, "perf_counter"),
+    }
+
+
+def _median(script: str, clock: str = "process_time") -> float:
+    return statistics.median(_seconds(script, clock) for _ in range(5))
+
+
+def _seconds(script: str, clock: str = "process_time", **environment: str) -> float:
+    done = subprocess.run(
+        [sys.executable, "-c", _TIMED.format(clock, script)],
+        env={**os.environ, **environment}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return float(done.stdout)

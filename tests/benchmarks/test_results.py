@@ -23,7 +23,7 @@ def test_ratios_are_medians_over_turns_and_are_shown_and_written(tmp_path: Path)
     assert told[0]["agent_steps_per_second"] == 50.0
     assert told[1]["microseconds_per_step"] == 400_000.0
     assert "2.00" in shown(told)
-    save(tmp_path, told, {"first_step": 1.0})
+    save(tmp_path, told, {"import": 1.0})
     written = json.loads((tmp_path / "benchmark.json").read_text())
     assert [row["cost_to_base"] for row in written["contestants"]] == [None, 2.0]
 
