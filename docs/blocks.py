@@ -13,6 +13,7 @@ import contextlib
 import io
 import re
 import shlex
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -143,47 +144,35 @@ def _printed_by_command(line: str) -> str:
     return printed + (" ".join(shlex.split(otherwise)) + "\n" if code else "")
 
 
-# What makes a command small: options that are added, and options that go with their value.
+# What makes a command small; of an option that is given twice the last one counts.
 SMALL = {
-    ("judge",): (["--seeds", "3", "--all-seeds"], []),
-    ("study", "run"): (["--seeds", "1"], ["--seeds", "--until-clear", "--most", "--shard"]),
-    ("train",): (["--steps", "1"], []),
+    "judge": ["--seeds", "3", "--all-seeds"],
+    "study": ["--seeds", "1"],
+    "train": ["--steps", "1"],
 }
-FLAGS = {"--until-clear"}  # options without a value
-
-
-def in_small(arguments: list[str]) -> list[str] | None:
-    """Return a command with few seeds and steps; None: it serves until somebody stops it."""
-    if arguments[0] == "watch" and "--save" not in arguments:
-        return None
-    for command, (more, less) in SMALL.items():
-        if tuple(arguments[: len(command)]) == command:
-            kept, rest = [], iter(arguments)
-            for one in rest:
-                if one not in less:
-                    kept.append(one)
-                elif one not in FLAGS:
-                    next(rest)
-            return kept + more
-    return arguments
 
 
 def run_in_small(texts: Mapping[str, str]) -> None:
-    """Run the shell commands of the pages one after another in a folder with all their files."""
-    files = {path.name: path.read_text("utf-8") for path in (ROOT / "examples").glob("*.py")}
-    for block in (block for text in texts.values() for block in blocks(text)):
-        if file := _FILE.match(block.code):
-            files[file[1]] = block.code
+    """Run the shell commands of the pages one after another in a folder with all their files.
+
+    Not run is what serves a page until somebody stops it, and what takes other numbers of seeds.
+    """
     with _folder() as folder:
-        for file_name, code in files.items():
-            (folder / file_name).write_text(code, encoding="utf-8")
+        for path in (ROOT / "examples").glob("*.py"):
+            shutil.copy(path, folder)
+        for block in (block for text in texts.values() for block in blocks(text)):
+            if file := _FILE.match(block.code):
+                (folder / file[1]).write_text(block.code, encoding="utf-8")
         for name, text in texts.items():
             for arguments in commands(text, ("sh", "")):
-                small = in_small(arguments)
-                rest = "" if small else ": is not run, it serves a page"
-                print(f"{name}: swarm-logistics {shlex.join(small or arguments)}{rest}", flush=True)
-                if small and app.run(small):
-                    raise SystemExit(f"{name}: swarm-logistics {shlex.join(arguments)} failed")
+                command = f"{name}: swarm-logistics {shlex.join(arguments)}"
+                is_served = arguments[0] == "watch" and "--save" not in arguments
+                if is_served or {"--until-clear", "--shard"} & set(arguments):
+                    print(f"{command}: is not run", flush=True)
+                    continue
+                print(command, flush=True)
+                if app.run([*arguments, *SMALL.get(arguments[0], [])]):
+                    raise SystemExit(f"{command} failed")
 
 
 if __name__ == "__main__":

@@ -2,13 +2,11 @@
 
 from functools import partial
 from importlib.metadata import version as installed_version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from docutils.nodes import SkipNode
 from latex2mathml.converter import convert
-
-if TYPE_CHECKING:
-    from sphinx.application import Sphinx
+from sphinx.application import Sphinx
 
 project = html_title = "swarm-logistics-env"
 author = project_copyright = "swarm-logistics-env contributors"
@@ -50,7 +48,7 @@ CONTENTS = {
 }
 
 
-def setup(app: "Sphinx") -> None:
+def setup(app: Sphinx) -> None:
     """Render formulas as MathML, which browsers draw themselves; add the contents."""
     app.connect("source-read", add_contents)
     renderers = [(partial(formula, display), None) for display in ("inline", "block")]
@@ -58,7 +56,7 @@ def setup(app: "Sphinx") -> None:
     app.connect("autodoc-process-docstring", tidy, priority=100)  # before napoleon
 
 
-def add_contents(app: "Sphinx", page: str, text: list[str]) -> None:
+def add_contents(app: Sphinx, page: str, text: list[str]) -> None:
     """Put the list of all pages below the first one."""
     if page == "index":
         for caption, pages in CONTENTS.items():

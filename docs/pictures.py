@@ -4,14 +4,13 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, policies
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.rendering import Renderer
 from swarm_logistics_env.rendering.palette import film_colours
+from swarm_logistics_env.rendering.renderer import write_film
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.film import Film, Take
 from swarm_logistics_env.watch.messages import recorded_page
@@ -32,12 +31,15 @@ def run(name: str, scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) 
 
 
 def scene(file: str, play: Play, seconds: float) -> None:
-    """Write a picture of a run after some time."""
+    """Write a picture of a run after some time, in the colours of films: it takes a third."""
     while play.world.state.time < seconds:
         play.step()
     renderer = Renderer(play.world.scenario, "rgb_array", 560)
     picture = renderer.frame(play.world.state, play.world.scenario)
-    in_film_colours(picture).save(MEDIA / file, optimize=True)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([part for colour in film_colours() for part in colour])
+    few = Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+    few.save(MEDIA / file, optimize=True)
 
 
 def browser_view(name: str) -> None:
@@ -59,36 +61,21 @@ def browser_view(name: str) -> None:
     Image.open(MEDIA / name).convert("RGB").save(MEDIA / name, optimize=True)
 
 
-def keep(film: Film, name: str, milliseconds: int = 125) -> None:
-    """Write a film that loops, each frame for so long."""
-    first, *rest = map(in_film_colours, film.frames())
-    timing = {"duration": milliseconds, "loop": 0}
-    first.save(MEDIA / name, None, save_all=True, append_images=rest, optimize=True, **timing)
-
-
 def films() -> None:
     """Film a learned swarm without and with faults, each failure mode, and each kind of policy."""
-    takes = [
-        Take("25 robots, no fault", run("ppo-delivery", RESTOCKED, 0)),
-        Take(
-            "two of them deliver nothing (FM4)",
-            run("ppo-delivery", RESTOCKED, 0, [Fault("FM4", 2)]),
-        ),
-    ]
-    keep(Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400), "fm4.gif", 80)
+    sound = run("ppo-delivery", RESTOCKED, 0)
+    faulty = run("ppo-delivery", RESTOCKED, 0, [Fault("FM4", 2)])
+    takes = [Take("25 robots, no fault", sound), Take("two of them deliver nothing (FM4)", faulty)]
+    film = Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400)
+    write_film(MEDIA / "fm4.gif", film.frames(), 12.5)
     for mode in FAILURE_MODES:
         take = Take(f"{mode}, 2 of 8", run("homing", TINY, 2, [Fault(mode, 2, onset=3.0)]))
-        keep(Film([take], 30.0, 8.0, 8.0, size=400), f"mode-{mode}.gif")
+        film = Film([take], 30.0, speed=8.0, frame_rate=8.0, size=400)
+        write_film(MEDIA / f"mode-{mode}.gif", film.frames(), 8.0)
     for name in ("swarm-dt", "homing", "homing-stock", "central", "ppo-delivery", "ppo-robust"):
         take = Take(name, run(name, RESTOCKED, 0))
-        keep(Film([take], 90.0, 20.0, 8.0, size=300), f"policy-{name}.gif")
-
-
-def in_film_colours(picture: NDArray[np.uint8]) -> Image.Image:
-    """Return a picture in the colours of all films: it takes a third, and none shifts."""
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([part for colour in film_colours() for part in colour])
-    return Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+        film = Film([take], 90.0, speed=20.0, frame_rate=8.0, size=300)
+        write_film(MEDIA / f"policy-{name}.gif", film.frames(), 8.0)
 
 
 if __name__ == "__main__":

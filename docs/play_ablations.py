@@ -97,10 +97,7 @@ def block(found: StudyResults) -> str:
     arms = [arm for arm in arms if not re.match("removed|.*behaviour seeds", str(arm))]
     cells = {(cell.policy, cell.arm.setting): cell for cell in found.cells}
     rows = [(one, *(section.mean_p(cells[one, arm]) for arm in arms)) for one in found.policies]
-    return (
-        f"{table(('', *arms), rows)}\n\nP, items delivered in 500 s by 25 robots where items come "
-        f"back; {seeds_from(found)}, of each training. Three trainings are too few for a verdict."
-    )
+    return f"{table(('', *arms), rows)}\n\n{seeds_from(found)}, of each training."
 
 
 def main() -> None:

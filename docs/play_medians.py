@@ -13,6 +13,7 @@ import numpy as np
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.presets import load_preset
+from swarm_logistics_env.studies.verdict import grouped
 
 
 def means(files: list[str]) -> dict[str, float]:
@@ -33,10 +34,8 @@ def means(files: list[str]) -> dict[str, float]:
     )
     study.run(processes=2)
     cells = {(cell.policy, cell.arm.case.key): cell for cell in study.findings().cells}
-    return {
-        one: float(np.mean([cell.mean.value for (name, _), cell in cells.items() if name == one]))
-        for one in files
-    }
+    by_policy = grouped(cells.values(), lambda cell: cell.policy)
+    return {one: float(np.mean([cell.mean.value for cell in by_policy[one]])) for one in files}
 
 
 if __name__ == "__main__":

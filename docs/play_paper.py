@@ -64,44 +64,38 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
     """Return the paper's table: P of the paper beside ours, and how well they agree."""
     with_drift, exact = _published_cells(parts[:3]), _published_cells(parts[3:])
     found = _agreement(with_drift)
-    missed = len(found.misses)
     rows = list(_rows(with_drift.values(), found.misses))
     rows += [
         (f"without taxis, N = {c.arm.setting.value:g}", "", section.mean_p(c), "", str(c.n_seeds))
         for c in parts[0].cells
         if c.arm.setting.name == "random-walk"
     ]
-    nearness = {
-        "as shipped": found,
-        "FM3_send in the place of FM3": _agreement(with_drift, reading="FM3_send"),
-        "headings that do not drift": _agreement(exact),
-    }
     measures = (
         "reading",
         r"mean of \|ln(ours / paper's)\|",
         "typically off by",
         "paper's values in the 95 % interval of our mean",
     )
-    capped = [
-        f"{section.SATURATED}: in some run every item was delivered, so this P is capped. A",
-        "verdict that rests on it is given only where a larger P could not turn it.",
+    nearness = [
+        ("as shipped", *_near(found)),
+        ("FM3_send in the place of FM3", *_near(_agreement(with_drift, reading="FM3_send"))),
+        ("headings that do not drift", *_near(_agreement(exact))),
     ]
-    lines = [
-        *_summary(parts),
-        "",
-        table(("", "paper's P", "ours, mean [95 %]", "ours / paper's", "seeds"), rows),
-        "",
-        f"Seeds from {parts[0].plan.seeds[0]:,} on, on which nothing was fitted.",
-        f"{missed} of the paper's values lie outside the 95 % prediction interval of one run",
-        "of ours (bold).",
-        *(capped if any(cell.saturated for cell in with_drift.values()) else ()),
-        "",
-        table(measures, [(reading, *_near(one)) for reading, one in nearness.items()]),
-        "",
-        "Without drift the deliveries of all conditions of this table together change by",
-        f"{_change(_published_cells(parts[:2]), exact)}, over {SEEDS} seeds.",
-    ]
-    return "\n".join(lines)
+    return f"""\
+{_summary(parts)}
+
+{table(("", "paper's P", "ours, mean [95 %]", "ours / paper's", "seeds"), rows)}
+
+Seeds from {parts[0].plan.seeds[0]:,} on, on which nothing was fitted.
+{len(found.misses)} of the paper's values lie outside the 95 % prediction interval of one run
+of ours (bold).
+{section.SATURATED}: in some run every item was delivered, so this P is capped. A
+verdict that rests on it is given only where a larger P could not turn it.
+
+{table(measures, nearness)}
+
+Without drift the deliveries of all conditions of this table together change by
+{_change(_published_cells(parts[:2]), exact)}, over {SEEDS} seeds."""
 
 
 def _published_cells(parts: Iterable[StudyResults]) -> Cells:
@@ -171,39 +165,27 @@ def sentences_block(parts: Sequence[StudyResults]) -> str:
         *claims("(P falls without taxis)", beside),
         *claims("(the same of FM3_send)", other),
     ]
-    lines = [
-        '"Up to m robots" is read as "and not with m + 1".',
-        "",
-        f"FT and R have {len(parts[1].plan.seeds)} seeds, all else {len(parts[0].plan.seeds)}, the",
-        "same ones in all conditions; N is 25 but for S. Intervals are of 95 % each and hold one",
-        "by one; verdicts hold for all claims on one indicator together (Holm). So a claim may be",
-        'open although its interval lies on one side: "leans for" or "leans against" says which.',
-        '"change" is that of P without taxis, relative to P with it.',
-        "",
-        table(("the paper's text", "claim", "ours [95 %]", "verdict"), rows),
-    ]
-    return "\n".join(lines)
+    seeds = f"FT and R: {len(parts[1].plan.seeds)} seeds, all else {len(parts[0].plan.seeds)}."
+    head = "the paper's text", "claim", "ours [95 %]", "verdict"
+    return f"{table(head, rows)}\n\n{seeds}"
 
 
-def _summary(parts: Sequence[StudyResults]) -> list[str]:
+def _summary(parts: Sequence[StudyResults]) -> str:
     """Return how many claims are supported and contradicted, and what that means."""
     of_text, beside, other = _claims(parts)
     counted = Counter(map(_said, of_text))
-    told = [(test.after, _said(test)) for test in of_text]
-    names = ["N" if one.kind == "size" else one.name for one, _ in told]
-    of = Counter(name for name, (_, said) in zip(names, told) if said == "contradicted")
+    names = ["N" if test.after.kind == "size" else test.after.name for test in of_text]
+    of = Counter(n for n, test in zip(names, of_text) if _said(test) == "contradicted")
     listed = ", ".join(f"{count} on {what}" for what, count in of.most_common())
     about = f" ({listed})" if listed else ""
-    sure = names.count("warehouse_width")
-    return [
-        f"Of {len(of_text)} claims of the paper's text this re-implementation supports",
-        f"{counted['supported']} and contradicts {counted['contradicted']}{about};",
-        f"{counted['open']} are open. {sure} of",
-        "those supported, on the warehouse's width, cannot fail, as A cannot fall below 0 where a",
-        f"parameter at least doubles. {len(beside)} more, that P falls without taxis, are not in",
-        f"the text: {_counted(beside)}. Of FM3_send, the other reading of FM3: {_counted(other)}.",
-        PAPER.whose,
-    ]
+    return f"""\
+Of {len(of_text)} claims of the paper's text this re-implementation supports
+{counted["supported"]} and contradicts {counted["contradicted"]}{about};
+{counted["open"]} are open. {names.count("warehouse_width")} of
+those supported, on the warehouse's width, cannot fail, as A cannot fall below 0 where a
+parameter at least doubles. {len(beside)} more, that P falls without taxis, are not in
+the text: {_counted(beside)}. Of FM3_send, the other reading of FM3: {_counted(other)}.
+{PAPER.whose}"""
 
 
 def _claims(parts: Sequence[StudyResults]) -> tuple[list[Verdict], ...]:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import question_tables as tables
 from play_tables import OUT, play
@@ -18,7 +18,6 @@ from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.drawing import Draw, Panel, Point
 from swarm_logistics_env.report.section import DECIDED
-from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.measures import RateCurve, rate_curves
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped
@@ -28,11 +27,6 @@ if TYPE_CHECKING:
 
 DOCS = ROOT / "docs"
 Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and its height [inch]
-
-
-def study(name: str, **changed: Any) -> Study:
-    """Return the study of a question."""
-    return example(OUT, f"questions/{name}", **changed)
 
 
 def policies_compared(found: StudyResults) -> Answer:
@@ -99,7 +93,8 @@ def wear_and_repair(found: StudyResults) -> Answer:
 def realistic_robots(found: StudyResults) -> Answer:
     """Answer with all policies, and each beside itself in the ideal world."""
     blocks, draw, height = policies_compared(found)
-    (ideal,) = play([study("central_or_swarm", seeds=len(found.plan.seeds))])
+    seeds = len(found.plan.seeds)
+    (ideal,) = play([example(OUT, "questions/central_or_swarm", seeds=seeds)])
     return {**blocks, "lost": tables.beside_another_world(found, ideal)}, draw, height
 
 
@@ -114,7 +109,7 @@ QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
 def main(names: list[str]) -> None:
     """Play the studies of these names, and rewrite their tables and figures."""
     for name in names or QUESTIONS:
-        (found,) = play([study(name)])
+        (found,) = play([example(OUT, f"questions/{name}")])
         blocks, draw, height = QUESTIONS[name](found)
         svg, _ = drawing.images(draw, height)
         (DOCS / "media" / f"{name}.svg").write_text(svg, encoding="utf-8")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import front_page
 from play_paper import draw_figures, paper_block, paper_studies, sentences_block
-from tables import ROOT, asked, by_policy, example, rewrite, seeds_from, table
+from tables import ROOT, by_policy, example, rewrite, seeds_from, table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.judging import ENTRIES
@@ -21,7 +21,7 @@ from swarm_logistics_env.report import benchmark, drawing, section
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import UNAFFECTED, Cell, grouped
+from swarm_logistics_env.studies.verdict import Cell, grouped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,6 +34,10 @@ BENCHMARK = ROOT / "results" / "benchmark" / "benchmark.json"
 # seeds from 0 on, trainings evaluate on those from 1,000,000 on.
 FIRST_SEED = 20_000
 PROCESSES = os.cpu_count() or 1
+# Studies in examples/ that are tables of the page.
+EXAMPLES = (
+    "clearing", "ladder", "ladder_restocked", "leans", "shipped_policies", "robust_policy",
+)  # fmt: skip
 
 
 def play(studies: Iterable[Study]) -> list[StudyResults]:
@@ -47,34 +51,11 @@ def play(studies: Iterable[Study]) -> list[StudyResults]:
     return found
 
 
-_EXACT = " ="
-
-
-def policy_studies(out: Path) -> tuple[Study, ...]:
-    """Return the studies of the shipped policies, and of `ppo-robust` under three failed robots."""
-    return example(out, "shipped_policies"), example(out, "robust_policy")
-
-
 def policies_block(results: StudyResults) -> str:
     """Return P and the indicators of every policy."""
-    rows: dict[str, dict[str, str]] = {}
-    for cell in results.cells:
-        if cell.arm.setting.kind in ("size", "parameter"):
-            rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
-    exact = ""
-    for test in results.verdicts:
-        mark = _EXACT if test.plain == UNAFFECTED else ""
-        rows.setdefault(asked(test), {})[test.compared.policy] = section.ratio(test) + mark
-        if mark:
-            exact = (
-                f"\nThe sign{_EXACT} marks what is {section.UNAFFECTED}: equal runs, an exact "
-                "value, and no evidence."
-            )
-    return (
-        f"{by_policy(rows, results.policies)}\n\n{seeds_from(results)}, of each training. Each "
-        "interval is of 95 % by itself; verdicts are not shown. A divides by the relative change "
-        "of the parameter, which is 4 from 0.02 to 0.1: there A = 0.96 is 16 % fewer items." + exact
-    )
+    cells = (cell for cell in results.cells if cell.arm.setting.kind in ("size", "parameter"))
+    found = by_policy(results.policies, cells, results.verdicts, section.ratio)
+    return f"{found}\n\n{seeds_from(results)}, of each training."
 
 
 def robust_block(results: StudyResults) -> str:
@@ -83,11 +64,12 @@ def robust_block(results: StudyResults) -> str:
     for label, tests in grouped(results.verdicts, lambda one: one.compared.label).items():
         cell = results.cells_of(tests[0].compared)[tests[0].compared.changed]
         by_symbol = {test.compared.indicator: test for test in tests}
-        words = {one: section.said(by_symbol[one].conclusion) for one in ("R", "FT")}
-        said = [f"{section.ratio(by_symbol[one])}, {word}" for one, word in words.items()]
-        rows.append((label, section.mean_p(cell), *said))
-        for symbol, word in words.items():
+        row = [label, section.mean_p(cell)]
+        for symbol in ("R", "FT"):
+            word = section.said(by_symbol[symbol].conclusion)
+            row.append(f"{section.ratio(by_symbol[symbol])}, {word}")
             told.setdefault(word, []).append(f"{symbol} under {label}")
+        rows.append(row)
     found = "; ".join(f"{words}: {section.listed(what)}" for words, what in told.items())
     head = "", "P", "R above 0?", "FT above 0?"
     return (
@@ -95,11 +77,6 @@ def robust_block(results: StudyResults) -> str:
         f"{seeds_from(results, 'seeds of each')}; verdicts by Holm's method. "
         f"{found[:1].upper()}{found[1:]}."
     )
-
-
-def clearing_study(out: Path) -> Study:
-    """Return the study of how fast the shipped swarms clear the paper's warehouse."""
-    return example(out, "clearing")
 
 
 def clearing_block(results: StudyResults) -> str:
@@ -111,38 +88,12 @@ def clearing_block(results: StudyResults) -> str:
         for policy in results.policies
     ]
     limit = results.plan.cases[0].scenario.duration
-    text = (
+    return (
+        f"{table(('', *settings), rows)}\n\n"
         "Median time until all items are delivered [s], with its 95 % interval: less is better; N "
         f"is 25; {seeds_from(results)}; of several trainings the mean. "
         f'"x of y": so many runs were not done after {limit:g} s.'
     )
-    cells = {policy: by_place[policy, settings[0]] for policy in results.policies}
-    medians = {
-        policy: spi.median_interval([run.time_to_clear for run in cell.outcomes]).value
-        for policy, cell in cells.items()
-    }
-    fastest = min(medians, key=lambda policy: medians[policy])
-    if not fastest.startswith("ppo-"):
-        text += (
-            f"\nWithout a failure the script `{fastest}` is the fastest, "
-            f"with {medians[fastest]:.0f} s."
-        )
-    learned = [policy for policy in medians if policy.startswith("ppo-robust")]
-    if learned and {"swarm-dt", "homing", "homing-stock"} <= medians.keys():
-        slow, fast = medians["swarm-dt"], medians[learned[0]]
-        saved = {one: slow - medians[one] for one in ("homing", "homing-stock")}
-        shares = [f"`{one}` {s:.0f} s ({s / (slow - fast):.0%})" for one, s in saved.items()]
-        text += (
-            f"\n`ppo-robust` is {slow - fast:.0f} s faster than `swarm-dt`. Two "
-            f"scripts, which learned nothing, save most of that: {' and '.join(shares)}. Of the "
-            "deliveries where items come back they reach [less](#what-the-scripts-owe-to-what)."
-        )
-    return f"{table(('', *settings), rows)}\n\n{text}"
-
-
-def ladder_studies(out: Path) -> tuple[Study, ...]:
-    """Return the studies of both tables."""
-    return tuple(example(out, name) for name in ("ladder", "ladder_restocked", "leans"))
 
 
 def _worlds(found: StudyResults) -> dict[str, dict[str, Cell]]:
@@ -160,25 +111,15 @@ def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
     for rung, above in zip(rungs, ("", *rungs)):
         before = "" if rung.startswith("ppo-") else "homing" if rung == "central" else above
         row = [f"`{rung}`"]
-        for name in times:
-            row += [section.time_to_clear(times[name][rung]), _gain(gains[name], rung, before)]
+        for name, cells in gains.items():
+            told = section.mean_p(cells[rung])
+            if before:
+                more = t_interval(cells[rung].by_seed - cells[before].by_seed)
+                told += f" (+{section.bracketed(more, 1)})".replace("+-", "-")
+            row += [section.time_to_clear(times[name][rung]), told]
         rows.append(row)
     head = ["", *(f"{kind}, {name}" for name in times for kind in kinds)]
-    return (
-        f"{table(head, rows)}\n\n"
-        f"{seeds_from(cleared)}. Times are medians with 95 % intervals: less is "
-        "better; those of networks are means over their trainings and seeds. P is the items "
-        "delivered in 500 s, and in brackets the gain over the rung above, seed by seed; that of "
-        "`central`, which has no stock, is over `homing`."
-    )
-
-
-def _gain(cells: dict[str, Cell], rung: str, before: str) -> str:
-    told = section.mean_p(cells[rung])
-    if not before:
-        return told
-    more = t_interval(cells[rung].by_seed - cells[before].by_seed)
-    return f"{told} (+{section.bracketed(more, 1)})".replace("+-", "-")
+    return f"{table(head, rows)}\n\n{seeds_from(cleared)}."
 
 
 def leans_block(found: StudyResults) -> str:
@@ -195,32 +136,13 @@ def leans_block(found: StudyResults) -> str:
     return (
         f"{table(head, rows)}\n\n"
         f"P, items delivered in 500 s by 25 robots, with 95 % intervals; {seeds_from(found)}, of "
-        f"each training. {section.SATURATED}: in at least one run every item was delivered. "
-        "Stalled: so many of the runs delivered less than a quarter of the median.\n"
-        + _shares(next(iter(worlds.values())))
+        "each training."
     )
 
 
 def _p_and_stalls(cell: Cell) -> str:
     stalled = spi.share_stalled(cell.by_seed.ravel())
     return section.mean_p(cell) + (f"; {stalled:.0%} stalled" if stalled else "")
-
-
-def _shares(cells: dict[str, Cell]) -> str:
-    """Return in a sentence how much of the networks' gains a script reaches."""
-    p = {one: cell.mean.value for one, cell in cells.items()}
-    told = []
-    for network in (one for one in p if one.startswith("ppo-")):
-        shares = [
-            f"{(p[script] - p['swarm-dt']) / (p[network] - p['swarm-dt']):.0%}"
-            for script in ("homing", "homing-stock")
-        ]
-        told.append(
-            f"`homing` has {shares[0]} and `homing-stock` {shares[1]} of those of `{network}`"
-        )
-    if not told:
-        return ""
-    return f"As it is, of the deliveries that a network has over `swarm-dt`: {'; '.join(told)}."
 
 
 def draw_ladder(restocked: StudyResults, path: Path) -> None:
@@ -257,34 +179,28 @@ def costs_block(found: Mapping[str, Any]) -> str:
     ]
     machine = found["machine"]
     head = "", "agent-steps per s", "us per step", "cost per agent-step"
-    text = (
+    return (
         f"{table(head, rows)}\n\n"
         "Cost: less is better; the median over rounds of the ratio in each.\n"
-        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}."
+        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}.\n"
+        f"A second process takes its first step after {found['seconds']['first_step']:.1f} s."
     )
-    if seconds := found.get("seconds", {}).get("first_step"):
-        text += f"\nA second process takes its first step after {seconds:.1f} s."
-    return text
 
 
-ENTRANTS = (
-    "swarm-dt", "swarm-dt-follow", "homing", "homing-stock", "central", "central-stock",
-    "ppo-delivery@all", "ppo-robust@all", "ppo-indicator@all",
-)  # fmt: skip
 # Other people's learners, where `make interop` has trained them; each in its largest world.
 LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "benchmarl-mappo-small")
 
 
 def benchmark_studies(out: Path) -> tuple[Study, ...]:
-    """Return the benchmark's study of each entrant, each in a directory of its own."""
+    """Return the benchmark's study of each policy that clears and of the learners, in folders."""
     trained = ROOT / "results" / "interop"
     there = [one for one in LEARNERS if (trained / f"{one}@0.safetensors").exists()]
-    names = [*ENTRANTS, *(f"{trained / one}@all.safetensors" for one in there)]
-    folders = [out / "benchmark" / section.slug(Path(name).stem) for name in names]
-    return tuple(
-        Study.preset(benchmark.STUDY, out=folder, policies=[name])
-        for name, folder in zip(names, folders)
-    )
+    shipped = [one.name for one in example(out, "clearing").specification.policies]
+    studies = []
+    for name in (*shipped, *(f"{trained / one}@all.safetensors" for one in there)):
+        folder = out / "benchmark" / section.slug(Path(name).stem)
+        studies.append(Study.preset(benchmark.STUDY, out=folder, policies=[name]))
+    return tuple(studies)
 
 
 def benchmark_block(found: Sequence[StudyResults]) -> str:
@@ -307,19 +223,19 @@ def main() -> None:
     """Play, rewrite the page of results, then the README."""
     paper = play(paper_studies(OUT, FIRST_SEED))
     draw_figures(paper, MEDIA)
-    cleared, restocked, leans = play(ladder_studies(OUT))
+    clearing, cleared, restocked, leans, policies, robust = play(
+        example(OUT, name) for name in EXAMPLES
+    )
     draw_ladder(restocked, MEDIA / "ladder.svg")
-    policies, robust = play(policy_studies(OUT))
-    entered = play(benchmark_studies(OUT))
     blocks = {
-        "clearing": clearing_block(*play([clearing_study(OUT)])),
+        "clearing": clearing_block(clearing),
         "paper": paper_block(paper),
         "sentences": sentences_block(paper),
         "ladder": ladder_block(cleared, restocked),
         "leans": leans_block(leans),
         "policies": policies_block(policies),
         "robust": robust_block(robust),
-        "benchmark": benchmark_block(entered),
+        "benchmark": benchmark_block(play(benchmark_studies(OUT))),
     }
     if BENCHMARK.exists():
         blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))

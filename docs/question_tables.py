@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from tables import asked, by_policy, seeds_from, table
+from tables import by_policy, seeds_from, table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
@@ -13,10 +13,6 @@ from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
 
-LEGEND = (
-    "supported: above the threshold; refuted: below it; equivalent: open there, but P within a "
-    "tenth of P_o; under Holm"
-)
 Counts = NDArray[np.float64]  # of every seed, or of every training and seed
 
 
@@ -26,7 +22,7 @@ def with_verdict(test: Verdict) -> str:
 
 
 def _over(found: StudyResults) -> str:
-    return f"{seeds_from(found, 'paired seeds')}. [95 %]"
+    return f"{seeds_from(found, 'paired seeds')}. [95 %]."
 
 
 def _change(before: Counts, after: Counts) -> str:
@@ -59,18 +55,14 @@ def jackknife_interval(n_seeds: int, statistic: Callable[[NDArray[np.intp]], flo
 
 def side_by_side(found: StudyResults) -> str:
     """Return P and the indicators of every policy, a column a policy."""
-    rows: dict[str, dict[str, str]] = {}
     cells = [c for c in found.cells if c.arm.setting.kind != "policy" and not c.arm.case.faults]
-    known: set[str] = set()
-    for cell in sorted(cells, key=lambda one: one.arm.setting.kind != "size"):
-        if cell.arm.case.key not in known:  # a case may stand in several tables
-            known.add(cell.arm.case.key)
-            rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
+    # A case may stand in several tables; that of sizes names it.
+    cells.sort(key=lambda one: one.arm.setting.kind != "size")
+    once = [alike[0] for alike in grouped(cells, lambda cell: cell.arm.case.key).values()]
     compared = [one for one in found.verdicts if one.after.kind != "policy"]
-    for own in grouped(compared, lambda v: (v.compared.table, v.compared.question)).values():
-        if len(own) > 1:  # asked of all policies
-            rows[asked(own[0])] = {test.compared.policy: with_verdict(test) for test in own}
-    return f"{by_policy(rows, found.policies)}\n\n{_over(found)}; {LEGEND}."
+    questions = grouped(compared, lambda v: (v.compared.table, v.compared.question)).values()
+    of_all = [test for own in questions if len(own) > 1 for test in own]
+    return f"{by_policy(found.policies, once, of_all, with_verdict)}\n\n{_over(found)}"
 
 
 def by_size(found: StudyResults) -> str:
@@ -83,8 +75,8 @@ def by_size(found: StudyResults) -> str:
     for (policy, mode), own in tests.items():
         more = section.bracketed(difference(found, own[-1], own[0]), 3)
         body.append((f"`{policy}`", mode, *map(with_verdict, own), more))
-    note = f"{_over(found)}; the last column is paired by seed and unadjusted. {LEGEND}."
-    return f"{table(head, body)}\n\n{note}"
+    note = "The last column is paired by seed and unadjusted."
+    return f"{table(head, body)}\n\n{_over(found)} {note}"
 
 
 def performances_by_size(found: StudyResults) -> str:
@@ -136,7 +128,7 @@ def after_repairs(found: StudyResults) -> str:
         back = section.said(spi.equivalence(whole, after[1], margin=margin).verdict)
         body.append((policy, mode, *(_change(whole, counts) for counts in after), back))
     head = ("policy", "mode", "not repaired [%]", "repaired [%]", "all back")
-    return f"{table(head, body)}\n\n{_over(found)}. {LEGEND}."
+    return f"{table(head, body)}\n\n{_over(found)}"
 
 
 def wear(found: StudyResults) -> str:

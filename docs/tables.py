@@ -1,12 +1,13 @@
 """What the scripts share: blocks of a page between markers, and tables to put there."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from swarm_logistics_env.report import section
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Verdict
+from swarm_logistics_env.studies.verdict import Cell, Verdict
 
 ROOT = Path(__file__).parents[1]
 BLOCK = "<!-- tables: {name} -->"
@@ -47,8 +48,19 @@ def table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
 
 
-def by_policy(rows: Mapping[str, Mapping[str, str]], policies: Sequence[str]) -> str:
-    """Return a table of labelled rows with a column for each policy."""
+def by_policy(
+    policies: Sequence[str],
+    cells: Iterable[Cell],
+    tests: Iterable[Verdict],
+    told: Callable[[Verdict], str],
+) -> str:
+    """Return a table of P and of indicators, as they are told, with a column for each policy."""
+    rows: dict[str, dict[str, str]] = {}
+    for cell in cells:
+        rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
+    for test in tests:
+        label = f"{test.compared.indicator}, {test.compared.label}"
+        rows.setdefault(label, {})[test.compared.policy] = told(test)
     body = [(label, *(row.get(policy, "") for policy in policies)) for label, row in rows.items()]
     return table(("", *(f"`{policy}`" for policy in policies)), body)
 
@@ -57,11 +69,6 @@ def seeds_from(results: StudyResults, noun: str = "seeds") -> str:
     """Return over which seeds a table is, e.g. "20 seeds from 20,000 on"."""
     seeds = results.plan.seeds
     return f"{len(seeds)} {noun} from {seeds[0]:,} on"
-
-
-def asked(test: Verdict) -> str:
-    """Return an indicator and what is changed."""
-    return f"{test.compared.indicator}, {test.compared.label}"
 
 
 def example(out: Path, name: str, **changed: Any) -> Study:

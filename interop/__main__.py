@@ -6,22 +6,22 @@ What results/interop has already is not trained again. One training more of a ro
 
 from __future__ import annotations
 
-import argparse
-import contextlib
 import json
 import subprocess
 import sys
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+import typer
 
-from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning, robustness
+from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning
 from swarm_logistics_env import policies, spi
-from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, images
-from swarm_logistics_env.report.section import bracketed
+from swarm_logistics_env.report.section import Section, bracketed
+from swarm_logistics_env.report.write import section_markdown
 from swarm_logistics_env.train.evaluation import performances
 
 ROOT = RESULTS.parents[1]
@@ -47,20 +47,18 @@ LEARNERS = {
 }
 
 
-def main() -> None:
-    """Say how long it takes, train what is missing, and write the table and the picture."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--processes", type=int, default=1, help="trainings at once")
-    asked = parser.parse_args()
+def main(processes: int = 1) -> None:
+    """Say how long it takes, train what is missing, so many at once; write table and picture."""
     small = missing("small", LEARNERS)
     slowest = max(each.minutes["paper"] for each in LEARNERS.values())
     minutes = sum(LEARNERS[name].minutes["small"] for name, _ in small)
-    minutes += slowest * max(0, BEST * len(TRAININGS) - len(first(rows("paper"))))
+    done = sum(len(first(rows("paper", name))) for name in LEARNERS)
+    minutes += slowest * max(0, BEST * len(TRAININGS) - done)
     print(f"at most {minutes / 60:.1f} core-hours; what is done is kept, so it may be stopped")
-    train("small", small, asked.processes)
+    train("small", small, processes)
     reached = {name: np.mean([row["P"] for row in first(rows("small", name))]) for name in LEARNERS}
     best = sorted(reached, key=lambda name: -reached[name])[:BEST]
-    train("paper", missing("paper", best), asked.processes)
+    train("paper", missing("paper", best), processes)
     beside = references()
     text = table(beside)
     (RESULTS / "table.md").write_text(text, encoding="utf-8")
@@ -69,14 +67,12 @@ def main() -> None:
     print(text)
 
 
-def rows(world: str, learner: str | None = None) -> list[dict[str, Any]]:
-    """Return the rows of whole trainings that are there, by learner and seed."""
-    found = [json.loads(path.read_text("utf-8")) for path in RESULTS.glob(f"*-{world}@*.json")]
-    names, whole = LEARNERS if learner is None else (learner,), Learning("", world, 0).agent_steps
-    return sorted(
-        (row for row in found if row["learner"] in names and row["agent_steps"] == whole),
-        key=lambda row: (row["learner"], row["seed"]),
-    )
+def rows(world: str, learner: str) -> list[dict[str, Any]]:
+    """Return the rows of a learner's whole trainings that are there, by seed."""
+    paths, whole = RESULTS.glob(f"{learner}-{world}@*.json"), Learning("", world, 0).agent_steps
+    found = [json.loads(path.read_text("utf-8")) for path in paths]
+    kept = [row for row in found if row["agent_steps"] == whole]
+    return sorted(kept, key=lambda row: int(row["seed"]))
 
 
 def first(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -84,10 +80,13 @@ def first(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [row for row in found if row["seed"] in TRAININGS]
 
 
-def missing(world: str, learners: Any) -> list[tuple[str, int]]:
+def missing(world: str, learners: Iterable[str]) -> list[tuple[str, int]]:
     """Return learner and seed of the trainings that have no row yet."""
-    done = {(row["learner"], row["seed"]) for row in rows(world)}
-    return [each for each in product(learners, TRAININGS) if each not in done]
+    found = []
+    for name in learners:
+        done = {row["seed"] for row in rows(world, name)}
+        found += [(name, seed) for seed in TRAININGS if seed not in done]
+    return found
 
 
 def train(world: str, runs: list[tuple[str, int]], processes: int) -> None:
@@ -105,15 +104,11 @@ def train(world: str, runs: list[tuple[str, int]], processes: int) -> None:
 
 
 def references() -> Beside:
-    """Return P of the shipped policies on the same seeds, by world; some may not be there."""
-    path = RESULTS / "references.json"
-    found: Beside = json.loads(path.read_text("utf-8")) if path.exists() else {}
+    """Return P of the shipped policies on the same seeds, by world."""
+    found: Beside = {world: {} for world in WORLDS}
     for world, name in product(WORLDS, REFERENCES):
-        if name not in found.setdefault(world, {}):
-            with contextlib.suppress(PolicyError):
-                p = performances(policies.load(name), WORLDS[world], [()], SEEDS)[0]
-                found[world][name] = p.tolist()
-    path.write_text(json.dumps(found) + "\n", encoding="utf-8")
+        p = performances(policies.load(name), WORLDS[world], [()], SEEDS)[0]
+        found[world][name] = p.tolist()
     return found
 
 
@@ -121,23 +116,29 @@ def table(beside: Beside) -> str:
     """Return the rows as Markdown: P and R over trainings and seeds, each with its interval."""
     head = ["learner", "world", "agent-steps", "CPU minutes", "P", "P of each training"]
     head += ["clear of Swarm D-T", *(f"R, {mode}, m = {FAULTY}" for mode in MODES)]
-    lines = [head, ["---"] * len(head)]
+    lines = []
     for world, name in product(WORLDS, LEARNERS):
         found = rows(world, name)
         if kept := first(found):
             p = [row["P"] for row in kept]
-            lines.append([
+            lines.append((
                 name, world, f"{kept[0]['agent_steps']:,}",
                 f"{np.mean([row['cpu_minutes'] for row in kept]):.1f}",
                 bracketed(spi.mean_interval(p), 1), each_training(found),
                 f"{sum(is_clear(each, beside[world]['swarm-dt']) for each in p)} of {len(p)}",
                 *(robustness(p, [row["P_F"][mode] for row in kept], world) for mode in MODES),
-            ])  # fmt: skip
+            ))  # fmt: skip
     for world, name in product(WORLDS, REFERENCES):
-        if name in beside[world]:
-            p_of = bracketed(spi.mean_interval(beside[world][name]), 1)
-            lines.append([name, world, *[""] * 2, p_of, *[""] * (len(head) - 5)])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+        p_of = bracketed(spi.mean_interval(beside[world][name]), 1)
+        lines.append((name, world, "", "", p_of, *[""] * (len(head) - 5)))
+    return section_markdown(Section("", tuple(head), tuple(lines)))
+
+
+def robustness(p_o: list[list[float]], p_f: list[list[float]], world: str) -> str:
+    """Return R over trainings and seeds with its interval; "-": nothing was delivered."""
+    if not np.any(p_o):
+        return "-"
+    return bracketed(spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY), 2)
 
 
 def each_training(found: list[dict[str, Any]]) -> str:
@@ -171,4 +172,4 @@ def draw(canvas: Any, beside: Beside) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -7,7 +7,6 @@ Each learner writes results/interop/NAME.csv, its curve, NAME.safetensors, a pol
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import torch
 from numpy.typing import NDArray
 
@@ -27,27 +27,14 @@ from swarm_logistics_env.policies.learned import LearnedPolicy, Network, PolicyC
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.report.section import bracketed
 from swarm_logistics_env.train.evaluation import performances, versions
+from swarm_logistics_env.train.training import load_training
 from swarm_logistics_env.wrappers import MotionFrame
 
 RESULTS = Path(__file__).parents[1] / "results" / "interop"
 
-# Scenario and rewards of the preset `delivery`, without its further worlds.
-WORLDS = {
-    "small": Scenario(
-        n_robots=10,
-        warehouse_width=6.0,
-        warehouse_height=5.0,
-        delivery_width=1.5,
-        n_items=8,
-        duration=200.0,
-        restock=True,
-    ),
-    "paper": Scenario(restock=True),
-}
-REWARDS = {
-    "own_delivery": 0.5, "delivery": 0.5, "lift_requested": 0.3,
-    "approach": 0.1, "stocking": 0.15, "contact": -0.05,
-}  # fmt: skip
+_PRESET = load_training("delivery")  # of whose worlds all but these two are left out
+WORLDS = {"small": _PRESET.each_world[0][1], "paper": _PRESET.scenario}
+REWARDS = _PRESET.rewards
 AGENT_STEPS = {"small": 2_000_000, "paper": 4_000_000}
 N_WORLDS = {"small": 12, "paper": 5}
 
@@ -132,13 +119,8 @@ class Learning:
         minutes = round(self._seconds / 60, 2)
         self._curve.append({"agent_steps": agent_steps, "cpu_minutes": minutes, "P": float(p)})
         RESULTS.mkdir(parents=True, exist_ok=True)
-        with (
-            becoming(RESULTS / f"{self.name}.csv", SetupError) as part,
-            part.open("w", newline="", encoding="utf-8") as file,
-        ):
-            writer = csv.DictWriter(file, self._curve[0])
-            writer.writeheader()
-            writer.writerows(self._curve)
+        with becoming(RESULTS / f"{self.name}.csv", SetupError) as part:
+            pd.DataFrame(self._curve).to_csv(part, index=False, lineterminator="\r\n")
         print(f"{self.name}: {agent_steps:,} agent-steps, {minutes} CPU minutes, P {p:.1f}")
         self._since = time.process_time()
 
@@ -161,12 +143,7 @@ class Learning:
         }
         with becoming(RESULTS / f"{self.name}.json", SetupError) as part:
             part.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
-        r = ", ".join(f"{mode} {robustness(p_o, p, self.world)}" for mode, p in row["P_F"].items())
-        print(
-            f"{self.name}: {self.agent_steps:,} agent-steps, {row['cpu_minutes']} CPU minutes, "
-            f"P {bracketed(spi.mean_interval(p_o), 1)} on {len(SEEDS)} new seeds; "
-            f"R with {FAULTY} of {self.scenario.n_robots} robots: {r}"
-        )
+        print(f"{self.name}: P {bracketed(spi.mean_interval(p_o), 1)} on {len(SEEDS)} new seeds")
         return row
 
     def _played(
@@ -186,13 +163,6 @@ class Learning:
             seed=self.seed,
             agent_steps=self.agent_steps,
         )
-
-
-def robustness(p_o: Sequence[Any], p_f: Sequence[Any], world: str = "small") -> str:
-    """Return R with its interval from (seeds,) or (trainings, seeds); "-": nothing delivered."""
-    if not np.any(p_o):
-        return "-"
-    return bracketed(spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY), 2)
 
 
 def main(learn: Callable[[Learning], Tensors], learners: Sequence[str]) -> None:

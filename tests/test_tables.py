@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,20 +50,27 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ladder["ablations"] = [{"policy": "swarm-dt", "title": "fast"}, slow]
     asked: dict[str, list[dict[str, Any]]] = {
         "paper": [rest, {**paper, **fault}, {**paper, "faults": [{"modes": ["FM3_send"]}]}, rest],
-        "policy": [{"policies": policies, **sizes, **fault}, {"seeds": 3, **fault}],
-        "ladder": [{"task": "clearing", **ladder}, ladder, ladder],
         "benchmark": [{"policies": ["homing"], "parameters": [widths]}],
     }
+    examples = {
+        "clearing": {"task": "clearing", "policies": policies[1:], "scenario": few, **sizes},
+        "ladder": {"task": "clearing", **ladder},
+        "ladder_restocked": ladder,
+        "leans": ladder,
+        "shipped_policies": {"policies": policies, **sizes, **fault},
+        "robust_policy": {"seeds": 3, **fault},
+    }
+
+    def study(out: Path, fields: dict[str, Any]) -> Study:
+        short: dict[str, Any] = {"seeds": 2, "first_seed": 3, "scenario": {"duration": 40.0}}
+        return Study(out=out, **{**short, **fields})
 
     def studies(name: str, out: Path) -> list[Study]:
-        short: dict[str, Any] = {"seeds": 2, "first_seed": 3, "scenario": {"duration": 40.0}}
-        each = enumerate(asked[name])
-        return [Study(out=out / f"{name}{i}", **{**short, **fields}) for i, fields in each]
+        return [study(out / f"{name}{i}", fields) for i, fields in enumerate(asked[name])]
 
     for name in asked:
         monkeypatch.setattr(tables, f"{name}_studies", lambda out, *_, n=name: studies(n, out))
-    cleared: Any = partial(Study, task="clearing", policies=policies[1:], seeds=2, **sizes)
-    monkeypatch.setattr(tables, "clearing_study", lambda out: cleared(out=out / "c", scenario=few))
+    monkeypatch.setattr(tables, "example", lambda out, name: study(out / name, examples[name]))
     for name in ("OUT", "BENCHMARK", "ENTRIES"):
         monkeypatch.setattr(tables, name, tmp_path / name)
     for name, value in {"PAGE": page, "MEDIA": tmp_path, "PROCESSES": 1}.items():
@@ -105,9 +111,9 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
 def test_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> None:
     out = Path("a")
     studies = [
-        *tables.paper_studies(out, tables.FIRST_SEED), *tables.policy_studies(out),
-        tables.clearing_study(out), *tables.ladder_studies(out),
-    ]  # fmt: skip
+        *tables.paper_studies(out, tables.FIRST_SEED),
+        *(tables.example(out, name) for name in tables.EXAMPLES),
+    ]
     for study in (*studies, *map(Study.from_file, QUESTIONS)):
         seeds = study.plan().seeds
         assert min(seeds) >= 20_000
@@ -169,7 +175,7 @@ def test_page_quotes_what_was_played(
     page = Path(shutil.copy(ANSWERS, tmp_path / ANSWERS.parent.name))
     questions = script("play_questions")
     monkeypatch.setattr(questions, "DOCS", tmp_path)
-    monkeypatch.setattr(questions, "study", lambda *_, **__: study)
+    monkeypatch.setattr(questions, "example", lambda *_, **__: study)
     monkeypatch.setattr(tables, "PROCESSES", 1)
     questions.main([name])
     text, found = page.read_text(encoding="utf-8"), study.findings()

@@ -1,7 +1,6 @@
 """A headless Chromium that is driven by real mouse and key events."""
 
 import base64
-import fcntl
 import itertools
 import json
 import os
@@ -28,25 +27,20 @@ class Browser:
             raise FileNotFoundError(f"no Chromium on this machine: none of {', '.join(_NAMES)}")
         to_browser, self._out = os.pipe()
         self._in, from_browser = os.pipe()
-        # Above 4, so that none is in the way of 3 and 4, where the browser looks for them.
-        ends = [fcntl.fcntl(end, fcntl.F_DUPFD, 10) for end in (to_browser, from_browser)]
-
-        def place_pipes() -> None:
-            os.dup2(ends[0], 3)
-            os.dup2(ends[1], 4)
-
+        # The browser looks for the pipes at 3 and 4.
         self._process = subprocess.Popen(
             [
+                "bash", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "bash",
                 program, "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run",
                 "--disable-dev-shm-usage", "--disable-background-networking", "--mute-audio",
                 "--remote-debugging-pipe", f"--user-data-dir={profile}",
                 f"--window-size={size[0]},{size[1]}", "about:blank",
             ],
-            close_fds=False, preexec_fn=place_pipes, stdin=subprocess.DEVNULL,
+            pass_fds=(to_browser, from_browser), stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
-        for end in (to_browser, from_browser, *ends):
-            os.close(end)
+        os.close(to_browser)
+        os.close(from_browser)
         self._numbers, self._buffer, self._session = itertools.count(1), b"", None
         self.console: list[str] = []
         targets = self.call("Target.getTargets")["targetInfos"]

@@ -85,7 +85,7 @@ class Watch:
         self._demand(np.isfinite(state.item_position), "an item is nowhere")
         carriers = np.flatnonzero(state.robot_item != NOBODY)
         carried = state.robot_item[carriers]
-        self._demand(_all_differ(carried), "two robots carry one item")
+        self._demand(len(np.unique(carried)) == len(carried), "two robots carry one item")
         hands = np.full(len(status), NOBODY)
         hands[carried] = carriers
         self._demand(hands == state.item_carrier, f"items {carried} are not noted as carried")
@@ -124,7 +124,7 @@ class Watch:
         state, before = self.world.state, self._before
         kind, item, _ = state.robots.handling.T
         lifted = item[kind == LIFTING]
-        self._demand(_all_differ(lifted), "two robots lift one item")
+        self._demand(len(np.unique(lifted)) == len(lifted), "two robots lift one item")
         is_stored = state.item_status[lifted] == STORED
         self._demand(is_stored, "an item is being lifted and is not stored")
         stood = (before.robots.handling[:, 0] != IDLE) & state.robot_present
@@ -264,10 +264,6 @@ class Watch:
         asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
         flags = rows[:, asked : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
         self._demand(flags.sum(axis=1) <= scenario.n_requests, "a robot sees too many requests")
-
-
-def _all_differ(items: NDArray[Any]) -> bool:
-    return len(np.unique(items)) == len(items)
 
 
 def _distances(places: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,7 +6,6 @@
 Ends with 1 at the first broken promise, naming the world that shows it.
 """
 
-import argparse
 import contextlib
 import random
 import sys
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
@@ -130,14 +130,6 @@ def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> l
     return faults
 
 
-def drawn_change(source: random.Random, scenario: Scenario) -> dict[str, Any]:
-    """Return one or two fields for `Warehouse.change`; what cannot be is refused there."""
-    fields = _fields(source)
-    fields["delivery_width"] = scenario.warehouse_width * source.uniform(0.05, 0.6)
-    fields["max_speed"] = scenario.max_speed * source.uniform(0.3, 1.0)
-    return {name: fields[name] for name in source.sample(CHANGEABLE, source.randint(1, 2))}
-
-
 def play(source: random.Random, steps: int, tally: Tally) -> None:
     """Play one random world and look at it after every step."""
     scenario = some_scenario(source)
@@ -169,11 +161,16 @@ def play(source: random.Random, steps: int, tally: Tally) -> None:
 
 
 def _disturb(source: random.Random, world: Warehouse, seconds: float) -> None:
-    if source.random() < 0.5:
-        with contextlib.suppress(ScenarioError):
-            world.change(**drawn_change(source, world.scenario))
-    else:
+    """Set other faults, or change one or two fields; what these cannot be is refused."""
+    if source.random() >= 0.5:
         world.set_faults(drawn_faults(source, world.scenario, seconds))
+        return
+    fields = _fields(source)
+    fields["delivery_width"] = world.scenario.warehouse_width * source.uniform(0.05, 0.6)
+    fields["max_speed"] = world.scenario.max_speed * source.uniform(0.3, 1.0)
+    names = source.sample(CHANGEABLE, source.randint(1, 2))
+    with contextlib.suppress(ScenarioError):
+        world.change(**{name: fields[name] for name in names})
 
 
 def _steered(name: str, scenario: Scenario, seed: int) -> Steer:
@@ -199,32 +196,22 @@ def towards(world: Warehouse, target: NDArray[np.float64], width: int) -> NDArra
     return commands
 
 
-def main() -> int:
-    """Play worlds until the time is over."""
-    parser = argparse.ArgumentParser(description="Random worlds, every invariant at every step.")
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--first", type=int, default=0, help="number of the first world")
-    parser.add_argument("--worlds", type=int, default=sys.maxsize, help="at most so many")
-    parser.add_argument("--steps", type=int, default=400, help="of each world")
-    asked = parser.parse_args()
-    said, tally = time.monotonic(), Tally()
-    until = said + 60.0 * asked.minutes
-    for number in range(asked.first, asked.first + asked.worlds):
+def main(
+    minutes: float = 10.0, first: int = 0, worlds: int = sys.maxsize, steps: int = 400
+) -> None:
+    """Play at most so many random worlds of so many steps until the time is over."""
+    tally, until = Tally(), time.monotonic() + 60.0 * minutes
+    for number in range(first, first + worlds):
         try:
-            play(random.Random(number), asked.steps, tally)
+            play(random.Random(number), steps, tally)
         except BrokenPromiseError as error:
             again = f"python -m verification.soak --first {number} --worlds 1"
             print(f"world {number}: {error} ({again})")
-            return 1
-        now = time.monotonic()
-        if now - said > 60.0:
-            said = now
-            print(tally, flush=True)
-        if now > until:
+            raise SystemExit(1) from None
+        if time.monotonic() > until:
             break
     print(f"no promise broken: {tally}")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

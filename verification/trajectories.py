@@ -7,12 +7,10 @@ The record says on which machine it was written. Its key "stories" is the former
 trajectories.
 """
 
-import argparse
 import copy
 import hashlib
 import json
 import platform
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -20,6 +18,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
@@ -212,30 +211,24 @@ def explained(played: dict[str, Digests]) -> str | None:
     if not lines:
         return None
     then = record["recorded_on"]
-    other = [
-        f"{what}: {then[what]} there, {now[what]} here"
-        for what in now
-        if then.get(what) != now[what]
-    ]
+    differing = [what for what in now if then.get(what) != now[what]]
+    other = [f"{what}: {then[what]} there, {now[what]} here" for what in differing]
     why = "; ".join(other) or "the same platform and versions, so the code has changed it"
     return "\n".join([f"{len(lines)} golden trajectories are not as recorded ({why})", *lines])
 
 
-def main() -> int:
-    """Compare or record, as the command line says."""
-    parser = argparse.ArgumentParser(description="Golden trajectories, compared with their record.")
-    parser.add_argument("--record", action="store_true", help="write the record anew")
-    asked = parser.parse_args()
+def main(record: bool = False) -> None:
+    """Compare golden trajectories with their record, or write it anew."""
     played = {name: digests(golden) for name, golden in GOLDEN.items()}
-    if asked.record:
-        record = {"recorded_on": here(), "stories": played}
-        RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    if record:
+        written = {"recorded_on": here(), "stories": played}
+        RECORD.write_text(json.dumps(written, indent=1) + "\n", encoding="utf-8")
         print(f"{len(GOLDEN)} golden trajectories written to {RECORD.name}")
-        return 0
+        return
     found = explained(played)
     print(found or f"all {len(GOLDEN)} golden trajectories are as recorded")
-    return 1 if found else 0
+    raise SystemExit(int(found is not None))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -1,8 +1,7 @@
 """How often verdicts are wrong, over simulated studies: `python -m verification.verdict_errors`.
 
-It prints the errors of studies that run until they are clear, of a family of twelve of them, and of
-equivalence at the edge of its margin, with the power at the planned seeds; then the same where some
-runs stall, with the errors that only the runs seen would make; and how often intervals over
+It prints the errors of studies of so many seeds, and of those that run until they are clear, and of
+equivalence at the edge of its margin, also where some runs stall; and how often intervals over
 trainings and seeds hold the true value.
 """
 
@@ -22,9 +21,8 @@ from swarm_logistics_env.spi.summaries import at_stake
 from swarm_logistics_env.studies.specification import looks_up_to
 from swarm_logistics_env.studies.until_clear import SPENDING
 
-STUDIES, STALL_STUDIES, TRAINED_STUDIES = 10_000, 3_000, 1_000
+STUDIES, TRAINED_STUDIES = 3_000, 1_000
 P_O, P_F, LEARNED_P = 39.0, 34.0, 300.0  # true means [items]
-FAMILY = 12
 EDGE = 0.1
 REMOVED = 3
 _CHUNK = 300  # studies whose resamples fit into memory at once
@@ -89,11 +87,12 @@ _AROUND: Mapping[str, Callable[[Rng, Floats], Floats]] = {
 }
 
 
-def judged(p_o: Floats, p_new: Floats, threshold: float, level: float = 0.95) -> RatioTest[Any]:
+def judged(p_o: Floats, p_new: Floats, threshold: float, confidence: float = 0.95) -> RatioTest:
     """Return the test of the relative change of P, as studies make it."""
     stakes = at_stake([(1.0, p_new), (-1.0 - threshold, p_o)])
-    told = {"threshold": threshold, "confidence": level}
-    return paired_ratio(p_new - p_o, p_o, at_stake=stakes, **told)
+    return paired_ratio(
+        p_new - p_o, p_o, at_stake=stakes, threshold=threshold, confidence=confidence
+    )
 
 
 def _p_values(
@@ -196,70 +195,18 @@ def trainings_coverage(
     return Coverage(held / studies, float(np.median(widths)))
 
 
-def planned_seeds(model: str) -> int:
-    """Return the seeds planned for a power of 80 % at no change, from a pilot of 1,000."""
-    draw, mean_o, _ = _ALL[model]
-    pilot = draw(np.random.default_rng(0), (1_000,), mean_o)
-    return spi.seeds_for_equivalence(spi.equivalence(*pilot)) or 0
-
-
-def planned_power(
-    model: str, distance: float, pilot_seeds: int, pilots: int
-) -> tuple[float, float]:
-    """Return the seeds that pilots plan for a verdict on the change, and the power of these.
-
-    `distance` is from the threshold to the true change; below 0: the verdict is "refuted". 25
-    studies follow each pilot.
-    """
-    draw, mean_o, mean_f = _ALL[model]
-    rng, truth = np.random.default_rng(pilot_seeds), mean_f / mean_o - 1
-    threshold = truth - distance
-    planned, found = [], []
-    for _ in range(pilots):
-        pilot = spi.relative_change(*draw(rng, (pilot_seeds,), mean_f), threshold=threshold)
-        n = spi.seeds_for_power(pilot, truth) or 0
-        test = judged(*draw(rng, (25, n), mean_f), threshold)
-        planned.append(n)
-        is_right = (test.mean_difference > 0.0) == (distance > 0.0)
-        found.append(float(((test.p_value < 0.05) & is_right).mean()))
-    return float(np.median(planned)), float(np.mean(found))
-
-
-def until_clear_rows() -> Iterator[Row]:
-    """Yield the errors of studies that run until they are clear, alone and in a family."""
-    for model, most in product(MODELS, (60, 200)):
-        looks = looks_up_to(most)
-        one = wrong_verdicts(model, looks)
-        each = wrong_verdicts(model, looks, FAMILY * STUDIES, 0.05 / FAMILY).share
-        family = {f"in a family of {FAMILY}": 1 - (1 - each) ** FAMILY}
-        yield {"counts": model, "most seeds": most, **one._asdict(), **family}
-
-
-def equivalence_rows() -> Iterator[Row]:
-    """Yield the errors and the power of equivalence at a margin of 0.1."""
-    for model in ("poisson", "overdispersed"):
-        edges = (-EDGE, EDGE)
-        wrong = {f"wrong at {at}, 30 seeds": share_equivalent(model, 30, at) for at in edges}
-        seeds = planned_seeds(model)
-        power = share_equivalent(model, seeds, 0.0)
-        yield {"counts": model, **wrong, "planned seeds": seeds, "their power": power}
-
-
-def stall_rows() -> Iterator[Row]:
-    """Yield the errors at the true value where some runs stall, also if only the runs seen count.
+def verdict_rows() -> Iterator[Row]:
+    """Yield the errors of studies of so many seeds, or until clear, at the true value.
 
     What is called wrong above the truth, and equivalent though P falls by a tenth, is the harm.
     """
     fixed: list[Sequence[int]] = [[n] for n in (10, 20, 30, 50, 100)]
-    for model, looks in product(STALLS, (*fixed, looks_up_to(60), looks_up_to(200))):
+    for model, looks in product(_ALL, (*fixed, looks_up_to(60), looks_up_to(200))):
         until = "" if len(looks) == 1 else "until clear, "
-        row: Row = {"runs": model, "seeds": f"{until}{looks[-1]}"}
-        for seen, words in ((False, ""), (True, ", only seen")):
-            wrong = wrong_verdicts(model, looks, STALL_STUDIES, only_seen=seen)
-            row |= {f"above{words}": wrong.above, f"below{words}": wrong.below}
-            if len(looks) == 1:
-                same = share_equivalent(model, looks[0], -EDGE, STALL_STUDIES, only_seen=seen)
-                row[f"equivalent{words}"] = same
+        wrong = wrong_verdicts(model, looks)
+        row: Row = {"runs": model, "seeds": f"{until}{looks[-1]}", **wrong._asdict()}
+        if not until:
+            row["equivalent"] = share_equivalent(model, looks[0], -EDGE)
         yield row
 
 
@@ -270,10 +217,8 @@ def trainings_rows() -> Iterator[Row]:
         yield {"counts": model, "trainings": trainings, "spread": spread, **told._asdict()}
 
 
-TABLES: Mapping[str, Callable[[], Iterator[Row]]] = {
-    f"Until clear, {STUDIES:,} studies": until_clear_rows,
-    f"Equivalence, {STUDIES:,} studies": equivalence_rows,
-    f"Where runs stall, {STALL_STUDIES:,} studies": stall_rows,
+TABLES = {
+    f"Verdicts, {STUDIES:,} studies": verdict_rows,
     f"R over trainings and 20 seeds, {TRAINED_STUDIES:,} studies": trainings_rows,
 }
 

@@ -33,12 +33,13 @@ def test_the_floor_moves_robots_exactly_as_the_world_does() -> None:
     recording = record(scenario, 20)
     bare, world = ForceFloor(recording), Warehouse(scenario)
     world.reset(seed=0)
-    is_free = np.ones(5, np.bool_)  # of contacts, which the floor solves with other precision
+    at_first = world.state.robot_position.copy()
+    is_free = np.ones(5, np.bool_)  # of contacts, which the floor solves with fewer iterations
     for step in range(20):
         bare.step(step)
         world.step(recording.commands[step])
         is_free &= ~world.state.robot_contact
     assert is_free.sum() >= 3
     position = world.state.robot_position
-    assert np.linalg.norm(position - recording.start, axis=1).max() > 0.5
+    assert np.linalg.norm(position - at_first, axis=1).max() > 0.5
     np.testing.assert_allclose(bare.state[:5, :2][is_free], position[is_free], atol=1e-9)

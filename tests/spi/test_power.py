@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import chi2, nct, t, ttest_1samp
 
 from swarm_logistics_env import spi
-from verification.verdict_errors import planned_power
+from verification.verdict_errors import MODELS, STALLS, judged
 
 rng = np.random.default_rng(11)
 P_O = rng.poisson(39, 10)
@@ -121,6 +121,14 @@ def test_a_plan_counts_what_stalls_may_hide() -> None:
 
 @pytest.mark.parametrize(("model", "distance"), [("geometric", -0.1), ("0% stall", 0.1)])
 def test_plans_from_large_pilots_have_the_promised_power(model: str, distance: float) -> None:
-    # `python -m verification.verdict_errors` prints what small pilots promise in vain.
-    _, power = planned_power(model, distance, 1_000, pilots=8)
-    assert 0.7 < power < 0.9
+    draw, mean_o, mean_f = {**MODELS, **STALLS}[model]
+    rng, truth = np.random.default_rng(0), mean_f / mean_o - 1
+    threshold = truth - distance
+    shares = []
+    for _ in range(8):
+        pilot = spi.relative_change(*draw(rng, (1_000,), mean_f), threshold=threshold)
+        n = spi.seeds_for_power(pilot, truth) or 0
+        test = judged(*draw(rng, (25, n), mean_f), threshold)
+        is_right = (test.mean_difference > 0.0) == (distance > 0.0)
+        shares.append(((test.p_value < 0.05) & is_right).mean())
+    assert 0.7 < np.mean(shares) < 0.9
