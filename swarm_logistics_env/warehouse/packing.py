@@ -141,16 +141,11 @@ def replace(
 S = TypeVar("S", bound=tuple[Any, ...])
 
 
-def hints(structure: type) -> dict[str, Any]:
-    """Return the annotation of each field."""
-    return get_type_hints(structure, include_extras=True)
-
-
 @functools.cache
 def field_kinds(structure: type) -> dict[str, Any]:
     """Return by field `float`, `int`, `bool`, a structure, or (dtype, shape) of an array."""
     kinds: dict[str, Any] = {}
-    for name, hint in hints(structure).items():
+    for name, hint in get_type_hints(structure, include_extras=True).items():
         kinds[name] = getattr(hint, "__origin__", hint)
         if get_origin(kinds[name]) is np.ndarray:
             scalar = get_args(get_args(kinds[name])[1])[0]

@@ -24,7 +24,7 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.scenario import Scenario
 
-from .packing import call_at, hints, made_at, packed, store_at, unpacked_at
+from .packing import call_at, made_at, packed, store_at, unpacked_at
 from .structs import (
     NOBODY,
     STORED,
@@ -66,13 +66,13 @@ def advance(engine: Engine, parameters: Parameters, n_touching: int) -> None:
     within the substep, or with its greatest force. So many robots touch something as it begins.
     """
     iterations = min(_FEWEST_ITERATIONS + n_touching // _TOUCHING_PER_ITERATION, _MOST_ITERATIONS)
-    call_at(engine.functions.set_iterations, (engine.space[0], iterations))
+    call_at(engine.functions.cpSpaceSetIterations, (engine.space[0], iterations))
     period = parameters.physics_period
     greatest = parameters.max_acceleration * period
     for _ in range(parameters.n_substeps):
         read(engine, engine.velocities)
         push(engine, greatest, parameters.robot_mass / period)
-        call_at(engine.functions.step, (engine.space[0], period))
+        call_at(engine.functions.cpSpaceStep, (engine.space[0], period))
     read(engine, engine.bodies)
 
 
@@ -91,7 +91,10 @@ def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
         forces[robot, 0], forces[robot, 1] = share * change_x, share * change_y
     call = engine.functions
     store_at(engine.forces.count_address, 0)
-    call_at(call.each_body, (engine.space[0], call.write_body, engine.forces.address))
+    call_at(
+        call.cpSpaceEachBody,
+        (engine.space[0], call.pmSpaceBodySetIteratorFuncBatched, engine.forces.address),
+    )
 
 
 @kernel
@@ -99,7 +102,10 @@ def read(engine: Engine, batch: Batch) -> None:
     """Fill a batch with what it holds of the bodies."""
     store_at(batch.count_address, 0)
     call = engine.functions
-    call_at(call.each_body, (engine.space[0], call.read_body, batch.address))
+    call_at(
+        call.cpSpaceEachBody,
+        (engine.space[0], call.pmSpaceBodyGetIteratorFuncBatched, batch.address),
+    )
 
 
 @kernel
@@ -119,14 +125,14 @@ def follow(engine: Engine, events: Integers, n_events: int, item_position: Numbe
 @kernel
 def move(engine: Engine, item_shape: int, x: float, y: float) -> None:
     """Move an item to (x, y) [m]; who collides with it stays as it is."""
-    call_at(engine.functions.set_offset, (item_shape, (x, y)))
-    call_at(engine.functions.reindex, (engine.space[0], item_shape))
+    call_at(engine.functions.cpCircleShapeSetOffset, (item_shape, (x, y)))
+    call_at(engine.functions.cpSpaceReindexShape, (engine.space[0], item_shape))
 
 
 @kernel
 def collide_with(engine: Engine, shape: int, whom: int) -> None:
     """Give a shape a filter, of no group."""
-    call_at(engine.functions.set_filter, (shape, (0, whom)))
+    call_at(engine.functions.cpShapeSetFilter, (shape, (0, whom)))
 
 
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
@@ -140,11 +146,11 @@ def build(address: int) -> None:
     """Make everything of the world at `address` and note it in its engine's arrays."""
     world = unpacked_at(World, address)
     engine, call = world.engine, world.engine.functions
-    space = made_at(call.new_space, ())
+    space = made_at(call.cpSpaceNew, ())
     engine.space[0] = space
-    call_at(call.set_slop, (space, _SLOP))
-    call_at(call.set_bias, (space, _BIAS))
-    static = made_at(call.static_body, (space,))
+    call_at(call.cpSpaceSetCollisionSlop, (space, _SLOP))
+    call_at(call.cpSpaceSetCollisionBias, (space, _BIAS))
+    static = made_at(call.cpSpaceGetStaticBody, (space,))
     build_solids(engine, static, world.parameters, world.obstacles)
     build_robots(engine, world.parameters, world.robots)
     build_items(engine, static, world.parameters, world.items)
@@ -161,7 +167,9 @@ def build_solids(engine: Engine, static: int, parameters: Parameters, obstacles:
     for side in range(N_WALLS):
         one, other = side, (side + 1) % N_WALLS
         ends = ((corner_x[one], corner_y[one]), (corner_x[other], corner_y[other]))
-        engine.solid_shapes[side] = made_at(call.new_segment, (static, ends[0], ends[1], _WALL))
+        engine.solid_shapes[side] = made_at(
+            call.cpSegmentShapeNew, (static, ends[0], ends[1], _WALL)
+        )
     for obstacle in range(len(obstacles)):
         engine.solid_shapes[N_WALLS + obstacle] = new_circle(
             engine, static, parameters.obstacle_radius,
@@ -169,7 +177,7 @@ def build_solids(engine: Engine, static: int, parameters: Parameters, obstacles:
         )  # fmt: skip
     for shape in engine.solid_shapes:
         collide_with(engine, shape, SOLID_THING)
-        made_at(call.add_shape, (space, shape))
+        made_at(call.cpSpaceAddShape, (space, shape))
 
 
 @kernel
@@ -177,20 +185,20 @@ def build_robots(engine: Engine, parameters: Parameters, robots: Robots) -> None
     """Make the robots' bodies, which no contact turns, and their shapes."""
     call, space, n = engine.functions, engine.space[0], len(robots.item)
     for robot in range(n):
-        body = made_at(call.new_body, (parameters.robot_mass, math.inf))
+        body = made_at(call.cpBodyNew, (parameters.robot_mass, math.inf))
         place = (robots.position[robot, 0], robots.position[robot, 1])
-        call_at(call.set_position, (body, place))
+        call_at(call.cpBodySetPosition, (body, place))
         velocity = (robots.velocity[robot, 0], robots.velocity[robot, 1])
-        call_at(call.set_velocity, (body, velocity))
+        call_at(call.cpBodySetVelocity, (body, velocity))
         shape = new_circle(engine, body, parameters.robot_radius, 0.0, 0.0)
         met = EMPTY_ROBOT if robots.item[robot] == NOBODY else LADEN_ROBOT
         collide_with(engine, shape, met if robots.present[robot] else NO_ONE)
         engine.robot_bodies[robot], engine.robot_shapes[robot] = body, shape
     # A batch reads and writes bodies in the order in which they were added.
     for body in engine.robot_bodies:
-        made_at(call.add_body, (space, body))
+        made_at(call.cpSpaceAddBody, (space, body))
     for shape in engine.robot_shapes:
-        made_at(call.add_shape, (space, shape))
+        made_at(call.cpSpaceAddShape, (space, shape))
 
 
 @kernel
@@ -204,14 +212,14 @@ def build_items(engine: Engine, static: int, parameters: Parameters, items: Item
         shape = new_circle(engine, static, parameters.item_radius, x, y)
         is_solid = items.status[item] == STORED and items.covered[item] == 0
         collide_with(engine, shape, FREE_ITEM if is_solid else NO_ONE)
-        made_at(engine.functions.add_shape, (engine.space[0], shape))
+        made_at(engine.functions.cpSpaceAddShape, (engine.space[0], shape))
         engine.item_shapes[item] = shape
 
 
 @kernel
 def new_circle(engine: Engine, body: int, radius: float, x: float, y: float) -> int:
     """Return the address of a new disc around (x, y) from its body."""
-    return made_at(engine.functions.new_circle, (body, radius, (x, y)))
+    return made_at(engine.functions.cpCircleShapeNew, (body, radius, (x, y)))
 
 
 @kernel
@@ -219,12 +227,12 @@ def free(address: int) -> None:
     """Free everything that `build` made for the engine at `address`."""
     engine = unpacked_at(Engine, address)
     call = engine.functions
-    call_at(call.free_space, (engine.space[0],))
+    call_at(call.cpSpaceFree, (engine.space[0],))
     for shapes in (engine.robot_shapes, engine.item_shapes, engine.solid_shapes):
         for shape in shapes:
-            call_at(call.free_shape, (shape,))
+            call_at(call.cpShapeFree, (shape,))
     for body in engine.robot_bodies:
-        call_at(call.free_body, (body,))
+        call_at(call.cpBodyFree, (body,))
 
 
 class Physics:
@@ -313,8 +321,7 @@ def _function_addresses() -> Functions:
     if sys.maxsize < 2**32 or sys.byteorder != "little":
         raise SetupError("this machine's words: should be of 64 bits, lowest byte first")
     try:
-        names = [kind.__metadata__[0] for kind in hints(Functions).values()]
-        return Functions(*(_address(ffi.addressof(lib, name)) for name in names))
+        return Functions(*(_address(ffi.addressof(lib, name)) for name in Functions._fields))
     except AttributeError as error:
         # pymunk.version is not used, because in pymunk 7.0 it is the version of something else.
         raise SetupError(f"pymunk {version('pymunk')} lacks a function: {error}") from None

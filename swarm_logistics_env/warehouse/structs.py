@@ -4,6 +4,8 @@ Lengths are numbers or names, see `lengths_of`: N robots, I items, C columns of 
 of a robot that is absent holds zeros and `NOBODY`.
 """
 
+# ruff: noqa: N815 - the engine's functions have their names in C
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -173,30 +175,30 @@ class Claims(NamedTuple):
 
 
 class Functions(NamedTuple):
-    """Addresses of the engine's functions, with their names in C."""
+    """Addresses of the engine's functions, by their names in C."""
 
-    step: Annotated[int, "cpSpaceStep"]
-    set_iterations: Annotated[int, "cpSpaceSetIterations"]
-    each_body: Annotated[int, "cpSpaceEachBody"]
-    read_body: Annotated[int, "pmSpaceBodyGetIteratorFuncBatched"]
-    write_body: Annotated[int, "pmSpaceBodySetIteratorFuncBatched"]
-    set_filter: Annotated[int, "cpShapeSetFilter"]
-    set_offset: Annotated[int, "cpCircleShapeSetOffset"]
-    reindex: Annotated[int, "cpSpaceReindexShape"]
-    new_space: Annotated[int, "cpSpaceNew"]
-    static_body: Annotated[int, "cpSpaceGetStaticBody"]
-    set_slop: Annotated[int, "cpSpaceSetCollisionSlop"]
-    set_bias: Annotated[int, "cpSpaceSetCollisionBias"]
-    new_body: Annotated[int, "cpBodyNew"]
-    set_position: Annotated[int, "cpBodySetPosition"]
-    set_velocity: Annotated[int, "cpBodySetVelocity"]
-    new_circle: Annotated[int, "cpCircleShapeNew"]
-    new_segment: Annotated[int, "cpSegmentShapeNew"]
-    add_body: Annotated[int, "cpSpaceAddBody"]
-    add_shape: Annotated[int, "cpSpaceAddShape"]
-    free_space: Annotated[int, "cpSpaceFree"]
-    free_body: Annotated[int, "cpBodyFree"]
-    free_shape: Annotated[int, "cpShapeFree"]
+    cpSpaceStep: int
+    cpSpaceSetIterations: int
+    cpSpaceEachBody: int
+    pmSpaceBodyGetIteratorFuncBatched: int
+    pmSpaceBodySetIteratorFuncBatched: int
+    cpShapeSetFilter: int
+    cpCircleShapeSetOffset: int
+    cpSpaceReindexShape: int
+    cpSpaceNew: int
+    cpSpaceGetStaticBody: int
+    cpSpaceSetCollisionSlop: int
+    cpSpaceSetCollisionBias: int
+    cpBodyNew: int
+    cpBodySetPosition: int
+    cpBodySetVelocity: int
+    cpCircleShapeNew: int
+    cpSegmentShapeNew: int
+    cpSpaceAddBody: int
+    cpSpaceAddShape: int
+    cpSpaceFree: int
+    cpBodyFree: int
+    cpShapeFree: int
 
 
 class Batch(NamedTuple):
