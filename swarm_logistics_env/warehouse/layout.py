@@ -13,7 +13,7 @@ from swarm_logistics_env.kernels import gaussian, kernel, pair_key, uniform
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-from .structs import STORED, Integers, Keys, Numbers, World
+from .structs import STORED, Keys, Numbers, World
 
 _ARRANGEMENTS = 100  # of all discs anew, where the first ones left no room for the last
 _ATTEMPTS = 5_000  # to place a disc among those that stand
@@ -44,40 +44,6 @@ def heading_drifts(scenario: Scenario, seed: int) -> Numbers:
     """Return at which rate each robot's body turns unasked [rad/s], shape (N,)."""
     keys = row_keys(seed, "drift", scenario.n_robots)
     return scenario.heading_drift * np.array([gaussian(key, 0) for key in keys])
-
-
-@kernel
-def draw_order(keys: Keys, cycle: int, order: Integers) -> None:
-    """Fill the order in which items are asked for, for the `cycle`-th time (0: the first)."""
-    draws = np.empty(len(keys))
-    for item in range(len(keys)):
-        draws[item] = uniform(keys[item], cycle)
-    sort_by(draws, order)
-
-
-@kernel
-def sort_by(keys: Numbers, order: Integers) -> None:
-    """Fill `order` with the indices of `keys`, smallest first; equal ones in their order.
-
-    Merges runs of 1, 2, 4, ... indices. numpy's sort would take three seconds to compile.
-    """
-    count, run = len(keys), 1
-    source, target = np.empty(count, np.int64), np.empty(count, np.int64)
-    for index in range(count):
-        source[index] = index
-    while run < count:
-        for first in range(0, count, 2 * run):
-            left, right = first, min(first + run, count)
-            middle, end = right, min(first + 2 * run, count)
-            for place in range(first, end):
-                is_left = left < middle and (
-                    right == end or keys[source[left]] <= keys[source[right]]
-                )
-                target[place] = source[left] if is_left else source[right]
-                left, right = left + int(is_left), right + int(not is_left)
-        source, target, run = target, source, 2 * run
-    for index in range(count):
-        order[index] = source[index]
 
 
 @kernel

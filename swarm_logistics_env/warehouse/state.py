@@ -113,8 +113,9 @@ class WarehouseState:
         self.robots = blank_robots(lengths)
         self.able = blank(Capabilities, lengths)
         self.items = blank(Items, lengths)
-        self.items.carrier[:], self.items.order[:] = NOBODY, np.arange(scenario.n_items)
+        self.items.carrier[:] = NOBODY
         self.progress = blank(Progress, lengths)
+        self.progress.asked_last[0] = NOBODY
         self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
         # Per robot, the failure modes that hold.
         self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * scenario.n_robots

@@ -108,13 +108,12 @@ class Capabilities(NamedTuple):
 
 
 class Items(NamedTuple):
-    """The items, and in which order they are asked for."""
+    """The items, and the streams that decide which one is asked for next."""
 
     position: Annotated[Numbers, "I", 2]  # [m], its carrier's while carried
     status: Annotated[Integers, "I"]  # STORED, CARRIED or DELIVERED
     carrier: Annotated[Integers, "I"]  # robot, or NOBODY
     covered: Annotated[Integers, "I"]  # 1: stored, yet no obstacle; or 0
-    order: Annotated[Integers, "I"]  # items in the order of this cycle's requests
     request_key: Annotated[Keys, "I"]  # of the streams that decide the order of every cycle
     demand_key: Annotated[Keys, 1]  # of the stream of requests that are drawn independently
     restock_key: Annotated[Keys, 1]  # of the streams that decide where delivered items come back
@@ -126,7 +125,9 @@ class Progress(NamedTuple):
     step: Annotated[Integers, 1]  # control steps since the start
     time: Annotated[Numbers, 1]  # [s] since the start
     requested: Annotated[Integers, "n_requests"]  # items asked for, oldest first, then NOBODY
-    n_asked: Annotated[Integers, 1]  # requests drawn so far, those that were skipped included
+    cycle: Annotated[Integers, 1]  # how often all items were asked for
+    asked_last: Annotated[Integers, 1]  # the item that was asked for last in this cycle, or NOBODY
+    n_drawn: Annotated[Integers, 1]  # requests drawn independently so far
     dock_free: Annotated[Numbers, 1]  # [s] since the start, when the next delivery may begin
     n_delivered: Annotated[Integers, 1]  # items delivered
     anchoring_seconds: Annotated[Numbers, 1]  # of working robots that touch failed ones, summed

@@ -239,7 +239,6 @@ class Warehouse:
         items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
         items.demand_key[0] = key(seed, "demand")
         items.restock_key[0] = key(seed, "restock")
-        layout.draw_order(items.request_key, 0, items.order)
         state.open_requests[:] = NOBODY
 
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ import pytest
 from swarm_logistics_env import Fault, Warehouse
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse import physics
-from swarm_logistics_env.warehouse.packing import blank, hints, packed
-from swarm_logistics_env.warehouse.structs import Claims, Functions
+from swarm_logistics_env.warehouse.packing import blank, packed
+from swarm_logistics_env.warehouse.structs import Claims
 from tests.warehouse.conftest import EAST, FAR, HOLD, OPEN, STAY, WEST, Build, steps
 
 DIAMETER = 0.25
@@ -124,7 +124,6 @@ def test_an_array_that_is_not_as_declared_is_refused_before_a_kernel_reads_it() 
 
 
 def test_a_pymunk_without_the_functions_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    renamed = {**hints(Functions), "step": Annotated[int, "cpSpaceLeap"]}
-    monkeypatch.setattr(physics, "hints", lambda _: renamed)
+    monkeypatch.setattr(physics, "Functions", NamedTuple("Functions", [("cpSpaceLeap", int)]))
     with pytest.raises(SetupError, match=r"pymunk 7.* lacks a function: .*cpSpaceLeap"):
         physics._function_addresses()
