@@ -25,7 +25,6 @@ from .structs import (
 __all__ = ["CARRIED", "DELIVERED", "NOBODY", "STORED", "WarehouseState"]
 
 T = TypeVar("T", bound=np.generic)
-V = TypeVar("V", int, float)
 
 
 class Quantity(Generic[T]):
@@ -47,23 +46,6 @@ class Quantity(Generic[T]):
     def __set__(self, state: WarehouseState, values: NDArray[T]) -> None:
         """Copy `values` into the array."""
         getattr(state.__dict__[self.structure], self.name)[...] = values
-
-
-class Count(Generic[V]):
-    """A number of `Progress`; of `requested`, the oldest request."""
-
-    def __set_name__(self, owner: type[WarehouseState], name: str) -> None:
-        """Take the attribute's name."""
-        self.name = name
-
-    def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> V:
-        """Return the number."""
-        number: V = getattr(state.progress, self.name).item(0)
-        return number
-
-    def __set__(self, state: WarehouseState, value: V) -> None:
-        """Set the number."""
-        getattr(state.progress, self.name)[0] = value
 
 
 class WarehouseState:
@@ -105,9 +87,6 @@ class WarehouseState:
 
     open_requests = Quantity[np.int64]("progress", "requested")
 
-    step, requested, time = Count[int](), Count[int](), Count[float]()
-    anchoring_seconds = Count[float]()
-
     def __init__(self, scenario: Scenario) -> None:
         lengths = lengths_of(scenario)
         self.robots = blank_robots(lengths)
@@ -121,6 +100,26 @@ class WarehouseState:
         self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * scenario.n_robots
         self.delivery_times: list[float] = []  # [s], ascending
         self.delivered_by: list[int] = []  # robot, one per delivery
+
+    @property
+    def step(self) -> int:
+        """Control steps since the start."""
+        return int(self.progress.step[0])
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start."""
+        return float(self.progress.time[0])
+
+    @property
+    def requested(self) -> int:
+        """The item of the oldest request, or NOBODY."""
+        return int(self.progress.requested[0])
+
+    @property
+    def anchoring_seconds(self) -> float:
+        """Seconds for which working robots touched failed ones, summed over robots."""
+        return float(self.progress.anchoring_seconds[0])
 
     @property
     def n_robots(self) -> int:
