@@ -16,9 +16,10 @@ from pymunk._chipmunk_cffi import ffi, lib  # its functions' addresses have no p
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.warehouse.packing import call_at, store_at
+from swarm_logistics_env.warehouse.packing import call_at
 
 Numbers = NDArray[np.float64]
+Counts = NDArray[np.int32]
 
 
 class Recording(NamedTuple):
@@ -82,7 +83,7 @@ def space_of(recording: Recording) -> pymunk.Space:
 
 
 class _Batch:
-    """Numbers of all bodies, (rows, columns), and where the engine finds them."""
+    """Numbers of all bodies, (rows, columns), and where the engine finds and counts them."""
 
     def __init__(self, rows: int, columns: int, fields: batch.BodyFields) -> None:
         memory = np.zeros(rows * columns + 1)  # pymunk wants one number to spare
@@ -92,7 +93,8 @@ class _Batch:
         self._buffer.arr, self._buffer.max = self._memory, len(memory)
         self._data = ffi.new("pmBatchedData *")
         self._data.floatArray, self._data.fields = self._buffer, fields.value
-        self.where = (_address(self._data), _address(ffi.addressof(self._buffer, "num")))
+        filled = np.frombuffer(ffi.buffer(ffi.addressof(self._buffer, "num")), np.int32)
+        self.where = (_address(self._data), filled)
 
 
 class ForceFloor:
@@ -137,14 +139,14 @@ def _drive_by_force(
     drive: tuple[float, float, float, int],
     velocity: Numbers,
     force: Numbers,
-    batches: tuple[tuple[int, int], tuple[int, int], tuple[int, int]],
+    batches: tuple[tuple[int, Counts], tuple[int, Counts], tuple[int, Counts]],
 ) -> None:
     step, each_body, read, write = functions
     acceleration, mass, period, n_substeps = drive
     greatest = acceleration * period
     (velocities, n_velocities), (forces, n_forces), (state, n_state) = batches
     for _ in range(n_substeps):
-        store_at(n_velocities, 0)
+        n_velocities[0] = 0
         call_at(each_body, (space, read, velocities))
         for robot in range(len(wanted)):
             x = wanted[robot, 0] - velocity[robot, 0]
@@ -152,10 +154,10 @@ def _drive_by_force(
             change = np.sqrt(x * x + y * y)
             share = mass / period * (1.0 if change <= greatest else greatest / change)
             force[robot, 0], force[robot, 1] = share * x, share * y
-        store_at(n_forces, 0)
+        n_forces[0] = 0
         call_at(each_body, (space, write, forces))
         call_at(step, (space, period))
-    store_at(n_state, 0)
+    n_state[0] = 0
     call_at(each_body, (space, read, state))
 
 

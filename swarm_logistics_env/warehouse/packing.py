@@ -78,18 +78,6 @@ def pointer_at(typing_context: Any, address: types.Type) -> Any:
     return types.voidptr(types.int64), generate
 
 
-@_generated
-def store_at(typing_context: Any, address: types.Type, value: types.Type) -> Any:
-    """Write `value` as a C int (32 bits) to `address`."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        where, number = values
-        builder.store(number, builder.inttoptr(where, ir.IntType(32).as_pointer()))
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.int32), generate
-
-
 _IN_ORDER = "seq_cst"  # all threads see all changes in one order
 
 

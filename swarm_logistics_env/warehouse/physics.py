@@ -24,7 +24,7 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.scenario import Scenario
 
-from .packing import call_at, made_at, packed, store_at, unpacked_at
+from .packing import call_at, made_at, packed, unpacked_at
 from .structs import (
     NOBODY,
     STORED,
@@ -90,7 +90,7 @@ def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
         share = mass_per_period * (1.0 if change <= greatest else greatest / change)
         forces[robot, 0], forces[robot, 1] = share * change_x, share * change_y
     call = engine.functions
-    store_at(engine.forces.count_address, 0)
+    engine.forces.filled[0] = 0
     call_at(
         call.cpSpaceEachBody,
         (engine.space[0], call.pmSpaceBodySetIteratorFuncBatched, engine.forces.address),
@@ -100,7 +100,7 @@ def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
 @kernel
 def read(engine: Engine, batch: Batch) -> None:
     """Fill a batch with what it holds of the bodies."""
-    store_at(batch.count_address, 0)
+    batch.filled[0] = 0
     call = engine.functions
     call_at(
         call.cpSpaceEachBody,
@@ -249,10 +249,12 @@ class Physics:
     def __init__(self, scenario: Scenario) -> None:
         n = scenario.n_robots
         # A batch call reads and writes every body: of N robots, and the static one.
-        state = _Memory(n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY)
-        velocities = _Memory(n + 1, 2, BodyFields.VELOCITY)
-        forces = _Memory(n + 1, 2, BodyFields.FORCE)
-        self._kept = state, velocities, forces
+        self._kept = [
+            _batch(n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY),
+            _batch(n + 1, 2, BodyFields.VELOCITY),
+            _batch(n + 1, 2, BodyFields.FORCE),
+        ]
+        bodies, velocities, forces = (batch for batch, _ in self._kept)
         self.engine = Engine(
             functions=_FUNCTION_ADDRESSES,
             space=np.zeros(1, np.int64),
@@ -260,9 +262,9 @@ class Physics:
             robot_shapes=np.zeros(n, np.int64),
             item_shapes=np.zeros(scenario.n_items, np.int64),
             solid_shapes=np.zeros(N_WALLS + scenario.n_obstacles, np.int64),
-            bodies=state.batch,
-            velocities=velocities.batch,
-            forces=forces.batch,
+            bodies=bodies,
+            velocities=velocities,
+            forces=forces,
             wanted_velocity=np.zeros((n, 2)),
         )
 
@@ -272,39 +274,23 @@ class Physics:
         # This is left out at the end of the process, which frees everything anyway.
         finalize(self, _free, packed(self.engine), self.engine, self._kept).atexit = False
 
-    def release(self, robot: int, item: int, x: float, y: float) -> None:
-        """Put `item` to (x, y) [m], masked, and make `robot` an unladen one."""
-        engine = self.engine
-        collide_with(engine, int(engine.robot_shapes[robot]), EMPTY_ROBOT)
-        move(engine, int(engine.item_shapes[item]), x, y)
-
-    def remove(self, robot: int) -> None:
-        """Take `robot` out of everybody's way, for good."""
-        collide_with(self.engine, int(self.engine.robot_shapes[robot]), NO_ONE)
-
 
 def _free(engine: NDArray[np.int64], *kept: object) -> None:
     free(engine.ctypes.data)
 
 
-class _Memory:
-    """The memory of a batch, (rows, columns)."""
-
-    def __init__(self, rows: int, columns: int, fields: BodyFields) -> None:
-        # The engine trusts the memory it is given. One number to spare: it replaces, with memory of
-        # its own, a buffer that what it reads would fill.
-        memory = np.zeros(rows * columns + 1)
-        # All kept, because what a structure of cffi points to lives no longer for it.
-        self._memory = ffi.from_buffer("double[]", memory)
-        self._buffer = ffi.new("pmFloatArray *")
-        self._buffer.arr, self._buffer.max = self._memory, len(memory)
-        self._data = ffi.new("pmBatchedData *")
-        self._data.floatArray, self._data.fields = self._buffer, fields.value
-        self.batch = Batch(
-            address=_address(self._data),
-            count_address=_address(ffi.addressof(self._buffer, "num")),
-            numbers=memory[:-1].reshape(rows, columns),
-        )
+def _batch(rows: int, columns: int, fields: BodyFields) -> tuple[Batch, object]:
+    """Return a batch of (rows, columns), and what has to be kept as long as it is used."""
+    # The engine trusts the memory it is given. One number to spare: it replaces, with memory of
+    # its own, a buffer that what it reads would fill.
+    memory = np.zeros(rows * columns + 1)
+    # What a structure of cffi points to lives no longer for it.
+    numbers = ffi.from_buffer("double[]", memory)
+    buffer = ffi.new("pmFloatArray *", {"arr": numbers, "max": len(memory)})
+    data = ffi.new("pmBatchedData *", {"floatArray": buffer, "fields": fields.value})
+    filled = np.frombuffer(ffi.buffer(ffi.addressof(buffer, "num")), np.int32)
+    batch = Batch(_address(data), filled, memory[:-1].reshape(rows, columns))
+    return batch, (numbers, buffer, data)
 
 
 def _address(thing: Any) -> int:

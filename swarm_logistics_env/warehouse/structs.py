@@ -206,7 +206,7 @@ class Batch(NamedTuple):
     """Numbers of all bodies, the static one last, that one call of the engine reads or writes."""
 
     address: int  # of the engine's structure
-    count_address: int  # of how many numbers it has read or written
+    filled: Annotated[NDArray[np.int32], 1]  # numbers that it has read or written
     numbers: Annotated[Numbers, "bodies", "columns"]
 
 
