@@ -15,16 +15,18 @@ from swarm_logistics_env.kernels import kernel
 from .demand import ask
 from .grid import fill, look_around
 from .logistics import (
+    IDLE,
     carry_along,
     close_grippers,
     deliver,
     drive,
     end_handling,
+    note_event,
     open_grippers,
     refused_command,
 )
 from .packing import unpacked_at
-from .physics import FREE_ITEM, LIFTED, NO_ONE, advance, collide_with, follow
+from .physics import FREE_ITEM, LIFTED, NO_ONE, PUT_DOWN, advance, collide_with, follow
 from .sensing import disturb, fail_rangers, sense
 from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
 from .surroundings import run_timers, send_messages
@@ -94,6 +96,29 @@ def perceive(address: int, rows: Sensed) -> None:
     disturb(world, rows)
     fail_rangers(world, rows)
     progress.anchoring_seconds[0] += n_anchored * world.parameters.control_period
+
+
+@kernel
+def take_out(address: int, robot: int) -> None:
+    """Take a robot out of the arena of the world at `address`; what it carries is put down."""
+    world = unpacked_at(World, address)
+    robots, items, engine = world.robots, world.items, world.engine
+    item = robots.item[robot]
+    if item != NOBODY:
+        items.status[item] = STORED
+        items.carrier[item] = NOBODY
+        items.covered[item] = 1
+        n_events = note_event(world.claims.events, 0, PUT_DOWN, robot, item)
+        follow(engine, world.claims.events, n_events, items.position)
+    collide_with(engine, engine.robot_shapes[robot], NO_ONE)
+    robots.present[robot] = False
+    robots.in_delivery[robot] = False
+    robots.item[robot] = NOBODY
+    robots.handling[robot, :] = IDLE
+    robots.memory[robot, :] = NOBODY
+    robots.position[robot, :] = 0.0
+    robots.velocity[robot, :] = 0.0
+    robots.heading[robot] = 0.0
 
 
 @kernel
