@@ -29,8 +29,9 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator, row_keys
 
-from .failure_modes import FAILURE_MODES, LOST_AS_A_WHOLE, failure_mode
+from .failure_modes import FAILURE_MODES, FailureMode, failure_mode
 from .state import WarehouseState, robots_in_role
+from .structs import Capabilities
 
 ROLES = {
     "carrier": "carries the requested item",
@@ -317,6 +318,12 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
     # Ranked by a key of seed and robot alone: nested in m, the same for every mode and any N.
     order = np.argsort(row_keys(seed, "faulty robots", n_robots), kind="stable")
     return np.sort(order[: fault.robots]).astype(np.int64)
+
+
+# Capabilities that a mode takes away as a whole: each is a field of both.
+LOST_AS_A_WHOLE = tuple(
+    name for name in Capabilities._fields if getattr(FailureMode, name, None) is True
+)
 
 
 def apply_faults(

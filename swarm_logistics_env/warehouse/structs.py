@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from swarm_logistics_env.observations import N_BEAMS
 from swarm_logistics_env.scenario import Scenario
 
+from .failure_modes import FAILURE_MODES
 from .packing import blank
 
 STORED, CARRIED, DELIVERED = 0, 1, 2
-LONGEST_RADIO_DELAY = 2.0  # [s] for which broadcasts are kept
 NOBODY = -1
 
 Numbers: TypeAlias = NDArray[np.float64]
@@ -268,7 +268,8 @@ def parameters_of(scenario: Scenario) -> Parameters:
 def lengths_of(scenario: Scenario) -> dict[str, int]:
     """Return the lengths of a world's arrays by the names that their shapes have."""
     n, n_items = scenario.n_robots, scenario.n_items
-    n_kept = round(LONGEST_RADIO_DELAY / scenario.control_period) + 1
+    longest_delay = max(mode.radio_delay for mode in FAILURE_MODES.values())
+    n_kept = round(longest_delay / scenario.control_period) + 1  # steps of broadcasts
     return {
         "N": n,
         "4 N": 4 * n,
