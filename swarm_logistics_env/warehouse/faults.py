@@ -6,6 +6,7 @@ MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]].
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from bisect import bisect_right
@@ -75,7 +76,7 @@ class Fault(Record):
     error_type = FaultError
 
     mode: str
-    robots: PositiveInt | tuple[NonNegativeInt, ...] = 1
+    robots: PositiveInt | Annotated[tuple[NonNegativeInt, ...], Field(min_length=1)] = 1
     onset: Annotated[float, Field(ge=0)] = 0.0
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
@@ -92,8 +93,6 @@ class Fault(Record):
         intermittent: tuple[float, float] | None = None,
         role: str | None = None,
     ) -> None:
-        if isinstance(robots, Sequence) and not isinstance(robots, str):
-            robots = tuple(robots)
         given = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
         super().__init__(**given, factor=factor, intermittent=intermittent, role=role)
 
@@ -114,8 +113,6 @@ class Fault(Record):
         for name in ("duration", "intermittent"):
             if self.mode == "removed" and getattr(self, name) is not None:
                 raise ValueError(f"a removed robot does not come back: {name} should be None")
-        if isinstance(self.robots, tuple) and not self.robots:
-            raise ValueError("robots = (): should name at least one robot")
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
             raise ValueError(f"robots = {self.robots}: should name each robot once")
         if self.role is not None and self.role not in ROLES:
@@ -207,15 +204,12 @@ def fault_of(text: str) -> Fault:
 
 def text_of(fault: Fault) -> str | None:
     """Return the text that describes the fault; None: none does, as it has a factor, say."""
+    digits = functools.partial(np.format_float_positional, trim="-")
     role = f":{fault.role}" if fault.role else ""
-    lasts = f"+{_digits(fault.duration)}" if fault.duration else ""
-    onset = f"@{_digits(fault.onset)}{lasts}" if fault.onset or lasts else ""
+    lasts = f"+{digits(fault.duration)}" if fault.duration else ""
+    onset = f"@{digits(fault.onset)}{lasts}" if fault.onset or lasts else ""
     text = f"{fault.mode}:{fault.robots}{role}{onset}"
     return text if _FAULT.fullmatch(text) and fault_of(text) == fault else None
-
-
-def _digits(seconds: float) -> str:
-    return f"{seconds:.12f}".rstrip("0").rstrip(".")
 
 
 class Occurrence:
@@ -227,6 +221,7 @@ class Occurrence:
         n_robots: how many there are.
 
     Attributes:
+        mode: the failure mode.
         robots: the numbers of those affected, ascending; none before the onset of a fault that
             strikes by role.
 
@@ -235,7 +230,7 @@ class Occurrence:
     """
 
     def __init__(self, fault: Fault, seed: int, n_robots: int) -> None:
-        self.fault, self._seed = fault, seed
+        self.fault, self.mode, self._seed = fault, failure_mode(fault.mode), seed
         # The times at which an intermittent fault begins, ends, begins, ..., by robot.
         self._switches: dict[int, list[float]] = {}
         chosen = failed_robots(fault, seed, n_robots)
@@ -272,7 +267,7 @@ class Occurrence:
         if not fault.is_active(time):
             return fault.onset if fault.onset > time + GRACE else math.inf
         changes = [math.inf if fault.duration is None else fault.onset + fault.duration]
-        if failure_mode(fault.mode).wears:
+        if self.mode.wears:
             changes.append(next_step)
         for robot, switches in self._switches.items():
             changes.append(switches[self._n_switches(robot, time)])
@@ -280,7 +275,7 @@ class Occurrence:
 
     def left(self, time: float, end: float) -> tuple[float, float]:
         """Return the factors on speed and view at `time` [s] of an episode until `end` [s]."""
-        mode, fault = failure_mode(self.fault.mode), self.fault
+        mode, fault = self.mode, self.fault
         speed, view = mode.speed, mode.view
         if fault.factor is not None:
             speed = fault.factor if mode.factor == "speed" else speed
@@ -345,10 +340,10 @@ def apply_faults(
     for name in LOST_AS_A_WHOLE:
         getattr(able, name)[:] = True
     gone = np.zeros(state.n_robots, np.bool_)
-    modes: list[tuple[str, ...]] = [()] * state.n_robots
+    modes: list[list[str]] = [[] for _ in range(state.n_robots)]
     for occurrence in occurrences:
         occurrence.choose_by_role(state)
-        mode, robots = failure_mode(occurrence.fault.mode), occurrence.holds_for(state.time)
+        mode, robots = occurrence.mode, occurrence.holds_for(state.time)
         speed_left, view_left = occurrence.left(state.time, scenario.duration)
         able.max_speed[robots] *= speed_left
         able.max_turn_rate[robots] *= speed_left
@@ -361,7 +356,7 @@ def apply_faults(
             getattr(able, name)[robots] &= getattr(mode, name)
         gone[robots] |= not mode.present
         for robot in robots.tolist():
-            modes[robot] = (*modes[robot], occurrence.fault.mode)
-    state.failure_modes = tuple(modes)
+            modes[robot].append(occurrence.fault.mode)
+    state.failure_modes = tuple(map(tuple, modes))
     state.failed = np.array([bool(names) for names in modes])
     return gone
