@@ -31,7 +31,6 @@ from .structs import (
     Batch,
     Engine,
     Functions,
-    Integers,
     Items,
     Numbers,
     Parameters,
@@ -48,9 +47,6 @@ EMPTY_ROBOT = _ROBOT | (_ROBOT | _SOLID) << _MASK
 LADEN_ROBOT = _ROBOT | (_ROBOT | _SOLID | _ITEM) << _MASK
 FREE_ITEM = _ITEM | _ROBOT << _MASK
 SOLID_THING = _SOLID | _ROBOT << _MASK
-
-# Kinds of events: what happened to (robot, item) that changes whom they collide with.
-LIFTED, PUT_DOWN, DELIVERED_IT, CAME_BACK = 0, 1, 2, 3
 
 # The contact solver iterates more if more touch. With 16 a jam of 150 in a corner stands
 # 10 mm inside itself, with 50 now and then 7 mm, with 80 always 1 mm; always 80 costs a swarm of
@@ -109,24 +105,13 @@ def read(engine: Engine, batch: Batch) -> None:
 
 
 @kernel
-def follow(engine: Engine, events: Integers, n_events: int, item_position: Numbers) -> None:
-    """Let bodies collide as they must after these events (kind, robot, item)."""
-    for event in range(n_events):
-        kind, robot, item = events[event, 0], events[event, 1], events[event, 2]
-        if kind == LIFTED:
-            collide_with(engine, engine.item_shapes[item], NO_ONE)
-            collide_with(engine, engine.robot_shapes[robot], LADEN_ROBOT)
-        if kind in (PUT_DOWN, DELIVERED_IT):
-            collide_with(engine, engine.robot_shapes[robot], EMPTY_ROBOT)
-        if kind in (PUT_DOWN, CAME_BACK):
-            move(engine, engine.item_shapes[item], item_position[item, 0], item_position[item, 1])
-
-
-@kernel
-def move(engine: Engine, item_shape: int, x: float, y: float) -> None:
-    """Move an item to (x, y) [m]; who collides with it stays as it is."""
-    call_at(engine.functions.cpCircleShapeSetOffset, (item_shape, (x, y)))
-    call_at(engine.functions.cpSpaceReindexShape, (engine.space[0], item_shape))
+def put_item(engine: Engine, item: int, position: Numbers) -> None:
+    """Move an item to its position, of those of all [m]; who collides with it stays as it is."""
+    shape = engine.item_shapes[item]
+    call_at(
+        engine.functions.cpCircleShapeSetOffset, (shape, (position[item, 0], position[item, 1]))
+    )
+    call_at(engine.functions.cpSpaceReindexShape, (engine.space[0], shape))
 
 
 @kernel

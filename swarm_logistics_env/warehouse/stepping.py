@@ -1,79 +1,27 @@
-"""A control step in one compiled call, bodies' motion and all, without the interpreter's lock.
-
-Items are no obstacles until no laden robot stands above them: the item collision mask.
-
-An unladen robot may stand above items. Were those solid to it from the moment it lifts another,
-they would shove it off, through its neighbours and walls where there is no room. So what it stands
-above is masked (`Items.covered`), as is an item that is put down, and is solid again when laden
-robots have left it.
-"""
+"""A control step in one compiled call, bodies' motion and all, without the interpreter's lock."""
 
 from __future__ import annotations
 
 from swarm_logistics_env.kernels import kernel
 
 from .demand import ask
-from .grid import fill, look_around
+from .grid import fill
 from .logistics import (
-    IDLE,
     carry_along,
     close_grippers,
     deliver,
     drive,
     end_handling,
-    note_event,
     open_grippers,
     refused_command,
+    take_out,
+    unmask_left,
 )
 from .packing import unpacked_at
-from .physics import FREE_ITEM, LIFTED, NO_ONE, PUT_DOWN, advance, collide_with, follow
+from .physics import advance
 from .sensing import disturb, fail_rangers, sense
 from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
 from .surroundings import run_timers, send_messages
-
-
-@kernel
-def mask_below_lifters(world: World, n_events: int) -> None:
-    """Mask what stands below robots that lifted, by the events of this step."""
-    events, items, grid, nearby = world.claims.events, world.items, world.item_grid, world.nearby
-    for event in range(n_events):
-        if events[event, 0] != LIFTED:
-            continue
-        position = world.robots.position[events[event, 1]]
-        n_found = look_around(grid, position[0], position[1], reach_of(world), NOBODY, nearby)
-        for index in range(n_found):
-            item = grid.members[nearby.place[index]]
-            if items.status[item] == STORED:
-                items.covered[item] = 1
-                collide_with(world.engine, world.engine.item_shapes[item], NO_ONE)
-
-
-@kernel
-def unmask_left(world: World) -> None:
-    """Make those masked items solid that no laden robot stands above any more.
-
-    Both grids hold where things stand now. An item that is in none yet waits for the next step.
-    """
-    grid, nearby = world.item_grid, world.nearby
-    for place in range(grid.start[-1]):
-        item = grid.members[place]
-        if world.items.covered[item] == 0:
-            continue
-        x, y = grid.places[place, 0], grid.places[place, 1]
-        n_found = look_around(world.robot_grid, x, y, reach_of(world), NOBODY, nearby)
-        is_below_laden = False
-        for index in range(n_found):
-            robot = world.robot_grid.members[nearby.place[index]]
-            is_below_laden |= world.robots.item[robot] != NOBODY
-        if not is_below_laden:
-            world.items.covered[item] = 0
-            collide_with(world.engine, world.engine.item_shapes[item], FREE_ITEM)
-
-
-@kernel
-def reach_of(world: World) -> float:
-    """Return the distance [m] between centres up to which a robot stands above an item."""
-    return world.parameters.robot_radius + world.parameters.item_radius
 
 
 @kernel
@@ -99,26 +47,9 @@ def perceive(address: int, rows: Sensed) -> None:
 
 
 @kernel
-def take_out(address: int, robot: int) -> None:
-    """Take a robot out of the arena of the world at `address`; what it carries is put down."""
-    world = unpacked_at(World, address)
-    robots, items, engine = world.robots, world.items, world.engine
-    item = robots.item[robot]
-    if item != NOBODY:
-        items.status[item] = STORED
-        items.carrier[item] = NOBODY
-        items.covered[item] = 1
-        n_events = note_event(world.claims.events, 0, PUT_DOWN, robot, item)
-        follow(engine, world.claims.events, n_events, items.position)
-    collide_with(engine, engine.robot_shapes[robot], NO_ONE)
-    robots.present[robot] = False
-    robots.in_delivery[robot] = False
-    robots.item[robot] = NOBODY
-    robots.handling[robot, :] = IDLE
-    robots.memory[robot, :] = NOBODY
-    robots.position[robot, :] = 0.0
-    robots.velocity[robot, :] = 0.0
-    robots.heading[robot] = 0.0
+def remove(address: int, robot: int) -> None:
+    """Take a robot out of the arena of the world at `address`."""
+    take_out(unpacked_at(World, address), robot)
 
 
 @kernel
@@ -187,10 +118,8 @@ def move(world: World, commands: Numbers) -> None:
 def handle_items(world: World, commands: Numbers) -> tuple[int, bool]:
     """Carry along, let go, lift and deliver; returns how many, and whether there was room."""
     carry_along(world)
-    n_events = open_grippers(world, commands)
-    n_events = close_grippers(world, commands, n_events)
-    mask_below_lifters(world, n_events)
-    n_events, n_delivered, is_room = deliver(world, n_events)
+    open_grippers(world, commands)
+    close_grippers(world, commands)
+    n_delivered, is_room = deliver(world)
     end_handling(world)
-    follow(world.engine, world.claims.events, n_events, world.items.position)
     return n_delivered, is_room

@@ -171,7 +171,6 @@ class Claims(NamedTuple):
 
     robot: Annotated[Integers, "I"]  # who is going to lift the item, NOBODY before and after
     square: Annotated[Numbers, "I"]  # [m^2] of the distance between the two
-    events: Annotated[Integers, "4 N", 3]  # kind, robot, item: what the bodies must be told
     delivered_by: Annotated[Integers, "N"]  # robots that delivered in this step
 
 
@@ -272,7 +271,6 @@ def lengths_of(scenario: Scenario) -> dict[str, int]:
     n_kept = round(longest_delay / scenario.control_period) + 1  # steps of broadcasts
     return {
         "N": n,
-        "4 N": 4 * n,
         "I": n_items,
         "K": n_kept,
         "K N": n_kept * n,

@@ -310,7 +310,7 @@ class Warehouse:
         state.progress.pause_step[0] = math.ceil((change - GRACE) / period) if is_ever else NOBODY
         gone = apply_faults(state, self.scenario, self._occurrences)
         for robot in np.flatnonzero(gone & state.robot_present).tolist():
-            stepping.take_out(self._address, robot)
+            stepping.remove(self._address, robot)
             self.n_removed += 1
 
     def _build(self) -> None:
