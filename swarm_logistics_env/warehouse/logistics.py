@@ -164,8 +164,6 @@ def item_lifted(world: World, robot: int) -> tuple[int, float]:
 @kernel
 def end_handling(world: World) -> None:
     """Let robots go on whose time is over."""
-    if world.parameters.handling_steps == 0:
-        return
     handling = world.robots.handling
     for robot in range(len(handling)):
         if handling[robot, LAST_STEP] <= world.progress.step[0]:
@@ -242,14 +240,12 @@ def open_grippers(world: World, commands: Numbers) -> None:
         command = gripper_of(world, robot, commands[robot, GRIPPER])
         if item == NOBODY or not is_able or command >= _OPEN:
             continue
-        if robots.in_delivery[robot] and not is_requested(world, item):
+        may_release = able.releases_inside[robot] and is_requested(world, item)
+        if robots.in_delivery[robot] and not may_release:
             continue
-        if robots.in_delivery[robot] and not able.releases_inside[robot]:
-            continue
-        if not is_done(world, robot, PUTTING_DOWN, item):
-            continue
-        remember(robots.memory, robot, item)
-        put_down(world, robot)
+        if is_done(world, robot, PUTTING_DOWN, item):
+            remember(robots.memory, robot, item)
+            put_down(world, robot)
 
 
 @kernel

@@ -278,19 +278,10 @@ def view_square(view_range: float) -> float:
 
 
 @inlined_kernel
-def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> None:
-    """Fill the block of items in a row from the free items nearby."""
-    robots, grid, nearby = world.robots, world.item_grid, world.nearby
-    limit, dropout = view_square(world.able.view_range[me]), world.parameters.sensor_dropout
-    n_seen, step = 0, world.progress.step[0]
-    for index in range(n_found):
-        item, square = grid.members[nearby.place[index]], nearby.square[index]
-        is_seen = square <= limit
-        if dropout > 0.0 and is_seen:
-            is_seen = not is_missed(robots.sensor_key[me], item, step, ITEM_SEEN, dropout)
-        nearby.chosen[n_seen], nearby.chosen_square[n_seen] = item, square
-        n_seen += int(is_seen)
-    for place in range(rank_nearest(nearby, n_seen, row.N_ITEMS_IN_VIEW)):
+def tell_of_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
+    """Fill the block of items in a row from the chosen items."""
+    robots, nearby = world.robots, world.nearby
+    for place in range(rank_nearest(nearby, n_chosen, row.N_ITEMS_IN_VIEW)):
         item = nearby.chosen[nearby.nearest[place]]
         position = world.items.position
         forward, left = in_frame(pose, position[item, 0], position[item, 1])
@@ -303,16 +294,15 @@ def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> N
 
 
 @inlined_kernel
-def choose_neighbours(me: int, world: World, n_found: int) -> int:
-    """List in `nearby.chosen` the robots that `me` sees or hears; returns how many."""
-    robots, nearby, grid = world.robots, world.nearby, world.robot_grid
-    limit = view_square(world.able.view_range[me])
+def choose(me: int, world: World, grid: Grid, n_found: int, purpose: int) -> int:
+    """List in `nearby.chosen` what `me` sees, and of robots whom it hears; returns how many."""
+    nearby, limit = world.nearby, view_square(world.able.view_range[me])
     dropout, n_chosen, step = world.parameters.sensor_dropout, 0, world.progress.step[0]
     for index in range(n_found):
         other, square = grid.members[nearby.place[index]], nearby.square[index]
-        is_heard, is_seen = nearby.is_heard[index], square <= limit
+        is_heard, is_seen = purpose == ROBOT_SEEN and nearby.is_heard[index], square <= limit
         if dropout > 0.0 and is_seen:
-            is_seen = not is_missed(robots.sensor_key[me], other, step, ROBOT_SEEN, dropout)
+            is_seen = not is_missed(world.robots.sensor_key[me], other, step, purpose, dropout)
         nearby.chosen[n_chosen], nearby.chosen_square[n_chosen] = other, square
         nearby.chosen_heard[n_chosen] = is_heard
         n_chosen += int(is_heard | is_seen)
