@@ -89,9 +89,9 @@ class MotionView:
     ) -> None:
         """Begin an episode in these rows alone."""
         self.keys[rows], self.counts[rows] = keys, 0
-        fresh = np.empty((len(rows), known.N_COLUMNS))
-        bodies = np.tile(self._body, (len(keys), 1)) if bodies is None else bodies
-        known.begin_memory(keys, bodies, fresh)
+        fresh = np.zeros((len(rows), known.N_COLUMNS))
+        fresh[:, known.BODY :] = self._body if bodies is None else bodies
+        known.face_anywhere(keys, fresh)
         self.memory[rows] = fresh
 
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:

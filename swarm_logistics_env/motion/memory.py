@@ -106,15 +106,8 @@ def body_of(scenario: Scenario) -> NDArray[np.float64]:
 
 
 @kernel
-def begin_memory(
-    keys: NDArray[np.uint64], bodies: NDArray[np.float64], memory: NDArray[np.float64]
-) -> None:
-    """Fill memories (N, N_COLUMNS) of robots that know their bodies (N, 3) and nothing else.
-
-    Their headings are random.
-    """
-    memory[:] = 0.0
-    memory[:, BODY:] = bodies
+def face_anywhere(keys: NDArray[np.uint64], memory: NDArray[np.float64]) -> None:
+    """Fill the headings in memories (N, N_COLUMNS) with random ones."""
     for robot in range(memory.shape[0]):
         angle = 2.0 * math.pi * uniform(keys[robot], 0)
         memory[robot, HEADING_X], memory[robot, HEADING_Y] = math.cos(angle), math.sin(angle)

@@ -234,7 +234,7 @@ class Occurrence:
         # The times at which an intermittent fault begins, ends, begins, ..., by robot.
         self._switches: dict[int, list[float]] = {}
         chosen = failed_robots(fault, seed, n_robots)
-        self._affect(chosen if fault.role is None else chosen[:0])
+        self.robots = chosen if fault.role is None else chosen[:0]
 
     def choose_by_role(self, state: WarehouseState) -> None:
         """Choose the robots of a fault that strikes by role, once it holds."""
@@ -242,18 +242,13 @@ class Occurrence:
         if fault.role is None or len(self.robots) or not fault.is_active(state.time):
             return
         assert isinstance(fault.robots, int)  # no numbers of robots stand beside a role
-        self._affect(robots_in_role(state, fault.role, fault.robots))
-
-    def _affect(self, robots: NDArray[np.int64]) -> None:
-        self.robots, fault = robots, self.fault
-        if fault.intermittent is not None:
-            self._switches = {robot: [fault.onset] for robot in robots.tolist()}
+        self.robots = robots_in_role(state, fault.role, fault.robots)
 
     def holds_for(self, time: float) -> NDArray[np.int64]:
         """Return the robots for which it holds at `time` [s], ascending."""
         if not self.fault.is_active(time):
             return self.robots[:0]
-        if not self._switches:
+        if self.fault.intermittent is None:
             return self.robots
         is_on = [self._n_switches(robot, time) % 2 == 1 for robot in self.robots.tolist()]
         return self.robots[is_on]
@@ -269,8 +264,10 @@ class Occurrence:
         changes = [math.inf if fault.duration is None else fault.onset + fault.duration]
         if self.mode.wears:
             changes.append(next_step)
-        for robot, switches in self._switches.items():
-            changes.append(switches[self._n_switches(robot, time)])
+        if fault.intermittent is not None:
+            for robot in self.robots.tolist():
+                n_switches = self._n_switches(robot, time)
+                changes.append(self._switches[robot][n_switches])
         return min(changes)
 
     def left(self, time: float, end: float) -> tuple[float, float]:
@@ -287,7 +284,8 @@ class Occurrence:
 
     def _n_switches(self, robot: int, time: float) -> int:
         """Return how often it has begun or ended for a robot until `time` [s]."""
-        switches, fault = self._switches[robot], self.fault
+        fault = self.fault
+        switches = self._switches.setdefault(robot, [fault.onset])
         while switches[-1] <= time + GRACE:
             about = (robot, len(switches) // _SWITCHES)
             rng = generator(self._seed, f"intermittent {fault.mode}", *about)

@@ -10,7 +10,6 @@ address within a control step.
 from __future__ import annotations
 
 import math
-import sys
 from importlib.metadata import version
 from typing import Any
 from weakref import finalize
@@ -286,11 +285,8 @@ def _function_addresses() -> Functions:
     """Return the addresses of pymunk's C functions, by which kernels call them.
 
     Raises:
-        SetupError: this pymunk lacks one of them, or this machine's words are not of 64 bits with
-            the lowest byte first, as kernels need them.
+        SetupError: this pymunk lacks one of them.
     """
-    if sys.maxsize < 2**32 or sys.byteorder != "little":
-        raise SetupError("this machine's words: should be of 64 bits, lowest byte first")
     try:
         return Functions(*(_address(ffi.addressof(lib, name)) for name in Functions._fields))
     except AttributeError as error:

@@ -111,21 +111,17 @@ def full_range(world: World, robot: int) -> float:
 
 
 @kernel
-def disturb(world: World, rows: Sensed) -> None:
-    """Add the scenario's noise to rows (N, D) and drop beams, in place.
+def disturb(me: int, world: World, out: Sensed) -> None:
+    """Add the scenario's noise to a row and drop beams, in place.
 
     What is measured stays within the column's range.
     """
-    robots, parameters = world.robots, world.parameters
-    is_exact = parameters.ranger_noise == 0.0 and parameters.position_noise == 0.0
-    if is_exact and parameters.sensor_dropout == 0.0:
-        return
-    for robot in range(len(rows)):
-        if robots.present[robot]:
-            key, first = robots.sensor_key[robot], world.progress.step[0] * _DRAWS
-            disturb_beams(key, first, full_range(world, robot), parameters, rows[robot])
-            if parameters.position_noise > 0.0:
-                disturb_places(key, first + _PLACES, parameters, rows[robot])
+    parameters = world.parameters
+    key, first = world.robots.sensor_key[me], world.progress.step[0] * _DRAWS
+    if parameters.ranger_noise > 0.0 or parameters.sensor_dropout > 0.0:
+        disturb_beams(key, first, full_range(world, me), parameters, out)
+    if parameters.position_noise > 0.0:
+        disturb_places(key, first + _PLACES, parameters, out)
 
 
 @kernel
@@ -162,26 +158,22 @@ def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sens
 
 
 @kernel
-def fail_rangers(world: World, rows: Sensed) -> None:
-    """Make of the beams in rows (N, D) what rangers that have failed report, in place."""
-    robots, able = world.robots, world.able
-    for robot in range(len(rows)):
-        if not robots.present[robot]:
-            continue
-        beams, frozen = rows[robot, :_N_RANGES], robots.frozen_beams[robot]
-        bias, reach = able.ranger_bias[robot], full_range(world, robot)
-        if bias != 0.0:
-            for beam in range(_N_RANGES):
-                if beams[beam] < np.float32(reach):
-                    beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
-        if able.rangers_refresh[robot]:
-            frozen[0] = math.nan
-        elif math.isnan(frozen[0]):
-            for beam in range(_N_RANGES):
-                frozen[beam] = beams[beam]
-        else:
-            for beam in range(_N_RANGES):
-                beams[beam] = frozen[beam]
+def fail_rangers(me: int, world: World, out: Sensed) -> None:
+    """Make of the beams in a row what rangers that have failed report, in place."""
+    able, frozen = world.able, world.robots.frozen_beams[me]
+    bias, reach = able.ranger_bias[me], full_range(world, me)
+    if bias != 0.0:
+        for beam in range(_N_RANGES):
+            if out[beam] < np.float32(reach):
+                out[beam] = min(max(out[beam] + bias, 0.0), reach)
+    if able.rangers_refresh[me]:
+        frozen[0] = math.nan
+    elif math.isnan(frozen[0]):
+        for beam in range(_N_RANGES):
+            frozen[beam] = out[beam]
+    else:
+        for beam in range(_N_RANGES):
+            out[beam] = frozen[beam]
 
 
 @kernel
@@ -212,6 +204,8 @@ def sense(world: World, rows: Sensed) -> int:
         if touches_solid(pose, world):
             robots.contact[me] = True
         feel_itself(me, pose, world, rows[me])
+        disturb(me, world, rows[me])
+        fail_rangers(me, world, rows[me])
     return n_anchored
 
 

@@ -19,7 +19,7 @@ from .logistics import (
 )
 from .packing import unpacked_at
 from .physics import advance
-from .sensing import disturb, fail_rangers, sense
+from .sensing import sense
 from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
 from .surroundings import run_timers, send_messages
 
@@ -41,8 +41,6 @@ def perceive(address: int, rows: Sensed) -> None:
         world.nearby.is_free[item] = items.status[item] == STORED
     fill(world.item_grid, items.position, world.nearby.is_free)
     n_anchored = sense(world, rows)
-    disturb(world, rows)
-    fail_rangers(world, rows)
     progress.anchoring_seconds[0] += n_anchored * world.parameters.control_period
 
 
