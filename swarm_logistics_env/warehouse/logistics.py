@@ -30,11 +30,7 @@ from .structs import (
     DELIVERED,
     NOBODY,
     STORED,
-    Capabilities,
     Integers,
-    Numbers,
-    Parameters,
-    Robots,
     World,
 )
 
@@ -46,14 +42,15 @@ _GRACE = 1e-6  # [s]; times are sums of periods
 
 
 @kernel
-def refused_command(commands: Numbers, robots: Robots, able: Capabilities) -> int:
+def refused_command(world: World) -> int:
     """Return the place, row by row, of the first command that is not finite; NOBODY if all are.
 
     Rows of robots that ignore their commands may hold anything.
     """
+    commands = world.commands.now
     n_columns = commands.shape[1]
     for robot in range(len(commands)):
-        if robots.present[robot] and able.obeys[robot]:
+        if world.robots.present[robot] and world.able.obeys[robot]:
             for column in range(n_columns):
                 if not math.isfinite(commands[robot, column]):
                     return int(robot * n_columns + column)
@@ -61,20 +58,16 @@ def refused_command(commands: Numbers, robots: Robots, able: Capabilities) -> in
 
 
 @kernel
-def drive(
-    commands: Numbers,
-    robots: Robots,
-    able: Capabilities,
-    parameters: Parameters,
-    wanted_velocity: Numbers,
-) -> None:
-    """Turn the robots and fill their wanted velocities (N, 2) [m/s] for one control period.
+def drive(world: World) -> None:
+    """Turn the robots and fill their wanted velocities for one control period.
 
     Commands beyond [-1, 1] are cut, and the speed to the top speed whatever the direction. A robot
     turns as commanded and by its heading drift, unless its motor is dead, and drives along its mean
     direction; one that is not holonomic ignores `left`. Rows of robots that ignore their commands,
     or stand to handle an item, are ignored.
     """
+    commands, robots, able = world.commands.now, world.robots, world.able
+    parameters, wanted_velocity = world.parameters, world.engine.wanted_velocity
     for robot in range(len(commands)):
         wanted_velocity[robot, 0] = 0.0
         wanted_velocity[robot, 1] = 0.0
@@ -228,12 +221,12 @@ def carry_along(world: World) -> None:
 
 
 @kernel
-def open_grippers(world: World, commands: Numbers) -> None:
+def open_grippers(world: World) -> None:
     """Put down what robots let go of.
 
     A requested item is let go of anywhere, another one only outside the delivery area.
     """
-    robots, able = world.robots, world.able
+    robots, able, commands = world.robots, world.able, world.commands.now
     for robot in range(len(commands)):
         item = robots.item[robot]
         is_able = robots.present[robot] and able.obeys[robot]
@@ -322,13 +315,13 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
 
 
 @kernel
-def close_grippers(world: World, commands: Numbers) -> None:
+def close_grippers(world: World) -> None:
     """Lift what empty robots hold on to.
 
     If several want the same item, the nearest able one gets it, and the others choose again.
     """
     robots, able, items, claims = world.robots, world.able, world.items, world.claims
-    engine = world.engine
+    engine, commands = world.engine, world.commands.now
     while True:
         is_settled = True
         for robot in range(len(commands)):

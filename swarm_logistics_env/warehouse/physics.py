@@ -30,10 +30,7 @@ from .structs import (
     Batch,
     Engine,
     Functions,
-    Items,
     Numbers,
-    Parameters,
-    Robots,
     World,
 )
 
@@ -54,12 +51,15 @@ _FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 16, 80, 2
 
 
 @kernel
-def advance(engine: Engine, parameters: Parameters, n_touching: int) -> None:
+def advance(world: World) -> None:
     """Take the substeps of a control step, and read where the bodies are then and how fast.
 
     Before each, every drive pushes with the force that brings its robot to the wanted velocity
-    within the substep, or with its greatest force. So many robots touch something as it begins.
+    within the substep, or with its greatest force.
     """
+    engine, parameters, n_touching = world.engine, world.parameters, 0
+    for touches in world.robots.contact:
+        n_touching += int(touches)
     iterations = min(_FEWEST_ITERATIONS + n_touching // _TOUCHING_PER_ITERATION, _MOST_ITERATIONS)
     call_at(engine.functions.cpSpaceSetIterations, (engine.space[0], iterations))
     period = parameters.physics_period
@@ -135,16 +135,17 @@ def build(address: int) -> None:
     call_at(call.cpSpaceSetCollisionSlop, (space, _SLOP))
     call_at(call.cpSpaceSetCollisionBias, (space, _BIAS))
     static = made_at(call.cpSpaceGetStaticBody, (space,))
-    build_solids(engine, static, world.parameters, world.obstacles)
-    build_robots(engine, world.parameters, world.robots)
-    build_items(engine, static, world.parameters, world.items)
+    build_solids(world, static)
+    build_robots(world)
+    build_items(world, static)
     read(engine, engine.bodies)
 
 
 @kernel
-def build_solids(engine: Engine, static: int, parameters: Parameters, obstacles: Numbers) -> None:
+def build_solids(world: World, static: int) -> None:
     """Make walls and obstacles."""
-    call, space = engine.functions, engine.space[0]
+    engine, parameters, obstacles = world.engine, world.parameters, world.obstacles
+    call = engine.functions
     width, height = parameters.warehouse_width, parameters.warehouse_height
     corner_x = (-_WALL, width + _WALL, width + _WALL, -_WALL)
     corner_y = (-_WALL, -_WALL, height + _WALL, height + _WALL)
@@ -155,55 +156,48 @@ def build_solids(engine: Engine, static: int, parameters: Parameters, obstacles:
             call.cpSegmentShapeNew, (static, ends[0], ends[1], _WALL)
         )
     for obstacle in range(len(obstacles)):
-        engine.solid_shapes[N_WALLS + obstacle] = new_circle(
-            engine, static, parameters.obstacle_radius,
-            obstacles[obstacle, 0], obstacles[obstacle, 1],
-        )  # fmt: skip
+        place = (obstacles[obstacle, 0], obstacles[obstacle, 1])
+        shape = made_at(call.cpCircleShapeNew, (static, parameters.obstacle_radius, place))
+        engine.solid_shapes[N_WALLS + obstacle] = shape
     for shape in engine.solid_shapes:
         collide_with(engine, shape, SOLID_THING)
-        made_at(call.cpSpaceAddShape, (space, shape))
+        made_at(call.cpSpaceAddShape, (engine.space[0], shape))
 
 
 @kernel
-def build_robots(engine: Engine, parameters: Parameters, robots: Robots) -> None:
+def build_robots(world: World) -> None:
     """Make the robots' bodies, which no contact turns, and their shapes."""
-    call, space, n = engine.functions, engine.space[0], len(robots.item)
-    for robot in range(n):
+    engine, parameters, robots = world.engine, world.parameters, world.robots
+    call, space = engine.functions, engine.space[0]
+    # A batch reads and writes bodies in the order in which they were added.
+    for robot in range(len(robots.item)):
         body = made_at(call.cpBodyNew, (parameters.robot_mass, math.inf))
         place = (robots.position[robot, 0], robots.position[robot, 1])
         call_at(call.cpBodySetPosition, (body, place))
         velocity = (robots.velocity[robot, 0], robots.velocity[robot, 1])
         call_at(call.cpBodySetVelocity, (body, velocity))
-        shape = new_circle(engine, body, parameters.robot_radius, 0.0, 0.0)
+        shape = made_at(call.cpCircleShapeNew, (body, parameters.robot_radius, (0.0, 0.0)))
         met = EMPTY_ROBOT if robots.item[robot] == NOBODY else LADEN_ROBOT
         collide_with(engine, shape, met if robots.present[robot] else NO_ONE)
         engine.robot_bodies[robot], engine.robot_shapes[robot] = body, shape
-    # A batch reads and writes bodies in the order in which they were added.
-    for body in engine.robot_bodies:
         made_at(call.cpSpaceAddBody, (space, body))
-    for shape in engine.robot_shapes:
         made_at(call.cpSpaceAddShape, (space, shape))
 
 
 @kernel
-def build_items(engine: Engine, static: int, parameters: Parameters, items: Items) -> None:
+def build_items(world: World, static: int) -> None:
     """Make the items' shapes, on the static body and moved by their offset.
 
     So there is no body to integrate or to read.
     """
+    engine, items, call = world.engine, world.items, world.engine.functions
     for item in range(len(items.status)):
-        x, y = items.position[item, 0], items.position[item, 1]
-        shape = new_circle(engine, static, parameters.item_radius, x, y)
+        place = (items.position[item, 0], items.position[item, 1])
+        shape = made_at(call.cpCircleShapeNew, (static, world.parameters.item_radius, place))
         is_solid = items.status[item] == STORED and items.covered[item] == 0
         collide_with(engine, shape, FREE_ITEM if is_solid else NO_ONE)
-        made_at(engine.functions.cpSpaceAddShape, (engine.space[0], shape))
+        made_at(call.cpSpaceAddShape, (engine.space[0], shape))
         engine.item_shapes[item] = shape
-
-
-@kernel
-def new_circle(engine: Engine, body: int, radius: float, x: float, y: float) -> int:
-    """Return the address of a new disc around (x, y) from its body."""
-    return made_at(engine.functions.cpCircleShapeNew, (body, radius, (x, y)))
 
 
 @kernel

@@ -20,7 +20,7 @@ from .logistics import (
 from .packing import unpacked_at
 from .physics import advance
 from .sensing import sense
-from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
+from .structs import NOBODY, STORED, Commands, Sensed, World
 from .surroundings import run_timers, send_messages
 
 
@@ -60,15 +60,15 @@ def step(address: int, rows: Sensed) -> bool:
     """
     world = unpacked_at(World, address)
     commands, progress, outcome = world.commands, world.progress, world.outcome
-    outcome.refused[0] = refused_command(commands.now, world.robots, world.able)
+    outcome.refused[0] = refused_command(world)
     if outcome.refused[0] != NOBODY:
         return True
     log_command(commands)
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * world.parameters.control_period
-    move(world, commands.now)
-    send_messages(world, commands.now)
-    n_delivered, is_room = handle_items(world, commands.now)
+    move(world)
+    send_messages(world)
+    n_delivered, is_room = handle_items(world)
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:
         perceive(address, rows)
@@ -95,16 +95,12 @@ def log_command(commands: Commands) -> None:
 
 
 @kernel
-def move(world: World, commands: Numbers) -> None:
+def move(world: World) -> None:
     """Turn and move the robots as commanded and as far as bodies let them."""
-    robots, engine, parameters = world.robots, world.engine, world.parameters
-    drive(commands, robots, world.able, parameters, engine.wanted_velocity)
+    drive(world)
     unmask_left(world)
-    n_touching = 0
-    for robot in range(len(robots.contact)):
-        n_touching += int(robots.contact[robot])
-    advance(engine, parameters, n_touching)
-    bodies = engine.bodies.numbers
+    advance(world)
+    robots, bodies = world.robots, world.engine.bodies.numbers
     for robot in range(len(robots.item)):
         is_there = 1.0 if robots.present[robot] else 0.0
         for axis in range(2):
@@ -113,11 +109,11 @@ def move(world: World, commands: Numbers) -> None:
 
 
 @kernel
-def handle_items(world: World, commands: Numbers) -> tuple[int, bool]:
+def handle_items(world: World) -> tuple[int, bool]:
     """Carry along, let go, lift and deliver; returns how many, and whether there was room."""
     carry_along(world)
-    open_grippers(world, commands)
-    close_grippers(world, commands)
+    open_grippers(world)
+    close_grippers(world)
     n_delivered, is_room = deliver(world)
     end_handling(world)
     return n_delivered, is_room

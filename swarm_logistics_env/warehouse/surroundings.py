@@ -16,7 +16,7 @@ from swarm_logistics_env.kernels import inlined_kernel, kernel, pair_key, unifor
 
 from .demand import is_requested
 from .logistics import MESSAGE, is_remembered
-from .structs import NOBODY, Grid, Nearby, Numbers, Sensed, World
+from .structs import NOBODY, Grid, Nearby, Sensed, World
 
 _N_BEAMS = row.N_BEAMS
 _BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
@@ -173,7 +173,7 @@ def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: 
 
 
 @kernel
-def send_messages(world: World, commands: Numbers) -> None:
+def send_messages(world: World) -> None:
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
     robots, able, step = world.robots, world.able, world.progress.step[0]
     message, before = robots.message, robots.message_before
@@ -181,7 +181,7 @@ def send_messages(world: World, commands: Numbers) -> None:
     for robot in range(n):
         sends = robots.present[robot] and able.obeys[robot]
         for place in range(message.shape[1]):
-            given = commands[robot, MESSAGE + place] if sends else 0.0
+            given = world.commands.now[robot, MESSAGE + place] if sends else 0.0
             given = min(max(given, -1.0), 1.0)
             before[(step % n_kept) * n + robot, place] = given
             if able.radio_delay[robot] > 0:

@@ -182,7 +182,7 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
         for robot in range(len(now)):
             for column in range(now.shape[1]):
                 now[robot, column] = commands[first + robot, column]
-        refused = refused_command(now, world.robots, world.able)
+        refused = refused_command(world)
         world.outcome.refused[0] = NOBODY
         if refused != NOBODY:
             return int(first * commands.shape[1] + refused)
