@@ -13,11 +13,12 @@ import math
 import multiprocessing
 import os
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
@@ -27,15 +28,18 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
 
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
 QUIET = "SWARM_LOGISTICS_QUIET"  # environment variable of workers: nobody reads what they say
+_SILENCE = 1.0  # [s] of compiling that nobody is told of
 _HERE = Path(__file__).parent
+_all_kernels: list[Any] = []
 _parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
-_config, _events, _lock, _types = cast(
-    "tuple[Any, Any, Any, Any]", (config, event, global_compiler_lock, types)
-)  # without types
+_config, _events, _types = cast("tuple[Any, Any, Any]", (config, event, types))  # without types
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -63,6 +67,7 @@ def _compiled(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
     if not _config.DISABLE_JIT:
         compiled.get_call_template = functools.partial(_call_template, compiled)
         compiled.compile = functools.partial(_compile, compiled)
+        _all_kernels.append(compiled)
     return cast("Callable[P, R]", compiled)
 
 
@@ -75,9 +80,8 @@ def _call_template(compiled: Any, args: tuple[Any, ...], named: dict[str, Any]) 
 def _compile(compiled: Any, signature: Any) -> Any:
     """Compile a kernel for a signature, or load it: with all that it calls, if Python calls it."""
     compile_it = functools.partial(type(compiled).compile, compiled, signature)
-    is_part = _lock.is_locked()  # by this thread, which compiles what calls it
-    with _lock:
-        if is_part:
+    with global_compiler_lock:
+        if _Report.current is not None:
             return compile_it() if signature in compiled.overloads else _part(compiled, compile_it)
         if signature in _parts.get(compiled, ()):
             _parts[compiled].remove(signature)
@@ -85,7 +89,7 @@ def _compile(compiled: Any, signature: Any) -> Any:
         if signature in compiled.overloads:
             return compile_it()
         _import_without_blas()
-        with _kept_on_disk(compiled), _events.install_listener("numba:compile", _Listener()):
+        with _kept_on_disk(compiled), _Report():
             return compile_it()
 
 
@@ -187,21 +191,51 @@ def _digest() -> str:
     return digest.hexdigest()
 
 
-class _Listener(event.Listener):
-    """Hears that something is compiled, as it could not be loaded."""
+class _Report(event.Listener):
+    """Tells a person once that kernels are being compiled and for how long, with a bar."""
+
+    current: _Report | None = None
+    is_told = False
+    seconds, n_done = 0.0, 0  # of compiling, and kernels that are compiled, in this process
+
+    def __enter__(self) -> None:
+        self._bar: Progress | None = None
+        self._last = time.monotonic()
+        _Report.current = self
+        _events.register("numba:compile", self)
+
+    def __exit__(self, *_: object) -> None:
+        _Report.current = None
+        _events.unregister("numba:compile", self)
+        if self._bar is not None:
+            self._bar.stop()
 
     def on_start(self, event: Any) -> None:
-        """Tell a person."""
-        if QUIET not in os.environ and multiprocessing.parent_process() is None:
-            _tell_of_compiling()
+        """Begin to count the time, as nothing could be loaded."""
+        self._last = time.monotonic()
 
     def on_end(self, event: Any) -> None:
-        """Say nothing more."""
+        """Count a kernel, and tell a person who has been waiting."""
+        now = time.monotonic()
+        _Report.seconds += now - self._last
+        self._last = now
+        _Report.n_done += event.data["dispatcher"] in _all_kernels
+        is_worker = QUIET in os.environ or multiprocessing.parent_process() is not None
+        if is_worker or _Report.seconds < _SILENCE or not self.n_done:
+            return
+        total = max(len(_all_kernels), self.n_done)
+        if not _Report.is_told:
+            _Report.is_told = True
+            sys.stderr.write("Compiling, which later runs reuse: up to 15 s of a free core.\n")
+        if self._bar is None and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import Progress
 
-
-@functools.cache
-def _tell_of_compiling() -> None:
-    sys.stderr.write("Compiling, which later runs reuse: up to 15 s of a free core.\n")
+            self._bar = Progress(console=Console(stderr=True), transient=True)
+            self._task = self._bar.add_task("Compiling", total=total)
+            self._bar.start()
+        if self._bar is not None:
+            self._bar.update(self._task, completed=self.n_done)
 
 
 @functools.cache
