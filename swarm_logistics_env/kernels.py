@@ -18,7 +18,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast, get_type_hints
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
@@ -27,8 +27,6 @@ from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.dispatcher import Dispatcher
-from numba.core.extending import _Intrinsic
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -171,7 +169,7 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
             return
         if Path(compiled.py_func.__code__.co_filename).is_relative_to(_HERE):
             # numba looks at the file's time alone, not at kernels and constants of other files.
-            compiled._cache._cache_file._source_stamp = _digest_of(compiled)
+            compiled._cache._cache_file._source_stamp = _digest()
     from filelock import FileLock
 
     kept = Path(compiled.stats.cache_path)
@@ -183,40 +181,14 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
         yield
 
 
-def _digest_of(compiled: Any) -> str:
-    """Return a digest of all that a kernel is made of; no text belongs to it, as docstrings."""
-    digest, things = hashlib.blake2b(digest_size=8), [compiled]
-    for thing in things:
-        told, parts = _made_of(thing)
-        digest.update(repr(told).encode())
-        things += [part for part in parts if part not in things]
+@functools.cache
+def _digest() -> str:
+    """Return a digest of the files whose code kernels are made of."""
+    digest = hashlib.blake2b(digest_size=8)
+    for pattern in ("*.py", "motion/*.py", "policies/*.py", "train/*.py", "warehouse/*.py"):
+        for file in sorted(_HERE.glob(pattern)):
+            digest.update(file.read_bytes())
     return digest.hexdigest()
-
-
-def _made_of(thing: Any) -> tuple[object, list[Any]]:
-    """Return code and constants of a kernel, fields of a structure, or an intrinsic's whole file.
-
-    And what it names: kernels, structures and intrinsics.
-    """
-    if isinstance(thing, _Intrinsic):
-        defined: Any = thing._defn
-        return Path(defined.__code__.co_filename).read_bytes(), []
-    if isinstance(thing, type):
-        hints = get_type_hints(thing, include_extras=True)
-        return hints, [kind for kind in hints.values() if hasattr(kind, "_fields")]
-    function = thing.py_func
-    code, known = function.__code__, function.__globals__
-    named = [known[name] for name in code.co_names if name in known]
-    for module in [value for value in named if isinstance(value, ModuleType)]:
-        if module.__name__.startswith(__package__):
-            named += [getattr(module, name) for name in code.co_names if hasattr(module, name)]
-    values = [*code.co_consts, *(function.__defaults__ or ()), *named]
-    plain = [each for each in values if isinstance(each, int | float | tuple | np.generic)]
-    plain += [each.tolist() for each in values if isinstance(each, np.ndarray)]
-    parts: list[Any] = [each for each in values if isinstance(each, Dispatcher | _Intrinsic)]
-    parts += [each for each in values if isinstance(each, type) and hasattr(each, "_fields")]
-    called = [(each.__module__, each.__name__) for each in parts]
-    return (thing.targetoptions, code.co_code, code.co_names, plain, called), parts
 
 
 class _Report(event.Listener):

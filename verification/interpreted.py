@@ -61,10 +61,6 @@ def _unpacked_at(structure: type, address: int) -> Any:
     return loaded(structure)
 
 
-def _store_at(address: int, value: int) -> None:
-    ctypes.c_int32.from_address(int(address)).value = int(value)
-
-
 def _word_at(address: int, place: int = 0) -> ctypes.c_int64:
     return ctypes.c_int64.from_address(int(address) + 8 * int(place))
 
@@ -90,7 +86,7 @@ def interpret_kernels() -> None:
     if os.environ.get("NUMBA_DISABLE_JIT") != "1":
         raise pytest.UsageError("verification.interpreted needs NUMBA_DISABLE_JIT=1")
     made_at = partial(_call_at, returned=ctypes.c_int64)
-    vars(physics).update(call_at=_call_at, made_at=made_at, store_at=_store_at)
+    vars(physics).update(call_at=_call_at, made_at=made_at)
     for module in (physics, stepping, thread_pool):
         vars(module).update(unpacked_at=_unpacked_at)
     vars(thread_pool).update(

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.warehouse.failure_modes import LOST_AS_A_WHOLE, failure_mode
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.warehouse.faults import LOST_AS_A_WHOLE, failed_robots
 from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.warehouse.state import WarehouseState as State
 

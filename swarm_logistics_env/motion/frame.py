@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.memory import clear_the_way, stand_to_handle, steer
+from swarm_logistics_env.motion.memory import clear_the_way, in_frame, stand_to_handle, steer
 from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
@@ -89,9 +89,9 @@ class MotionView:
     ) -> None:
         """Begin an episode in these rows alone."""
         self.keys[rows], self.counts[rows] = keys, 0
-        fresh = np.empty((len(rows), known.N_COLUMNS))
-        bodies = np.tile(self._body, (len(keys), 1)) if bodies is None else bodies
-        known.begin_memory(keys, bodies, fresh)
+        fresh = np.zeros((len(rows), known.N_COLUMNS))
+        fresh[:, known.BODY :] = self._body if bodies is None else bodies
+        known.face_anywhere(keys, fresh)
         self.memory[rows] = fresh
 
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -166,58 +166,59 @@ def read_rows(
         heading = math.atan2(own[known.HEADING_Y], own[known.HEADING_X])
         beams = round(heading / (2.0 * math.pi / row.N_BEAMS)) % row.N_BEAMS
         turned[robot] = 2.0 * math.pi * beams / row.N_BEAMS
-        cos, sin = math.cos(turned[robot]), math.sin(turned[robot])
+        frame = math.cos(turned[robot]), math.sin(turned[robot])
         for beam in range(row.N_BEAMS):
             away = sensed[row.RANGE_WALLS + (beam + beams) % row.N_BEAMS]
             read[beam] = max(0.0, 1.0 - away / WALL_REACH)
-        at = read_neighbours(sensed, cos, sin, read, row.N_BEAMS)
-        at = read_items(sensed, cos, sin, read, at)
+        at = read_neighbours(sensed, frame, read, row.N_BEAMS)
+        at = read_items(sensed, frame, read, at)
         # The robot that tells the lowest timer may lie: it counts less the more this robot knows.
         sure = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
-        at = read_lead(sensed, cos, sin, 1.0 - math.tanh(sure), read, at)
+        at = read_lead(sensed, frame, 1.0 - math.tanh(sure), read, at)
         read[at] = sensed[row.CARRYING]
         read[at + 1] = sensed[row.CARRYING_REQUESTED]
         read[at + 2] = sensed[row.IN_DELIVERY_AREA]
         read[at + 3], read[at + 4] = sensed[row.TIMER_RUNS], sensed[row.TIMER] / 10.0
         read[at + 5] = sensed[row.CONTACT]
-        at += 6
-        x, y = sensed[row.VELOCITY] / 2.0, sensed[row.VELOCITY + 1] / 2.0
-        read[at], read[at + 1] = cos * x + sin * y, cos * y - sin * x
-        at += 2
-        x, y = own[known.HEADING_X], own[known.HEADING_Y]
+        at = put(read, at + 6, 0.5, frame, sensed[row.VELOCITY], sensed[row.VELOCITY + 1])
+        at = put(read, at, 1.0, frame, own[known.HEADING_X], own[known.HEADING_Y])
         # The heading is at most half a beam aside, so it is doubled to be as large as other inputs.
-        read[at], read[at + 1] = cos * x + sin * y, 2.0 * (cos * y - sin * x)
-        at += 2
-        x, y = own[known.HOME_X], own[known.HOME_Y]
+        read[at - 1] *= 2.0
         unit = math.tanh(sure) / sure if sure > 0.0 else 0.0
-        read[at], read[at + 1] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
-        read[at + 2] = math.tanh(sure / 3.0)
-        at += 3
-        read[at], read[at + 1] = own[known.FAILED], own[known.STUCK]
-        at += 2
+        at = put(read, at, unit, frame, own[known.HOME_X], own[known.HOME_Y])
+        read[at] = math.tanh(sure / 3.0)
+        read[at + 1], read[at + 2] = own[known.FAILED], own[known.STUCK]
         angle = random_heading(keys[robot], random_headings[robot]) - turned[robot]
-        read[at], read[at + 1] = math.cos(angle), math.sin(angle)
-        at += 2
+        read[at + 3], read[at + 4] = math.cos(angle), math.sin(angle)
         x, y, sure = known.kept_home(own)
         sure = math.tanh(sure)
-        read[at], read[at + 1] = sure * (cos * x + sin * y), sure * (cos * y - sin * x)
-        read[at + 2] = sure * min(max(own[known.AWAY], -FARTHEST), FARTHEST) / FARTHEST
-        at += 3
-        read[at], read[at + 1] = own[known.CANNOT_DELIVER], own[known.CANNOT_LIFT]
+        at = put(read, at + 5, sure, frame, x, y)
+        read[at] = sure * min(max(own[known.AWAY], -FARTHEST), FARTHEST) / FARTHEST
+        read[at + 1], read[at + 2] = own[known.CANNOT_DELIVER], own[known.CANNOT_LIFT]
         surely = own[known.HANDLING_TIME] + known.SURELY_IN_VAIN
-        read[at + 2] = min(1.0, own[known.DELIVERING] / surely)
+        read[at + 3] = min(1.0, own[known.DELIVERING] / surely)
         in_view = 0.0
         for place in range(row.N_ITEMS_IN_VIEW):
             in_view += sensed[row.ITEMS + row.ITEM_WIDTH * place]
-        read[at + 3] = in_view / row.N_ITEMS_IN_VIEW
-        read[at + 4] = own[known.TOP_SPEED] / 2.0
-        read[at + 5] = own[known.HANDLING_TIME] / 2.0
-        read[at + 6] = 1.0 if own[known.WIDEST_TURN] > 0.0 else 0.0
+        read[at + 4] = in_view / row.N_ITEMS_IN_VIEW
+        read[at + 5] = own[known.TOP_SPEED] / 2.0
+        read[at + 6] = own[known.HANDLING_TIME] / 2.0
+        read[at + 7] = 1.0 if own[known.WIDEST_TURN] > 0.0 else 0.0
+
+
+@inlined_kernel
+def put(
+    read: NDArray[np.float32], at: int, scale: float, frame: tuple[float, float], x: float, y: float
+) -> int:
+    """Fill two inputs with a vector in the frame, times `scale`; return the column after them."""
+    along, aside = in_frame(frame, x, y)
+    read[at], read[at + 1] = scale * along, scale * aside
+    return at + 2
 
 
 @kernel
 def read_neighbours(
-    sensed: NDArray[np.float32], cos: float, sin: float, read: NDArray[np.float32], at: int
+    sensed: NDArray[np.float32], frame: tuple[float, float], read: NDArray[np.float32], at: int
 ) -> int:
     """Fill the inputs of neighbours, from column `at` on; return the column after them."""
     for place in range(N_FAR + N_NEAR):
@@ -227,34 +228,28 @@ def read_neighbours(
         x, y = float(sensed[there + 1]), float(sensed[there + 2])
         away = math.sqrt(x * x + y * y)
         near = max(0.0, 1.0 - away / reach) / away if away > 0.0 else 0.0
-        read[at], read[at + 1] = near * (cos * x + sin * y), near * (cos * y - sin * x)
-        at += 2
+        at = put(read, at, near, frame, x, y)
     return at
 
 
 @kernel
 def read_items(
-    sensed: NDArray[np.float32], cos: float, sin: float, read: NDArray[np.float32], at: int
+    sensed: NDArray[np.float32], frame: tuple[float, float], read: NDArray[np.float32], at: int
 ) -> int:
     """Fill the inputs of obstacles and the requested item; return the column after them."""
     carries = sensed[row.CARRYING] > 0.5
     for place in range(N_OBSTACLES):
         there = row.ITEMS + row.ITEM_WIDTH * place
-        x, y = float(sensed[there + 1]), float(sensed[there + 2])
-        is_there = 1.0 if carries and sensed[there] > 0.5 else 0.0
-        read[at] = is_there
-        read[at + 1] = is_there * (cos * x + sin * y)
-        read[at + 2] = is_there * (cos * y - sin * x)
-        at += 3
+        read[at] = 1.0 if carries and sensed[there] > 0.5 else 0.0
+        at = put(read, at + 1, read[at], frame, sensed[there + 1], sensed[there + 2])
     read[at : at + 6] = 0.0
     for place in range(row.N_ITEMS_IN_VIEW):
         there = row.ITEMS + row.ITEM_WIDTH * place
         if sensed[there] > 0.5 and sensed[there + 3] > 0.5:
             x, y = float(sensed[there + 1]), float(sensed[there + 2])
             away = max(math.sqrt(x * x + y * y), 1e-9)
-            read[at] = 1.0
-            read[at + 1] = (cos * x + sin * y) / away
-            read[at + 2] = (cos * y - sin * x) / away
+            along, aside = in_frame(frame, x, y)
+            read[at], read[at + 1], read[at + 2] = 1.0, along / away, aside / away
             read[at + 3] = away
             read[at + 4] = max(0.0, 1.0 - away / NEAR)
             read[at + 5] = sensed[there + 4]
@@ -265,8 +260,7 @@ def read_items(
 @kernel
 def read_lead(
     sensed: NDArray[np.float32],
-    cos: float,
-    sin: float,
+    frame: tuple[float, float],
     trust: float,
     read: NDArray[np.float32],
     at: int,
@@ -277,10 +271,10 @@ def read_lead(
     away = math.sqrt(x * x + y * y)
     unit = heard / away if away > 0.0 else 0.0
     read[at] = heard
-    read[at + 1], read[at + 2] = unit * (cos * x + sin * y), unit * (cos * y - sin * x)
-    read[at + 3] = heard * away / 4.0
-    read[at + 4] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
-    return at + 5
+    at = put(read, at + 1, unit, frame, x, y)
+    read[at] = heard * away / 4.0
+    read[at + 1] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
+    return at + 2
 
 
 @kernel

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
 from swarm_logistics_env.scenario import Scenario
 
 BEAM_ANGLE = 2.0 * math.pi / row.N_BEAMS
@@ -106,15 +106,8 @@ def body_of(scenario: Scenario) -> NDArray[np.float64]:
 
 
 @kernel
-def begin_memory(
-    keys: NDArray[np.uint64], bodies: NDArray[np.float64], memory: NDArray[np.float64]
-) -> None:
-    """Fill memories (N, N_COLUMNS) of robots that know their bodies (N, 3) and nothing else.
-
-    Their headings are random.
-    """
-    memory[:] = 0.0
-    memory[:, BODY:] = bodies
+def face_anywhere(keys: NDArray[np.uint64], memory: NDArray[np.float64]) -> None:
+    """Fill the headings in memories (N, N_COLUMNS) with random ones."""
     for robot in range(memory.shape[0]):
         angle = 2.0 * math.pi * uniform(keys[robot], 0)
         memory[robot, HEADING_X], memory[robot, HEADING_Y] = math.cos(angle), math.sin(angle)
@@ -141,15 +134,29 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
         if known[STANDING] > CAGED_TIME and not is_inside:
             known[STANDING], known[CLEARING] = 0.0, CLEARING_TIME
 
-        kept = math.exp(-period / HOME_TIME)
-        known[HOME_X] *= kept
-        known[HOME_Y] *= kept
+        watch_walls(sensed, period, known)
+        for column, time in ((HOME_X, HOME_TIME), (KEPT_X, KEPT_TIME)):
+            known[column] *= math.exp(-period / time)
+            known[column + 1] *= math.exp(-period / time)
         if is_inside != (known[WAS_INSIDE] > 0.5) and speed > MOVES:
             way = 1.0 if is_inside else -1.0
             known[HOME_X] += way * x / speed
             known[HOME_Y] += way * y / speed
-        reckon(sensed, period, known)
+            along, aside = in_frame((math.cos(known[WALL]), math.sin(known[WALL])), x, y)
+            known[KEPT_X] += way / speed * along
+            known[KEPT_Y] += way / speed * aside
+            known[AWAY] = 0.0
+        home_x, home_y, sure = kept_home(known)
+        if sure > 0.0:
+            known[AWAY] -= period * (home_x * x + home_y * y)
         known[WAS_INSIDE] = 1.0 if is_inside else 0.0
+
+
+@inlined_kernel
+def in_frame(frame: tuple[float, float], x: float, y: float) -> tuple[float, float]:
+    """Return a vector in a frame that is turned by an angle of that cosine and sine."""
+    cos, sin = frame
+    return cos * x + sin * y, cos * y - sin * x
 
 
 @kernel
@@ -201,8 +208,8 @@ def item_in_reach(sensed: NDArray[np.float32]) -> bool:
 
 
 @kernel
-def reckon(sensed: NDArray[np.float32], period: float, known: NDArray[np.float64]) -> None:
-    """Take one robot's row into the columns from WALL to AWAY of its memory."""
+def watch_walls(sensed: NDArray[np.float32], period: float, known: NDArray[np.float64]) -> None:
+    """Take one robot's row into what its memory tells of a wall's direction."""
     if known[SIGHTINGS] > 0.0:
         known[WATCHED] += period
         known[TURNED] += known[DRIFT] * period
@@ -218,22 +225,6 @@ def reckon(sensed: NDArray[np.float32], period: float, known: NDArray[np.float64
         known[WALL] += off
         known[DRIFT] = known[TURNED] / (known[WATCHED] + SETTLING_TIME)
     known[WALL] -= 2.0 * math.pi * round(known[WALL] / (2.0 * math.pi))
-
-    x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
-    speed = math.sqrt(x * x + y * y)
-    is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
-    kept = math.exp(-period / KEPT_TIME)
-    known[KEPT_X] *= kept
-    known[KEPT_Y] *= kept
-    if is_inside != (known[WAS_INSIDE] > 0.5) and speed > MOVES:
-        way = (1.0 if is_inside else -1.0) / speed
-        cos, sin = math.cos(known[WALL]), math.sin(known[WALL])
-        known[KEPT_X] += way * (cos * x + sin * y)
-        known[KEPT_Y] += way * (cos * y - sin * x)
-        known[AWAY] = 0.0
-    home_x, home_y, sure = kept_home(known)
-    if sure > 0.0:
-        known[AWAY] -= period * (home_x * x + home_y * y)
 
 
 @kernel
@@ -328,10 +319,9 @@ def steer(memory: NDArray[np.float64], commands: NDArray[np.float64]) -> None:
 @kernel
 def turn_back(turn: float, own: NDArray[np.float64]) -> None:
     """Turn the directions in one memory by -turn [rad], as the body turns by `turn`."""
-    cos, sin = math.cos(turn), math.sin(turn)
+    frame = math.cos(turn), math.sin(turn)
     for column in (HEADING_X, HOME_X):
-        x, y = own[column], own[column + 1]
-        own[column], own[column + 1] = cos * x + sin * y, cos * y - sin * x
+        own[column], own[column + 1] = in_frame(frame, own[column], own[column + 1])
     own[WALL] -= turn
 
 

@@ -7,9 +7,10 @@ twice at a time where delivered items come back; else it is asked for once, as i
 
 from __future__ import annotations
 
+import math
+
 from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
 
-from .layout import draw_order
 from .structs import DELIVERED, NOBODY, World
 
 
@@ -54,10 +55,10 @@ def next_item(world: World) -> int:
         total += weight_of(world, item)
     if total == 0.0:
         return NOBODY
-    number, chosen = progress.n_asked[0], NOBODY
+    chosen = NOBODY
     if world.parameters.is_independent:
-        progress.n_asked[0] += 1
-        left = total * uniform(items.demand_key[0], number)
+        left = total * uniform(items.demand_key[0], progress.n_drawn[0])
+        progress.n_drawn[0] += 1
         for item in range(len(items.status)):
             weight = weight_of(world, item)
             if weight > 0.0 and left >= 0.0:  # of equal numbers by rounding, the last one
@@ -65,12 +66,31 @@ def next_item(world: World) -> int:
             left -= weight
         return chosen
     while chosen == NOBODY:
-        cycle, place = divmod(progress.n_asked[0], len(items.order))
-        if cycle > 0 and place == 0:
-            draw_order(items.request_key, cycle, items.order)
-        progress.n_asked[0] += 1
-        if weight_of(world, items.order[place]) > 0.0:
-            chosen = items.order[place]
+        chosen = next_of_cycle(world)
+        if chosen == NOBODY:
+            progress.cycle[0] += 1
+        progress.asked_last[0] = chosen
+    return chosen
+
+
+@kernel
+def next_of_cycle(world: World) -> int:
+    """Return what this cycle asks for after the item that it asked for last; NOBODY: nothing.
+
+    Each item draws a number in every cycle; the lowest comes first, of equal ones the first item.
+    """
+    keys, cycle, last = (
+        world.items.request_key,
+        world.progress.cycle[0],
+        world.progress.asked_last[0],
+    )
+    past = uniform(keys[last], cycle) if last != NOBODY else -1.0
+    chosen, lowest = NOBODY, math.inf
+    for item in range(len(keys)):
+        number = uniform(keys[item], cycle)
+        is_next = number > past or (number == past and item > last)
+        if is_next and number < lowest and weight_of(world, item) > 0.0:
+            chosen, lowest = item, number
     return chosen
 
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from swarm_logistics_env.errors import FaultError, suggest
 
-from .structs import LONGEST_RADIO_DELAY, Capabilities
-
 
 @dataclass(frozen=True)
 class FailureMode:
@@ -23,13 +21,10 @@ class FailureMode:
             the end of the episode.
         rangers: False: they report nothing near.
         ranger_bias: what they read too far [m].
-        radio_delay: how late its broadcasts come [s], at most `LONGEST_RADIO_DELAY`.
+        radio_delay: how late its broadcasts come [s].
         present: False: it is out of the arena.
         lifts, delivers, sends, hears, honest, obeys, releases_inside, rangers_refresh: see
             `structs.Capabilities`.
-
-    Raises:
-        FaultError: broadcasts cannot come that late.
     """
 
     description: str
@@ -51,18 +46,6 @@ class FailureMode:
     releases_inside: bool = True
     rangers_refresh: bool = True
 
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.radio_delay <= LONGEST_RADIO_DELAY:
-            raise FaultError(
-                f"FailureMode.radio_delay = {self.radio_delay}: should be 0 to "
-                f"{LONGEST_RADIO_DELAY} s, for which broadcasts are kept"
-            )
-
-
-# Capabilities that a mode takes away as a whole: each is a field of both.
-LOST_AS_A_WHOLE = tuple(
-    name for name in Capabilities._fields if getattr(FailureMode, name, None) is True
-)
 
 FAILURE_MODES: dict[str, FailureMode] = {
     "FM1": FailureMode("always tells timer 0, as if in the delivery area", mark="1", honest=False),

@@ -6,6 +6,7 @@ MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]].
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from bisect import bisect_right
@@ -29,8 +30,9 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator, row_keys
 
-from .failure_modes import FAILURE_MODES, LOST_AS_A_WHOLE, failure_mode
+from .failure_modes import FAILURE_MODES, FailureMode, failure_mode
 from .state import WarehouseState, robots_in_role
+from .structs import Capabilities
 
 ROLES = {
     "carrier": "carries the requested item",
@@ -74,7 +76,7 @@ class Fault(Record):
     error_type = FaultError
 
     mode: str
-    robots: PositiveInt | tuple[NonNegativeInt, ...] = 1
+    robots: PositiveInt | Annotated[tuple[NonNegativeInt, ...], Field(min_length=1)] = 1
     onset: Annotated[float, Field(ge=0)] = 0.0
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
@@ -91,8 +93,6 @@ class Fault(Record):
         intermittent: tuple[float, float] | None = None,
         role: str | None = None,
     ) -> None:
-        if isinstance(robots, Sequence) and not isinstance(robots, str):
-            robots = tuple(robots)
         given = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
         super().__init__(**given, factor=factor, intermittent=intermittent, role=role)
 
@@ -113,8 +113,6 @@ class Fault(Record):
         for name in ("duration", "intermittent"):
             if self.mode == "removed" and getattr(self, name) is not None:
                 raise ValueError(f"a removed robot does not come back: {name} should be None")
-        if isinstance(self.robots, tuple) and not self.robots:
-            raise ValueError("robots = (): should name at least one robot")
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
             raise ValueError(f"robots = {self.robots}: should name each robot once")
         if self.role is not None and self.role not in ROLES:
@@ -206,15 +204,12 @@ def fault_of(text: str) -> Fault:
 
 def text_of(fault: Fault) -> str | None:
     """Return the text that describes the fault; None: none does, as it has a factor, say."""
+    digits = functools.partial(np.format_float_positional, trim="-")
     role = f":{fault.role}" if fault.role else ""
-    lasts = f"+{_digits(fault.duration)}" if fault.duration else ""
-    onset = f"@{_digits(fault.onset)}{lasts}" if fault.onset or lasts else ""
+    lasts = f"+{digits(fault.duration)}" if fault.duration else ""
+    onset = f"@{digits(fault.onset)}{lasts}" if fault.onset or lasts else ""
     text = f"{fault.mode}:{fault.robots}{role}{onset}"
     return text if _FAULT.fullmatch(text) and fault_of(text) == fault else None
-
-
-def _digits(seconds: float) -> str:
-    return f"{seconds:.12f}".rstrip("0").rstrip(".")
 
 
 class Occurrence:
@@ -226,6 +221,7 @@ class Occurrence:
         n_robots: how many there are.
 
     Attributes:
+        mode: the failure mode.
         robots: the numbers of those affected, ascending; none before the onset of a fault that
             strikes by role.
 
@@ -234,11 +230,11 @@ class Occurrence:
     """
 
     def __init__(self, fault: Fault, seed: int, n_robots: int) -> None:
-        self.fault, self._seed = fault, seed
+        self.fault, self.mode, self._seed = fault, failure_mode(fault.mode), seed
         # The times at which an intermittent fault begins, ends, begins, ..., by robot.
         self._switches: dict[int, list[float]] = {}
         chosen = failed_robots(fault, seed, n_robots)
-        self._affect(chosen if fault.role is None else chosen[:0])
+        self.robots = chosen if fault.role is None else chosen[:0]
 
     def choose_by_role(self, state: WarehouseState) -> None:
         """Choose the robots of a fault that strikes by role, once it holds."""
@@ -246,18 +242,13 @@ class Occurrence:
         if fault.role is None or len(self.robots) or not fault.is_active(state.time):
             return
         assert isinstance(fault.robots, int)  # no numbers of robots stand beside a role
-        self._affect(robots_in_role(state, fault.role, fault.robots))
-
-    def _affect(self, robots: NDArray[np.int64]) -> None:
-        self.robots, fault = robots, self.fault
-        if fault.intermittent is not None:
-            self._switches = {robot: [fault.onset] for robot in robots.tolist()}
+        self.robots = robots_in_role(state, fault.role, fault.robots)
 
     def holds_for(self, time: float) -> NDArray[np.int64]:
         """Return the robots for which it holds at `time` [s], ascending."""
         if not self.fault.is_active(time):
             return self.robots[:0]
-        if not self._switches:
+        if self.fault.intermittent is None:
             return self.robots
         is_on = [self._n_switches(robot, time) % 2 == 1 for robot in self.robots.tolist()]
         return self.robots[is_on]
@@ -271,15 +262,17 @@ class Occurrence:
         if not fault.is_active(time):
             return fault.onset if fault.onset > time + GRACE else math.inf
         changes = [math.inf if fault.duration is None else fault.onset + fault.duration]
-        if failure_mode(fault.mode).wears:
+        if self.mode.wears:
             changes.append(next_step)
-        for robot, switches in self._switches.items():
-            changes.append(switches[self._n_switches(robot, time)])
+        if fault.intermittent is not None:
+            for robot in self.robots.tolist():
+                n_switches = self._n_switches(robot, time)
+                changes.append(self._switches[robot][n_switches])
         return min(changes)
 
     def left(self, time: float, end: float) -> tuple[float, float]:
         """Return the factors on speed and view at `time` [s] of an episode until `end` [s]."""
-        mode, fault = failure_mode(self.fault.mode), self.fault
+        mode, fault = self.mode, self.fault
         speed, view = mode.speed, mode.view
         if fault.factor is not None:
             speed = fault.factor if mode.factor == "speed" else speed
@@ -291,7 +284,8 @@ class Occurrence:
 
     def _n_switches(self, robot: int, time: float) -> int:
         """Return how often it has begun or ended for a robot until `time` [s]."""
-        switches, fault = self._switches[robot], self.fault
+        fault = self.fault
+        switches = self._switches.setdefault(robot, [fault.onset])
         while switches[-1] <= time + GRACE:
             about = (robot, len(switches) // _SWITCHES)
             rng = generator(self._seed, f"intermittent {fault.mode}", *about)
@@ -319,6 +313,12 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
     return np.sort(order[: fault.robots]).astype(np.int64)
 
 
+# Capabilities that a mode takes away as a whole: each is a field of both.
+LOST_AS_A_WHOLE = tuple(
+    name for name in Capabilities._fields if getattr(FailureMode, name, None) is True
+)
+
+
 def apply_faults(
     state: WarehouseState, scenario: Scenario, occurrences: Sequence[Occurrence]
 ) -> NDArray[np.bool_]:
@@ -338,10 +338,10 @@ def apply_faults(
     for name in LOST_AS_A_WHOLE:
         getattr(able, name)[:] = True
     gone = np.zeros(state.n_robots, np.bool_)
-    modes: list[tuple[str, ...]] = [()] * state.n_robots
+    modes: list[list[str]] = [[] for _ in range(state.n_robots)]
     for occurrence in occurrences:
         occurrence.choose_by_role(state)
-        mode, robots = failure_mode(occurrence.fault.mode), occurrence.holds_for(state.time)
+        mode, robots = occurrence.mode, occurrence.holds_for(state.time)
         speed_left, view_left = occurrence.left(state.time, scenario.duration)
         able.max_speed[robots] *= speed_left
         able.max_turn_rate[robots] *= speed_left
@@ -354,7 +354,7 @@ def apply_faults(
             getattr(able, name)[robots] &= getattr(mode, name)
         gone[robots] |= not mode.present
         for robot in robots.tolist():
-            modes[robot] = (*modes[robot], occurrence.fault.mode)
-    state.failure_modes = tuple(modes)
+            modes[robot].append(occurrence.fault.mode)
+    state.failure_modes = tuple(map(tuple, modes))
     state.failed = np.array([bool(names) for names in modes])
     return gone

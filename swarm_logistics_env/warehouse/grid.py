@@ -81,16 +81,21 @@ def look_through(
     return n_found
 
 
+@inlined_kernel
+def cell_of(grid: Grid, x: float, y: float) -> int:
+    """Return the number of the cell that holds (x, y), row by row."""
+    column = cell_along(x, grid.cell, grid.n_columns)
+    return cell_along(y, grid.cell, grid.n_rows) * grid.n_columns + column
+
+
 @kernel
 def fill(grid: Grid, position: Numbers, included: Flags) -> None:
     """Sort the included points of `position` (n, 2) into the grid's cells."""
-    start, cell = grid.start, grid.cell
+    start = grid.start
     start[:] = 0
     for point in range(len(position)):
         if included[point]:
-            column = cell_along(position[point, 0], cell, grid.n_columns)
-            row = cell_along(position[point, 1], cell, grid.n_rows)
-            start[row * grid.n_columns + column] += 1
+            start[cell_of(grid, position[point, 0], position[point, 1])] += 1
     total = 0
     for index in range(len(start)):
         total += start[index]
@@ -98,10 +103,9 @@ def fill(grid: Grid, position: Numbers, included: Flags) -> None:
     # Backwards, so that each cell lists its points in ascending order: ties never depend on memory.
     for point in range(len(position) - 1, -1, -1):
         if included[point]:
-            column = cell_along(position[point, 0], cell, grid.n_columns)
-            row = cell_along(position[point, 1], cell, grid.n_rows)
-            start[row * grid.n_columns + column] -= 1
-            place = start[row * grid.n_columns + column]
-            grid.members[place] = point
-            grid.places[place, 0] = position[point, 0]
-            grid.places[place, 1] = position[point, 1]
+            x, y = position[point, 0], position[point, 1]
+            cell = cell_of(grid, x, y)
+            start[cell] -= 1
+            grid.members[start[cell]] = point
+            grid.places[start[cell], 0] = x
+            grid.places[start[cell], 1] = y

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from swarm_logistics_env.errors import ScenarioError
-from swarm_logistics_env.kernels import gaussian, kernel, pair_key, uniform
+from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, pair_key, uniform
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-from .structs import STORED, Integers, Keys, Numbers, World
+from .structs import STORED, Keys, Numbers, World
 
 _ARRANGEMENTS = 100  # of all discs anew, where the first ones left no room for the last
 _ATTEMPTS = 5_000  # to place a disc among those that stand
@@ -47,40 +47,6 @@ def heading_drifts(scenario: Scenario, seed: int) -> Numbers:
 
 
 @kernel
-def draw_order(keys: Keys, cycle: int, order: Integers) -> None:
-    """Fill the order in which items are asked for, for the `cycle`-th time (0: the first)."""
-    draws = np.empty(len(keys))
-    for item in range(len(keys)):
-        draws[item] = uniform(keys[item], cycle)
-    sort_by(draws, order)
-
-
-@kernel
-def sort_by(keys: Numbers, order: Integers) -> None:
-    """Fill `order` with the indices of `keys`, smallest first; equal ones in their order.
-
-    Merges runs of 1, 2, 4, ... indices. numpy's sort would take three seconds to compile.
-    """
-    count, run = len(keys), 1
-    source, target = np.empty(count, np.int64), np.empty(count, np.int64)
-    for index in range(count):
-        source[index] = index
-    while run < count:
-        for first in range(0, count, 2 * run):
-            left, right = first, min(first + run, count)
-            middle, end = right, min(first + 2 * run, count)
-            for place in range(first, end):
-                is_left = left < middle and (
-                    right == end or keys[source[left]] <= keys[source[right]]
-                )
-                target[place] = source[left] if is_left else source[right]
-                left, right = left + int(is_left), right + int(not is_left)
-        source, target, run = target, source, 2 * run
-    for index in range(count):
-        order[index] = source[index]
-
-
-@kernel
 def place_restocked(world: World, item: int) -> bool:
     """Put an item that comes back into the storage, clear of free items and of robots.
 
@@ -90,12 +56,11 @@ def place_restocked(world: World, item: int) -> bool:
     """
     parameters, items, robots = world.parameters, world.items, world.robots
     radius = parameters.item_radius
-    width, height = parameters.storage_width - radius, parameters.warehouse_height - radius
+    high_x, high_y = parameters.storage_width - radius, parameters.warehouse_height - radius
     spacing = radius + max(radius, parameters.robot_radius)
     key = pair_key(items.restock_key[0], world.progress.n_delivered[0])
     for attempt in range(_ATTEMPTS):
-        x = radius + (width - radius) * uniform(key, 2 * attempt)
-        y = radius + (height - radius) * uniform(key, 2 * attempt + 1)
+        x, y = place_drawn(key, attempt, radius, high_x, high_y)
         is_free = is_clear(x, y, world.obstacles, parameters.obstacle_radius + radius)
         for other in range(len(items.status)):
             dx, dy = items.position[other, 0] - x, items.position[other, 1] - y
@@ -116,13 +81,12 @@ def _strewn(
     scenario: Scenario, seed: int, what: str, count: int, radius: float, obstacles: Numbers
 ) -> Numbers:
     centres = np.zeros((count, 2))
-    low = np.array([radius, radius])
-    high = np.array([scenario.storage_width - radius, scenario.warehouse_height - radius])
+    high_x, high_y = scenario.storage_width - radius, scenario.warehouse_height - radius
     reach = scenario.obstacle_radius + radius
     for arrangement in range(_ARRANGEMENTS):
         again = f" {arrangement}" if arrangement else ""
         keys = row_keys(seed, f"places of {what}{again}", count)
-        if strew(keys, centres, low, high, 2.0 * radius, obstacles, reach):
+        if strew(keys, centres, radius, high_x, high_y, obstacles, reach):
             return centres
     raise ScenarioError(
         f"no room for {count} {what} of radius {radius} m: should be fewer {what}, fewer "
@@ -134,29 +98,36 @@ def _strewn(
 def strew(
     keys: Keys,
     centres: Numbers,
-    low: Numbers,
-    high: Numbers,
-    spacing: float,
+    radius: float,
+    high_x: float,
+    high_y: float,
     obstacles: Numbers,
     obstacle_spacing: float,
 ) -> bool:
-    """Fill the rows of `centres`, one per key, uniformly in the box, by rejection.
+    """Fill the rows of `centres` of discs, one per key, uniformly in the box, by rejection.
 
     Returns whether there was room for all.
     """
     for disc in range(len(keys)):
         for attempt in range(_ATTEMPTS):
-            x = low[0] + (high[0] - low[0]) * uniform(keys[disc], 2 * attempt)
-            y = low[1] + (high[1] - low[1]) * uniform(keys[disc], 2 * attempt + 1)
-            if is_clear(x, y, centres[:disc], spacing) and is_clear(
-                x, y, obstacles, obstacle_spacing
-            ):
+            x, y = place_drawn(keys[disc], attempt, radius, high_x, high_y)
+            is_free = is_clear(x, y, centres[:disc], 2.0 * radius)
+            if is_free and is_clear(x, y, obstacles, obstacle_spacing):
                 centres[disc, 0] = x
                 centres[disc, 1] = y
                 break
         else:
             return False
     return True
+
+
+@inlined_kernel
+def place_drawn(
+    key: np.uint64, attempt: int, low: float, high_x: float, high_y: float
+) -> tuple[float, float]:
+    """Return the place that a stream draws at an attempt, from (low, low) to (high_x, high_y)."""
+    x = low + (high_x - low) * uniform(key, 2 * attempt)
+    return x, low + (high_y - low) * uniform(key, 2 * attempt + 1)
 
 
 @kernel

@@ -1,7 +1,11 @@
 """The rules of the warehouse: from commands to motion, to loads, deliveries and the next request.
 
-Kernels change the world's arrays and list what the physics must know as events
-(kind, robot, item), so that they call no engine.
+Items are no obstacles until no laden robot stands above them: the item collision mask.
+
+An unladen robot may stand above items. Were those solid to it from the moment it lifts another,
+they would shove it off, through its neighbours and walls where there is no room. So what it stands
+above is masked (`Items.covered`), as is an item that is put down, and is solid again when laden
+robots have left it.
 
 To handle an item takes time: a robot stands for `handling_time` before what it does to it. It
 lifts, puts down or delivers once the time is over, if it is able to then; else it has stood in
@@ -20,17 +24,13 @@ from swarm_logistics_env.kernels import inlined_kernel, kernel
 from .demand import ask, close_request, is_requested
 from .grid import look_around
 from .layout import place_restocked
-from .physics import CAME_BACK, DELIVERED_IT, LIFTED, PUT_DOWN
+from .physics import EMPTY_ROBOT, FREE_ITEM, LADEN_ROBOT, NO_ONE, collide_with, put_item
 from .structs import (
     CARRIED,
     DELIVERED,
     NOBODY,
     STORED,
-    Capabilities,
     Integers,
-    Numbers,
-    Parameters,
-    Robots,
     World,
 )
 
@@ -42,14 +42,15 @@ _GRACE = 1e-6  # [s]; times are sums of periods
 
 
 @kernel
-def refused_command(commands: Numbers, robots: Robots, able: Capabilities) -> int:
+def refused_command(world: World) -> int:
     """Return the place, row by row, of the first command that is not finite; NOBODY if all are.
 
     Rows of robots that ignore their commands may hold anything.
     """
+    commands = world.commands.now
     n_columns = commands.shape[1]
     for robot in range(len(commands)):
-        if robots.present[robot] and able.obeys[robot]:
+        if world.robots.present[robot] and world.able.obeys[robot]:
             for column in range(n_columns):
                 if not math.isfinite(commands[robot, column]):
                     return int(robot * n_columns + column)
@@ -57,20 +58,16 @@ def refused_command(commands: Numbers, robots: Robots, able: Capabilities) -> in
 
 
 @kernel
-def drive(
-    commands: Numbers,
-    robots: Robots,
-    able: Capabilities,
-    parameters: Parameters,
-    wanted_velocity: Numbers,
-) -> None:
-    """Turn the robots and fill their wanted velocities (N, 2) [m/s] for one control period.
+def drive(world: World) -> None:
+    """Turn the robots and fill their wanted velocities for one control period.
 
     Commands beyond [-1, 1] are cut, and the speed to the top speed whatever the direction. A robot
     turns as commanded and by its heading drift, unless its motor is dead, and drives along its mean
     direction; one that is not holonomic ignores `left`. Rows of robots that ignore their commands,
     or stand to handle an item, are ignored.
     """
+    commands, robots, able = world.commands.now, world.robots, world.able
+    parameters, wanted_velocity = world.parameters, world.engine.wanted_velocity
     for robot in range(len(commands)):
         wanted_velocity[robot, 0] = 0.0
         wanted_velocity[robot, 1] = 0.0
@@ -160,8 +157,6 @@ def item_lifted(world: World, robot: int) -> tuple[int, float]:
 @kernel
 def end_handling(world: World) -> None:
     """Let robots go on whose time is over."""
-    if world.parameters.handling_steps == 0:
-        return
     handling = world.robots.handling
     for robot in range(len(handling)):
         if handling[robot, LAST_STEP] <= world.progress.step[0]:
@@ -171,13 +166,45 @@ def end_handling(world: World) -> None:
 _HOLD, _OPEN = 0.5, -0.5
 
 
-@inlined_kernel
-def note_event(events: Integers, n_events: int, kind: int, robot: int, item: int) -> int:
-    """Write an event; returns the number of events so far."""
-    events[n_events, 0] = kind
-    events[n_events, 1] = robot
-    events[n_events, 2] = item
-    return n_events + 1
+@kernel
+def mask_below(world: World, robot: int) -> None:
+    """Mask what stands below a robot that lifts."""
+    items, grid, nearby = world.items, world.item_grid, world.nearby
+    x, y = world.robots.position[robot, 0], world.robots.position[robot, 1]
+    n_found = look_around(grid, x, y, reach_of(world), NOBODY, nearby)
+    for index in range(n_found):
+        item = grid.members[nearby.place[index]]
+        if items.status[item] == STORED:
+            items.covered[item] = 1
+            collide_with(world.engine, world.engine.item_shapes[item], NO_ONE)
+
+
+@kernel
+def unmask_left(world: World) -> None:
+    """Make those masked items solid that no laden robot stands above any more.
+
+    Both grids hold where things stand now. An item that is in none yet waits for the next step.
+    """
+    grid, nearby = world.item_grid, world.nearby
+    for place in range(grid.start[-1]):
+        item = grid.members[place]
+        if world.items.covered[item] == 0:
+            continue
+        x, y = grid.places[place, 0], grid.places[place, 1]
+        n_found = look_around(world.robot_grid, x, y, reach_of(world), NOBODY, nearby)
+        is_below_laden = False
+        for index in range(n_found):
+            robot = world.robot_grid.members[nearby.place[index]]
+            is_below_laden |= world.robots.item[robot] != NOBODY
+        if not is_below_laden:
+            world.items.covered[item] = 0
+            collide_with(world.engine, world.engine.item_shapes[item], FREE_ITEM)
+
+
+@kernel
+def reach_of(world: World) -> float:
+    """Return the distance [m] between centres up to which a robot stands above an item."""
+    return world.parameters.robot_radius + world.parameters.item_radius
 
 
 @kernel
@@ -194,31 +221,53 @@ def carry_along(world: World) -> None:
 
 
 @kernel
-def open_grippers(world: World, commands: Numbers) -> int:
-    """Put down what robots let go of, covered; returns the number of events written.
+def open_grippers(world: World) -> None:
+    """Put down what robots let go of.
 
     A requested item is let go of anywhere, another one only outside the delivery area.
     """
-    robots, able, items, n_events = world.robots, world.able, world.items, 0
+    robots, able, commands = world.robots, world.able, world.commands.now
     for robot in range(len(commands)):
         item = robots.item[robot]
         is_able = robots.present[robot] and able.obeys[robot]
         command = gripper_of(world, robot, commands[robot, GRIPPER])
         if item == NOBODY or not is_able or command >= _OPEN:
             continue
-        if robots.in_delivery[robot] and not is_requested(world, item):
+        may_release = able.releases_inside[robot] and is_requested(world, item)
+        if robots.in_delivery[robot] and not may_release:
             continue
-        if robots.in_delivery[robot] and not able.releases_inside[robot]:
-            continue
-        if not is_done(world, robot, PUTTING_DOWN, item):
-            continue
-        remember(robots.memory, robot, item)
-        robots.item[robot] = NOBODY
-        items.status[item] = STORED
-        items.carrier[item] = NOBODY
-        items.covered[item] = 1
-        n_events = note_event(world.claims.events, n_events, PUT_DOWN, robot, item)
-    return n_events
+        if is_done(world, robot, PUTTING_DOWN, item):
+            remember(robots.memory, robot, item)
+            put_down(world, robot)
+
+
+@kernel
+def put_down(world: World, robot: int) -> None:
+    """Let a robot's item lie where it is, covered."""
+    robots, items, engine = world.robots, world.items, world.engine
+    item = robots.item[robot]
+    robots.item[robot] = NOBODY
+    items.status[item] = STORED
+    items.carrier[item] = NOBODY
+    items.covered[item] = 1
+    collide_with(engine, engine.robot_shapes[robot], EMPTY_ROBOT)
+    put_item(engine, item, items.position)
+
+
+@kernel
+def take_out(world: World, robot: int) -> None:
+    """Take a robot out of the arena; what it carries is put down where it is."""
+    robots, engine = world.robots, world.engine
+    if robots.item[robot] != NOBODY:
+        put_down(world, robot)
+    collide_with(engine, engine.robot_shapes[robot], NO_ONE)
+    robots.present[robot] = False
+    robots.in_delivery[robot] = False
+    robots.handling[robot, :] = IDLE
+    robots.memory[robot, :] = NOBODY
+    robots.position[robot, :] = 0.0
+    robots.velocity[robot, :] = 0.0
+    robots.heading[robot] = 0.0
 
 
 @inlined_kernel
@@ -266,12 +315,13 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
 
 
 @kernel
-def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
-    """Lift what empty robots hold on to; returns the number of events so far.
+def close_grippers(world: World) -> None:
+    """Lift what empty robots hold on to.
 
     If several want the same item, the nearest able one gets it, and the others choose again.
     """
     robots, able, items, claims = world.robots, world.able, world.items, world.claims
+    engine, commands = world.engine, world.commands.now
     while True:
         is_settled = True
         for robot in range(len(commands)):
@@ -298,21 +348,22 @@ def close_grippers(world: World, commands: Numbers, n_events: int) -> int:
             items.covered[item] = 0
             items.position[item, 0] = robots.position[robot, 0]
             items.position[item, 1] = robots.position[robot, 1]
-            n_events = note_event(claims.events, n_events, LIFTED, robot, item)
+            collide_with(engine, engine.item_shapes[item], NO_ONE)
+            collide_with(engine, engine.robot_shapes[robot], LADEN_ROBOT)
+            mask_below(world, robot)
         if is_settled:
-            return n_events
+            return
 
 
 @kernel
-def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
+def deliver(world: World) -> tuple[int, bool]:
     """Deliver the requested items whose carriers can, the oldest request first, then the next.
 
     A delivery clears every robot's memory; with `restock` the item comes back to the storage.
 
-    Returns:
-        The number of events so far, of deliveries, and whether all that came back found room.
+    Returns how many there were, and whether all that came back found room.
     """
-    robots, items, progress = world.robots, world.items, world.progress
+    robots, items, progress, engine = world.robots, world.items, world.progress, world.engine
     n_delivered, is_room, place = 0, True, 0
     while place < len(progress.requested) and progress.requested[place] != NOBODY:
         item = progress.requested[place]
@@ -323,23 +374,21 @@ def deliver(world: World, n_events: int) -> tuple[int, int, bool]:
         if not may_deliver(world, robot) or not is_done(world, robot, DELIVERING, item):
             continue
         robots.item[robot] = NOBODY
-        for other in range(len(robots.memory)):
-            for slot in range(robots.memory.shape[1]):
-                robots.memory[other, slot] = NOBODY
+        collide_with(engine, engine.robot_shapes[robot], EMPTY_ROBOT)
+        robots.memory[:, :] = NOBODY
         items.status[item] = DELIVERED
         items.carrier[item] = NOBODY
         world.claims.delivered_by[n_delivered] = robot
         n_delivered += 1
         progress.n_delivered[0] += 1
-        n_events = note_event(world.claims.events, n_events, DELIVERED_IT, robot, item)
         if world.parameters.restock:
             if place_restocked(world, item):
                 items.status[item] = STORED
                 items.covered[item] = 1
-                n_events = note_event(world.claims.events, n_events, CAME_BACK, robot, item)
+                put_item(engine, item, items.position)
             else:
                 is_room = False
         close_request(world, item)
         ask(world)
         place = 0  # what is asked for now may have waited here
-    return n_events, n_delivered, is_room
+    return n_delivered, is_room

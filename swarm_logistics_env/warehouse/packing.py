@@ -78,18 +78,6 @@ def pointer_at(typing_context: Any, address: types.Type) -> Any:
     return types.voidptr(types.int64), generate
 
 
-@_generated
-def store_at(typing_context: Any, address: types.Type, value: types.Type) -> Any:
-    """Write `value` as a C int (32 bits) to `address`."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        where, number = values
-        builder.store(number, builder.inttoptr(where, ir.IntType(32).as_pointer()))
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.int32), generate
-
-
 _IN_ORDER = "seq_cst"  # all threads see all changes in one order
 
 
@@ -141,16 +129,11 @@ def replace(
 S = TypeVar("S", bound=tuple[Any, ...])
 
 
-def hints(structure: type) -> dict[str, Any]:
-    """Return the annotation of each field."""
-    return get_type_hints(structure, include_extras=True)
-
-
 @functools.cache
 def field_kinds(structure: type) -> dict[str, Any]:
     """Return by field `float`, `int`, `bool`, a structure, or (dtype, shape) of an array."""
     kinds: dict[str, Any] = {}
-    for name, hint in hints(structure).items():
+    for name, hint in get_type_hints(structure, include_extras=True).items():
         kinds[name] = getattr(hint, "__origin__", hint)
         if get_origin(kinds[name]) is np.ndarray:
             scalar = get_args(get_args(kinds[name])[1])[0]

@@ -10,7 +10,6 @@ address within a control step.
 from __future__ import annotations
 
 import math
-import sys
 from importlib.metadata import version
 from typing import Any
 from weakref import finalize
@@ -24,18 +23,14 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.scenario import Scenario
 
-from .packing import call_at, hints, made_at, packed, store_at, unpacked_at
+from .packing import call_at, made_at, packed, unpacked_at
 from .structs import (
     NOBODY,
     STORED,
     Batch,
     Engine,
     Functions,
-    Integers,
-    Items,
     Numbers,
-    Parameters,
-    Robots,
     World,
 )
 
@@ -49,9 +44,6 @@ LADEN_ROBOT = _ROBOT | (_ROBOT | _SOLID | _ITEM) << _MASK
 FREE_ITEM = _ITEM | _ROBOT << _MASK
 SOLID_THING = _SOLID | _ROBOT << _MASK
 
-# Kinds of events: what happened to (robot, item) that changes whom they collide with.
-LIFTED, PUT_DOWN, DELIVERED_IT, CAME_BACK = 0, 1, 2, 3
-
 # The contact solver iterates more if more touch. With 16 a jam of 150 in a corner stands
 # 10 mm inside itself, with 50 now and then 7 mm, with 80 always 1 mm; always 80 costs a swarm of
 # 25 an eighth of its step.
@@ -59,20 +51,23 @@ _FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 16, 80, 2
 
 
 @kernel
-def advance(engine: Engine, parameters: Parameters, n_touching: int) -> None:
+def advance(world: World) -> None:
     """Take the substeps of a control step, and read where the bodies are then and how fast.
 
     Before each, every drive pushes with the force that brings its robot to the wanted velocity
-    within the substep, or with its greatest force. So many robots touch something as it begins.
+    within the substep, or with its greatest force.
     """
+    engine, parameters, n_touching = world.engine, world.parameters, 0
+    for touches in world.robots.contact:
+        n_touching += int(touches)
     iterations = min(_FEWEST_ITERATIONS + n_touching // _TOUCHING_PER_ITERATION, _MOST_ITERATIONS)
-    call_at(engine.functions.set_iterations, (engine.space[0], iterations))
+    call_at(engine.functions.cpSpaceSetIterations, (engine.space[0], iterations))
     period = parameters.physics_period
     greatest = parameters.max_acceleration * period
     for _ in range(parameters.n_substeps):
         read(engine, engine.velocities)
         push(engine, greatest, parameters.robot_mass / period)
-        call_at(engine.functions.step, (engine.space[0], period))
+        call_at(engine.functions.cpSpaceStep, (engine.space[0], period))
     read(engine, engine.bodies)
 
 
@@ -90,43 +85,38 @@ def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
         share = mass_per_period * (1.0 if change <= greatest else greatest / change)
         forces[robot, 0], forces[robot, 1] = share * change_x, share * change_y
     call = engine.functions
-    store_at(engine.forces.count_address, 0)
-    call_at(call.each_body, (engine.space[0], call.write_body, engine.forces.address))
+    engine.forces.filled[0] = 0
+    call_at(
+        call.cpSpaceEachBody,
+        (engine.space[0], call.pmSpaceBodySetIteratorFuncBatched, engine.forces.address),
+    )
 
 
 @kernel
 def read(engine: Engine, batch: Batch) -> None:
     """Fill a batch with what it holds of the bodies."""
-    store_at(batch.count_address, 0)
+    batch.filled[0] = 0
     call = engine.functions
-    call_at(call.each_body, (engine.space[0], call.read_body, batch.address))
+    call_at(
+        call.cpSpaceEachBody,
+        (engine.space[0], call.pmSpaceBodyGetIteratorFuncBatched, batch.address),
+    )
 
 
 @kernel
-def follow(engine: Engine, events: Integers, n_events: int, item_position: Numbers) -> None:
-    """Let bodies collide as they must after these events (kind, robot, item)."""
-    for event in range(n_events):
-        kind, robot, item = events[event, 0], events[event, 1], events[event, 2]
-        if kind == LIFTED:
-            collide_with(engine, engine.item_shapes[item], NO_ONE)
-            collide_with(engine, engine.robot_shapes[robot], LADEN_ROBOT)
-        if kind in (PUT_DOWN, DELIVERED_IT):
-            collide_with(engine, engine.robot_shapes[robot], EMPTY_ROBOT)
-        if kind in (PUT_DOWN, CAME_BACK):
-            move(engine, engine.item_shapes[item], item_position[item, 0], item_position[item, 1])
-
-
-@kernel
-def move(engine: Engine, item_shape: int, x: float, y: float) -> None:
-    """Move an item to (x, y) [m]; who collides with it stays as it is."""
-    call_at(engine.functions.set_offset, (item_shape, (x, y)))
-    call_at(engine.functions.reindex, (engine.space[0], item_shape))
+def put_item(engine: Engine, item: int, position: Numbers) -> None:
+    """Move an item to its position, of those of all [m]; who collides with it stays as it is."""
+    shape = engine.item_shapes[item]
+    call_at(
+        engine.functions.cpCircleShapeSetOffset, (shape, (position[item, 0], position[item, 1]))
+    )
+    call_at(engine.functions.cpSpaceReindexShape, (engine.space[0], shape))
 
 
 @kernel
 def collide_with(engine: Engine, shape: int, whom: int) -> None:
     """Give a shape a filter, of no group."""
-    call_at(engine.functions.set_filter, (shape, (0, whom)))
+    call_at(engine.functions.cpShapeSetFilter, (shape, (0, whom)))
 
 
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
@@ -140,78 +130,74 @@ def build(address: int) -> None:
     """Make everything of the world at `address` and note it in its engine's arrays."""
     world = unpacked_at(World, address)
     engine, call = world.engine, world.engine.functions
-    space = made_at(call.new_space, ())
+    space = made_at(call.cpSpaceNew, ())
     engine.space[0] = space
-    call_at(call.set_slop, (space, _SLOP))
-    call_at(call.set_bias, (space, _BIAS))
-    static = made_at(call.static_body, (space,))
-    build_solids(engine, static, world.parameters, world.obstacles)
-    build_robots(engine, world.parameters, world.robots)
-    build_items(engine, static, world.parameters, world.items)
+    call_at(call.cpSpaceSetCollisionSlop, (space, _SLOP))
+    call_at(call.cpSpaceSetCollisionBias, (space, _BIAS))
+    static = made_at(call.cpSpaceGetStaticBody, (space,))
+    build_solids(world, static)
+    build_robots(world)
+    build_items(world, static)
     read(engine, engine.bodies)
 
 
 @kernel
-def build_solids(engine: Engine, static: int, parameters: Parameters, obstacles: Numbers) -> None:
+def build_solids(world: World, static: int) -> None:
     """Make walls and obstacles."""
-    call, space = engine.functions, engine.space[0]
+    engine, parameters, obstacles = world.engine, world.parameters, world.obstacles
+    call = engine.functions
     width, height = parameters.warehouse_width, parameters.warehouse_height
     corner_x = (-_WALL, width + _WALL, width + _WALL, -_WALL)
     corner_y = (-_WALL, -_WALL, height + _WALL, height + _WALL)
     for side in range(N_WALLS):
         one, other = side, (side + 1) % N_WALLS
         ends = ((corner_x[one], corner_y[one]), (corner_x[other], corner_y[other]))
-        engine.solid_shapes[side] = made_at(call.new_segment, (static, ends[0], ends[1], _WALL))
+        engine.solid_shapes[side] = made_at(
+            call.cpSegmentShapeNew, (static, ends[0], ends[1], _WALL)
+        )
     for obstacle in range(len(obstacles)):
-        engine.solid_shapes[N_WALLS + obstacle] = new_circle(
-            engine, static, parameters.obstacle_radius,
-            obstacles[obstacle, 0], obstacles[obstacle, 1],
-        )  # fmt: skip
+        place = (obstacles[obstacle, 0], obstacles[obstacle, 1])
+        shape = made_at(call.cpCircleShapeNew, (static, parameters.obstacle_radius, place))
+        engine.solid_shapes[N_WALLS + obstacle] = shape
     for shape in engine.solid_shapes:
         collide_with(engine, shape, SOLID_THING)
-        made_at(call.add_shape, (space, shape))
+        made_at(call.cpSpaceAddShape, (engine.space[0], shape))
 
 
 @kernel
-def build_robots(engine: Engine, parameters: Parameters, robots: Robots) -> None:
+def build_robots(world: World) -> None:
     """Make the robots' bodies, which no contact turns, and their shapes."""
-    call, space, n = engine.functions, engine.space[0], len(robots.item)
-    for robot in range(n):
-        body = made_at(call.new_body, (parameters.robot_mass, math.inf))
+    engine, parameters, robots = world.engine, world.parameters, world.robots
+    call, space = engine.functions, engine.space[0]
+    # A batch reads and writes bodies in the order in which they were added.
+    for robot in range(len(robots.item)):
+        body = made_at(call.cpBodyNew, (parameters.robot_mass, math.inf))
         place = (robots.position[robot, 0], robots.position[robot, 1])
-        call_at(call.set_position, (body, place))
+        call_at(call.cpBodySetPosition, (body, place))
         velocity = (robots.velocity[robot, 0], robots.velocity[robot, 1])
-        call_at(call.set_velocity, (body, velocity))
-        shape = new_circle(engine, body, parameters.robot_radius, 0.0, 0.0)
+        call_at(call.cpBodySetVelocity, (body, velocity))
+        shape = made_at(call.cpCircleShapeNew, (body, parameters.robot_radius, (0.0, 0.0)))
         met = EMPTY_ROBOT if robots.item[robot] == NOBODY else LADEN_ROBOT
         collide_with(engine, shape, met if robots.present[robot] else NO_ONE)
         engine.robot_bodies[robot], engine.robot_shapes[robot] = body, shape
-    # A batch reads and writes bodies in the order in which they were added.
-    for body in engine.robot_bodies:
-        made_at(call.add_body, (space, body))
-    for shape in engine.robot_shapes:
-        made_at(call.add_shape, (space, shape))
+        made_at(call.cpSpaceAddBody, (space, body))
+        made_at(call.cpSpaceAddShape, (space, shape))
 
 
 @kernel
-def build_items(engine: Engine, static: int, parameters: Parameters, items: Items) -> None:
+def build_items(world: World, static: int) -> None:
     """Make the items' shapes, on the static body and moved by their offset.
 
     So there is no body to integrate or to read.
     """
+    engine, items, call = world.engine, world.items, world.engine.functions
     for item in range(len(items.status)):
-        x, y = items.position[item, 0], items.position[item, 1]
-        shape = new_circle(engine, static, parameters.item_radius, x, y)
+        place = (items.position[item, 0], items.position[item, 1])
+        shape = made_at(call.cpCircleShapeNew, (static, world.parameters.item_radius, place))
         is_solid = items.status[item] == STORED and items.covered[item] == 0
         collide_with(engine, shape, FREE_ITEM if is_solid else NO_ONE)
-        made_at(engine.functions.add_shape, (engine.space[0], shape))
+        made_at(call.cpSpaceAddShape, (engine.space[0], shape))
         engine.item_shapes[item] = shape
-
-
-@kernel
-def new_circle(engine: Engine, body: int, radius: float, x: float, y: float) -> int:
-    """Return the address of a new disc around (x, y) from its body."""
-    return made_at(engine.functions.new_circle, (body, radius, (x, y)))
 
 
 @kernel
@@ -219,12 +205,12 @@ def free(address: int) -> None:
     """Free everything that `build` made for the engine at `address`."""
     engine = unpacked_at(Engine, address)
     call = engine.functions
-    call_at(call.free_space, (engine.space[0],))
+    call_at(call.cpSpaceFree, (engine.space[0],))
     for shapes in (engine.robot_shapes, engine.item_shapes, engine.solid_shapes):
         for shape in shapes:
-            call_at(call.free_shape, (shape,))
+            call_at(call.cpShapeFree, (shape,))
     for body in engine.robot_bodies:
-        call_at(call.free_body, (body,))
+        call_at(call.cpBodyFree, (body,))
 
 
 class Physics:
@@ -241,10 +227,12 @@ class Physics:
     def __init__(self, scenario: Scenario) -> None:
         n = scenario.n_robots
         # A batch call reads and writes every body: of N robots, and the static one.
-        state = _Memory(n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY)
-        velocities = _Memory(n + 1, 2, BodyFields.VELOCITY)
-        forces = _Memory(n + 1, 2, BodyFields.FORCE)
-        self._kept = state, velocities, forces
+        self._kept = [
+            _batch(n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY),
+            _batch(n + 1, 2, BodyFields.VELOCITY),
+            _batch(n + 1, 2, BodyFields.FORCE),
+        ]
+        bodies, velocities, forces = (batch for batch, _ in self._kept)
         self.engine = Engine(
             functions=_FUNCTION_ADDRESSES,
             space=np.zeros(1, np.int64),
@@ -252,9 +240,9 @@ class Physics:
             robot_shapes=np.zeros(n, np.int64),
             item_shapes=np.zeros(scenario.n_items, np.int64),
             solid_shapes=np.zeros(N_WALLS + scenario.n_obstacles, np.int64),
-            bodies=state.batch,
-            velocities=velocities.batch,
-            forces=forces.batch,
+            bodies=bodies,
+            velocities=velocities,
+            forces=forces,
             wanted_velocity=np.zeros((n, 2)),
         )
 
@@ -264,39 +252,23 @@ class Physics:
         # This is left out at the end of the process, which frees everything anyway.
         finalize(self, _free, packed(self.engine), self.engine, self._kept).atexit = False
 
-    def release(self, robot: int, item: int, x: float, y: float) -> None:
-        """Put `item` to (x, y) [m], masked, and make `robot` an unladen one."""
-        engine = self.engine
-        collide_with(engine, int(engine.robot_shapes[robot]), EMPTY_ROBOT)
-        move(engine, int(engine.item_shapes[item]), x, y)
-
-    def remove(self, robot: int) -> None:
-        """Take `robot` out of everybody's way, for good."""
-        collide_with(self.engine, int(self.engine.robot_shapes[robot]), NO_ONE)
-
 
 def _free(engine: NDArray[np.int64], *kept: object) -> None:
     free(engine.ctypes.data)
 
 
-class _Memory:
-    """The memory of a batch, (rows, columns)."""
-
-    def __init__(self, rows: int, columns: int, fields: BodyFields) -> None:
-        # The engine trusts the memory it is given. One number to spare: it replaces, with memory of
-        # its own, a buffer that what it reads would fill.
-        memory = np.zeros(rows * columns + 1)
-        # All kept, because what a structure of cffi points to lives no longer for it.
-        self._memory = ffi.from_buffer("double[]", memory)
-        self._buffer = ffi.new("pmFloatArray *")
-        self._buffer.arr, self._buffer.max = self._memory, len(memory)
-        self._data = ffi.new("pmBatchedData *")
-        self._data.floatArray, self._data.fields = self._buffer, fields.value
-        self.batch = Batch(
-            address=_address(self._data),
-            count_address=_address(ffi.addressof(self._buffer, "num")),
-            numbers=memory[:-1].reshape(rows, columns),
-        )
+def _batch(rows: int, columns: int, fields: BodyFields) -> tuple[Batch, object]:
+    """Return a batch of (rows, columns), and what has to be kept as long as it is used."""
+    # The engine trusts the memory it is given. One number to spare: it replaces, with memory of
+    # its own, a buffer that what it reads would fill.
+    memory = np.zeros(rows * columns + 1)
+    # What a structure of cffi points to lives no longer for it.
+    numbers = ffi.from_buffer("double[]", memory)
+    buffer = ffi.new("pmFloatArray *", {"arr": numbers, "max": len(memory)})
+    data = ffi.new("pmBatchedData *", {"floatArray": buffer, "fields": fields.value})
+    filled = np.frombuffer(ffi.buffer(ffi.addressof(buffer, "num")), np.int32)
+    batch = Batch(_address(data), filled, memory[:-1].reshape(rows, columns))
+    return batch, (numbers, buffer, data)
 
 
 def _address(thing: Any) -> int:
@@ -307,14 +279,10 @@ def _function_addresses() -> Functions:
     """Return the addresses of pymunk's C functions, by which kernels call them.
 
     Raises:
-        SetupError: this pymunk lacks one of them, or this machine's words are not of 64 bits with
-            the lowest byte first, as kernels need them.
+        SetupError: this pymunk lacks one of them.
     """
-    if sys.maxsize < 2**32 or sys.byteorder != "little":
-        raise SetupError("this machine's words: should be of 64 bits, lowest byte first")
     try:
-        names = [kind.__metadata__[0] for kind in hints(Functions).values()]
-        return Functions(*(_address(ffi.addressof(lib, name)) for name in names))
+        return Functions(*(_address(ffi.addressof(lib, name)) for name in Functions._fields))
     except AttributeError as error:
         # pymunk.version is not used, because in pymunk 7.0 it is the version of something else.
         raise SetupError(f"pymunk {version('pymunk')} lacks a function: {error}") from None

@@ -19,13 +19,15 @@ from .demand import is_requested
 from .grid import look_around
 from .structs import NOBODY, Parameters, Sensed, World
 from .surroundings import (
+    ITEM_SEEN,
+    ROBOT_SEEN,
     Pose,
-    choose_neighbours,
+    choose,
     in_frame,
     listen,
     scan_discs,
     scan_solids,
-    see_items,
+    tell_of_items,
     tell_of_neighbours,
 )
 
@@ -101,24 +103,25 @@ _N_THINGS = row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1
 _DROPPED, _PLACES, _DRAWS = _N_RANGES, 2 * _N_RANGES, 2 * _N_RANGES + 2 * _N_THINGS
 
 
+@inlined_kernel
+def full_range(world: World, robot: int) -> float:
+    """Return what a robot's beams read that meet nothing [m], also where its rangers are blind."""
+    own = world.able.ranger_range[robot]
+    return own if own > 0.0 else world.parameters.ranger_range
+
+
 @kernel
-def disturb(world: World, rows: Sensed) -> None:
-    """Add the scenario's noise to rows (N, D) and drop beams, in place.
+def disturb(me: int, world: World, out: Sensed) -> None:
+    """Add the scenario's noise to a row and drop beams, in place.
 
     What is measured stays within the column's range.
     """
-    robots, able, parameters = world.robots, world.able, world.parameters
-    is_exact = parameters.ranger_noise == 0.0 and parameters.position_noise == 0.0
-    if is_exact and parameters.sensor_dropout == 0.0:
-        return
-    for robot in range(len(rows)):
-        if robots.present[robot]:
-            key, first = robots.sensor_key[robot], world.progress.step[0] * _DRAWS
-            own_range = able.ranger_range[robot]
-            reach = own_range if own_range > 0.0 else parameters.ranger_range
-            disturb_beams(key, first, reach, parameters, rows[robot])
-            if parameters.position_noise > 0.0:
-                disturb_places(key, first + _PLACES, parameters, rows[robot])
+    parameters = world.parameters
+    key, first = world.robots.sensor_key[me], world.progress.step[0] * _DRAWS
+    if parameters.ranger_noise > 0.0 or parameters.sensor_dropout > 0.0:
+        disturb_beams(key, first, full_range(world, me), parameters, out)
+    if parameters.position_noise > 0.0:
+        disturb_places(key, first + _PLACES, parameters, out)
 
 
 @kernel
@@ -155,27 +158,22 @@ def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sens
 
 
 @kernel
-def fail_rangers(world: World, rows: Sensed) -> None:
-    """Make of the beams in rows (N, D) what rangers that have failed report, in place."""
-    robots, able = world.robots, world.able
-    for robot in range(len(rows)):
-        if not robots.present[robot]:
-            continue
-        beams, frozen = rows[robot, :_N_RANGES], robots.frozen_beams[robot]
-        bias, own = able.ranger_bias[robot], able.ranger_range[robot]
-        if bias != 0.0:
-            reach = own if own > 0.0 else world.parameters.ranger_range
-            for beam in range(_N_RANGES):
-                if beams[beam] < np.float32(reach):
-                    beams[beam] = min(max(beams[beam] + bias, 0.0), reach)
-        if able.rangers_refresh[robot]:
-            frozen[0] = math.nan
-        elif math.isnan(frozen[0]):
-            for beam in range(_N_RANGES):
-                frozen[beam] = beams[beam]
-        else:
-            for beam in range(_N_RANGES):
-                beams[beam] = frozen[beam]
+def fail_rangers(me: int, world: World, out: Sensed) -> None:
+    """Make of the beams in a row what rangers that have failed report, in place."""
+    able, frozen = world.able, world.robots.frozen_beams[me]
+    bias, reach = able.ranger_bias[me], full_range(world, me)
+    if bias != 0.0:
+        for beam in range(_N_RANGES):
+            if out[beam] < np.float32(reach):
+                out[beam] = min(max(out[beam] + bias, 0.0), reach)
+    if able.rangers_refresh[me]:
+        frozen[0] = math.nan
+    elif math.isnan(frozen[0]):
+        for beam in range(_N_RANGES):
+            frozen[beam] = out[beam]
+    else:
+        for beam in range(_N_RANGES):
+            out[beam] = frozen[beam]
 
 
 @kernel
@@ -197,7 +195,7 @@ def sense(world: World, rows: Sensed) -> int:
         )
         reach = world.able.ranger_range[me]
         scans = rows[me, :_N_RANGES]
-        scans[:] = reach if reach > 0.0 else world.parameters.ranger_range
+        scans[:] = full_range(world, me)
         if reach > 0.0:
             scan = rows[me, row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
             scan_solids(pose, reach, world, scan)
@@ -206,6 +204,8 @@ def sense(world: World, rows: Sensed) -> int:
         if touches_solid(pose, world):
             robots.contact[me] = True
         feel_itself(me, pose, world, rows[me])
+        disturb(me, world, rows[me])
+        fail_rangers(me, world, rows[me])
     return n_anchored
 
 
@@ -233,7 +233,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
         out[row.LOWEST_TIMER + 1] = forward
         out[row.LOWEST_TIMER + 2] = left
         out[row.LOWEST_TIMER + 3] = timer
-    n_chosen = choose_neighbours(me, world, n_found)
+    n_chosen = choose(me, world, grid, n_found, ROBOT_SEEN)
     tell_of_neighbours(pose, world, n_chosen, out)
     return is_anchored
 
@@ -252,4 +252,5 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
         scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     if world.robots.item[me] != NOBODY:
         world.robots.contact[me] |= touches_items(world, n_found)
-    see_items(me, pose, world, n_found, out)
+    n_chosen = choose(me, world, grid, n_found, ITEM_SEEN)
+    tell_of_items(me, pose, world, n_chosen, out)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Generic, TypeVar
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +14,10 @@ from .structs import (
     NOBODY,
     STORED,
     Capabilities,
+    Flags,
+    Integers,
     Items,
+    Numbers,
     Progress,
     blank_robots,
     lengths_of,
@@ -24,102 +25,91 @@ from .structs import (
 
 __all__ = ["CARRIED", "DELIVERED", "NOBODY", "STORED", "WarehouseState"]
 
-T = TypeVar("T", bound=np.generic)
-V = TypeVar("V", int, float)
-
-
-class Quantity(Generic[T]):
-    """An array of a structure; what is assigned is copied into it, as kernels know where it lies.
-
-    Args:
-        structure: the state's attribute that holds the structure.
-        name: the structure's field, where shape and unit are told.
-    """
-
-    def __init__(self, structure: str, name: str) -> None:
-        self.structure, self.name = structure, name
-
-    def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> NDArray[T]:
-        """Return the array."""
-        array: NDArray[T] = getattr(state.__dict__[self.structure], self.name)
-        return array
-
-    def __set__(self, state: WarehouseState, values: NDArray[T]) -> None:
-        """Copy `values` into the array."""
-        getattr(state.__dict__[self.structure], self.name)[...] = values
-
-
-class Count(Generic[V]):
-    """A number of `Progress`; of `requested`, the oldest request."""
-
-    def __set_name__(self, owner: type[WarehouseState], name: str) -> None:
-        """Take the attribute's name."""
-        self.name = name
-
-    def __get__(self, state: WarehouseState, owner: type[WarehouseState]) -> V:
-        """Return the number."""
-        number: V = getattr(state.progress, self.name).item(0)
-        return number
-
-    def __set__(self, state: WarehouseState, value: V) -> None:
-        """Set the number."""
-        getattr(state.progress, self.name)[0] = value
-
 
 class WarehouseState:
     """What is true in the warehouse now. N robots, I items; a row is one robot or item for good.
 
     `structs` tells of every array its shape and unit. The row of a robot that is absent holds
-    zeros and `NOBODY`.
+    zeros and `NOBODY`. What is assigned to an array's name is copied into the array, as kernels
+    know where it lies.
     """
 
-    robot_position = Quantity[np.float64]("robots", "position")
-    robot_velocity = Quantity[np.float64]("robots", "velocity")
-    robot_heading = Quantity[np.float64]("robots", "heading")
-    robot_heading_drift = Quantity[np.float64]("robots", "heading_drift")
-    robot_present = Quantity[np.bool_]("robots", "present")
-    robot_in_delivery = Quantity[np.bool_]("robots", "in_delivery")
-    robot_contact = Quantity[np.bool_]("robots", "contact")
-    robot_item = Quantity[np.int64]("robots", "item")
-    robot_memory = Quantity[np.int64]("robots", "memory")
-    robot_timer = Quantity[np.float64]("robots", "timer")
-    robot_told = Quantity[np.float64]("robots", "told")
-    robot_heard = Quantity[np.float64]("robots", "heard")
-    robot_message = Quantity[np.float64]("robots", "message")
-    last_in_delivery = Quantity[np.int64]("robots", "last_in_delivery")
-    failed = Quantity[np.bool_]("robots", "failed")
+    robot_position: Numbers
+    robot_velocity: Numbers
+    robot_heading: Numbers
+    robot_heading_drift: Numbers
+    robot_present: Flags
+    robot_in_delivery: Flags
+    robot_contact: Flags
+    robot_item: Integers
+    robot_memory: Integers
+    robot_timer: Numbers
+    robot_told: Numbers
+    robot_heard: Numbers
+    robot_message: Numbers
+    last_in_delivery: Integers
+    failed: Flags
 
-    max_speed = Quantity[np.float64]("able", "max_speed")
-    max_turn_rate = Quantity[np.float64]("able", "max_turn_rate")
-    ranger_range = Quantity[np.float64]("able", "ranger_range")
-    view_range = Quantity[np.float64]("able", "view_range")
-    lifts = Quantity[np.bool_]("able", "lifts")
-    delivers = Quantity[np.bool_]("able", "delivers")
-    sends = Quantity[np.bool_]("able", "sends")
-    hears = Quantity[np.bool_]("able", "hears")
+    max_speed: Numbers
+    max_turn_rate: Numbers
+    ranger_range: Numbers
+    view_range: Numbers
+    lifts: Flags
+    delivers: Flags
+    sends: Flags
+    hears: Flags
 
-    item_position = Quantity[np.float64]("items", "position")
-    item_status = Quantity[np.int64]("items", "status")
-    item_carrier = Quantity[np.int64]("items", "carrier")
-    item_covered = Quantity[np.int64]("items", "covered")
+    item_position: Numbers
+    item_status: Integers
+    item_carrier: Integers
+    item_covered: Integers
 
-    open_requests = Quantity[np.int64]("progress", "requested")
-
-    step, requested, time = Count[int](), Count[int](), Count[float]()
-    anchoring_seconds = Count[float]()
+    open_requests: Integers
 
     def __init__(self, scenario: Scenario) -> None:
         lengths = lengths_of(scenario)
         self.robots = blank_robots(lengths)
         self.able = blank(Capabilities, lengths)
         self.items = blank(Items, lengths)
-        self.items.carrier[:], self.items.order[:] = NOBODY, np.arange(scenario.n_items)
+        self.items.carrier[:] = NOBODY
         self.progress = blank(Progress, lengths)
+        self.progress.asked_last[0] = NOBODY
+        for prefix, structure in (("robot_", self.robots), ("", self.able), ("item_", self.items)):
+            for name, array in structure._asdict().items():
+                setattr(self, prefix + name, array)
+        self.failed, self.last_in_delivery = self.robots.failed, self.robots.last_in_delivery
+        self.open_requests = self.progress.requested
         self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
         # Per robot, the failure modes that hold.
         self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * scenario.n_robots
         self.delivery_times: list[float] = []  # [s], ascending
         self.delivered_by: list[int] = []  # robot, one per delivery
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if isinstance(self.__dict__.get(name), np.ndarray):
+            self.__dict__[name][...] = value
+        else:
+            super().__setattr__(name, value)
+
+    @property
+    def step(self) -> int:
+        """Control steps since the start."""
+        return int(self.progress.step[0])
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start."""
+        return float(self.progress.time[0])
+
+    @property
+    def requested(self) -> int:
+        """The item of the oldest request, or NOBODY."""
+        return int(self.progress.requested[0])
+
+    @property
+    def anchoring_seconds(self) -> float:
+        """Seconds for which working robots touched failed ones, summed over robots."""
+        return float(self.progress.anchoring_seconds[0])
 
     @property
     def n_robots(self) -> int:

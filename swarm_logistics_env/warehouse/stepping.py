@@ -1,19 +1,11 @@
-"""A control step in one compiled call, bodies' motion and all, without the interpreter's lock.
-
-Items are no obstacles until no laden robot stands above them: the item collision mask.
-
-An unladen robot may stand above items. Were those solid to it from the moment it lifts another,
-they would shove it off, through its neighbours and walls where there is no room. So what it stands
-above is masked (`Items.covered`), as is an item that is put down, and is solid again when laden
-robots have left it.
-"""
+"""A control step in one compiled call, bodies' motion and all, without the interpreter's lock."""
 
 from __future__ import annotations
 
 from swarm_logistics_env.kernels import kernel
 
 from .demand import ask
-from .grid import fill, look_around
+from .grid import fill
 from .logistics import (
     carry_along,
     close_grippers,
@@ -22,56 +14,14 @@ from .logistics import (
     end_handling,
     open_grippers,
     refused_command,
+    take_out,
+    unmask_left,
 )
 from .packing import unpacked_at
-from .physics import FREE_ITEM, LIFTED, NO_ONE, advance, collide_with, follow
-from .sensing import disturb, fail_rangers, sense
-from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
+from .physics import advance
+from .sensing import sense
+from .structs import NOBODY, STORED, Commands, Sensed, World
 from .surroundings import run_timers, send_messages
-
-
-@kernel
-def mask_below_lifters(world: World, n_events: int) -> None:
-    """Mask what stands below robots that lifted, by the events of this step."""
-    events, items, grid, nearby = world.claims.events, world.items, world.item_grid, world.nearby
-    for event in range(n_events):
-        if events[event, 0] != LIFTED:
-            continue
-        position = world.robots.position[events[event, 1]]
-        n_found = look_around(grid, position[0], position[1], reach_of(world), NOBODY, nearby)
-        for index in range(n_found):
-            item = grid.members[nearby.place[index]]
-            if items.status[item] == STORED:
-                items.covered[item] = 1
-                collide_with(world.engine, world.engine.item_shapes[item], NO_ONE)
-
-
-@kernel
-def unmask_left(world: World) -> None:
-    """Make those masked items solid that no laden robot stands above any more.
-
-    Both grids hold where things stand now. An item that is in none yet waits for the next step.
-    """
-    grid, nearby = world.item_grid, world.nearby
-    for place in range(grid.start[-1]):
-        item = grid.members[place]
-        if world.items.covered[item] == 0:
-            continue
-        x, y = grid.places[place, 0], grid.places[place, 1]
-        n_found = look_around(world.robot_grid, x, y, reach_of(world), NOBODY, nearby)
-        is_below_laden = False
-        for index in range(n_found):
-            robot = world.robot_grid.members[nearby.place[index]]
-            is_below_laden |= world.robots.item[robot] != NOBODY
-        if not is_below_laden:
-            world.items.covered[item] = 0
-            collide_with(world.engine, world.engine.item_shapes[item], FREE_ITEM)
-
-
-@kernel
-def reach_of(world: World) -> float:
-    """Return the distance [m] between centres up to which a robot stands above an item."""
-    return world.parameters.robot_radius + world.parameters.item_radius
 
 
 @kernel
@@ -91,9 +41,13 @@ def perceive(address: int, rows: Sensed) -> None:
         world.nearby.is_free[item] = items.status[item] == STORED
     fill(world.item_grid, items.position, world.nearby.is_free)
     n_anchored = sense(world, rows)
-    disturb(world, rows)
-    fail_rangers(world, rows)
     progress.anchoring_seconds[0] += n_anchored * world.parameters.control_period
+
+
+@kernel
+def remove(address: int, robot: int) -> None:
+    """Take a robot out of the arena of the world at `address`."""
+    take_out(unpacked_at(World, address), robot)
 
 
 @kernel
@@ -106,15 +60,15 @@ def step(address: int, rows: Sensed) -> bool:
     """
     world = unpacked_at(World, address)
     commands, progress, outcome = world.commands, world.progress, world.outcome
-    outcome.refused[0] = refused_command(commands.now, world.robots, world.able)
+    outcome.refused[0] = refused_command(world)
     if outcome.refused[0] != NOBODY:
         return True
     log_command(commands)
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * world.parameters.control_period
-    move(world, commands.now)
-    send_messages(world, commands.now)
-    n_delivered, is_room = handle_items(world, commands.now)
+    move(world)
+    send_messages(world)
+    n_delivered, is_room = handle_items(world)
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:
         perceive(address, rows)
@@ -141,16 +95,12 @@ def log_command(commands: Commands) -> None:
 
 
 @kernel
-def move(world: World, commands: Numbers) -> None:
+def move(world: World) -> None:
     """Turn and move the robots as commanded and as far as bodies let them."""
-    robots, engine, parameters = world.robots, world.engine, world.parameters
-    drive(commands, robots, world.able, parameters, engine.wanted_velocity)
+    drive(world)
     unmask_left(world)
-    n_touching = 0
-    for robot in range(len(robots.contact)):
-        n_touching += int(robots.contact[robot])
-    advance(engine, parameters, n_touching)
-    bodies = engine.bodies.numbers
+    advance(world)
+    robots, bodies = world.robots, world.engine.bodies.numbers
     for robot in range(len(robots.item)):
         is_there = 1.0 if robots.present[robot] else 0.0
         for axis in range(2):
@@ -159,13 +109,11 @@ def move(world: World, commands: Numbers) -> None:
 
 
 @kernel
-def handle_items(world: World, commands: Numbers) -> tuple[int, bool]:
+def handle_items(world: World) -> tuple[int, bool]:
     """Carry along, let go, lift and deliver; returns how many, and whether there was room."""
     carry_along(world)
-    n_events = open_grippers(world, commands)
-    n_events = close_grippers(world, commands, n_events)
-    mask_below_lifters(world, n_events)
-    n_events, n_delivered, is_room = deliver(world, n_events)
+    open_grippers(world)
+    close_grippers(world)
+    n_delivered, is_room = deliver(world)
     end_handling(world)
-    follow(world.engine, world.claims.events, n_events, world.items.position)
     return n_delivered, is_room

@@ -4,6 +4,8 @@ Lengths are numbers or names, see `lengths_of`: N robots, I items, C columns of 
 of a robot that is absent holds zeros and `NOBODY`.
 """
 
+# ruff: noqa: N815 - the engine's functions have their names in C
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -15,10 +17,10 @@ from numpy.typing import NDArray
 from swarm_logistics_env.observations import N_BEAMS
 from swarm_logistics_env.scenario import Scenario
 
+from .failure_modes import FAILURE_MODES
 from .packing import blank
 
 STORED, CARRIED, DELIVERED = 0, 1, 2
-LONGEST_RADIO_DELAY = 2.0  # [s] for which broadcasts are kept
 NOBODY = -1
 
 Numbers: TypeAlias = NDArray[np.float64]
@@ -106,13 +108,12 @@ class Capabilities(NamedTuple):
 
 
 class Items(NamedTuple):
-    """The items, and in which order they are asked for."""
+    """The items, and the streams that decide which one is asked for next."""
 
     position: Annotated[Numbers, "I", 2]  # [m], its carrier's while carried
     status: Annotated[Integers, "I"]  # STORED, CARRIED or DELIVERED
     carrier: Annotated[Integers, "I"]  # robot, or NOBODY
     covered: Annotated[Integers, "I"]  # 1: stored, yet no obstacle; or 0
-    order: Annotated[Integers, "I"]  # items in the order of this cycle's requests
     request_key: Annotated[Keys, "I"]  # of the streams that decide the order of every cycle
     demand_key: Annotated[Keys, 1]  # of the stream of requests that are drawn independently
     restock_key: Annotated[Keys, 1]  # of the streams that decide where delivered items come back
@@ -124,7 +125,9 @@ class Progress(NamedTuple):
     step: Annotated[Integers, 1]  # control steps since the start
     time: Annotated[Numbers, 1]  # [s] since the start
     requested: Annotated[Integers, "n_requests"]  # items asked for, oldest first, then NOBODY
-    n_asked: Annotated[Integers, 1]  # requests drawn so far, those that were skipped included
+    cycle: Annotated[Integers, 1]  # how often all items were asked for
+    asked_last: Annotated[Integers, 1]  # the item that was asked for last in this cycle, or NOBODY
+    n_drawn: Annotated[Integers, 1]  # requests drawn independently so far
     dock_free: Annotated[Numbers, 1]  # [s] since the start, when the next delivery may begin
     n_delivered: Annotated[Integers, 1]  # items delivered
     anchoring_seconds: Annotated[Numbers, 1]  # of working robots that touch failed ones, summed
@@ -168,42 +171,41 @@ class Claims(NamedTuple):
 
     robot: Annotated[Integers, "I"]  # who is going to lift the item, NOBODY before and after
     square: Annotated[Numbers, "I"]  # [m^2] of the distance between the two
-    events: Annotated[Integers, "4 N", 3]  # kind, robot, item: what the bodies must be told
     delivered_by: Annotated[Integers, "N"]  # robots that delivered in this step
 
 
 class Functions(NamedTuple):
-    """Addresses of the engine's functions, with their names in C."""
+    """Addresses of the engine's functions, by their names in C."""
 
-    step: Annotated[int, "cpSpaceStep"]
-    set_iterations: Annotated[int, "cpSpaceSetIterations"]
-    each_body: Annotated[int, "cpSpaceEachBody"]
-    read_body: Annotated[int, "pmSpaceBodyGetIteratorFuncBatched"]
-    write_body: Annotated[int, "pmSpaceBodySetIteratorFuncBatched"]
-    set_filter: Annotated[int, "cpShapeSetFilter"]
-    set_offset: Annotated[int, "cpCircleShapeSetOffset"]
-    reindex: Annotated[int, "cpSpaceReindexShape"]
-    new_space: Annotated[int, "cpSpaceNew"]
-    static_body: Annotated[int, "cpSpaceGetStaticBody"]
-    set_slop: Annotated[int, "cpSpaceSetCollisionSlop"]
-    set_bias: Annotated[int, "cpSpaceSetCollisionBias"]
-    new_body: Annotated[int, "cpBodyNew"]
-    set_position: Annotated[int, "cpBodySetPosition"]
-    set_velocity: Annotated[int, "cpBodySetVelocity"]
-    new_circle: Annotated[int, "cpCircleShapeNew"]
-    new_segment: Annotated[int, "cpSegmentShapeNew"]
-    add_body: Annotated[int, "cpSpaceAddBody"]
-    add_shape: Annotated[int, "cpSpaceAddShape"]
-    free_space: Annotated[int, "cpSpaceFree"]
-    free_body: Annotated[int, "cpBodyFree"]
-    free_shape: Annotated[int, "cpShapeFree"]
+    cpSpaceStep: int
+    cpSpaceSetIterations: int
+    cpSpaceEachBody: int
+    pmSpaceBodyGetIteratorFuncBatched: int
+    pmSpaceBodySetIteratorFuncBatched: int
+    cpShapeSetFilter: int
+    cpCircleShapeSetOffset: int
+    cpSpaceReindexShape: int
+    cpSpaceNew: int
+    cpSpaceGetStaticBody: int
+    cpSpaceSetCollisionSlop: int
+    cpSpaceSetCollisionBias: int
+    cpBodyNew: int
+    cpBodySetPosition: int
+    cpBodySetVelocity: int
+    cpCircleShapeNew: int
+    cpSegmentShapeNew: int
+    cpSpaceAddBody: int
+    cpSpaceAddShape: int
+    cpSpaceFree: int
+    cpBodyFree: int
+    cpShapeFree: int
 
 
 class Batch(NamedTuple):
     """Numbers of all bodies, the static one last, that one call of the engine reads or writes."""
 
     address: int  # of the engine's structure
-    count_address: int  # of how many numbers it has read or written
+    filled: Annotated[NDArray[np.int32], 1]  # numbers that it has read or written
     numbers: Annotated[Numbers, "bodies", "columns"]
 
 
@@ -265,10 +267,10 @@ def parameters_of(scenario: Scenario) -> Parameters:
 def lengths_of(scenario: Scenario) -> dict[str, int]:
     """Return the lengths of a world's arrays by the names that their shapes have."""
     n, n_items = scenario.n_robots, scenario.n_items
-    n_kept = round(LONGEST_RADIO_DELAY / scenario.control_period) + 1
+    longest_delay = max(mode.radio_delay for mode in FAILURE_MODES.values())
+    n_kept = round(longest_delay / scenario.control_period) + 1  # steps of broadcasts
     return {
         "N": n,
-        "4 N": 4 * n,
         "I": n_items,
         "K": n_kept,
         "K N": n_kept * n,

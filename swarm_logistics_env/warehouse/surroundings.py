@@ -16,7 +16,7 @@ from swarm_logistics_env.kernels import inlined_kernel, kernel, pair_key, unifor
 
 from .demand import is_requested
 from .logistics import MESSAGE, is_remembered
-from .structs import NOBODY, Grid, Nearby, Numbers, Sensed, World
+from .structs import NOBODY, Grid, Nearby, Sensed, World
 
 _N_BEAMS = row.N_BEAMS
 _BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
@@ -173,7 +173,7 @@ def is_missed(key: np.uint64, other: int, step: int, purpose: int, probability: 
 
 
 @kernel
-def send_messages(world: World, commands: Numbers) -> None:
+def send_messages(world: World) -> None:
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
     robots, able, step = world.robots, world.able, world.progress.step[0]
     message, before = robots.message, robots.message_before
@@ -181,7 +181,7 @@ def send_messages(world: World, commands: Numbers) -> None:
     for robot in range(n):
         sends = robots.present[robot] and able.obeys[robot]
         for place in range(message.shape[1]):
-            given = commands[robot, MESSAGE + place] if sends else 0.0
+            given = world.commands.now[robot, MESSAGE + place] if sends else 0.0
             given = min(max(given, -1.0), 1.0)
             before[(step % n_kept) * n + robot, place] = given
             if able.radio_delay[robot] > 0:
@@ -278,19 +278,10 @@ def view_square(view_range: float) -> float:
 
 
 @inlined_kernel
-def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> None:
-    """Fill the block of items in a row from the free items nearby."""
-    robots, grid, nearby = world.robots, world.item_grid, world.nearby
-    limit, dropout = view_square(world.able.view_range[me]), world.parameters.sensor_dropout
-    n_seen, step = 0, world.progress.step[0]
-    for index in range(n_found):
-        item, square = grid.members[nearby.place[index]], nearby.square[index]
-        is_seen = square <= limit
-        if dropout > 0.0 and is_seen:
-            is_seen = not is_missed(robots.sensor_key[me], item, step, ITEM_SEEN, dropout)
-        nearby.chosen[n_seen], nearby.chosen_square[n_seen] = item, square
-        n_seen += int(is_seen)
-    for place in range(rank_nearest(nearby, n_seen, row.N_ITEMS_IN_VIEW)):
+def tell_of_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
+    """Fill the block of items in a row from the chosen items."""
+    robots, nearby = world.robots, world.nearby
+    for place in range(rank_nearest(nearby, n_chosen, row.N_ITEMS_IN_VIEW)):
         item = nearby.chosen[nearby.nearest[place]]
         position = world.items.position
         forward, left = in_frame(pose, position[item, 0], position[item, 1])
@@ -303,16 +294,15 @@ def see_items(me: int, pose: Pose, world: World, n_found: int, out: Sensed) -> N
 
 
 @inlined_kernel
-def choose_neighbours(me: int, world: World, n_found: int) -> int:
-    """List in `nearby.chosen` the robots that `me` sees or hears; returns how many."""
-    robots, nearby, grid = world.robots, world.nearby, world.robot_grid
-    limit = view_square(world.able.view_range[me])
+def choose(me: int, world: World, grid: Grid, n_found: int, purpose: int) -> int:
+    """List in `nearby.chosen` what `me` sees, and of robots whom it hears; returns how many."""
+    nearby, limit = world.nearby, view_square(world.able.view_range[me])
     dropout, n_chosen, step = world.parameters.sensor_dropout, 0, world.progress.step[0]
     for index in range(n_found):
         other, square = grid.members[nearby.place[index]], nearby.square[index]
-        is_heard, is_seen = nearby.is_heard[index], square <= limit
+        is_heard, is_seen = purpose == ROBOT_SEEN and nearby.is_heard[index], square <= limit
         if dropout > 0.0 and is_seen:
-            is_seen = not is_missed(robots.sensor_key[me], other, step, ROBOT_SEEN, dropout)
+            is_seen = not is_missed(world.robots.sensor_key[me], other, step, purpose, dropout)
         nearby.chosen[n_chosen], nearby.chosen_square[n_chosen] = other, square
         nearby.chosen_heard[n_chosen] = is_heard
         n_chosen += int(is_heard | is_seen)

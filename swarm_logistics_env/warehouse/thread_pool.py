@@ -69,21 +69,20 @@ class WorldThreadPool:
     def _start(self) -> None:
         self._process, n_worlds = os.getpid(), len(self._worlds)
         self._queue = queue = np.zeros(FIRST_JOB + n_worlds * JOB_LENGTH, np.int64)
-        queue[N_JOBS] = n_worlds
         self._jobs = jobs = queue[FIRST_JOB:].reshape(-1, JOB_LENGTH)
         jobs[:, FIRST_ROW], jobs[:, IS_DONE] = self._firsts, 1
         jobs[:, IS_WATCHED], self.is_watched = self.is_watched, jobs[:, IS_WATCHED]
         self._address: int = queue.ctypes.data
         # No semaphore: another thread may hold its lock at a fork or when a finalizer comes.
         self._wake: SimpleQueue[None] = SimpleQueue()
-        # Compiled before helpers are many and in the way of the caller, and so that no Ctrl-C
-        # finds them half compiled.
-        no_jobs = np.zeros(FIRST_JOB, np.int64)
-        submit(no_jobs.ctypes.data, np.zeros((0, 0)), np.zeros((0, 0), np.float32))
-        for compiled in (take_sleepers, finish):
-            compiled(no_jobs.ctypes.data)
-        help_out(no_jobs.ctypes.data, 0)
-        next_told(no_jobs.ctypes.data, 0, 0)
+        # Compiled, as there are no jobs yet, before helpers are many and in the way of the caller,
+        # and so that no Ctrl-C finds them half compiled.
+        submit(self._address, np.zeros((0, 0)), np.zeros((0, 0), np.float32))
+        help_out(self._address, 0)
+        next_told(self._address, 0, 0)
+        finish(self._address)
+        take_sleepers(self._address)
+        queue[N_JOBS] = n_worlds
         self.close = weakref.finalize(self, _close, queue, self._wake, self._n_helpers)
         for _ in range(self._n_helpers):
             threading.Thread(
@@ -183,7 +182,7 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
         for robot in range(len(now)):
             for column in range(now.shape[1]):
                 now[robot, column] = commands[first + robot, column]
-        refused = refused_command(now, world.robots, world.able)
+        refused = refused_command(world)
         world.outcome.refused[0] = NOBODY
         if refused != NOBODY:
             return int(first * commands.shape[1] + refused)

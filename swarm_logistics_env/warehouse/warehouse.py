@@ -18,10 +18,10 @@ from swarm_logistics_env.streams import key, row_keys
 from . import layout, stepping
 from .faults import GRACE, Fault, FaultLike, Occurrence, apply_faults, checked_faults
 from .grid import blank_grid
-from .logistics import IDLE, MESSAGE
+from .logistics import MESSAGE
 from .packing import blank, packed
 from .physics import Physics
-from .state import NOBODY, STORED, WarehouseState
+from .state import NOBODY, WarehouseState
 from .structs import Claims, Commands, Nearby, Sensed, StepResult, World, lengths_of, parameters_of
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
@@ -57,7 +57,6 @@ class Warehouse:
         self.n_removed = 0
         self.is_eventful = False
         self._seed: int | None = None
-        self._command_shape = (-1, -1)  # no commands have it before a reset
         self._words = np.zeros(0, np.int64)
 
     def reset(
@@ -86,9 +85,9 @@ class Warehouse:
         self._build()
         stepping.begin(self._address)
         self._apply_faults()
-        self._rows = self._blank_rows()
+        self._rows = np.empty((state.n_robots, n_columns(scenario)), np.float32)
         stepping.perceive(self._address, self._rows)
-        state.anchoring_seconds = 0.0
+        state.progress.anchoring_seconds[0] = 0.0
         self._save()
         return self.observe()
 
@@ -108,14 +107,9 @@ class Warehouse:
             CommandError: wrong shape, not numbers, or not finite; the world is as it was.
             SetupError: the world was never reset.
         """
-        if not (
-            isinstance(commands, np.ndarray)
-            and commands.shape == self._command_shape
-            and commands.dtype.kind in "fiub"
-        ):
-            commands = self._checked(commands)
-        self._world.commands.now[...] = commands
-        rows = self._blank_rows()
+        given = self._checked(commands)
+        self._world.commands.now[...] = given
+        rows = np.empty_like(self._rows)  # what was handed out stays as it was
         self.take(rows, stepping.step(self._address, rows))
         return rows
 
@@ -239,7 +233,6 @@ class Warehouse:
         items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
         items.demand_key[0] = key(seed, "demand")
         items.restock_key[0] = key(seed, "restock")
-        layout.draw_order(items.request_key, 0, items.order)
         state.open_requests[:] = NOBODY
 
     def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
@@ -251,11 +244,11 @@ class Warehouse:
         if given.dtype.kind not in "fiub":  # NumPy makes numbers of texts and times, too
             raise CommandError(f"commands should be numbers: real ones, not {given.dtype}")
         n, n_columns = self._command_shape
+        if given.shape == self._command_shape:
+            return given
         if given.shape == (n, MESSAGE):
             return np.pad(given, ((0, 0), (0, n_columns - MESSAGE)))
-        if given.shape != self._command_shape:
-            raise CommandError(f"commands of shape {given.shape}: should be {self._command_shape}")
-        return given
+        raise CommandError(f"commands of shape {given.shape}: should be {self._command_shape}")
 
     def _make_room_to_work(self) -> None:
         scenario = self.scenario
@@ -268,7 +261,6 @@ class Warehouse:
         self._robot_grid = blank_grid(width, height, hears / 2, n)
         self._item_grid = blank_grid(width, height, sees / 2, n_items)
         self._command_shape = (n, MESSAGE + scenario.message_size)
-        self._row_shape = (n, n_columns(scenario))
         size = math.prod(self._command_shape)
         self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
 
@@ -318,28 +310,8 @@ class Warehouse:
         state.progress.pause_step[0] = math.ceil((change - GRACE) / period) if is_ever else NOBODY
         gone = apply_faults(state, self.scenario, self._occurrences)
         for robot in np.flatnonzero(gone & state.robot_present).tolist():
-            self._remove(robot)
-
-    def _remove(self, robot: int) -> None:
-        state = self.state
-        item = int(state.robot_item[robot])
-        if item != NOBODY:
-            state.item_status[item], state.item_covered[item] = STORED, 1
-            state.item_carrier[item] = NOBODY
-            self._physics.release(robot, item, *state.item_position[item].tolist())
-        self._physics.remove(robot)
-        self.n_removed += 1
-        state.robot_present[robot] = False
-        state.robot_in_delivery[robot] = False
-        state.robot_item[robot] = NOBODY
-        state.robots.handling[robot] = IDLE
-        state.robot_memory[robot] = NOBODY
-        for zeroed in (state.robot_position, state.robot_velocity, state.robot_heading):
-            zeroed[robot] = 0.0
-
-    def _blank_rows(self) -> Sensed:
-        # New memory every time: what was handed out stays as it was.
-        return np.empty(self._row_shape, np.float32)
+            stepping.remove(self._address, robot)
+            self.n_removed += 1
 
     def _build(self) -> None:
         """Make the bodies, and tell compiled code where everything is."""

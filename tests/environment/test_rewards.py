@@ -17,7 +17,7 @@ def world() -> Warehouse:
     """A world of four robots whose state the tests change by hand, as a step would."""
     made = Warehouse(Scenario(n_robots=4, n_items=6))
     made.reset(0)
-    made.state.requested = 2
+    made.state.open_requests[0] = 2
     return made
 
 
@@ -37,7 +37,7 @@ def deliver(world: Warehouse, robot: int, next_request: int) -> None:
     world.state.item_status[world.state.requested] = DELIVERED
     world.state.delivery_times.append(1.0)
     world.state.delivered_by.append(robot)
-    world.state.requested = next_request
+    world.state.open_requests[0] = next_request
 
 
 Act = tuple[Any, ...]  # a change of the world by hand, and what it pays

@@ -113,7 +113,7 @@ def test_frame_depends_on_the_state_alone() -> None:
     assert np.array_equal(before, kept)  # an array of the caller's own
     assert np.array_equal(renderer.frame(state, scenario), before)
     renderer.close()
-    state.time = 271.8  # words that were not written before
+    state.progress.time[0] = 271.8  # words that were not written before
     assert not np.array_equal(renderer.frame(state, scenario), before)
 
 
@@ -121,14 +121,14 @@ def test_requested_item_is_plain_to_see() -> None:
     state, scenario = situation([[2, 2]], [[5, 5], [7, 7]])
     for place in (0.5, 0.7, 0.2):  # one item, the other, and that one on the robot
         if place == 0.7:
-            state.requested = 1
+            state.open_requests[0] = 1
         if place == 0.2:
             give(state, 0, 1)
         rows, columns = np.nonzero((arena(state, scenario, 800) == palette.REQUESTED).all(axis=2))
         assert len(rows) > 250
         assert rows.mean() == pytest.approx((1.0 - place) * 760, abs=2)  # y points up
         assert columns.mean() == pytest.approx(place * 760, abs=2)
-    state.requested, state.robot_item[0] = NOBODY, NOBODY
+    state.open_requests[0], state.robot_item[0] = NOBODY, NOBODY
     state.item_status[:] = DELIVERED
     assert count(arena(state, scenario, 800), palette.REQUESTED) == 0
 
@@ -152,7 +152,7 @@ def test_what_a_robot_does_its_timer_and_its_heading_show() -> None:
     assert colours() == [True, False, False]
     give(state, 0, 1)
     assert colours() == [False, True, False]
-    state.requested = 1
+    state.open_requests[0] = 1
     assert colours() == [False, False, True]
     looks_east = arena(state, scenario)
     state.robot_heading[:] = np.pi

@@ -10,7 +10,9 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.warehouse import layout
+from swarm_logistics_env.kernels import uniform
+from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.warehouse import layout, warehouse
 
 Build = Callable[..., Warehouse]
 Command = tuple[float, float, float, float]
@@ -39,6 +41,12 @@ def follow(world: Warehouse, script: Iterable[Sequence[Command]]) -> Warehouse:
     return world
 
 
+def ascending(seed: int, purpose: str, n_rows: int) -> NDArray[np.uint64]:
+    """Return keys of streams, sorted by the first number of each."""
+    keys = row_keys(seed, purpose, n_rows)
+    return keys[np.argsort([uniform(one, 0) for one in keys])]
+
+
 @pytest.fixture
 def build(monkeypatch: pytest.MonkeyPatch) -> Build:
     """Return a maker of worlds that were just reset, with everything placed by hand.
@@ -53,7 +61,7 @@ def build(monkeypatch: pytest.MonkeyPatch) -> Build:
         n = len(places)
         monkeypatch.setattr(layout, "place_robots", lambda *_: (places.copy(), np.zeros(n)))
         monkeypatch.setattr(layout, "place_items", lambda *_: item_places.copy())
-        monkeypatch.setattr(layout, "draw_order", lambda *_: None)
+        monkeypatch.setattr(warehouse, "row_keys", ascending)
         counts = {"n_robots": n, "n_items": len(item_places)}
         world = Warehouse(Scenario(**{"heading_drift": 0.0, **counts, **fields}))
         world.reset(0, faults)

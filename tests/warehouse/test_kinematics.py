@@ -10,9 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.warehouse import structs
 from swarm_logistics_env.warehouse.logistics import drive
-from swarm_logistics_env.warehouse.packing import blank
 
 
 @given(
@@ -25,14 +23,15 @@ from swarm_logistics_env.warehouse.packing import blank
 def test_a_robot_drives_along_its_mean_direction_at_most_at_its_top_speed(
     commands: list[float], heading: float, period: float, is_holonomic: bool
 ) -> None:
-    scenario = Scenario(n_robots=2)
-    lengths, wanted = structs.lengths_of(scenario), np.full((2, 2), 9.0)
-    robots, able = structs.blank_robots(lengths), blank(structs.Capabilities, lengths)
-    robots.heading[:], able.obeys[:] = heading, [True, False]
+    still = Warehouse(Scenario(n_robots=2, heading_drift=0.0))
+    still.reset(0)
+    parameters = still._world.parameters._replace(control_period=period, is_holonomic=is_holonomic)
+    world = still._world._replace(parameters=parameters)
+    robots, able, wanted = world.robots, world.able, world.engine.wanted_velocity
+    robots.heading[:], able.obeys[:], wanted[:] = heading, [True, False], 9.0
     able.max_speed[:], able.max_turn_rate[:] = 2.0, 6.0
-    parameters = structs.parameters_of(scenario)
-    parameters = parameters._replace(control_period=period, is_holonomic=is_holonomic)
-    drive(np.array([commands, commands]), robots, able, parameters, wanted)
+    world.commands.now[:] = commands
+    drive(world)
     forward, left, turn = np.clip(commands[:3], -1.0, 1.0)
     way = complex(forward, left if is_holonomic else 0.0)
     way *= 2.0 / max(abs(way), 1.0) * cmath.exp(1j * (heading + 0.5 * turn * 6.0 * period))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ import pytest
 from swarm_logistics_env import Fault, Warehouse
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.warehouse import physics
-from swarm_logistics_env.warehouse.packing import blank, hints, packed
-from swarm_logistics_env.warehouse.structs import Claims, Functions
+from swarm_logistics_env.warehouse.packing import blank, packed
+from swarm_logistics_env.warehouse.structs import Items
 from tests.warehouse.conftest import EAST, FAR, HOLD, OPEN, STAY, WEST, Build, steps
 
 DIAMETER = 0.25
@@ -116,15 +116,14 @@ def test_an_item_is_in_the_way_where_it_was_put_down_and_nowhere_else(build: Bui
 
 
 def test_an_array_that_is_not_as_declared_is_refused_before_a_kernel_reads_it() -> None:
-    claims = blank(Claims, {"I": 4, "4 N": 8, "N": 2})
-    others: list[Any] = [claims.events.astype(np.int32), claims.events[0], claims.events[::2].T]
-    for events in others:
-        with pytest.raises(TypeError, match=r"Claims\.events: should be"):
-            packed(claims._replace(events=events))
+    items = blank(Items, {"I": 4})
+    others: list[Any] = [items.position.astype("f4"), items.position[0], items.position[::2].T]
+    for position in others:
+        with pytest.raises(TypeError, match=r"Items\.position: should be"):
+            packed(items._replace(position=position))
 
 
 def test_a_pymunk_without_the_functions_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    renamed = {**hints(Functions), "step": Annotated[int, "cpSpaceLeap"]}
-    monkeypatch.setattr(physics, "hints", lambda _: renamed)
+    monkeypatch.setattr(physics, "Functions", NamedTuple("Functions", [("cpSpaceLeap", int)]))
     with pytest.raises(SetupError, match=r"pymunk 7.* lacks a function: .*cpSpaceLeap"):
         physics._function_addresses()
