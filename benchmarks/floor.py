@@ -62,4 +62,4 @@ class ForceFloor:
 def _drive_by_force(address: int, wanted: Numbers) -> None:
     world = unpacked_at(World, address)
     world.engine.wanted_velocity[:] = wanted
-    advance(world.engine, world.parameters, 0)
+    advance(world)

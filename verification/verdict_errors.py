@@ -87,7 +87,9 @@ _AROUND: Mapping[str, Callable[[Rng, Floats], Floats]] = {
 }
 
 
-def judged(p_o: Floats, p_new: Floats, threshold: float, confidence: float = 0.95) -> RatioTest[Any]:
+def judged(
+    p_o: Floats, p_new: Floats, threshold: float, confidence: float = 0.95
+) -> RatioTest[Any]:
     """Return the test of the relative change of P, as studies make it."""
     stakes = at_stake([(1.0, p_new), (-1.0 - threshold, p_o)])
     return paired_ratio(
