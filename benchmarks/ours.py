@@ -101,7 +101,6 @@ def vec_env(threads: int) -> Contestant:
         env.num_envs * _STEPS,
         _STEPS,
         ARRAYS,
-        timed_by="wall",
     )
 
 
@@ -119,27 +118,24 @@ def _timed(
 def start_up() -> dict[str, float]:
     """Return the seconds before the first step, of the processor and in the end of the wall.
 
-    To import the package, and what it stands on alone; to the first step where all has to be
-    compiled, and where nothing has to be.
+    To import the package; to the first step where all has to be compiled, and where nothing has to
+    be.
     """
     with tempfile.TemporaryDirectory() as cache:
-        compiling = _seconds(_FIRST_STEP, NUMBA_CACHE_DIR=cache)
-    _seconds(_FIRST_STEP)  # warms the cache
+        compiling = _seconds(_FIRST_STEP, 1, NUMBA_CACHE_DIR=cache)
+    _seconds(_FIRST_STEP, 1)  # warms the cache
     return {
-        "import": _median("import swarm_logistics_env"),
-        "import_of_needed": _median("import pettingzoo, pymunk, numba"),
+        "import": _seconds("import swarm_logistics_env"),
         "first_step, empty cache": compiling,
-        "first_step": _median(_FIRST_STEP, "perf_counter"),
+        "first_step": _seconds(_FIRST_STEP, clock="perf_counter"),
     }
 
 
-def _median(script: str, clock: str = "process_time") -> float:
-    return statistics.median(_seconds(script, clock) for _ in range(5))
-
-
-def _seconds(script: str, clock: str = "process_time", **environment: str) -> float:
-    done = subprocess.run(
-        [sys.executable, "-c", _TIMED.format(clock, script)],
-        env={**os.environ, **environment}, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return float(done.stdout)
+def _seconds(
+    script: str, repeats: int = 5, clock: str = "process_time", **environment: str
+) -> float:
+    command = [sys.executable, "-c", _TIMED.format(clock, script)]
+    told = [
+        subprocess.check_output(command, env={**os.environ, **environment}) for _ in range(repeats)
+    ]
+    return statistics.median(map(float, told))

@@ -27,7 +27,6 @@ class Contestant:
     agent_steps: int  # of single agents, in a run
     control_steps: int  # of everything, in a run
     base: str | None = None  # the contestant whose cost its own is divided by
-    timed_by: str = "processor"  # on a machine that does other things too; of threads "wall"
     seconds: list[float] = field(default_factory=list)  # of each run so far
 
     def ratio_to(self, base: "Contestant") -> float:
@@ -55,7 +54,6 @@ def rows(contestants: Sequence[Contestant]) -> list[dict[str, Any]]:
             "microseconds_per_step": statistics.median(one.seconds) / one.control_steps * 1e6,
             "base": one.base,
             "cost_to_base": one.ratio_to(known[one.base]) if one.base else None,
-            "timed_by": one.timed_by,
             "agent_steps": one.agent_steps,
             "seconds": one.seconds,
         }

@@ -147,21 +147,18 @@ def _p_and_stalls(cell: Cell) -> str:
 
 def draw_ladder(restocked: StudyResults, path: Path) -> None:
     """Draw P of each rung with its interval, without and with a handling time."""
+    worlds = list(enumerate(_worlds(restocked).items()))
+    rows = [
+        (rung, [drawing.Point(name, style, "", *of[rung].mean) for style, (name, of) in worlds])
+        for rung in restocked.policies
+    ]
 
     def draw(canvas: "Figure") -> None:
-        axes = canvas.subplots()
-        places = range(len(restocked.policies), 0, -1)
-        worlds = zip(_worlds(restocked).items(), drawing.COLOURS, drawing.MARKERS)
-        for shift, ((name, cells), colour, marker) in enumerate(worlds):
-            for place, rung in zip(places, restocked.policies):
-                value, low, high = cells[rung].mean
-                at = place + 0.14 - 0.28 * shift
-                axes.plot([low or value, high or value], [at, at], color=colour)
-                axes.plot(value, at, marker, color=colour)
-            axes.plot([], [], marker, color=colour, label=name)
-        axes.set_yticks(list(places), restocked.policies)
+        drawing.forest(canvas, rows)
+        (axes,) = canvas.axes
         axes.set(xlabel="P, items delivered in 500 s where items come back", xlim=(0.0, None))
-        axes.legend(loc="upper right")
+        marks, names = axes.get_legend_handles_labels()
+        axes.legend(marks[: len(worlds)], names[: len(worlds)], loc="upper right")
 
     path.write_text(drawing.images(draw, 2.9)[0], encoding="utf-8")
 
