@@ -42,8 +42,8 @@ class Policy(Protocol):
         """Return commands (N, 4) in [-1, 1] for observation rows (N, D)."""
 
 
-def checked(policy: object) -> Policy:
-    """Return the policy that `policy` is.
+def check_policy(policy: object) -> None:
+    """Check that `policy` is one.
 
     Raises:
         PolicyError: it is none.
@@ -53,7 +53,6 @@ def checked(policy: object) -> Policy:
             f"policy = {policy!r}: should have the methods reset and act, as what "
             "policies.load(name) returns has"
         )
-    return policy
 
 
 def start(policy: Policy, scenario: Scenario, seed: int) -> None:
@@ -62,7 +61,8 @@ def start(policy: Policy, scenario: Scenario, seed: int) -> None:
     Raises:
         PolicyError: it is none.
     """
-    configure = getattr(checked(policy), "configure", None)
+    check_policy(policy)
+    configure = getattr(policy, "configure", None)
     if configure is not None:
         configure(scenario)
     policy.reset(scenario.n_robots, seed)

@@ -30,7 +30,7 @@ from swarm_logistics_env.policies.files import (
 )
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
-from swarm_logistics_env.policies.policy import Policy, checked, identity
+from swarm_logistics_env.policies.policy import Policy, check_policy, identity
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.records import Record, canonical_json
 
@@ -85,7 +85,9 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         kinds = "a name, 'package.module:Class' or a .safetensors or .zip file"
         raise PolicyError(f"no policy {name!r} ({kinds}){meant}")
     try:
-        return checked(make(**parameters))
+        policy: Policy = make(**parameters)
+        check_policy(policy)
+        return policy
     except SwarmLogisticsError:
         raise
     except Exception as error:  # of code that is not ours
@@ -200,7 +202,9 @@ class PolicySpec(Record):
                 raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
             return found
         if self.made is not None:
-            found = self.made if makers else checked(self.made)
+            if not makers:
+                check_policy(self.made)
+            found = self.made
         elif makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         elif makers and self.name.endswith(SB3_SUFFIX):

@@ -89,7 +89,7 @@ def lifted_in_fm2(state: Any) -> None:
 SPOILT: list[tuple[str, Spoil]] = [
     ("two robots carry one item", two_hands),
     ("an item is carried by nobody", put("item_status", slice(None), DELIVERED)),
-    ("nothing is asked for", lambda state: setattr(state, "requested", NOBODY)),
+    ("nothing is asked for", put("open_requests", 0, NOBODY)),
     ("overlap by", put("robot_position", (0, 0), 0.01)),
     ("overlap by nan", put("robot_position", 0, np.nan)),
     (r"robot_timer leaves \[0, 10\)", put("robot_timer", 0, 10.0)),
