@@ -164,7 +164,7 @@ def test_page_quotes_what_was_played(
         one["modes"] = ["FM4"] if "FM4" in one["modes"] else one["modes"][:1]
     study = Study(
         out=tmp_path / name,
-        policies=["homing"] if late else ["homing", "central"],
+        policies=["homing"] if late else ["homing", "homing-stock"],
         seeds=2,
         scenario={**asked.scenario.model_dump(), "duration": 210.0 if late else 40.0},
         indicators=asked.indicators,
