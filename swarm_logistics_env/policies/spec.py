@@ -82,7 +82,7 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
     if make is None:
         known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         meant = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, known)
-        kinds = "a name, 'package.module:Class' or a .safetensors or .zip file"
+        kinds = "a name, 'my.py:Class', 'package.module:Class', or a .safetensors or .zip file"
         raise PolicyError(f"no policy {name!r} ({kinds}){meant}")
     try:
         policy: Policy = make(**parameters)
