@@ -64,7 +64,7 @@ def test_bad_samples_are_named(name: str) -> None:
         ([], "is empty"),
         ([[1.0, 2.0]], r"shape \(1, 2\)"),
         ([3.0, float("nan"), 1.0, 1.0], r"\[1\] = nan: should be finite"),
-        ([3.0, 1.0, -2.0, 1.0], r"\[2\] = -2: should not be negative"),
+        ([3.0, 1.0, -2.0, 1.0], r"\[2\] = -2: should be finite, not negative"),
         (["many", 1, 2, 3], "should be an array of numbers"),
     ):
         with pytest.raises(IndicatorError, match=r"^p_(o|n)\b.*" + message):
