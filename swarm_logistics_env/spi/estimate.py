@@ -23,8 +23,8 @@ from .inputs import (
 from .ratio import MIN_SEEDS, RatioTest, Term, over_trainings, paired_ratio, ratio_of_samples, welch
 from .summaries import at_stake, pairing_correlation
 
-# Performances by name, with their weights in numerator and denominator.
-Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float, float]]
+# Performances by name, with their weights in the numerator; the last is the denominator.
+Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float]]
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
 
@@ -177,10 +177,10 @@ def judge(
 
     Args:
         indicator: Its name.
-        terms: Name to performances over seeds [items] and their weights in numerator and
-            denominator; the first two are compared, the last is the reference that the ratio
-            divides by. Of several trainings of a policy each has a row, shape (K, n); a
-            performance of shape (n,) beside it is of a policy that is not trained.
+        terms: Name to performances over seeds [items] and their weight in the numerator; the first
+            two are compared, the last is the reference that the ratio divides by. Of several
+            trainings of a policy each has a row, shape (K, n); a performance of shape (n,) beside
+            it is of a policy that is not trained.
         offset: Added to the ratio of means.
 
     Raises:
@@ -277,7 +277,7 @@ def _checked(
     paired: bool,
     identical: bool,
 ) -> dict[str, Term]:
-    samples = {name: performance(name, p, or_trainings=True) for name, (p, *_) in terms.items()}
+    samples = {name: performance(name, p, or_trainings=True) for name, (p, _) in terms.items()}
     trainings = {len(p) for p in samples.values() if p.ndim == 2}
     if trainings:  # a policy that is not trained is the same beside every one
         every = (max(trainings), 1)
@@ -298,7 +298,10 @@ def _checked(
                 )
     reference = list(samples)[-1]
     positive_mean(reference, samples[reference])
-    return {name: Term(samples[name], *weights) for name, (_, *weights) in terms.items()}
+    return {
+        name: Term(samples[name], weight, float(name == reference))
+        for name, (_, weight) in terms.items()
+    }
 
 
 def _skewness(difference: Numbers) -> float:
