@@ -30,21 +30,16 @@ class Line(NamedTuple):
     Attributes:
         policy: whose swarm it is about.
         indicator: its symbol.
-        about: what is changed, e.g. "FM4, 1 of 25".
+        question: indicator and what is changed, e.g. "R FM4, 1 of 25".
         tests: the verdicts, in the order of the values.
         numbers: their places among the verdicts of the study.
     """
 
     policy: str
     indicator: str
-    about: str
+    question: str
     tests: tuple[Verdict, ...]
     numbers: tuple[int, ...]
-
-    @property
-    def question(self) -> str:
-        """Indicator and what is changed."""
-        return f"{self.indicator} {self.about}"
 
     @property
     def value(self) -> str:
@@ -155,7 +150,7 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     # Recorded trials may ask one question in several tables, at other values of a parameter.
     times = Counter((line.policy, line.question) for line in lines)
     lines = [
-        line._replace(about=f"{line.about}, {_part_of_title(line.tests[0].compared.table)}")
+        line._replace(question=f"{line.question}, {_part_of_title(line.tests[0].compared.table)}")
         if times[line.policy, line.question] > 1
         else line
         for line in lines
@@ -189,7 +184,8 @@ def _alike(shared: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
 def _line(numbered: Sequence[tuple[int, Verdict]]) -> Line:
     numbers, tests = zip(*numbered)
     compared = tests[0].compared
-    return Line(compared.policy, compared.indicator, _about(tests), tests, numbers)
+    question = f"{compared.indicator} {_about(tests)}"
+    return Line(compared.policy, compared.indicator, question, tests, numbers)
 
 
 def _about(tests: Sequence[Verdict]) -> str:
