@@ -269,11 +269,12 @@ def _last(results: StudyResults) -> str:
         parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):
         parts.append("some runs stalled (P below a quarter of the median; --full names them)")
-    if any(test.conclusion == "inconclusive" for test in tests):
+    undecided = [test for test in tests if test.conclusion == "inconclusive"]
+    if undecided:
         parts.append(
             f"so many more {runs} would tell such a value from the threshold in 4 of 5 studies"
         )
-    beside = [test for test in tests if test.conclusion == "inconclusive" and _on_one_side(test)]
+    beside = [test for test in undecided if section.lies_above(test) is not None]
     reasons = {
         "so few seeds may hide stalls": any("hidden_stalls" in test.flags for test in beside),
         "Holm counts all questions": any(test.plain in section.DECIDED for test in beside),
@@ -290,13 +291,6 @@ def _last(results: StudyResults) -> str:
             parts.append(f"of {section.plural(len(here), 'claim')}{where} {found}")
     line = "; ".join(parts)
     return f"{line[0].upper()}{line[1:]}."
-
-
-def _on_one_side(test: Verdict) -> bool:
-    """Return whether an interval leaves out the threshold."""
-    _, low, high = test.interval or (None, None, None)
-    threshold = test.compared.threshold
-    return low is not None and high is not None and not low <= threshold <= high
 
 
 def in_a_sentence(results: StudyResults) -> str:

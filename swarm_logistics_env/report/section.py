@@ -139,6 +139,15 @@ def ratio(test: Verdict) -> str:
     return bracketed(test.interval, 3) + SATURATED * (test.saturated and test.interval is not None)
 
 
+def lies_above(test: Verdict) -> bool | None:
+    """Return whether an interval lies above the threshold; None: it holds it, or there is none."""
+    _, low, high = test.interval or (None, None, None)
+    threshold = test.compared.threshold
+    if low is None or high is None or low <= threshold <= high:
+        return None
+    return low > threshold
+
+
 def said(verdict: str | None) -> str:
     """Return a verdict in words."""
     return WORDS[verdict or "blocked"]
