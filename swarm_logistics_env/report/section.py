@@ -27,7 +27,7 @@ NOTHING = "–"
 DECIDED = ("supported", "refuted", "equivalent")
 UNAFFECTED = SIGNS["unaffected"].word
 # The words for verdicts, in the order in which they are counted.
-WORDS = {**{verdict: sign.word for verdict, sign in SIGNS.items()}, "blocked": "undefined"}
+WORDS = {verdict: sign.word for verdict, sign in SIGNS.items()}
 FLAGS = {
     "single_seed": "One seed gives a value, but no interval and no verdict",
     "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
@@ -156,7 +156,7 @@ def said(verdict: str | None) -> str:
 def answered(test: Verdict) -> str:
     """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
     plain, adjusted = said(test.answer), said(test.answer_holm)
-    return plain if plain in (adjusted, "undefined") else f"{plain} ({adjusted})"
+    return plain if plain == adjusted else f"{plain} ({adjusted})"
 
 
 def counted_as(test: Verdict, verdict: str | None) -> str:

@@ -32,24 +32,22 @@ class Sign(NamedTuple):
     """How a verdict is shown.
 
     Attributes:
-        mark: one character, which tells it without colour.
-        word: what the mark is called in a legend.
+        word: what it is called in reports.
         light, dark: hexadecimal colours on white and on black paper, after Okabe and Ito.
     """
 
-    mark: str
     word: str
     light: str
     dark: str
 
 
 SIGNS = {
-    "supported": Sign("✓", "supported", "#006b4c", "#3fc79a"),
-    "refuted": Sign("✗", "refuted", "#a84300", "#f5915a"),
-    "equivalent": Sign("≈", "equivalent", "#005b94", "#6cb8ee"),
-    "inconclusive": Sign("?", "open", "#5b6068", "#a9afb8"),
-    "unaffected": Sign("=", "same runs", "#5b6068", "#a9afb8"),
-    "blocked": Sign("!", "blocked", "#a84300", "#f5915a"),
+    "supported": Sign("supported", "#006b4c", "#3fc79a"),
+    "refuted": Sign("refuted", "#a84300", "#f5915a"),
+    "equivalent": Sign("equivalent", "#005b94", "#6cb8ee"),
+    "inconclusive": Sign("open", "#5b6068", "#a9afb8"),
+    "unaffected": Sign("same runs", "#5b6068", "#a9afb8"),
+    "blocked": Sign("undefined", "#a84300", "#f5915a"),
 }
 
 
