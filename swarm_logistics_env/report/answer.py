@@ -72,12 +72,11 @@ class Line(NamedTuple):
     def verdict(self) -> str:
         """The verdicts in words, and what an open one takes."""
         words = [said(test.conclusion) for test in self.tests]
-        test, problems = self.tests[0], {test.problem for test in self.tests}
+        test = self.tests[0]
         if not any(one.estimate for one in self.tests):
-            others = f", and {len(problems) - 1} more reasons" if len(problems) > 1 else ""
-            if all(str(problem).endswith(" missing") for problem in problems):
+            if all(str(one.problem).endswith(" missing") for one in self.tests):
                 return "not played yet"
-            return f"{words[0]}: {test.problem}{others}"
+            return f"{words[0]}: {test.problem}"
         if all(one.estimate and one.conclusion is None for one in self.tests):
             return f"no verdict: {self.indicator} lacks runs"
         if len(self.tests) > 1:
