@@ -97,15 +97,13 @@ def digits_of(p: float) -> int:
 
 def fixed(value: float, digits: int) -> str:
     """Return a number to so many digits; infinity as its sign."""
-    if math.isinf(value):
-        return "∞" if value > 0 else "-∞"
     # "+ 0.0" after rounding: no minus sign before a zero.
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("inf", "∞")
 
 
-def limits(interval: spi.Interval | Estimate | None, digits: int) -> str:
+def limits(interval: spi.Interval | Estimate, digits: int) -> str:
     """Return the limits of an interval to so many digits, e.g. "[101.2, ∞]"; empty: none."""
-    if interval is None or interval.low is None or interval.high is None:
+    if interval.low is None or interval.high is None:
         return ""
     return f"[{fixed(interval.low, digits)}, {fixed(interval.high, digits)}]"
 

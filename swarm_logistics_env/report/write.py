@@ -22,7 +22,7 @@ from swarm_logistics_env.studies.runs import write_csv
 from .document import Document, document
 from .drawing import images
 from .page import axis, page_data
-from .section import WORDS, Section
+from .section import Section
 
 
 def write_report(
@@ -157,7 +157,6 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         answer=document.answer,
         axis=axis(document.answer),
         signs=SIGNS,
-        words=WORDS,
         drawings=drawings,
         latex=latex_tables((document.answer.section, *document.summary)),
         # A text must not end the script that it stands in.
