@@ -23,7 +23,7 @@ class ProgressBar:
 
     def __init__(self, label: str, total: int, unit: str, *, done: int = 0) -> None:
         console = Console(stderr=True, highlight=False)
-        self._unit, self._first, self._note = unit, done, ""
+        self._unit, self._first = unit, done
         # It draws itself anew twice a second, also while one piece of the work takes long.
         self._bar = Progress(
             TextColumn("{task.description}", markup=False),
@@ -52,10 +52,9 @@ class ProgressBar:
         Args:
             note: what plain lines say besides.
         """
-        self._note = note
         self._bar.update(self._task, completed=done)
         if self._bar.disable and monotonic() - self._last_line >= LINE_EVERY:
-            self.say()
+            self.say(note)
 
     def say(self, what: str = "") -> None:
         """Print a line: how much is done, and `what`."""
@@ -63,7 +62,7 @@ class ProgressBar:
         (task,) = self._bar.tasks
         seconds = task.elapsed or 0.0
         count = f"{task.completed:,} of {task.total:,} {self._unit}"
-        told = [count, self._note, f"{clock(seconds)} so far"]
+        told = [count, f"{clock(seconds)} so far"]
         gained = task.completed - self._first
         # A training ends with a whole round, so that more may be done than was to do.
         if gained and task.remaining and task.remaining > 0:
