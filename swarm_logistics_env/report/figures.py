@@ -106,8 +106,8 @@ def _panel(results: StudyResults, tests: Sequence[Verdict], definition: Definiti
         for test in here
     )
     # 0 first: it is the threshold that always stands in the picture.
-    thresholds = {0.0: None, **dict.fromkeys(definition.adjectives)}
-    thresholds |= dict.fromkeys(test.compared.threshold for test in here)
+    asked = [test.compared.threshold for test in here]
+    thresholds = dict.fromkeys([0.0, *definition.adjectives, *asked])
     x_label = f"{after.name}, x_o → x_new" if after.kind == "parameter" else X_LABELS[after.kind]
     return Panel("", definition.heading, points, tuple(thresholds), x_label, tuple(here))
 

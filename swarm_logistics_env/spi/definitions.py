@@ -216,8 +216,8 @@ class Definition:
         """
         if self.compares == "size":
             return None
-        original, changed, *removed = self.performances.values()
-        return f"{changed} within {100 * margin:.3g} % of {' from '.join([original, *removed])}"
+        _, changed, *_ = self.performances.values()
+        return f"{changed} within {100 * margin:.3g} % of {' from '.join(self.references)}"
 
 
 DEFINITIONS: dict[str, Definition] = {
