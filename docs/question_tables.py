@@ -8,7 +8,6 @@ from tables import by_policy, seeds_from, table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
-from swarm_logistics_env.spi.estimate import SIGNS
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Verdict, grouped
@@ -18,7 +17,7 @@ Counts = NDArray[np.float64]  # of every seed, or of every training and seed
 
 def with_verdict(test: Verdict) -> str:
     """Return an indicator with its interval and its verdict."""
-    return f"{section.ratio(test)} {SIGNS[test.conclusion or 'blocked'].word}"
+    return f"{section.ratio(test)} {section.said(test.conclusion)}"
 
 
 def _over(found: StudyResults) -> str:

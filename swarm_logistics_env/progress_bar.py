@@ -19,20 +19,11 @@ class ProgressBar:
         total: how much there is to do, in `unit`.
         unit: in words, e.g. "runs".
         done: how much of it was done before now.
-        console: the console to write to; None means standard error.
     """
 
-    def __init__(
-        self,
-        label: str,
-        total: int,
-        unit: str,
-        *,
-        done: int = 0,
-        console: Console | None = None,
-    ) -> None:
-        console = console or Console(stderr=True, highlight=False)
-        self._unit, self._first, self._note = unit, done, ""
+    def __init__(self, label: str, total: int, unit: str, *, done: int = 0) -> None:
+        console = Console(stderr=True, highlight=False)
+        self._unit, self._first = unit, done
         # It draws itself anew twice a second, also while one piece of the work takes long.
         self._bar = Progress(
             TextColumn("{task.description}", markup=False),
@@ -46,22 +37,14 @@ class ProgressBar:
             disable=not (total and console.is_terminal),
         )
         self._task = self._bar.add_task(label, total=total, completed=done)
-        self._start = self._last_line = monotonic()
-        self._stopped_at: float | None = None
+        self._last_line = monotonic()
 
     def __enter__(self) -> Self:
-        self._start = self._last_line = monotonic()
         self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stopped_at = monotonic()
         self._bar.stop()
-
-    @property
-    def seconds(self) -> float:
-        """Time since it was entered, or until it was left [s]."""
-        return (self._stopped_at or monotonic()) - self._start
 
     def reach(self, done: int, note: str = "") -> None:
         """Show that so much is done.
@@ -69,21 +52,21 @@ class ProgressBar:
         Args:
             note: what plain lines say besides.
         """
-        self._note = note
         self._bar.update(self._task, completed=done)
         if self._bar.disable and monotonic() - self._last_line >= LINE_EVERY:
-            self.say()
+            self.say(note)
 
     def say(self, what: str = "") -> None:
         """Print a line: how much is done, and `what`."""
         self._last_line = monotonic()
         (task,) = self._bar.tasks
+        seconds = task.elapsed or 0.0
         count = f"{task.completed:,} of {task.total:,} {self._unit}"
-        told = [count, self._note, f"{clock(self.seconds)} so far"]
+        told = [count, f"{clock(seconds)} so far"]
         gained = task.completed - self._first
         # A training ends with a whole round, so that more may be done than was to do.
         if gained and task.remaining and task.remaining > 0:
-            told.append(f"{clock(self.seconds * task.remaining / gained)} left")
+            told.append(f"{clock(seconds * task.remaining / gained)} left")
         line = f"{task.description}: {', '.join(filter(None, [*told, what]))}"
         self._bar.console.print(line, soft_wrap=True, markup=False)
 

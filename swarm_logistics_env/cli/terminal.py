@@ -17,12 +17,7 @@ from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import NOTHING, Section, Texts, number
-from swarm_logistics_env.report.write import (
-    how_to_get_figures,
-    missing_packages,
-    section_markdown,
-    write_report,
-)
+from swarm_logistics_env.report.write import how_to_get_figures, section_markdown, write_report
 from swarm_logistics_env.studies.play import Tally
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, Verdict
@@ -83,8 +78,8 @@ def show_report(
     found, most = (answer(results, most=None), None) if full else (whole.answer, MOST_LINES)
     echo("\n".join(map(plain, digest(found, width, most).split("\n"))))
     echo(f"Report: {write_report(results, out, whole)[0]}")
-    if missing := missing_packages():
-        echo(how_to_get_figures(missing))
+    if advice := how_to_get_figures():
+        echo(advice)
     else:
         echo(f"Figure: {out / 'figures' / 'answer.svg'}")
         echo(f"Tables: {out / 'tables.tex'}")

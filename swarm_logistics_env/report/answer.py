@@ -30,21 +30,16 @@ class Line(NamedTuple):
     Attributes:
         policy: whose swarm it is about.
         indicator: its symbol.
-        about: what is changed, e.g. "FM4, 1 of 25".
+        question: indicator and what is changed, e.g. "R FM4, 1 of 25".
         tests: the verdicts, in the order of the values.
         numbers: their places among the verdicts of the study.
     """
 
     policy: str
     indicator: str
-    about: str
+    question: str
     tests: tuple[Verdict, ...]
     numbers: tuple[int, ...]
-
-    @property
-    def question(self) -> str:
-        """Indicator and what is changed."""
-        return f"{self.indicator} {self.about}"
 
     @property
     def value(self) -> str:
@@ -77,12 +72,11 @@ class Line(NamedTuple):
     def verdict(self) -> str:
         """The verdicts in words, and what an open one takes."""
         words = [said(test.conclusion) for test in self.tests]
-        test, problems = self.tests[0], {test.problem for test in self.tests}
+        test = self.tests[0]
         if not any(one.estimate for one in self.tests):
-            others = f", and {len(problems) - 1} more reasons" if len(problems) > 1 else ""
-            if all(str(problem).endswith(" missing") for problem in problems):
+            if all(str(one.problem).endswith(" missing") for one in self.tests):
                 return "not played yet"
-            return f"{words[0]}: {test.problem}{others}"
+            return f"{words[0]}: {test.problem}"
         if all(one.estimate and one.conclusion is None for one in self.tests):
             return f"no verdict: {self.indicator} lacks runs"
         if len(self.tests) > 1:
@@ -155,7 +149,7 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     # Recorded trials may ask one question in several tables, at other values of a parameter.
     times = Counter((line.policy, line.question) for line in lines)
     lines = [
-        line._replace(about=f"{line.about}, {_part_of_title(line.tests[0].compared.table)}")
+        line._replace(question=f"{line.question}, {_part_of_title(line.tests[0].compared.table)}")
         if times[line.policy, line.question] > 1
         else line
         for line in lines
@@ -189,7 +183,8 @@ def _alike(shared: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
 def _line(numbered: Sequence[tuple[int, Verdict]]) -> Line:
     numbers, tests = zip(*numbered)
     compared = tests[0].compared
-    return Line(compared.policy, compared.indicator, _about(tests), tests, numbers)
+    question = f"{compared.indicator} {_about(tests)}"
+    return Line(compared.policy, compared.indicator, question, tests, numbers)
 
 
 def _about(tests: Sequence[Verdict]) -> str:
@@ -273,11 +268,12 @@ def _last(results: StudyResults) -> str:
         parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):
         parts.append("some runs stalled (P below a quarter of the median; --full names them)")
-    if any(test.conclusion == "inconclusive" for test in tests):
+    undecided = [test for test in tests if test.conclusion == "inconclusive"]
+    if undecided:
         parts.append(
             f"so many more {runs} would tell such a value from the threshold in 4 of 5 studies"
         )
-    beside = [test for test in tests if test.conclusion == "inconclusive" and _on_one_side(test)]
+    beside = [test for test in undecided if section.lies_above(test) is not None]
     reasons = {
         "so few seeds may hide stalls": any("hidden_stalls" in test.flags for test in beside),
         "Holm counts all questions": any(test.plain in section.DECIDED for test in beside),
@@ -294,13 +290,6 @@ def _last(results: StudyResults) -> str:
             parts.append(f"of {section.plural(len(here), 'claim')}{where} {found}")
     line = "; ".join(parts)
     return f"{line[0].upper()}{line[1:]}."
-
-
-def _on_one_side(test: Verdict) -> bool:
-    """Return whether an interval leaves out the threshold."""
-    _, low, high = test.interval or (None, None, None)
-    threshold = test.compared.threshold
-    return low is not None and high is not None and not low <= threshold <= high
 
 
 def in_a_sentence(results: StudyResults) -> str:

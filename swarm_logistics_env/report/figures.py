@@ -47,13 +47,14 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield S per step, FT and R per mode and m, A per value, and P without a part."""
     for (table, _, onset, swarm), tests in _by_figure(results).items():
         names = table, f"{onset:g}s" if onset else ""
+        definitions = _definitions(tests)
         crosses = "; crosses: published" if any(t.published is not None for t in tests) else ""
         caption = f"{listed(list(dict.fromkeys(t.compared.policy for t in tests)))}, "
-        caption += f"{_where(table, onset, swarm)}: {_caption(tests)} "
+        caption += f"{_where(table, onset, swarm)}: {_caption(definitions)} "
         caption += f"{seeds_text(results).capitalize()}. {_MARKS}{crosses}."
-        panels = [_panel(results, tests, definition) for definition in _definitions(tests)]
+        panels = [_panel(results, tests, definition) for definition in definitions]
         yield Figure(
-            slug(*(definition.symbol for definition in _definitions(tests)), *names),
+            slug(*(definition.symbol for definition in definitions), *names),
             caption + _capped(tests),
             frame(tests, VERDICT_COLUMNS)[_COLUMNS],
             0.5 + 2.5 * len(panels),
@@ -105,8 +106,8 @@ def _panel(results: StudyResults, tests: Sequence[Verdict], definition: Definiti
         for test in here
     )
     # 0 first: it is the threshold that always stands in the picture.
-    thresholds = {0.0: None, **dict.fromkeys(definition.adjectives)}
-    thresholds |= dict.fromkeys(test.compared.threshold for test in here)
+    asked = [test.compared.threshold for test in here]
+    thresholds = dict.fromkeys([0.0, *definition.adjectives, *asked])
     x_label = f"{after.name}, x_o → x_new" if after.kind == "parameter" else X_LABELS[after.kind]
     return Panel("", definition.heading, points, tuple(thresholds), x_label, tuple(here))
 
@@ -142,9 +143,8 @@ def _definitions(tests: Sequence[Verdict]) -> list[Definition]:
     return [definition for symbol, definition in DEFINITIONS.items() if symbol in asked]
 
 
-def _caption(tests: Sequence[Verdict]) -> str:
+def _caption(definitions: Sequence[Definition]) -> str:
     """Return what a figure shows, e.g. "robustness R; above 0 robust."."""
-    definitions = _definitions(tests)
     named = [named for definition in definitions for named in definition.adjectives.items()]
     above = grouped(named, lambda one: one[0]).items()
     says = ", ".join(f"above {at:g} {', '.join(word for _, word in here)}" for at, here in above)

@@ -27,7 +27,7 @@ NOTHING = "–"
 DECIDED = ("supported", "refuted", "equivalent")
 UNAFFECTED = SIGNS["unaffected"].word
 # The words for verdicts, in the order in which they are counted.
-WORDS = {**{verdict: sign.word for verdict, sign in SIGNS.items()}, "blocked": "undefined"}
+WORDS = {verdict: sign.word for verdict, sign in SIGNS.items()}
 FLAGS = {
     "single_seed": "One seed gives a value, but no interval and no verdict",
     "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
@@ -97,15 +97,13 @@ def digits_of(p: float) -> int:
 
 def fixed(value: float, digits: int) -> str:
     """Return a number to so many digits; infinity as its sign."""
-    if math.isinf(value):
-        return "∞" if value > 0 else "-∞"
     # "+ 0.0" after rounding: no minus sign before a zero.
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("inf", "∞")
 
 
-def limits(interval: spi.Interval | Estimate | None, digits: int) -> str:
+def limits(interval: spi.Interval | Estimate, digits: int) -> str:
     """Return the limits of an interval to so many digits, e.g. "[101.2, ∞]"; empty: none."""
-    if interval is None or interval.low is None or interval.high is None:
+    if interval.low is None or interval.high is None:
         return ""
     return f"[{fixed(interval.low, digits)}, {fixed(interval.high, digits)}]"
 
@@ -139,6 +137,15 @@ def ratio(test: Verdict) -> str:
     return bracketed(test.interval, 3) + SATURATED * (test.saturated and test.interval is not None)
 
 
+def lies_above(test: Verdict) -> bool | None:
+    """Return whether an interval lies above the threshold; None: it holds it, or there is none."""
+    _, low, high = test.interval or (None, None, None)
+    threshold = test.compared.threshold
+    if low is None or high is None or low <= threshold <= high:
+        return None
+    return low > threshold
+
+
 def said(verdict: str | None) -> str:
     """Return a verdict in words."""
     return WORDS[verdict or "blocked"]
@@ -147,7 +154,7 @@ def said(verdict: str | None) -> str:
 def answered(test: Verdict) -> str:
     """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
     plain, adjusted = said(test.answer), said(test.answer_holm)
-    return plain if plain in (adjusted, "undefined") else f"{plain} ({adjusted})"
+    return plain if plain == adjusted else f"{plain} ({adjusted})"
 
 
 def counted_as(test: Verdict, verdict: str | None) -> str:

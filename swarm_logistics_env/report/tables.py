@@ -128,12 +128,10 @@ def claims(heading: str, tests: Sequence[Verdict]) -> list[Texts]:
 def _on_claim(test: Verdict) -> str:
     """Return the verdict on a claim; of an open one the side on which its interval lies."""
     said = section.counted_as(test, test.claim_verdict_holm)
-    found, threshold = test.interval, test.compared.threshold
-    if said != "open" or found is None or found.low is None or found.high is None:
-        return "contradicted" if said == "refuted" else said
-    if found.low <= threshold <= found.high:
-        return said
-    return f"open, leans {'for' if (found.low > threshold) == test.claimed else 'against'}"
+    above = section.lies_above(test)
+    if said == "open" and above is not None:
+        return f"open, leans {'for' if above == test.claimed else 'against'}"
+    return "contradicted" if said == "refuted" else said
 
 
 def _times_to_clear(results: StudyResults) -> Iterator[Section]:

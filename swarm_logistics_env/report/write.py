@@ -22,7 +22,7 @@ from swarm_logistics_env.studies.runs import write_csv
 from .document import Document, document
 from .drawing import images
 from .page import axis, page_data
-from .section import WORDS, Section
+from .section import Section
 
 
 def write_report(
@@ -45,8 +45,8 @@ def write_report(
         write_text(paths[3], latex_tables((whole.answer.section, *whole.summary)))
         for figure in whole.figures():
             write_csv(pictures / f"{figure.name}.csv", figure.data)
-        if missing := missing_packages():
-            write_text(paths[0], markdown(whole, note=how_to_get_figures(missing)))
+        if advice := how_to_get_figures():
+            write_text(paths[0], markdown(whole, note=advice))
             return paths
         drawings = {}
         for figure in whole.figures():
@@ -72,13 +72,11 @@ def write_text(path: Path, text: str) -> None:
         part.write_text(text, encoding="utf-8", newline="\n")
 
 
-def missing_packages() -> tuple[str, ...]:
-    """Return which packages that figures and HTML need cannot be loaded."""
-    return tuple(name for name in ("jinja2", "matplotlib") if find_spec(name) is None)
-
-
-def how_to_get_figures(missing: Sequence[str]) -> str:
-    """Return the sentence that says what to install."""
+def how_to_get_figures() -> str:
+    """Return what to install for figures and HTML; empty: their packages are there."""
+    missing = [name for name in ("jinja2", "matplotlib") if find_spec(name) is None]
+    if not missing:
+        return ""
     return (
         f"report.html and the drawings of figures need {' and '.join(missing)}: "
         f"{how_to_install('study')}, then ask for the report again."
@@ -159,7 +157,6 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         answer=document.answer,
         axis=axis(document.answer),
         signs=SIGNS,
-        words=WORDS,
         drawings=drawings,
         latex=latex_tables((document.answer.section, *document.summary)),
         # A text must not end the script that it stands in.

@@ -40,7 +40,7 @@ def scalability(
             or not finite, mean P_N = 0, unequal seed sets where paired.
     """
     gain = count("n", n) / count("m", m)
-    return judge("S", {"p_nm": (p_nm, gain, 0.0), "p_n": (p_n, -gain, 1.0)}, **options)
+    return judge("S", {"p_nm": (p_nm, gain), "p_n": (p_n, -gain)}, **options)
 
 
 def fault_tolerance(
@@ -72,9 +72,7 @@ def fault_tolerance(
         raise IndicatorError(f"n = {n!r}, m = {m!r}: should be given together or not at all")
     if n is not None and m is not None and count("m", m) >= count("n", n):
         raise IndicatorError(f"m = {m} of n = {n} robots: should leave a robot for P_S (m < n)")
-    return judge(
-        "FT", {"p_f": (p_f, 1.0, 0.0), "p_s": (p_s, -1.0, 0.0), "p_o": (p_o, 0.0, 1.0)}, **options
-    )
+    return judge("FT", {"p_f": (p_f, 1.0), "p_s": (p_s, -1.0), "p_o": (p_o, 0.0)}, **options)
 
 
 def robustness(
@@ -103,9 +101,7 @@ def robustness(
     robots, faulty = count("n", n), count("m", m)
     if faulty > robots:
         raise IndicatorError(f"m = {faulty}: should be at most n = {robots} robots")
-    return judge(
-        "R", {"p_f": (p_f, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)}, offset=faulty / robots, **options
-    )
+    return judge("R", {"p_f": (p_f, 1.0), "p_o": (p_o, -1.0)}, offset=faulty / robots, **options)
 
 
 def adaptability(
@@ -131,9 +127,7 @@ def adaptability(
     if finite("x_new", x_new) == x_o:
         raise IndicatorError(f"x_new = {x_new:g} = x_o: should differ from x_o")
     gain = 1.0 / abs((x_new - x_o) / x_o)
-    return judge(
-        "A", {"p_new": (p_new, gain, 0.0), "p_o": (p_o, -gain, 1.0)}, offset=1.0, **options
-    )
+    return judge("A", {"p_new": (p_new, gain), "p_o": (p_o, -gain)}, offset=1.0, **options)
 
 
 def relative_change(p_o: ArrayLike, p_new: ArrayLike, **options: Unpack[Options]) -> Estimate:
@@ -150,7 +144,7 @@ def relative_change(p_o: ArrayLike, p_new: ArrayLike, **options: Unpack[Options]
         IndicatorError: Performance empty, negative or not finite, mean P_o = 0, unequal seed sets
             where paired.
     """
-    return judge("change", {"p_new": (p_new, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)}, **options)
+    return judge("change", {"p_new": (p_new, 1.0), "p_o": (p_o, -1.0)}, **options)
 
 
 Factor = Literal["size", "fault", "parameter", "policy"]
@@ -222,8 +216,8 @@ class Definition:
         """
         if self.compares == "size":
             return None
-        original, changed, *removed = self.performances.values()
-        return f"{changed} within {100 * margin:.3g} % of {' from '.join([original, *removed])}"
+        _, changed, *_ = self.performances.values()
+        return f"{changed} within {100 * margin:.3g} % of {' from '.join(self.references)}"
 
 
 DEFINITIONS: dict[str, Definition] = {

@@ -120,9 +120,9 @@ def equivalence(
     between_0_and_1("margin", margin)
     if not 0.0 < alpha < 0.5:
         raise IndicatorError(f"alpha = {alpha}: should lie between 0 and 0.5, both excluded")
-    terms = {"p_new": (p_new, 1.0, 0.0), "p_o": (p_o, -1.0, 1.0)}
+    terms = {"p_new": (p_new, 1.0), "p_o": (p_o, -1.0)}
     if p_s is not None:
-        terms = {"p_new": (p_new, 1.0, 0.0), "p_s": (p_s, -1.0, 0.0), "p_o": (p_o, 0.0, 1.0)}
+        terms = {"p_new": (p_new, 1.0), "p_s": (p_s, -1.0), "p_o": (p_o, 0.0)}
 
     def against(threshold: float) -> Estimate:
         return judge(

@@ -23,8 +23,8 @@ from .inputs import (
 from .ratio import MIN_SEEDS, RatioTest, Term, over_trainings, paired_ratio, ratio_of_samples, welch
 from .summaries import at_stake, pairing_correlation
 
-# Performances by name, with their weights in numerator and denominator.
-Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float, float]]
+# Performances by name, with their weights in the numerator; the last is the denominator.
+Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float]]
 Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
 
 
@@ -32,24 +32,22 @@ class Sign(NamedTuple):
     """How a verdict is shown.
 
     Attributes:
-        mark: one character, which tells it without colour.
-        word: what the mark is called in a legend.
+        word: what it is called in reports.
         light, dark: hexadecimal colours on white and on black paper, after Okabe and Ito.
     """
 
-    mark: str
     word: str
     light: str
     dark: str
 
 
 SIGNS = {
-    "supported": Sign("✓", "supported", "#006b4c", "#3fc79a"),
-    "refuted": Sign("✗", "refuted", "#a84300", "#f5915a"),
-    "equivalent": Sign("≈", "equivalent", "#005b94", "#6cb8ee"),
-    "inconclusive": Sign("?", "open", "#5b6068", "#a9afb8"),
-    "unaffected": Sign("=", "same runs", "#5b6068", "#a9afb8"),
-    "blocked": Sign("!", "blocked", "#a84300", "#f5915a"),
+    "supported": Sign("supported", "#006b4c", "#3fc79a"),
+    "refuted": Sign("refuted", "#a84300", "#f5915a"),
+    "equivalent": Sign("equivalent", "#005b94", "#6cb8ee"),
+    "inconclusive": Sign("open", "#5b6068", "#a9afb8"),
+    "unaffected": Sign("same runs", "#5b6068", "#a9afb8"),
+    "blocked": Sign("undefined", "#a84300", "#f5915a"),
 }
 
 
@@ -125,16 +123,6 @@ class Estimate:
         """On theta > threshold, one-sided (1 - confidence)/2 on each side, unadjusted."""
         return self.verdict_for(self.p_value)
 
-    @property
-    def answer(self) -> Verdict:
-        """The verdict; of identical runs what their exact value says, which is no evidence.
-
-        Gates ask for it: "is it above the threshold?" has an answer there.
-        """
-        if not self.identical:
-            return self.verdict
-        return "supported" if self.value > self.threshold else "refuted"
-
     def verdict_for(self, p_value: float | None) -> Verdict:
         """Return the verdict at a two-sided p, e.g. one that Holm adjusted; None: inconclusive."""
         if p_value is None or self.probability is None or not p_value < 1.0 - self.confidence:
@@ -187,10 +175,10 @@ def judge(
 
     Args:
         indicator: Its name.
-        terms: Name to performances over seeds [items] and their weights in numerator and
-            denominator; the first two are compared, the last is the reference that the ratio
-            divides by. Of several trainings of a policy each has a row, shape (K, n); a
-            performance of shape (n,) beside it is of a policy that is not trained.
+        terms: Name to performances over seeds [items] and their weight in the numerator; the first
+            two are compared, the last is the reference that the ratio divides by. Of several
+            trainings of a policy each has a row, shape (K, n); a performance of shape (n,) beside
+            it is of a policy that is not trained.
         offset: Added to the ratio of means.
 
     Raises:
@@ -287,7 +275,7 @@ def _checked(
     paired: bool,
     identical: bool,
 ) -> dict[str, Term]:
-    samples = {name: performance(name, p, or_trainings=True) for name, (p, *_) in terms.items()}
+    samples = {name: performance(name, p, or_trainings=True) for name, (p, _) in terms.items()}
     trainings = {len(p) for p in samples.values() if p.ndim == 2}
     if trainings:  # a policy that is not trained is the same beside every one
         every = (max(trainings), 1)
@@ -308,7 +296,10 @@ def _checked(
                 )
     reference = list(samples)[-1]
     positive_mean(reference, samples[reference])
-    return {name: Term(samples[name], *weights) for name, (_, *weights) in terms.items()}
+    return {
+        name: Term(samples[name], weight, float(name == reference))
+        for name, (_, weight) in terms.items()
+    }
 
 
 def _skewness(difference: Numbers) -> float:

@@ -29,11 +29,9 @@ def performance(name: str, values: ArrayLike, *, or_trainings: bool = False) -> 
     if array.size == 0:
         raise IndicatorError(f"{name} is empty: should hold one number per seed (or size)")
     for place, value in np.ndenumerate(array):
-        where = ", ".join(map(str, place))
-        if not math.isfinite(value):
-            raise IndicatorError(f"{name}[{where}] = {value}: should be finite")
-        if value < 0:
-            raise IndicatorError(f"{name}[{where}] = {value:g}: should not be negative")
+        if not 0.0 <= value < math.inf:
+            where = ", ".join(map(str, place))
+            raise IndicatorError(f"{name}[{where}] = {value:g}: should be finite, not negative")
     return array
 
 

@@ -200,7 +200,10 @@ def _times_drawn(n: int) -> Numbers:
 
 
 class Term(NamedTuple):
-    """One sample of performances and its weights in numerator and denominator of the ratio."""
+    """One sample of performances and its weights in numerator and denominator of the ratio.
+
+    The last of several terms is the denominator: its weight there is 1, that of all others 0.
+    """
 
     sample: Numbers
     in_num: float
@@ -236,7 +239,7 @@ def ratio_of_samples(
     """
     from scipy.special import stdtr
 
-    mean_den = sum(term.in_den * float(term.sample.mean()) for term in terms)
+    mean_den = float(terms[-1].sample.mean())
     value = sum(term.in_num * float(term.sample.mean()) for term in terms) / mean_den
     null = threshold - offset
     mean, variance, df = difference(terms, null)
@@ -318,7 +321,7 @@ def _limits(
         return abs(mean) - float(stdtrit(df, quantile)) * math.sqrt(variance)
 
     # Far out only the denominator's sample is left.
-    _, variance, df = difference([Term(sample, in_den, 0.0) for sample, _, in_den in terms], 0.0)
+    _, variance, df = difference([Term(terms[-1].sample, 1.0, 0.0)], 0.0)
     # The interval ends if the denominator's mean is clear of 0.
     if variance > 0.0 and mean_den <= float(stdtrit(df, quantile)) * math.sqrt(variance):
         return -math.inf, math.inf

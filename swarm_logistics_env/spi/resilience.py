@@ -43,7 +43,7 @@ def resilience_index(
         return np.array([np.count_nonzero(run > onset) for run in times], dtype=np.float64)
 
     broken, sound = after_onset("faulty", faulty), after_onset("reference", reference)
-    terms = {"faulty": (broken, 1.0, 0.0), "reference": (sound, 0.0, 1.0)}
+    terms = {"faulty": (broken, 1.0), "reference": (sound, 0.0)}
     return judge("resilience", terms, **options)
 
 

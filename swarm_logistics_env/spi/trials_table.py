@@ -130,9 +130,7 @@ def _lines(path: Path) -> tuple[list[str], str]:
 
 def _cells(path: Path, lines: list[str]) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
     """Return the columns' names, and line and cells by these names of every row with any."""
-    # Spreadsheets may say the delimiter in a first line such as "sep=;".
-    empty = ("", "sep=;", "sep=,", "sep=")
-    start = next((n for n, line in enumerate(lines) if line.strip().lower() not in empty), None)
+    start = next((n for n, line in enumerate(lines) if line.strip()), None)
     if start is None:
         raise IndicatorError(f"{path} is empty: should have a row of column names, then the trials")
     delimiter = max(";\t,", key=lines[start].count)

@@ -64,7 +64,7 @@ def test_bad_samples_are_named(name: str) -> None:
         ([], "is empty"),
         ([[1.0, 2.0]], r"shape \(1, 2\)"),
         ([3.0, float("nan"), 1.0, 1.0], r"\[1\] = nan: should be finite"),
-        ([3.0, 1.0, -2.0, 1.0], r"\[2\] = -2: should not be negative"),
+        ([3.0, 1.0, -2.0, 1.0], r"\[2\] = -2: should be finite, not negative"),
         (["many", 1, 2, 3], "should be an array of numbers"),
     ):
         with pytest.raises(IndicatorError, match=r"^p_(o|n)\b.*" + message):
@@ -158,8 +158,7 @@ def test_a_cap_blocks_the_side_on_which_it_can_move_the_indicator(
 def test_the_same_runs_have_an_exact_value_that_is_no_evidence() -> None:
     r = spi.robustness(MANY, MANY, n=25, m=2, identical=True)
     assert (r.value, r.low, r.high) == (0.08, 0.08, 0.08)
-    assert (r.verdict, r.answer, r.p_value) == ("inconclusive", "supported", None)
+    assert (r.verdict, r.p_value) == ("inconclusive", None)
     assert r.flags == ("identical",)
-    assert spi.relative_change(MANY, MANY, identical=True).answer == "refuted"  # 0 is not above 0
     with pytest.raises(IndicatorError, match="identical = True, but p_f and p_o differ"):
         spi.robustness(MANY, HALF, n=25, m=2, identical=True)

@@ -41,7 +41,7 @@ def test_a_file_with_decimal_commas_is_read(tmp_path: Path) -> None:
     [
         "n_robots\tfailure\tfailed\tP\n8\tnone\t0\t10.5\n8\tstuck wheel\t2\t7\n",
         "\ufeffRobots;Fault;Faulty;Items [box]\r\n8;None;0;10.5\r\n8;stuck wheel;2;7\r\n",
-        "sep=;\nN;mode;m;p\n8;;0;10.5\n8;stuck wheel;2;7\n",
+        "\nN;mode;m;p\n8;;0;10.5\n8;stuck wheel;2;7\n",
         'N,mode,m,p\n8,none,0,"10.5"\n\n8,stuck wheel,2,7\n,,,\n',
     ],
 )
