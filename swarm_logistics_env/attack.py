@@ -21,7 +21,7 @@ from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
 from swarm_logistics_env.studies.play import Engine
 from swarm_logistics_env.studies.runs import Runs
 from swarm_logistics_env.studies.verdict import Cell, same_runs
-from swarm_logistics_env.tasks.task import Case, Outcome
+from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import ROLES
@@ -278,7 +278,7 @@ def _outcomes(
     """Return the outcomes of faults (None: without one) at seeds; play what is not in the store."""
     code = WAREHOUSE.code()
     runs = [
-        replace(base, faults=() if fault is None else (fault,)).run(code, seed)
+        Run(replace(base, faults=() if fault is None else (fault,)), code, seed)
         for fault, seed in pairs
     ]
     done = store.succeeded()

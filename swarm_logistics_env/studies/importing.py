@@ -13,7 +13,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.records import file_name
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials
-from swarm_logistics_env.tasks.task import Case, Outcome
+from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
 from .comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
@@ -65,7 +65,7 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
         for rows in conditions.values():
             case = _case(origin, rows[0])
             for number, row in enumerate(rows):
-                run = case.run(RECORDED.code(), number if row.seed is None else row.seed)
+                run = Run(case, RECORDED.code(), number if row.seed is None else row.seed)
                 runs.add(run, _outcome(row))
         declared = Declaration.model_validate(specification)
         note(runs, specification, RECORDED.code(), {}, declared, origin)
