@@ -21,7 +21,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.tasks.task import Case, Run
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, code_version
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from tests.conftest import SMALL
 from tests.studies.made_up import digest
 
@@ -96,7 +96,7 @@ def test_other_behaviour_meets_the_same_worlds_and_nothing_is_remembered() -> No
     same = Case(PolicySpec.of(Remembering()), "identity", scenario, task=WAREHOUSE)
     other = replace(same, behaviour=1)
     played = [(seed, one) for seed in (0, 1) for one in (same, other, same)]
-    outcomes = [Run(one, code_version(), seed).play() for seed, one in played]
+    outcomes = [Run(one, WAREHOUSE.code(), seed).play() for seed, one in played]
     assert {outcome.error for outcome in outcomes} == {None}
     assert outcomes[0].digest == outcomes[2].digest != outcomes[1].digest
     first, other_first, again, second, other_second, _ = Remembering.seeds[-6:]
