@@ -268,7 +268,7 @@ def _robustness(asked: Attack, sound: Cell, failed: Cell) -> Estimate:
         n=asked.scenario.n_robots,
         m=asked.robots,
         saturated=[name for name, runs in (("p_o", sound), ("p_f", failed)) if runs.saturated],
-        identical=same_runs(sound.digests, failed.digests),
+        identical=same_runs(sound.outcomes, failed.outcomes),
     )
 
 

@@ -108,7 +108,7 @@ def _index(
             threshold=threshold,
             paired=results.plan.paired,
             saturated=[name for name, runs in named.items() if any(r.all_delivered for r in runs)],
-            identical=same_runs(*([run.digest for run in runs] for runs in named.values())),
+            identical=same_runs(*named.values()),
         )
     except spi.IndicatorError:  # nothing is delivered after the onset in the reference
         return None
