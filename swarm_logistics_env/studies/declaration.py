@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import to_json
 
-from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.spi.trials import Trial
 from swarm_logistics_env.tasks.task import Task, refuse_untrusted
 
-from .plan import Plan
+from .plan import Origin, Plan
 from .runs import FILE_NAME, Runs
 from .specification import Specification
 
@@ -32,9 +29,7 @@ class StoredSpecification(BaseModel):
     name: str
     task: str
 
-    def read(
-        self, place: Path, *, task: Task | None = None, trust_code: bool = False
-    ) -> Specification:
+    def read(self, place: Path, *, task: Task | None, trust_code: bool) -> Specification:
         """Return the specification, of a store in `place`.
 
         Args:
@@ -55,10 +50,10 @@ class StoredSpecification(BaseModel):
         are exploratory then, and `StudyResults.late_margin` whether equivalence is.
         """
         declared = Specification(**{**self.model_dump(), "task": asked.played})
-        free = ("seeds", "first_seed", "looks", "until_clear", "margin", "reference")
-        mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
+        free = {"seeds", "first_seed", "until_clear", "margin", "reference"}
+        mine, theirs = (one.model_dump(mode="json", exclude=free) for one in (asked, declared))
         theirs["task"] = self.task
-        return [name for name in mine if name not in free and mine[name] != theirs[name]]
+        return [name for name in mine if mine[name] != theirs[name]]
 
 
 class Declaration(BaseModel):
@@ -79,35 +74,11 @@ class Declaration(BaseModel):
 
     def covers(self, plan: Plan) -> bool:
         """Return whether the verdicts of a plan were declared, and so are not exploratory."""
-        if plan.imported_from is not None:
+        if plan.origin is not None:
             return True  # nothing is added to what was imported
         # A part of the declared seeds is a choice as well, made with the results at hand.
         seeds = range(self.first_seed, self.first_seed + self.seeds)
         return plan.seeds == seeds and self.looks in ((), plan.specification.looks)
-
-
-class Origin(Record):
-    """The source of recorded trials.
-
-    Attributes:
-        file: its name.
-        digest: of its content.
-        paired: whether its rows name their seeds.
-        seeds: those that they name, ascending; empty: none.
-        setup: what the user states about the trials, name and value.
-        trials: the first of every condition, in the file's order.
-        notes: sentences on how the file was read.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    file: str
-    digest: str
-    paired: bool
-    seeds: tuple[int, ...] = ()
-    setup: tuple[tuple[str, str], ...] = ()
-    trials: tuple[Trial, ...] = ()
-    notes: tuple[str, ...] = ()
 
 
 class StoredStudy(BaseModel):
@@ -161,7 +132,7 @@ class StoredStudy(BaseModel):
 
 def note(
     runs: Runs,
-    specification: Specification | StoredSpecification,
+    specification: Specification,
     code: str,
     identities: Mapping[str, str],
     declared: Declaration,
@@ -201,5 +172,5 @@ def merge(directories: Sequence[Path], out: Path) -> int:
     with Runs.new(out, "merge") as runs:
         for directory in directories:
             runs.absorb(directory / FILE_NAME)
-        note(runs, one.specification, one.code, one.identities, one.declared)
+        runs.note(NOTE, one.model_dump_json())
         return len(runs)

@@ -105,7 +105,7 @@ def _judged(results: StudyResults) -> _Judged:
         if case.policy.title != cell.policy:  # the second policy of an ablation
             continue
         # Imported tables may differ in P at one condition.
-        table = "" if results.plan.imported_from is None else cell.table
+        table = "" if results.plan.origin is None else cell.table
         content = (case.scenario, case.faults, case.behaviour, table)
         found.setdefault(cell.policy, {}).setdefault(content, cell)
     return found

@@ -17,8 +17,8 @@ from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
 from .comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
-from .declaration import Declaration, Origin, note
-from .plan import Plan
+from .declaration import Declaration, note
+from .plan import Origin, Plan
 from .runs import Runs
 from .specification import Specification
 from .verdict import grouped
@@ -102,10 +102,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
             for arm in arms[1:]
             if arm.setting == OTHER_BEHAVIOUR
         },
-        paired=origin.paired,
-        imported_from=origin.file,
-        imported_seeds=origin.seeds,
-        setup=origin.setup,
+        origin=origin,
     )
 
 

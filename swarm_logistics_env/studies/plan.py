@@ -10,7 +10,9 @@ from itertools import chain, pairwise, product
 from typing import Self
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import comparing
+from swarm_logistics_env.spi.trials import Trial
 from swarm_logistics_env.tasks.task import Case, Run, TaskFault
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
@@ -30,6 +32,30 @@ from .verdict import grouped
 SUPERLINEAR = 1.0  # threshold of S for the steps in `Sizes.superlinear`
 
 
+class Origin(Record):
+    """The source of recorded trials.
+
+    Attributes:
+        file: its name.
+        digest: of its content.
+        paired: whether its rows name their seeds.
+        seeds: those that they name, ascending; empty: none.
+        setup: what the user states about the trials, name and value.
+        trials: the first of every condition, in the file's order.
+        notes: sentences on how the file was read.
+    """
+
+    error_type = StudyError
+
+    file: str
+    digest: str
+    paired: bool
+    seeds: tuple[int, ...] = ()
+    setup: tuple[tuple[str, str], ...] = ()
+    trials: tuple[Trial, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
 class Plan:
     """The runs and the comparisons of a study.
@@ -42,10 +68,7 @@ class Plan:
         nulls: by table and original arm, an arm without fault that shares the worlds of the
             original one, not its behaviour: what chance alone makes of the two. For faults that
             begin during the run.
-        paired: whether all conditions share their seeds.
-        imported_from: name of the file that the results came in; None: they are run here.
-        imported_seeds: those that the file names; empty: it names none, or results are run here.
-        setup: name and value of what is stated about the conditions of imported results.
+        origin: of imported results; None: they are run here.
     """
 
     specification: Specification
@@ -53,15 +76,18 @@ class Plan:
     code: str
     identities: Mapping[str, str]
     nulls: Mapping[tuple[str, Arm], Arm] = field(default_factory=dict)
-    paired: bool = True
-    imported_from: str | None = None
-    imported_seeds: tuple[int, ...] = ()
-    setup: tuple[tuple[str, str], ...] = ()
+    origin: Origin | None = None
+
+    @property
+    def paired(self) -> bool:
+        """Whether all conditions share their seeds."""
+        return self.origin is None or self.origin.paired
 
     @property
     def seeds(self) -> Sequence[int]:
         """The seeds of every condition, ascending."""
-        return self.imported_seeds or self.specification.seed_numbers
+        named = self.origin.seeds if self.origin else ()
+        return named or self.specification.seed_numbers
 
     @cached_property
     def cells(self) -> tuple[tuple[str, str, Arm], ...]:
