@@ -13,7 +13,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.trials import Trial
-from swarm_logistics_env.tasks.task import Case, Run, TaskFault
+from swarm_logistics_env.tasks.task import Case, Fields, Run, TaskFault
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
 from .specification import (
@@ -21,8 +21,6 @@ from .specification import (
     Ablation,
     Factor,
     Faults,
-    Fields,
-    Manner,
     Parameter,
     Sizes,
     Specification,
@@ -30,6 +28,7 @@ from .specification import (
 from .verdict import grouped
 
 SUPERLINEAR = 1.0  # threshold of S for the steps in `Sizes.superlinear`
+Place = tuple[str, str, Arm]  # of a cell: label of the policy, table, arm
 
 
 class Origin(Record):
@@ -90,8 +89,8 @@ class Plan:
         return named or self.specification.seed_numbers
 
     @cached_property
-    def cells(self) -> tuple[tuple[str, str, Arm], ...]:
-        """Every (policy label, table, arm) whose P the report shows, those of a factor together."""
+    def cells(self) -> tuple[Place, ...]:
+        """Every place whose P the report shows, those of a factor together."""
         cells = [
             (comparison.policy, comparison.table, arm)
             for comparison in self.comparisons
@@ -279,7 +278,7 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
             f"{scenario.duration:g} s, or nothing fails"
         )
 
-    def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Manner) -> Arm:
+    def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Fields) -> Arm:
         failing = [task.fault(one, m, onset, lasts, manner) for one in mode.split(BOTH)]
         return _arm(base, Setting("fault", mode, m, onset), faults.scenario, *failing)
 
@@ -290,7 +289,7 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
     wanted = [one for one in comparing("fault") if one.symbol in indicators]
     if task.removed is not None and any(one.needs_removed for one in wanted):
         # The robots that are removed are those that would have failed.
-        whom: Manner = {} if faults.role is None else {"role": faults.role}
+        whom: Fields = {} if faults.role is None else {"role": faults.role}
         for onset, m in product(faults.onsets, faults.robots):
             arms.append(arm(task.removed, m, onset, None, whom))
     yield from compared(table, arms, task.removed)
