@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -130,21 +130,14 @@ class StoredStudy(BaseModel):
         return found
 
 
-def note(
-    runs: Runs,
-    specification: Specification,
-    code: str,
-    identities: Mapping[str, str],
-    declared: Declaration,
-    imported: Origin | None = None,
-) -> None:
+def note(runs: Runs, plan: Plan, declared: Declaration) -> None:
     """Note a study in its store, for `StoredStudy.of`."""
     told = {
-        "specification": specification,
-        "code": code,
-        "identities": identities,
+        "specification": plan.specification,
+        "code": plan.code,
+        "identities": plan.identities,
         "declared": declared,
-        "imported": imported,
+        "imported": plan.origin,
     }
     runs.note(NOTE, to_json(told).decode())
 

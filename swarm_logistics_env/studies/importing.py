@@ -58,17 +58,17 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
         seeds=max(map(len, conditions.values())),
     )
     try:
-        _refuse_unused(origin, imported_plan(specification, origin))
+        plan = imported_plan(specification, origin)
+        _refuse_unused(origin, plan)
     except StudyError as error:
         raise StudyError(f"{trials.file}, {error}") from None
     with Runs.new(out, "import") as runs:
         for rows in conditions.values():
             case = _case(origin, rows[0])
             for number, row in enumerate(rows):
-                run = Run(case, RECORDED.code(), number if row.seed is None else row.seed)
+                run = Run(case, plan.code, number if row.seed is None else row.seed)
                 runs.add(run, _outcome(row))
-        declared = Declaration.model_validate(specification)
-        note(runs, specification, RECORDED.code(), {}, declared, origin)
+        note(runs, plan, Declaration.model_validate(specification))
     return len(trials.rows)
 
 

@@ -140,6 +140,8 @@ class Study:
                 f"this study was played under code version {plan.code}, this is "
                 f"{code}: plan it anew, and all of it runs again"
             )
+        if plan.origin is not None:
+            raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         if engine is None or isinstance(engine, str):
             usual = "process" if (processes or 1) > 1 else "local"
             engine = engine_named(engine or usual, processes, address)
@@ -153,7 +155,7 @@ class Study:
         with self._store() as store:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.model_validate(self.specification)
-            note(store, self.specification, plan.code, plan.identities, declared)
+            note(store, plan, declared)
             done = store.succeeded()
             kept = sum(run.key in done for run in whole)
             tried: set[str] = set()
@@ -212,13 +214,11 @@ class Study:
         """Return every cell and every verdict, from the runs that are there.
 
         Raises:
-            StudyError: nothing has been run.
+            StudyError: nothing has been run, or the store is another study's.
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            noted = StoredStudy.of(store)
-            if noted is not None and noted.imported is None:
-                self._own_metadata(store)  # what another study played is not this one's
+            noted = self._own_metadata(store)
             return judge(plan, store.outcomes(plan.runs), noted.declared if noted else None)
 
     def results(self) -> pd.DataFrame:
@@ -255,8 +255,6 @@ class Study:
         noted = StoredStudy.of(store)
         if noted is None:
             return None
-        if noted.imported is not None:
-            raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         if differing := noted.specification.differing(self.specification):
             raise StudyError(
                 f"{self.out} holds the study {noted.specification.name!r} with other "
