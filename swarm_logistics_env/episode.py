@@ -42,7 +42,7 @@ class Episode:
     @property
     def delivered(self) -> int:
         """Items delivered in the order requested: the paper's performance P."""
-        return int(self.delivery_times.shape[0])
+        return len(self.delivery_times)
 
 
 class Play:
