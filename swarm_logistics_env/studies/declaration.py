@@ -11,7 +11,6 @@ from pydantic_core import to_json
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.tasks.task import Task, refuse_untrusted
 
 from .plan import Origin, Plan
 from .runs import FILE_NAME, Runs
@@ -29,30 +28,18 @@ class StoredSpecification(BaseModel):
     name: str
     task: str
 
-    def read(self, place: Path, *, task: Task | None, trust_code: bool) -> Specification:
-        """Return the specification, of a store in `place`.
-
-        Args:
-            task: the task that it names; None: it is found by that name.
-            trust_code: whether it may be found by importing it, which runs its module.
-
-        Raises:
-            StudyError: it is damaged, or its task cannot be found.
-        """
-        if task is None:
-            refuse_untrusted(place, self.task, trust_code=trust_code)
-        return Specification(**{**self.model_dump(), "task": task or self.task})
-
     def differing(self, asked: Specification) -> list[str]:
         """Return which fields of what is asked are not those that were declared.
 
         How far it is played, and how it is judged, may change: `Declaration` tells whether verdicts
         are exploratory then, and `StudyResults.late_margin` whether equivalence is.
         """
-        declared = Specification(**{**self.model_dump(), "task": asked.played})
         free = {"seeds", "first_seed", "until_clear", "margin", "reference"}
-        mine, theirs = (one.model_dump(mode="json", exclude=free) for one in (asked, declared))
-        theirs["task"] = self.task
+        mine = asked.model_dump(mode="json", exclude=free)
+        if mine["task"] != self.task:
+            return ["task"]  # whose scenarios have other fields
+        declared = Specification(**{**self.model_dump(), "task": asked.task})
+        theirs = declared.model_dump(mode="json", exclude=free)
         return [name for name in mine if mine[name] != theirs[name]]
 
 

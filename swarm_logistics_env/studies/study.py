@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.tasks.task import Run, Task
+from swarm_logistics_env.tasks.task import Run, Task, refuse_untrusted
 
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
@@ -97,8 +97,11 @@ class Study:
         """
         out = Path(out)
         noted = StoredStudy.existing(out)
-        specification = noted.specification.read(out, task=task, trust_code=trust_code)
-        study = cls(out=out, **dict(specification))
+        asked = noted.specification
+        if task is None:
+            refuse_untrusted(out, asked.task, trust_code=trust_code)
+        study = cls(**{**asked.model_dump(), "task": task or asked.task, "out": out})
+        specification = study.specification
         if noted.imported is not None:
             study._plan = imported_plan(specification, noted.imported)
         else:

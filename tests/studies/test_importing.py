@@ -137,7 +137,7 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
     with pytest.raises(StudyError, match="holds a study already"):
         imported(tmp_path, many)
     for study, words in (
-        (Study(out=tmp_path / "out", **small), "holds the study 'table' with other name, task,"),
+        (Study(out=tmp_path / "out", **small), "holds the study 'table' with other task: "),
         (Study.stored(tmp_path / "out"), "was imported: run into a new directory"),
     ):
         with pytest.raises(StudyError, match=words):
