@@ -93,7 +93,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     ]
     return Plan(
         specification,
-        tuple(one for title, arms in tables for one in compared(title, arms, RECORDED.removed)),
+        tuple(one for title, arms in tables for one in compared(title, arms)),
         RECORDED.code(),
         {},
         nulls={

@@ -292,7 +292,7 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
         whom: Fields = {} if faults.role is None else {"role": faults.role}
         for onset, m in product(faults.onsets, faults.robots):
             arms.append(arm(task.removed, m, onset, None, whom))
-    yield from compared(table, arms, task.removed)
+    yield from compared(table, arms)
 
 
 def _adaptability(parameter: Parameter, base: Case) -> Iterator[Comparison]:
