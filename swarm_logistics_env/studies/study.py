@@ -159,8 +159,7 @@ class Study:
             noted = self._own_metadata(store)
             declared = noted.declared if noted else Declaration.model_validate(self.specification)
             note(store, plan, declared)
-            done = store.succeeded()
-            kept = sum(run.key in done for run in whole)
+            kept = len({run.key for run in whole} & store.succeeded())
             tried: set[str] = set()
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
