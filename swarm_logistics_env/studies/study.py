@@ -156,9 +156,7 @@ class Study:
         start, left = time.monotonic(), 0
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
-            noted = self._own_metadata(store)
-            declared = noted.declared if noted else Declaration.model_validate(self.specification)
-            note(store, plan, declared)
+            note(store, plan, self._declared(store))
             kept = len({run.key for run in whole} & store.succeeded())
             tried: set[str] = set()
             # A run that failed in this call is not tried again.
@@ -209,8 +207,7 @@ class Study:
         if self.out is None or not (self.out / FILE_NAME).is_file():
             return False  # nothing has been run: what is asked now will be declared
         with self._store(existing=True) as store:
-            noted = self._own_metadata(store)
-        return noted is not None and not noted.declared.covers(self.plan())
+            return not self._declared(store).covers(self.plan())
 
     def findings(self) -> StudyResults:
         """Return every cell and every verdict, from the runs that are there.
@@ -220,8 +217,8 @@ class Study:
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            noted = self._own_metadata(store)
-            return judge(plan, store.outcomes(plan.runs), noted.declared if noted else None)
+            declared = self._declared(store)
+            return judge(plan, store.outcomes(plan.runs), declared)
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error."""
@@ -252,18 +249,18 @@ class Study:
             raise StudyError("report needs a path: the study is kept in memory")
         return write_report(self.findings(), directory)
 
-    def _own_metadata(self, store: Runs) -> StoredStudy | None:
-        """Return what the store says of this study; raise StudyError if it is another one's."""
+    def _declared(self, store: Runs) -> Declaration:
+        """Return what was declared before the first run; raise StudyError if another study was."""
         noted = StoredStudy.of(store)
         if noted is None:
-            return None
+            return Declaration.model_validate(self.specification)
         if differing := noted.specification.differing(self.specification):
             raise StudyError(
                 f"{self.out} holds the study {noted.specification.name!r} with other "
                 f"{', '.join(differing)}: this one should be kept in another directory, --out "
                 f"{shlex.quote(f'{self.out}-2')}"
             )
-        return noted
+        return noted.declared
 
     @contextmanager
     def _store(self, *, existing: bool = False) -> Iterator[Runs]:
