@@ -21,7 +21,7 @@ from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
 from swarm_logistics_env.studies.play import Engine
 from swarm_logistics_env.studies.runs import Runs
 from swarm_logistics_env.studies.verdict import Cell, same_runs
-from swarm_logistics_env.tasks.task import Case, Outcome
+from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import ROLES
@@ -242,21 +242,18 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
         worst, tried = search(faults, play, asked.budget, asked.seed)
         named = [Fault(mode, asked.robots) for mode in asked.modes]
         tries = delivered([*product(named, range(_NAMED_SEEDS))]).reshape(len(named), -1)
-        worst_named = int(tries.mean(axis=1).argmin())
-        chosen = [
-            ("search", faults[worst], asked.budget),
-            ("named modes", named[worst_named], _NAMED_SEEDS * len(named)),
-        ]
+        worst_named = named[int(tries.mean(axis=1).argmin())]
+        judged = (None, faults[worst], worst_named)
         # Seeds that neither the search can have met, nor the choice among the named modes.
         first = max(asked.budget, _NAMED_SEEDS)
         fresh = range(first, first + asked.fresh)
-        judged = (None, *(fault for _, fault, _ in chosen))
         outcomes = iter(_outcomes(base, engine, store, [*product(judged, fresh)]))
         arm = Arm(NO_FAULT, base)
-        sound, *failed = (Cell.of("", "", arm, [*islice(outcomes, len(fresh))]) for _ in judged)
-    found = tuple(
-        Found(by, fault, _robustness(asked, sound, with_fault), runs)
-        for (by, fault, runs), with_fault in zip(chosen, failed)
+        cells = (Cell.of("", "", arm, [*islice(outcomes, len(fresh))]) for _ in judged)
+        sound, by_search, by_name = cells
+    found = (
+        Found("search", faults[worst], _robustness(asked, sound, by_search), asked.budget),
+        Found("named modes", worst_named, _robustness(asked, sound, by_name), tries.size),
     )
     return AttackResult(found, len(set(tried)), len(faults), sound.saturated)
 
@@ -268,7 +265,7 @@ def _robustness(asked: Attack, sound: Cell, failed: Cell) -> Estimate:
         n=asked.scenario.n_robots,
         m=asked.robots,
         saturated=[name for name, runs in (("p_o", sound), ("p_f", failed)) if runs.saturated],
-        identical=same_runs(sound.digests, failed.digests),
+        identical=same_runs(sound.outcomes, failed.outcomes),
     )
 
 
@@ -278,7 +275,7 @@ def _outcomes(
     """Return the outcomes of faults (None: without one) at seeds; play what is not in the store."""
     code = WAREHOUSE.code()
     runs = [
-        replace(base, faults=() if fault is None else (fault,)).run(code, seed)
+        Run(replace(base, faults=() if fault is None else (fault,)), code, seed)
         for fault, seed in pairs
     ]
     done = store.succeeded()

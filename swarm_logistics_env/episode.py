@@ -42,18 +42,18 @@ class Episode:
     @property
     def delivered(self) -> int:
         """Items delivered in the order requested: the paper's performance P."""
-        return int(self.delivery_times.shape[0])
+        return len(self.delivery_times)
 
 
 class Play:
     """An episode that is played step by step; the caller may change its world in between.
 
     Args:
+        seed: decides the layout, the requests and which robots fail.
         policy_seed: decides the policy's own randomness; `seed` does if it is None.
 
     Attributes:
         world: the world; its scenario and faults may be changed between two steps.
-        seed: it decides the layout, the requests and which robots fail.
 
     Raises:
         FaultError: a fault names robots that are not there.
@@ -70,7 +70,7 @@ class Play:
         policy_seed: int | None = None,
     ) -> None:
         self.world = Warehouse(scenario)
-        self._policy, self.seed = policy, seed
+        self._policy = policy
         self.world.reset(seed, faults)
         start(policy, scenario, seed if policy_seed is None else policy_seed)
 

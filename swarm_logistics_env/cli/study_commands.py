@@ -21,6 +21,7 @@ from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.play import Engine, Tally, engine_named
 from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.studies.until_clear import MOST_SEEDS
+from swarm_logistics_env.tasks.task import Run
 
 from .app import Repeated, TrustOption
 from .terminal import say, say_what_was_played, show_power, show_report, show_table
@@ -152,7 +153,7 @@ def tell_what_a_pilot_shows(asked: Study) -> None:
     if not any(getattr(case.scenario, "n_items", None) for case in whole.values()):
         return
     for title, case in whole.items():
-        first = [one.run(plan.code, plan.seeds[0]).play() for one in case.trainings]
+        first = [Run(one, plan.code, plan.seeds[0]).play() for one in case.trainings]
         if any(outcome.capped for outcome in first):
             say(
                 f"{title} delivers every item before the end, so that P is capped and most "

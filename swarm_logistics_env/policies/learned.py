@@ -100,7 +100,7 @@ class PolicyCard(_Part):
         network: the network that decides.
         command: the command line that trained it.
         versions: the versions of the packages that trained it; "simulation" is the digest of the
-            world's code (`tasks.warehouse_task.code_version`) at that time.
+            world's code (`tasks.warehouse_task.WAREHOUSE.code`) at that time.
         scored_with: the versions with which it was scored.
         scenario: what it was trained in, fields that differ from the defaults.
         training: the specification of the training.

@@ -305,7 +305,7 @@ def in_a_sentence(results: StudyResults) -> str:
         line = _line([(0, worst)])
         told += f"; the lowest is {line.question} = {line.value} {line.interval}".rstrip()
     whose = results.policies
-    if results.plan.imported_from and len(whose) == 1:  # nobody named it
+    if results.plan.origin and len(whose) == 1:  # nobody named it
         whose = (results.plan.specification.name,)
     return f"{', '.join(whose)}: {told}."
 

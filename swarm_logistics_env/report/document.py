@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
-from swarm_logistics_env.studies.plan import Plan
+from swarm_logistics_env.studies.plan import Origin, Plan
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped
 
@@ -119,8 +119,8 @@ def _verdicts(results: StudyResults) -> Iterator[Section]:
 
 def setup_sheet(plan: Plan) -> tuple[Section, ...]:
     """Return everything that was held fixed and everything that was varied."""
-    if plan.imported_from is not None:
-        return _recorded_setup(plan)
+    if plan.origin is not None:
+        return _recorded_setup(plan, plan.origin)
     policies = {case.policy.title: case.identity for case in plan.cases}
     return (
         Section("Study", lines=(f"{_version()}, code version {plan.code}.",)),
@@ -157,18 +157,18 @@ def _variations(plan: Plan) -> Iterator[str]:
             yield f"{faults.title or 'Faults'}: robots fail {manner}."
 
 
-def _recorded_setup(plan: Plan) -> tuple[Section, ...]:
+def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:
     """Return what is known of the trials, the set-up that the user states, and the methods."""
-    shared = "Paired by the seeds that it names" if plan.paired else "Unpaired: it names no seeds"
+    shared = "Paired by the seeds that it names" if origin.paired else "Unpaired: it names no seeds"
     known = (
         f"Study {plan.specification.name!r}: {len(plan.cases)} conditions, imported from "
-        f"{plan.imported_from}. {shared}. Of their conditions what varies is known, and what is "
+        f"{origin.file}. {shared}. Of their conditions what varies is known, and what is "
         "stated below."
     )
-    unstated = () if plan.setup else ("Nothing is stated of the set-up (--setup NAME=VALUE).",)
+    unstated = () if origin.setup else ("Nothing is stated of the set-up (--setup NAME=VALUE).",)
     return (
         Section("Study", lines=(known,)),
-        Section("Set-up as stated", ("condition", "value"), plan.setup, unstated),
+        Section("Set-up as stated", ("condition", "value"), origin.setup, unstated),
     )
 
 
@@ -178,7 +178,7 @@ def methods(plan: Plan) -> str:
     names = [DEFINITIONS[symbol].heading for symbol in asked]
     n = len(plan.seeds)
     if plan.paired:
-        what = "trials" if plan.imported_from else "simulated runs"
+        what = "trials" if plan.origin else "simulated runs"
         trials = f"{n} {what} of each of {len(plan.cases)} conditions, paired by seed"
         test = "the paired t-test (Fieller's interval)"
         if n >= MIN_SEEDS:

@@ -156,18 +156,18 @@ class Comparison:
         )
 
 
-def compared(table: str, arms: Sequence[Arm], removed: str | None = None) -> Iterator[Comparison]:
-    """Yield what is asked of arms that differ in one factor, the original one first.
+def compared(table: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
+    """Yield what is asked of arms that differ in one factor.
 
     Neighbouring swarm sizes are compared, else the original arm with each other one; where no arm
     has the robots removed, no indicator that needs it is asked.
 
     Args:
         table: heading of the report's table.
-        removed: name of the setting in which the faulty robots are removed.
+        arms: the original one first.
     """
     original, *others = arms
-    kind = original.setting.kind
+    kind, removed = original.setting.kind, original.case.task.removed
     by_setting = {arm.setting: arm for arm in arms}
     for before, after in zip(arms, others) if kind == "size" else ((original, x) for x in others):
         setting = after.setting

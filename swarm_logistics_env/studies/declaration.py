@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import to_json
 
-from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.equivalence import MARGIN
-from swarm_logistics_env.spi.trials import Trial
-from swarm_logistics_env.tasks.task import Task, refuse_untrusted
 
-from .plan import Plan
+from .plan import Origin, Plan
 from .runs import FILE_NAME, Runs
 from .specification import Specification
 
@@ -32,33 +28,19 @@ class StoredSpecification(BaseModel):
     name: str
     task: str
 
-    def read(
-        self, place: Path, *, task: Task | None = None, trust_code: bool = False
-    ) -> Specification:
-        """Return the specification, of a store in `place`.
-
-        Args:
-            task: the task that it names; None: it is found by that name.
-            trust_code: whether it may be found by importing it, which runs its module.
-
-        Raises:
-            StudyError: it is damaged, or its task cannot be found.
-        """
-        if task is None:
-            refuse_untrusted(place, self.task, trust_code=trust_code)
-        return Specification(**{**self.model_dump(), "task": task or self.task})
-
     def differing(self, asked: Specification) -> list[str]:
         """Return which fields of what is asked are not those that were declared.
 
         How far it is played, and how it is judged, may change: `Declaration` tells whether verdicts
         are exploratory then, and `StudyResults.late_margin` whether equivalence is.
         """
-        declared = Specification(**{**self.model_dump(), "task": asked.played})
-        free = ("seeds", "first_seed", "looks", "until_clear", "margin", "reference")
-        mine, theirs = (json.loads(each.to_json()) for each in (asked, declared))
-        theirs["task"] = self.task
-        return [name for name in mine if name not in free and mine[name] != theirs[name]]
+        free = {"seeds", "first_seed", "until_clear", "margin", "reference"}
+        mine = asked.model_dump(mode="json", exclude=free)
+        if mine["task"] != self.task:
+            return ["task"]  # whose scenarios have other fields
+        declared = Specification(**{**self.model_dump(), "task": asked.task})
+        theirs = declared.model_dump(mode="json", exclude=free)
+        return [name for name in mine if mine[name] != theirs[name]]
 
 
 class Declaration(BaseModel):
@@ -79,35 +61,11 @@ class Declaration(BaseModel):
 
     def covers(self, plan: Plan) -> bool:
         """Return whether the verdicts of a plan were declared, and so are not exploratory."""
-        if plan.imported_from is not None:
+        if plan.origin is not None:
             return True  # nothing is added to what was imported
         # A part of the declared seeds is a choice as well, made with the results at hand.
         seeds = range(self.first_seed, self.first_seed + self.seeds)
         return plan.seeds == seeds and self.looks in ((), plan.specification.looks)
-
-
-class Origin(Record):
-    """The source of recorded trials.
-
-    Attributes:
-        file: its name.
-        digest: of its content.
-        paired: whether its rows name their seeds.
-        seeds: those that they name, ascending; empty: none.
-        setup: what the user states about the trials, name and value.
-        trials: the first of every condition, in the file's order.
-        notes: sentences on how the file was read.
-    """
-
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-    file: str
-    digest: str
-    paired: bool
-    seeds: tuple[int, ...] = ()
-    setup: tuple[tuple[str, str], ...] = ()
-    trials: tuple[Trial, ...] = ()
-    notes: tuple[str, ...] = ()
 
 
 class StoredStudy(BaseModel):
@@ -159,21 +117,14 @@ class StoredStudy(BaseModel):
         return found
 
 
-def note(
-    runs: Runs,
-    specification: Specification | StoredSpecification,
-    code: str,
-    identities: Mapping[str, str],
-    declared: Declaration,
-    imported: Origin | None = None,
-) -> None:
+def note(runs: Runs, plan: Plan, declared: Declaration) -> None:
     """Note a study in its store, for `StoredStudy.of`."""
     told = {
-        "specification": specification,
-        "code": code,
-        "identities": identities,
+        "specification": plan.specification,
+        "code": plan.code,
+        "identities": plan.identities,
         "declared": declared,
-        "imported": imported,
+        "imported": plan.origin,
     }
     runs.note(NOTE, to_json(told).decode())
 
@@ -201,5 +152,5 @@ def merge(directories: Sequence[Path], out: Path) -> int:
     with Runs.new(out, "merge") as runs:
         for directory in directories:
             runs.absorb(directory / FILE_NAME)
-        note(runs, one.specification, one.code, one.identities, one.declared)
+        runs.note(NOTE, one.model_dump_json())
         return len(runs)

@@ -105,7 +105,7 @@ def _judged(results: StudyResults) -> _Judged:
         if case.policy.title != cell.policy:  # the second policy of an ablation
             continue
         # Imported tables may differ in P at one condition.
-        table = "" if results.plan.imported_from is None else cell.table
+        table = "" if results.plan.origin is None else cell.table
         content = (case.scenario, case.faults, case.behaviour, table)
         found.setdefault(cell.policy, {}).setdefault(content, cell)
     return found
@@ -258,8 +258,8 @@ def _change(
     seeds: Sequence[int] | None,
 ) -> _Found:
     (old, one), (new, other) = before, after
-    if one.problem or other.problem:
-        return str(one.problem or other.problem)
+    if problem := one.problem or other.problem:
+        return problem
     if seeds is not None:
         if not seeds:
             return (
@@ -272,7 +272,7 @@ def _change(
             Cell.of(of.policy, of.table, of.arm, [results.outcome(of.arm, seed) for seed in seeds])
             for results, of in (before, after)
         )
-        if same_runs(one.digests, other.digests):
+        if same_runs(one.outcomes, other.outcomes):
             return 0.0
     try:
         return spi.relative_change(

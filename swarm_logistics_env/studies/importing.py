@@ -13,12 +13,12 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.records import file_name
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials
-from swarm_logistics_env.tasks.task import Case, Outcome
+from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
 from .comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
-from .declaration import Declaration, Origin, note
-from .plan import Plan
+from .declaration import Declaration, note
+from .plan import Origin, Plan
 from .runs import Runs
 from .specification import Specification
 from .verdict import grouped
@@ -58,17 +58,17 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
         seeds=max(map(len, conditions.values())),
     )
     try:
-        _refuse_unused(origin, imported_plan(specification, origin))
+        plan = imported_plan(specification, origin)
+        _refuse_unused(origin, plan)
     except StudyError as error:
         raise StudyError(f"{trials.file}, {error}") from None
     with Runs.new(out, "import") as runs:
         for rows in conditions.values():
             case = _case(origin, rows[0])
             for number, row in enumerate(rows):
-                run = case.run(RECORDED.code(), number if row.seed is None else row.seed)
+                run = Run(case, plan.code, number if row.seed is None else row.seed)
                 runs.add(run, _outcome(row))
-        declared = Declaration.model_validate(specification)
-        note(runs, specification, RECORDED.code(), {}, declared, origin)
+        note(runs, plan, Declaration.model_validate(specification))
     return len(trials.rows)
 
 
@@ -93,7 +93,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     ]
     return Plan(
         specification,
-        tuple(one for title, arms in tables for one in compared(title, arms, RECORDED.removed)),
+        tuple(one for title, arms in tables for one in compared(title, arms)),
         RECORDED.code(),
         {},
         nulls={
@@ -102,10 +102,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
             for arm in arms[1:]
             if arm.setting == OTHER_BEHAVIOUR
         },
-        paired=origin.paired,
-        imported_from=origin.file,
-        imported_seeds=origin.seeds,
-        setup=origin.setup,
+        origin=origin,
     )
 
 

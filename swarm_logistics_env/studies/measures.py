@@ -58,15 +58,15 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
 def _resilience(results: StudyResults, comparison: Comparison) -> Resilience:
     original, removed, faulty = comparison.original, comparison.removed, comparison.changed
     null = results.plan.nulls.get((comparison.table, original))
-    arms = filter(None, (*comparison.arms, null))
-    every = [run for arm in arms for run in results.outcomes_of(arm)]
     single: tuple[RepairCurve, ...] = ()
     problem = None
     if removed is None:
         problem = "no runs with the robots removed are there to compare with"
     elif null is None or not results.outcomes_of(null):
         problem = "the runs of the no-fault null are missing"
-    elif any(run.all_delivered for run in every):
+    elif any(
+        run.all_delivered for arm in (*comparison.arms, null) for run in results.outcomes_of(arm)
+    ):
         problem = "the items ran out, and the rate with them: use restock"
     else:
         try:
@@ -108,7 +108,7 @@ def _index(
             threshold=threshold,
             paired=results.plan.paired,
             saturated=[name for name, runs in named.items() if any(r.all_delivered for r in runs)],
-            identical=same_runs(*([run.digest for run in runs] for runs in named.values())),
+            identical=same_runs(*named.values()),
         )
     except spi.IndicatorError:  # nothing is delivered after the onset in the reference
         return None

@@ -10,8 +10,10 @@ from itertools import chain, pairwise, product
 from typing import Self
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import comparing
-from swarm_logistics_env.tasks.task import Case, Run, TaskFault
+from swarm_logistics_env.spi.trials import Trial
+from swarm_logistics_env.tasks.task import Case, Fields, Run, TaskFault
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
 from .specification import (
@@ -19,8 +21,6 @@ from .specification import (
     Ablation,
     Factor,
     Faults,
-    Fields,
-    Manner,
     Parameter,
     Sizes,
     Specification,
@@ -28,6 +28,31 @@ from .specification import (
 from .verdict import grouped
 
 SUPERLINEAR = 1.0  # threshold of S for the steps in `Sizes.superlinear`
+Place = tuple[str, str, Arm]  # of a cell: label of the policy, table, arm
+
+
+class Origin(Record):
+    """The source of recorded trials.
+
+    Attributes:
+        file: its name.
+        digest: of its content.
+        paired: whether its rows name their seeds.
+        seeds: those that they name, ascending; empty: none.
+        setup: what the user states about the trials, name and value.
+        trials: the first of every condition, in the file's order.
+        notes: sentences on how the file was read.
+    """
+
+    error_type = StudyError
+
+    file: str
+    digest: str
+    paired: bool
+    seeds: tuple[int, ...] = ()
+    setup: tuple[tuple[str, str], ...] = ()
+    trials: tuple[Trial, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -42,10 +67,7 @@ class Plan:
         nulls: by table and original arm, an arm without fault that shares the worlds of the
             original one, not its behaviour: what chance alone makes of the two. For faults that
             begin during the run.
-        paired: whether all conditions share their seeds.
-        imported_from: name of the file that the results came in; None: they are run here.
-        imported_seeds: those that the file names; empty: it names none, or results are run here.
-        setup: name and value of what is stated about the conditions of imported results.
+        origin: of imported results; None: they are run here.
     """
 
     specification: Specification
@@ -53,19 +75,22 @@ class Plan:
     code: str
     identities: Mapping[str, str]
     nulls: Mapping[tuple[str, Arm], Arm] = field(default_factory=dict)
-    paired: bool = True
-    imported_from: str | None = None
-    imported_seeds: tuple[int, ...] = ()
-    setup: tuple[tuple[str, str], ...] = ()
+    origin: Origin | None = None
+
+    @property
+    def paired(self) -> bool:
+        """Whether all conditions share their seeds."""
+        return self.origin is None or self.origin.paired
 
     @property
     def seeds(self) -> Sequence[int]:
         """The seeds of every condition, ascending."""
-        return self.imported_seeds or self.specification.seed_numbers
+        named = self.origin.seeds if self.origin else ()
+        return named or self.specification.seed_numbers
 
     @cached_property
-    def cells(self) -> tuple[tuple[str, str, Arm], ...]:
-        """Every (policy label, table, arm) whose P the report shows, those of a factor together."""
+    def cells(self) -> tuple[Place, ...]:
+        """Every place whose P the report shows, those of a factor together."""
         cells = [
             (comparison.policy, comparison.table, arm)
             for comparison in self.comparisons
@@ -253,7 +278,7 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
             f"{scenario.duration:g} s, or nothing fails"
         )
 
-    def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Manner) -> Arm:
+    def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Fields) -> Arm:
         failing = [task.fault(one, m, onset, lasts, manner) for one in mode.split(BOTH)]
         return _arm(base, Setting("fault", mode, m, onset), faults.scenario, *failing)
 
@@ -264,10 +289,10 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
     wanted = [one for one in comparing("fault") if one.symbol in indicators]
     if task.removed is not None and any(one.needs_removed for one in wanted):
         # The robots that are removed are those that would have failed.
-        whom: Manner = {} if faults.role is None else {"role": faults.role}
+        whom: Fields = {} if faults.role is None else {"role": faults.role}
         for onset, m in product(faults.onsets, faults.robots):
             arms.append(arm(task.removed, m, onset, None, whom))
-    yield from compared(table, arms, task.removed)
+    yield from compared(table, arms)
 
 
 def _adaptability(parameter: Parameter, base: Case) -> Iterator[Comparison]:

@@ -144,13 +144,12 @@ def _played(
     interrupted: list[Run] = []
     while playing or (waiting and not interrupted):
         while waiting and not interrupted and len(playing) < at_once:
-            message = _pickled(waiting[0])
+            first = waiting.popleft()
+            message = _pickled(first)
             try:
-                playing[pool.submit(_play, message)] = waiting[0]
+                playing[pool.submit(_play, message)] = first
             except BrokenProcessPool:  # a worker died between two runs
-                interrupted.append(waiting.popleft())
-            else:
-                waiting.popleft()
+                interrupted.append(first)
         for future in wait(playing, return_when=FIRST_COMPLETED).done:
             run = playing.pop(future)
             try:
@@ -247,8 +246,6 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
         StudyError: ray is not installed, or there is no cluster at that address.
     """
     waiting = deque(runs)
-    if not waiting:
-        return
     ray, ours = _connected(address, cores)
     pending: dict[Hashable, Run] = {}
     try:

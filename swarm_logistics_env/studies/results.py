@@ -12,7 +12,7 @@ from swarm_logistics_env.tasks.task import Outcome
 
 from .comparison import Arm, Comparison
 from .declaration import Declaration
-from .plan import Plan
+from .plan import Place, Plan
 from .presets import PAPER, Reference
 from .runs import Outcomes
 from .until_clear import standing
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Times = tuple[Numbers, ...]
-Place = tuple[str, str, Arm]  # of a cell: policy, table, arm
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -32,7 +32,6 @@ from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.task import DEFAULT, Task, TaskScenario, refuse_untrusted, task_of
 
 Fields = dict[str, JsonValue]
-Manner = dict[str, float | str | tuple[float, float]]
 BOTH = "+"  # between failure modes that the same robots have at once
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
 MOST_SEEDS = 100_000
@@ -66,18 +65,15 @@ TaskSource = Annotated[
 ]
 
 
-class _Part(Record):
-    model_config = ConfigDict(arbitrary_types_allowed=True)
-    error_type: ClassVar[type[SwarmLogisticsError]] = StudyError
-
-
-class Factor(_Part):
+class Factor(Record):
     """A factor that a study varies, and the scenario in which it is varied.
 
     Args:
         title: the heading in the report; an empty one is made from the factor.
         scenario: fields that differ from the study's base scenario.
     """
+
+    error_type = StudyError
 
     title: str = ""
     scenario: Fields = Field(default_factory=dict)
@@ -127,7 +123,7 @@ class Faults(Factor):
     role: str | None = None
 
     @property
-    def manner(self) -> Manner:
+    def manner(self) -> Fields:
         """The fields of a fault that say how it fails and whom it strikes, as far as given."""
         return self.model_dump(include={"factor", "intermittent", "role"}, exclude_none=True)
 
@@ -174,7 +170,7 @@ class Ablation(Factor):
     fall: Annotated[float, Field(ge=0, lt=1)] = 0.0
 
 
-class Specification(_Part):
+class Specification(Record):
     """All that a study asks: which policies, under which conditions, over how many seeds.
 
     Args:
@@ -200,6 +196,9 @@ class Specification(_Part):
     Raises:
         StudyError: a field is unknown, or its value is not allowed; the message names each.
     """
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    error_type = StudyError
 
     name: FileName = "study"
     task: TaskSource = DEFAULT
@@ -235,12 +234,9 @@ class Specification(_Part):
 
     def trusting(self) -> Self:
         """Return the specification with policies that may be files which run code."""
-
-        def trusted(policy: PolicySpec) -> PolicySpec:
-            return policy.replace(trusted=True)
-
-        parts = (one.replace(policy=trusted(one.policy)) for one in self.ablations)
-        return self.replace(policies=tuple(map(trusted, self.policies)), ablations=tuple(parts))
+        policies = (policy.replace(trusted=True) for policy in self.policies)
+        parts = (one.replace(policy=one.policy.replace(trusted=True)) for one in self.ablations)
+        return self.replace(policies=tuple(policies), ablations=tuple(parts))
 
     @field_validator("scenario", mode="before")
     @classmethod

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.tasks.task import Run, Task
+from swarm_logistics_env.tasks.task import Run, Task, refuse_untrusted
 
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
@@ -97,8 +97,11 @@ class Study:
         """
         out = Path(out)
         noted = StoredStudy.existing(out)
-        specification = noted.specification.read(out, task=task, trust_code=trust_code)
-        study = cls(out=out, **dict(specification))
+        asked = noted.specification
+        if task is None:
+            refuse_untrusted(out, asked.task, trust_code=trust_code)
+        study = cls(**{**asked.model_dump(), "task": task or asked.task, "out": out})
+        specification = study.specification
         if noted.imported is not None:
             study._plan = imported_plan(specification, noted.imported)
         else:
@@ -140,6 +143,8 @@ class Study:
                 f"this study was played under code version {plan.code}, this is "
                 f"{code}: plan it anew, and all of it runs again"
             )
+        if plan.origin is not None:
+            raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         if engine is None or isinstance(engine, str):
             usual = "process" if (processes or 1) > 1 else "local"
             engine = engine_named(engine or usual, processes, address)
@@ -151,11 +156,8 @@ class Study:
         start, left = time.monotonic(), 0
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
-            noted = self._own_metadata(store)
-            declared = noted.declared if noted else Declaration.model_validate(self.specification)
-            note(store, self.specification, plan.code, plan.identities, declared)
-            done = store.succeeded()
-            kept = sum(run.key in done for run in whole)
+            note(store, plan, self._declared(store))
+            kept = len({run.key for run in whole} & store.succeeded())
             tried: set[str] = set()
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
@@ -205,21 +207,18 @@ class Study:
         if self.out is None or not (self.out / FILE_NAME).is_file():
             return False  # nothing has been run: what is asked now will be declared
         with self._store(existing=True) as store:
-            noted = self._own_metadata(store)
-        return noted is not None and not noted.declared.covers(self.plan())
+            return not self._declared(store).covers(self.plan())
 
     def findings(self) -> StudyResults:
         """Return every cell and every verdict, from the runs that are there.
 
         Raises:
-            StudyError: nothing has been run.
+            StudyError: nothing has been run, or the store is another study's.
         """
         plan = self.plan()
         with self._store(existing=True) as store:
-            noted = StoredStudy.of(store)
-            if noted is not None and noted.imported is None:
-                self._own_metadata(store)  # what another study played is not this one's
-            return judge(plan, store.outcomes(plan.runs), noted.declared if noted else None)
+            declared = self._declared(store)
+            return judge(plan, store.outcomes(plan.runs), declared)
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error."""
@@ -250,20 +249,18 @@ class Study:
             raise StudyError("report needs a path: the study is kept in memory")
         return write_report(self.findings(), directory)
 
-    def _own_metadata(self, store: Runs) -> StoredStudy | None:
-        """Return what the store says of this study; raise StudyError if it is another one's."""
+    def _declared(self, store: Runs) -> Declaration:
+        """Return what was declared before the first run; raise StudyError if another study was."""
         noted = StoredStudy.of(store)
         if noted is None:
-            return None
-        if noted.imported is not None:
-            raise StudyError(f"the study in {self.out} was imported: run into a new directory")
+            return Declaration.model_validate(self.specification)
         if differing := noted.specification.differing(self.specification):
             raise StudyError(
                 f"{self.out} holds the study {noted.specification.name!r} with other "
                 f"{', '.join(differing)}: this one should be kept in another directory, --out "
                 f"{shlex.quote(f'{self.out}-2')}"
             )
-        return noted
+        return noted.declared
 
     @contextmanager
     def _store(self, *, existing: bool = False) -> Iterator[Runs]:

@@ -68,7 +68,7 @@ class _Looks:
 
     def missing(self, cases: Iterable[Case], n_seeds: int) -> dict[str, Run]:
         """Return the runs of cases that are not played yet, by their keys."""
-        runs = (case.run(self.plan.code, s) for case in cases for s in self.plan.seeds[:n_seeds])
+        runs = (Run(case, self.plan.code, s) for case in cases for s in self.plan.seeds[:n_seeds])
         return {run.key: run for run in runs if (run.case.key, run.seed) not in self._outcomes}
 
     def judged(self, comparisons: Iterable[Comparison], n_seeds: int) -> dict[Comparison, Verdict]:

@@ -79,9 +79,8 @@ class Cell:
         ]
         kept = tuple(one for one in found if one is not None and one.error is None)
         problem = ", ".join(problems) or None
-        if reference is None:
-            return cls(policy, table, arm, kept, problem)
-        published, counted = reference.performance.get(arm.setting), arm.setting in reference.cells
+        published = reference.performance.get(arm.setting) if reference else None
+        counted = reference is not None and arm.setting in reference.cells
         return cls(policy, table, arm, kept, problem, published, counted)
 
     @cached_property
@@ -95,11 +94,6 @@ class Cell:
     def n_seeds(self) -> int:
         """Number of runs that succeeded; of several trainings all together."""
         return len(self.outcomes)
-
-    @property
-    def digests(self) -> tuple[str | None, ...]:
-        """Digest of each run; equal digests: the same run."""
-        return tuple(outcome.digest for outcome in self.outcomes)
 
     @property
     def saturated(self) -> bool:
@@ -299,9 +293,9 @@ def judge_one(
         f"{arm.setting}: {cells[arm].problem}" for arm in comparison.arms if cells[arm].problem
     ]
     if not problems:
-        digests = (cells[arm].digests for arm in (comparison.original, comparison.changed))
+        pair = (cells[arm].outcomes for arm in (comparison.original, comparison.changed))
         # The removed robots make the third condition another one by construction.
-        identical = comparison.removed is None and same_runs(*digests)
+        identical = comparison.removed is None and same_runs(*pair)
         samples = {arm: cells[arm].by_seed for arm in comparison.arms}
         try:
             estimate = comparison.estimate(
@@ -348,6 +342,7 @@ def under_holm(found: Sequence[Verdict]) -> Iterator[Verdict]:
     yield from (adjusted[one.compared] for one in found)
 
 
-def same_runs(before: Sequence[str | None], after: Sequence[str | None]) -> bool:
+def same_runs(before: Sequence[Outcome], after: Sequence[Outcome]) -> bool:
     """Return whether two conditions gave the same run at every seed, by the digests of the runs."""
-    return list(before) == list(after) and None not in before
+    digests = [outcome.digest for outcome in before]
+    return digests == [outcome.digest for outcome in after] and None not in digests

@@ -228,10 +228,6 @@ class Case:
         identities = json.loads(self.identity)
         return tuple(replace(self, policy=one, identity=identities[one.name]) for one in several)
 
-    def run(self, code: str, seed: int) -> Run:
-        """Return the run of this case at one seed, under one version of the code."""
-        return Run(self, code, seed)
-
 
 @dataclass(frozen=True)
 class Run:

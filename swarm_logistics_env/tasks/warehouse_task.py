@@ -21,15 +21,6 @@ from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
 from .task import Case, Fields, Outcome, TaskScenario
 
 
-def code_version() -> str:
-    """Return the digest of the code that decides an episode, 16 hexadecimal digits.
-
-    Its modules are those that the warehouse and `run_episode` use; policies have identities of
-    their own. Docstrings, comments on lines of their own and blank lines do not count.
-    """
-    return code_digest(Play, Warehouse)
-
-
 class WarehouseTask:
     """Episodes of `run_episode`; see `Task` for its attributes."""
 
@@ -53,8 +44,12 @@ class WarehouseTask:
         return {mode: FAILURE_MODES[mode].description for mode in FAILURE_MODES}
 
     def code(self) -> str:
-        """Return the version of the simulation."""
-        return code_version()
+        """Return the digest of the code that decides an episode, 16 hexadecimal digits.
+
+        Its modules are those that the warehouse and `run_episode` use; policies have identities of
+        their own. Docstrings, comments on lines of their own and blank lines do not count.
+        """
+        return code_digest(Play, Warehouse)
 
     def vary(self, base: TaskScenario, fields: Fields) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.

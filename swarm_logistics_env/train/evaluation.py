@@ -27,7 +27,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.tasks.warehouse_task import code_version
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.warehouse import Fault
@@ -43,7 +43,7 @@ PACKAGES = (
 
 def versions() -> dict[str, str]:
     """Return the versions of everything that a training's result depends on."""
-    found = {"python": platform.python_version(), "simulation": code_version()}
+    found = {"python": platform.python_version(), "simulation": WAREHOUSE.code()}
     for package in PACKAGES:
         with suppress(PackageNotFoundError):
             found[package] = version(package)

@@ -20,8 +20,8 @@ from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.plan import Shard
-from swarm_logistics_env.tasks.task import Case
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, code_version
+from swarm_logistics_env.tasks.task import Case, Run
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from tests.conftest import SMALL
 from tests.studies.made_up import digest
 
@@ -96,13 +96,13 @@ def test_other_behaviour_meets_the_same_worlds_and_nothing_is_remembered() -> No
     same = Case(PolicySpec.of(Remembering()), "identity", scenario, task=WAREHOUSE)
     other = replace(same, behaviour=1)
     played = [(seed, one) for seed in (0, 1) for one in (same, other, same)]
-    outcomes = [one.run(code_version(), seed).play() for seed, one in played]
+    outcomes = [Run(one, WAREHOUSE.code(), seed).play() for seed, one in played]
     assert {outcome.error for outcome in outcomes} == {None}
     assert outcomes[0].digest == outcomes[2].digest != outcomes[1].digest
     first, other_first, again, second, other_second, _ = Remembering.seeds[-6:]
     assert (first, again, second) == (0, 0, 1)
     assert len({first, second, other_first, other_second}) == 4
-    stale = same.run("0" * 16, 0).play()
+    stale = Run(same, "0" * 16, 0).play()
     assert "the package changed while the study ran" in str(stale.error)
 
 

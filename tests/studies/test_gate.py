@@ -129,7 +129,8 @@ def test_the_same_runs_answer_a_gate_exactly() -> None:
             said = answers(Gate.parse(text), same, same)
             assert {(answer.fails, answer.exact) for answer in said} == {(failing, 0.0)}
     # Imported results have no digests: equal numbers do not show that runs are the same.
-    assert not same_runs(["a", None], ["a", None])
+    recorded = [Outcome(digest="a"), Outcome()]
+    assert not same_runs(recorded, recorded)
 
 
 def test_runs_are_paired_by_their_seeds_and_not_by_their_place() -> None:

@@ -136,7 +136,11 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
     imported(tmp_path, many)
     with pytest.raises(StudyError, match="holds a study already"):
         imported(tmp_path, many)
-    with pytest.raises(StudyError, match="was imported: run into a new directory"):
-        Study(out=tmp_path / "out", **small).run()
+    for study, words in (
+        (Study(out=tmp_path / "out", **small), "holds the study 'table' with other task: "),
+        (Study.stored(tmp_path / "out"), "was imported: run into a new directory"),
+    ):
+        with pytest.raises(StudyError, match=words):
+            study.run()
     with Runs.existing(tmp_path / "out") as runs:
         assert len(runs) == 5

@@ -14,7 +14,7 @@ from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import OTHER_BEHAVIOUR
 from swarm_logistics_env.studies.presets import PAPER, PRESETS
-from swarm_logistics_env.tasks.task import Case
+from swarm_logistics_env.tasks.task import Case, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.warehouse import Fault
 
@@ -70,7 +70,7 @@ def test_cases_and_runs_are_known_by_content() -> None:
         replace(base, behaviour=1),
     ]
     assert len({base.key, *(other.key for other in others)}) == 7
-    assert len({base.run("a", 0).key, base.run("a", 1).key, base.run("b", 0).key}) == 3
+    assert len({Run(base, "a", 0).key, Run(base, "a", 1).key, Run(base, "b", 0).key}) == 3
     named, built, other = (
         {case.key for case in Study(policies=[policy], sizes=[{"values": [2, 3]}]).plan().cases}
         for policy in ("swarm-dt", SwarmDT(), SwarmDT(taxis_gain=0.1))

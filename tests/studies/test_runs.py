@@ -23,7 +23,7 @@ CASE = Case(PolicySpec(name="swarm-dt", label="mine"), "identity", Scenario(), t
 
 
 def run(seed: int) -> Run:
-    return CASE.run("code", seed)
+    return Run(CASE, "code", seed)
 
 
 def outcome(*times: float) -> Outcome:

@@ -135,9 +135,9 @@ def test_another_study_does_not_enter_the_directory_of_this_one(
     small: dict[str, Any], tmp_path: Path
 ) -> None:
     others = {"name": "second", "policies": ["random-walk"], "faults": [], "indicators": ["S"]}
-    declared = Study(out=tmp_path, **small).specification
+    declared = Study(out=tmp_path, **small)
     with Runs(tmp_path / FILE_NAME) as runs:
-        note(runs, declared, declared.played.code(), {}, Declaration.model_validate(declared))
+        note(runs, declared.plan(), Declaration.model_validate(declared.specification))
         notes = runs.notes()
     for field, value in others.items():
         other = Study(out=tmp_path, **{**small, field: value})

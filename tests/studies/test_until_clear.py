@@ -93,7 +93,7 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
         alpha = spi.look_alphas(looks, spending=SPENDING)[looks.index(estimate.n_seeds)]
         assert estimate.confidence == pytest.approx(1 - alpha)
         p_o, p_f = (
-            [made_up(arm.case.run("", seed)).delivered for seed in range(estimate.n_seeds)]
+            [made_up(Run(arm.case, "", seed)).delivered for seed in range(estimate.n_seeds)]
             for arm in test.compared.arms
         )
         alone = spi.robustness(p_o, p_f, n=25, m=1, confidence=estimate.confidence)

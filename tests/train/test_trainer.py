@@ -21,8 +21,7 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS, MotionView
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
-from swarm_logistics_env.tasks.warehouse_task import WarehouseTask, code_version
-from swarm_logistics_env.train import evaluation
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
 from swarm_logistics_env.train.evaluation import versions
 from swarm_logistics_env.train.learner import KNOWN, NetworkView, make_learner, tensors_of
 from swarm_logistics_env.train.settings import Indicators, Scores
@@ -83,11 +82,12 @@ def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_cal
             train(training, tmp_path)
     card = policies.read_card(tmp_path / "small.safetensors")
     assert (card.scores, card.scored_with) == ((), {})
-    monkeypatch.setattr(evaluation, "code_version", lambda: "a later one")
+    trained_with = WAREHOUSE.code()
+    monkeypatch.setattr(WarehouseTask, "code", lambda _: "a later one")
     later = policies.read_card(train(training, tmp_path))
     assert later.scores
     assert later.scored_with["simulation"] == "a later one"
-    assert later.versions["simulation"] == code_version()
+    assert later.versions["simulation"] == trained_with
 
 
 def test_torch_and_the_policy_file_agree(small: Any) -> None:
