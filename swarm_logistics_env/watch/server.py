@@ -24,9 +24,8 @@ if TYPE_CHECKING:
     from aiohttp.typedefs import Handler
 
 LOOPBACK = "127.0.0.1"
-_OWN_NAMES = ("localhost", LOOPBACK, "::1")
-_ADDRESS = re.compile(r"[\d.]+|[\da-f.]*:[\da-f:.]*")  # what is written so is no name
-_HOST = re.compile(r"([^\s:/@\[\]]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
+# A foreign page may resolve its own name to this machine, but it cannot forge the name in a Host.
+_OWN_HOST = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNORECASE)
 FILES = {
     "page.html": "text/html",
     "page.css": "text/css",
@@ -55,7 +54,6 @@ class WatchServer:
     Args:
         session: the session to show.
         port: the port; 0 takes any that is free.
-        host: the name or address of this machine to listen on; "0.0.0.0" or "::" are all.
 
     Attributes:
         address: the address to open in a browser, once `start` is done.
@@ -64,13 +62,13 @@ class WatchServer:
         SetupError: aiohttp is not installed.
     """
 
-    def __init__(self, session: Session, port: int, host: str = LOOPBACK) -> None:
+    def __init__(self, session: Session, port: int) -> None:
         try:
             from aiohttp import web
         except ImportError as error:
             raise SetupError(f"watch needs aiohttp ({error}): {how_to_install('watch')}") from None
         self._web = web
-        self.session, self.port, self.host = session, port, host
+        self.session, self.port = session, port
         self.token = secrets.token_urlsafe(18)
         self.recording = Recording(session)
         self.address = ""
@@ -91,23 +89,21 @@ class WatchServer:
         self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
 
     async def start(self) -> None:
-        """Listen on the host.
+        """Listen on this machine.
 
         Raises:
-            SetupError: the port is in use or not allowed, or the host is none of this machine's.
+            SetupError: the port is in use or not allowed.
         """
         await self._runner.setup()
-        site = self._web.TCPSite(self._runner, self.host, self.port)
+        site = self._web.TCPSite(self._runner, LOOPBACK, self.port)
         try:
             await site.start()
         except OSError as error:
             await self._runner.cleanup()
             told = f"{error.strerror}; --port 0 takes any that is free"
-            raise SetupError(f"host = {self.host}, port = {self.port}: {told}") from None
+            raise SetupError(f"port = {self.port}: {told}") from None
         self.port = self._runner.addresses[0][1]
-        shown = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
-        shown = f"[{shown}]" if ":" in shown else shown
-        self.address = f"http://{shown}:{self.port}/{self.token}/"
+        self.address = f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
     async def play(self) -> None:
         """Let the session go on while a page is open, until this is cancelled.
@@ -170,29 +166,12 @@ class WatchServer:
 
     def _check(self, request: web.Request) -> None:
         hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
-        own = len(hosts) == 1 and self._is_own(hosts[0])
+        own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0]) is not None
         token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
         known = hmac.compare_digest(token.encode(), self.token.encode())
         if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
             text = "Open the address that swarm-logistics watch printed, on its machine.\n"
             raise self._web.HTTPForbidden(text=text)
-
-    def _is_own(self, host: str) -> bool:
-        """Return whether a request's Host means this machine.
-
-        A foreign page may resolve its own name to this machine, but it cannot forge this header;
-        and it has a name, so that any address will do where others may reach this machine.
-        """
-        match = _HOST.fullmatch(host)
-        name = match[1].strip("[]").lower() if match else ""
-        if name in (*_OWN_NAMES, self.host.lower()):
-            return True
-        return not is_loopback(self.host) and _ADDRESS.fullmatch(name) is not None
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether only this machine itself reaches it by that name or address."""
-    return host in _OWN_NAMES or host.startswith("127.")
 
 
 def _is_own_error(record: logging.LogRecord) -> bool:
@@ -211,14 +190,12 @@ def serve(
     session: Session,
     port: int,
     announce: Callable[[str], None],
-    host: str = LOOPBACK,
     show: Callable[[str], object] | None = None,
 ) -> None:
     """Show a session in the browser until Ctrl-C.
 
     Args:
         announce: is called with a sentence that has the address.
-        host: see `WatchServer`.
         show: is called with the address, in a thread of its own, as a browser may not return.
 
     Raises:
@@ -227,11 +204,11 @@ def serve(
     """
 
     async def run() -> None:
-        server = WatchServer(session, port, host)
+        server = WatchServer(session, port)
         await server.start()
         announce(
             f"Open {server.address} in a browser on this machine (from another one: "
-            f"ssh -L {server.port}:127.0.0.1:{server.port} HOST). Ctrl-C ends it."
+            f"ssh -L {server.port}:{LOOPBACK}:{server.port} HOST). Ctrl-C ends it."
         )
         if show is not None:
             threading.Thread(target=show, args=[server.address], daemon=True).start()
