@@ -5,7 +5,6 @@ Its VecNormalize as well, with statistics of robots alone.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -54,10 +53,10 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     (1 while any failure mode holds for the row's robot, else 0), `world`, `n_robots`, `delivered`
     (the paper's P, so far), and what wrappers add (see `wrappers.IndicatorReward`). A done row's
     has `terminal_observation` besides, as stable-baselines3 expects, and, where it was a robot's,
-    `episode`: its return "r", length "l" [steps], wall time "t" [s] and the world's "delivered". So
-    learners log `rollout/ep_rew_mean` and `ep_len_mean` by themselves; the means of a `VecMonitor`
-    count padding as episodes of return 0. `learn(.., callback=LogDeliveries())` logs
-    `rollout/delivered_mean` as well.
+    `episode`: its return "r", length "l" [steps] and the world's "delivered". So learners log
+    `rollout/ep_rew_mean` and `ep_len_mean` by themselves; the means of a `VecMonitor` count padding
+    as episodes of return 0. `learn(.., callback=LogDeliveries())` logs `rollout/delivered_mean` as
+    well.
 
     Args:
         scenario: the conditions; default: the paper's.
@@ -119,7 +118,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         n_rows = self._worlds.n_rows
         # Of each row's episode: its rewards so far, and the step that it began with.
         self._returns, self._begun = np.zeros(n_rows, np.float32), np.zeros(n_rows, np.int64)
-        self._n_steps, self._made_at = 0, time.time()
+        self._n_steps = 0
         super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
         if seed is not None:
             self.seed(seed)
@@ -286,7 +285,6 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
                 infos[row]["episode"] = {
                     "r": float(self._returns[row]),
                     "l": int(self._n_steps - self._begun[row]),
-                    "t": round(time.time() - self._made_at, 6),
                     "delivered": infos[row]["delivered"],
                 }
             self._returns[row], self._begun[row] = 0.0, self._n_steps
