@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.environment.requests import checked_count
+from swarm_logistics_env.environment.requests import checked_count, checked_options
 from swarm_logistics_env.errors import SetupError, how_to_install
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
@@ -144,20 +144,13 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._seeds = [key(seed, "world", world) >> 1 for world in self._worlds.world_of.tolist()]
         return list(self._seeds)
 
-    def set_options(self, options: Mapping[str, Any] | Sequence[Any] | None = None) -> None:
-        """Set the options of the next `reset`: a dict for all worlds, or a list with one for each.
+    def set_options(self, options: Mapping[str, Any] | None = None) -> None:
+        """Set the options of the next `reset`, the same for all worlds.
 
         Raises:
-            SetupError: the list has another length.
+            SetupError: they are no dict, or one is nearly called as one that there is.
         """
-        if options is None or isinstance(options, Mapping):
-            options = [options] * len(self.worlds)
-        if len(options) != len(self.worlds):
-            raise SetupError(
-                f"{len(options)} options: should be one dict, or a dict for each of the "
-                f"{len(self.worlds)} worlds"
-            )
-        self._options = [dict(given or {}) for given in options]
+        self._options = [checked_options(options)] * self.num_envs
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world; returns the observations (num_envs, D)."""
