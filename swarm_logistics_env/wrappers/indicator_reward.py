@@ -182,11 +182,11 @@ class IndicatorReward(Wrapper):
         for name in self.weights:
             if name not in PERFORMANCES:
                 continue
-            test = self._indicators.get(name)
-            info[name] = test.share * delivered + test.constant if test else 0.0
-            info[f"{name}_tested"] = int(test is not None)
+            test = self._indicators.get(name, Payment())
+            info[name] = test.share * delivered + test.constant
+            info[f"{name}_tested"] = int(name in self._indicators)
             for role in PERFORMANCES[name]:
-                info[f"{name}_{role}"] = test.performances[role] if test else 0.0
+                info[f"{name}_{role}"] = test.performances.get(role, 0.0)
         return info
 
     def begun(self, seed: int) -> None:
