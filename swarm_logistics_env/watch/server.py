@@ -11,12 +11,21 @@ import secrets
 import threading
 import time
 from collections.abc import Callable
-from importlib import resources
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, how_to_install
 
-from .messages import Message, Recording, changes, encode, fixed_data, frame, obey
+from .messages import (
+    FILES,
+    Message,
+    Recording,
+    changes,
+    encode,
+    fixed_data,
+    frame,
+    obey,
+    text_of_file,
+)
 from .session import Session
 
 if TYPE_CHECKING:
@@ -26,13 +35,6 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 # A foreign page may resolve its own name to this machine, but it cannot forge the name in a Host.
 _OWN_HOST = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNORECASE)
-FILES = {
-    "page.html": "text/html",
-    "page.css": "text/css",
-    "draw.js": "text/javascript",
-    "panel.js": "text/javascript",
-    "page.js": "text/javascript",
-}
 _HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
     "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
@@ -154,10 +156,11 @@ class WatchServer:
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"] or "page.html"
-        if name not in FILES or request.path.endswith("/page.html"):
+        if name not in FILES:
             raise self._web.HTTPNotFound(text="Not Found\n")
-        text = resources.files(__package__).joinpath("web", name).read_text(encoding="utf-8")
-        return self._web.Response(text=text, content_type=FILES[name], charset="utf-8")
+        return self._web.Response(
+            text=text_of_file(name), content_type=FILES[name], charset="utf-8"
+        )
 
     async def _save(self, request: web.Request) -> web.StreamResponse:
         headers = {"Content-Disposition": 'attachment; filename="run.html"'}
