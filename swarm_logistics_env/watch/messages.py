@@ -26,7 +26,7 @@ from .session import SPEEDS, Session
 
 Message: TypeAlias = dict[str, Any]
 
-_TOLD = ("seed", "speed", "paused", "mode", "note", "policy", "against", "names")
+_TOLD = ("seed", "speed", "paused", "mode", "note", "policy", "against")
 _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius",

@@ -83,11 +83,6 @@ class Session:
         """Whether both runs have come to their ends."""
         return self.run.is_over and self.beside.is_over
 
-    @property
-    def names(self) -> tuple[str, str]:
-        """The titles of the two runs."""
-        return self.policy, self.against or f"{self.policy} without faults"
-
     # Time
 
     def play(

@@ -151,11 +151,11 @@ def test_what_cannot_be_is_refused() -> None:
 
 def test_policies_are_compared_with_the_same_faults() -> None:
     session = Session(SMALL, against="homing", seed=3)
-    assert session.choices[:2] == session.names == ("swarm-dt", "homing")
+    assert session.choices[:2] == (session.policy, session.against) == ("swarm-dt", "homing")
     session.break_robot(2)
     assert session.beside.world.state.failure_modes[2] == ("FM4",)
     session.compare("homing")
-    assert session.names == ("homing", "homing without faults")
+    assert (session.policy, session.against) == ("homing", None)
     assert session.run.world.state.time == 0.0
 
 
