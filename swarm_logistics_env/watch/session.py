@@ -90,8 +90,8 @@ class Session:
         elapsed: float,
         budget: float = math.inf,
         after_step: Callable[[], object] = lambda: None,
-    ) -> int:
-        """Let both runs go on for some wall time; return the number of steps taken.
+    ) -> None:
+        """Let both runs go on for some wall time.
 
         Args:
             elapsed: wall time since the last call [s].
@@ -99,18 +99,16 @@ class Session:
             after_step: is called after every step.
         """
         if self.paused or self.is_over:
-            return 0
+            return
         self._due += elapsed * self.speed / self.scenario.control_period
-        stop, steps = time.perf_counter() + budget, 0
+        stop = time.perf_counter() + budget
         while self._due >= 1.0 and not self.is_over:
             self.advance()
             after_step()
             self._due -= 1.0
-            steps += 1
             if time.perf_counter() >= stop:
                 self._due = min(self._due, 1.0)
                 break
-        return steps
 
     def pause(self) -> None:
         """Pause, or go on."""
