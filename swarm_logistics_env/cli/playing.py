@@ -136,7 +136,6 @@ def watch_command(
 
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.messages import recorded_page
-    from swarm_logistics_env.watch.server import serve
 
     if until is not None and (save is None or not until > 0.0):
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
@@ -154,6 +153,8 @@ def watch_command(
         lambda name: load(given.get(name, name), trust_code=trust_code),
     )
     if save is None:
+        from swarm_logistics_env.watch.server import serve  # needs aiohttp
+
         shows = not no_open and sys.stdout.isatty() and _has_screen()
         serve(session, port, echo, show=webbrowser.open if shows else None)
         return

@@ -1,4 +1,7 @@
-"""The server: for this machine, for those who know the token in the address."""
+"""The server: for this machine, for those who know the token in the address.
+
+To import it raises a SetupError where aiohttp is not installed.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,6 @@ import secrets
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, how_to_install
 
@@ -28,9 +30,12 @@ from .messages import (
 )
 from .session import Session
 
-if TYPE_CHECKING:
+try:
     from aiohttp import web
+    from aiohttp.http_exceptions import HttpProcessingError
     from aiohttp.typedefs import Handler
+except ImportError as error:
+    raise SetupError(f"watch needs aiohttp ({error}): {how_to_install('watch')}") from None
 
 LOOPBACK = "127.0.0.1"
 # A foreign page may resolve its own name to this machine, but it cannot forge the name in a Host.
@@ -59,29 +64,15 @@ class WatchServer:
 
     Attributes:
         address: the address to open in a browser, once `start` is done.
-
-    Raises:
-        SetupError: aiohttp is not installed.
     """
 
     def __init__(self, session: Session, port: int) -> None:
-        try:
-            from aiohttp import web
-        except ImportError as error:
-            raise SetupError(f"watch needs aiohttp ({error}): {how_to_install('watch')}") from None
-        self._web = web
         self.session, self.port = session, port
         self.token = secrets.token_urlsafe(18)
         self.recording = Recording(session)
         self.address = ""
         self._pages: dict[web.WebSocketResponse, Message] = {}
-
-        @web.middleware
-        async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
-            self._check(request)
-            return await handler(request)
-
-        app = web.Application(middlewares=[guard])
+        app = web.Application(middlewares=[self._guard])
         app.router.add_get("/{token}/live", self._live)
         app.router.add_get("/{token}/recording.html", self._save)
         app.router.add_get("/{token}/{name:.*}", self._file)
@@ -97,7 +88,7 @@ class WatchServer:
             SetupError: the port is in use or not allowed.
         """
         await self._runner.setup()
-        site = self._web.TCPSite(self._runner, LOOPBACK, self.port)
+        site = web.TCPSite(self._runner, LOOPBACK, self.port)
         try:
             await site.start()
         except OSError as error:
@@ -136,10 +127,8 @@ class WatchServer:
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
         if len(self._pages) >= _MOST_PAGES:
-            raise self._web.HTTPServiceUnavailable(text="Too many pages are open.\n")
-        page = self._web.WebSocketResponse(
-            max_msg_size=_LONGEST_ORDER, heartbeat=10.0, compress=False
-        )
+            raise web.HTTPServiceUnavailable(text="Too many pages are open.\n")
+        page = web.WebSocketResponse(max_msg_size=_LONGEST_ORDER, heartbeat=10.0, compress=False)
         await page.prepare(request)
         await page.send_str(encode(fixed_data(self.session)))
         self._pages[page] = {}
@@ -157,30 +146,28 @@ class WatchServer:
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"] or "page.html"
         if name not in FILES:
-            raise self._web.HTTPNotFound(text="Not Found\n")
-        return self._web.Response(
-            text=text_of_file(name), content_type=FILES[name], charset="utf-8"
-        )
+            raise web.HTTPNotFound(text="Not Found\n")
+        return web.Response(text=text_of_file(name), content_type=FILES[name], charset="utf-8")
 
     async def _save(self, request: web.Request) -> web.StreamResponse:
         headers = {"Content-Disposition": 'attachment; filename="run.html"'}
         page = await asyncio.to_thread(self.recording.page)
-        return self._web.Response(text=page, content_type="text/html", headers=headers)
+        return web.Response(text=page, content_type="text/html", headers=headers)
 
-    def _check(self, request: web.Request) -> None:
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
         own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0]) is not None
         token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
         known = hmac.compare_digest(token.encode(), self.token.encode())
         if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
             text = "Open the address that swarm-logistics watch printed, on its machine.\n"
-            raise self._web.HTTPForbidden(text=text)
+            raise web.HTTPForbidden(text=text)
+        return await handler(request)
 
 
 def _is_own_error(record: logging.LogRecord) -> bool:
     """Return whether an error is ours: no request that is no HTTP, no page that was closed."""
-    from aiohttp.http_exceptions import HttpProcessingError
-
     others = HttpProcessingError | ConnectionError
     return not (record.exc_info and isinstance(record.exc_info[1], others))
 
@@ -202,7 +189,7 @@ def serve(
         show: is called with the address, in a thread of its own, as a browser may not return.
 
     Raises:
-        SetupError: the port is in use or not allowed, or aiohttp is not installed.
+        SetupError: the port is in use or not allowed.
         PolicyError: the policy returned commands of the wrong shape, or not finite.
     """
 
