@@ -50,6 +50,8 @@ _HEADERS = {
     "Cache-Control": "no-store",
     "Server": "swarm-logistics",
 }
+_LONGEST_ORDER = 4096  # bytes
+_MOST_PAGES = 16
 _FRAME_PERIOD = 0.05  # [s]
 
 
@@ -124,7 +126,9 @@ class WatchServer:
                     await page.send_str(encode(message))
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
-        page = web.WebSocketResponse(heartbeat=10.0, compress=False)
+        if len(self._pages) >= _MOST_PAGES:
+            raise web.HTTPServiceUnavailable(text="Too many pages are open.\n")
+        page = web.WebSocketResponse(max_msg_size=_LONGEST_ORDER, heartbeat=10.0, compress=False)
         await page.prepare(request)
         await page.send_str(encode(fixed_data(self.session)))
         self._pages[page] = {}

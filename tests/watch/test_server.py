@@ -171,6 +171,34 @@ def test_order_that_cannot_be_is_refused_in_a_sentence(
     assert words in messages(asked, [order], 10)[-1]["problem"]
 
 
+def test_a_message_that_is_too_long_ends_its_page_alone(served: Served) -> None:
+    async def talk() -> int | None:
+        live = f"{served.server.address}live"
+        async with aiohttp.ClientSession() as client, client.ws_connect(live) as page:
+            await page.send_str('{"do":"select","robot":' + " " * 5000 + "3}")
+            for _ in range(60):  # frames that are under way
+                if (await page.receive(30)).type is not aiohttp.WSMsgType.TEXT:
+                    break
+            return page.close_code
+
+    assert asyncio.run(talk()) == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
+    assert served.server.session.selected is None
+    assert messages(served, [], 1)
+
+
+def test_more_pages_than_there_may_be_are_refused(served: Served) -> None:
+    async def open_pages() -> int:
+        live = f"{served.server.address}live"
+        async with aiohttp.ClientSession() as client, contextlib.AsyncExitStack() as pages:
+            for _ in range(16):
+                await pages.enter_async_context(client.ws_connect(live))
+            with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+                await client.ws_connect(live)
+        return refused.value.status
+
+    assert asyncio.run(open_pages()) == 503
+
+
 def test_malformed_requests_neither_stop_it_nor_leak_a_path(
     served: Served, capfd: pytest.CaptureFixture[str]
 ) -> None:
