@@ -5,14 +5,13 @@ Its VecNormalize as well, with statistics of robots alone.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.environment.requests import checked_count
+from swarm_logistics_env.environment.requests import checked_count, checked_options
 from swarm_logistics_env.errors import SetupError, how_to_install
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
@@ -54,10 +53,10 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     (1 while any failure mode holds for the row's robot, else 0), `world`, `n_robots`, `delivered`
     (the paper's P, so far), and what wrappers add (see `wrappers.IndicatorReward`). A done row's
     has `terminal_observation` besides, as stable-baselines3 expects, and, where it was a robot's,
-    `episode`: its return "r", length "l" [steps], wall time "t" [s] and the world's "delivered". So
-    learners log `rollout/ep_rew_mean` and `ep_len_mean` by themselves; the means of a `VecMonitor`
-    count padding as episodes of return 0. `learn(.., callback=LogDeliveries())` logs
-    `rollout/delivered_mean` as well.
+    `episode`: its return "r", length "l" [steps] and the world's "delivered". So learners log
+    `rollout/ep_rew_mean` and `ep_len_mean` by themselves; the means of a `VecMonitor` count padding
+    as episodes of return 0. `learn(.., callback=LogDeliveries())` logs `rollout/delivered_mean` as
+    well.
 
     Args:
         scenario: the conditions; default: the paper's.
@@ -119,7 +118,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         n_rows = self._worlds.n_rows
         # Of each row's episode: its rewards so far, and the step that it began with.
         self._returns, self._begun = np.zeros(n_rows, np.float32), np.zeros(n_rows, np.int64)
-        self._n_steps, self._made_at = 0, time.time()
+        self._n_steps = 0
         super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
         if seed is not None:
             self.seed(seed)
@@ -145,20 +144,13 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._seeds = [key(seed, "world", world) >> 1 for world in self._worlds.world_of.tolist()]
         return list(self._seeds)
 
-    def set_options(self, options: Mapping[str, Any] | Sequence[Any] | None = None) -> None:
-        """Set the options of the next `reset`: a dict for all worlds, or a list with one for each.
+    def set_options(self, options: Mapping[str, Any] | None = None) -> None:
+        """Set the options of the next `reset`, the same for all worlds.
 
         Raises:
-            SetupError: the list has another length.
+            SetupError: they are no dict, or one is nearly called as one that there is.
         """
-        if options is None or isinstance(options, Mapping):
-            options = [options] * len(self.worlds)
-        if len(options) != len(self.worlds):
-            raise SetupError(
-                f"{len(options)} options: should be one dict, or a dict for each of the "
-                f"{len(self.worlds)} worlds"
-            )
-        self._options = [dict(given or {}) for given in options]
+        self._options = [checked_options(options)] * self.num_envs
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world; returns the observations (num_envs, D)."""
@@ -286,7 +278,6 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
                 infos[row]["episode"] = {
                     "r": float(self._returns[row]),
                     "l": int(self._n_steps - self._begun[row]),
-                    "t": round(time.time() - self._made_at, 6),
                     "delivered": infos[row]["delivered"],
                 }
             self._returns[row], self._begun[row] = 0.0, self._n_steps

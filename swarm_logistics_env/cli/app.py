@@ -40,7 +40,7 @@ class Application:
 
     def __call__(self) -> None:
         """Run the command line in `sys.argv`."""
-        code = self.run()
+        code = self.run(sys.argv[1:])
         try:
             sys.stdout.flush()
         except OSError:  # what is left in the buffer would be tried again
@@ -48,13 +48,13 @@ class Application:
         gc.freeze()  # the process ends: nobody needs to look for garbage
         sys.exit(code)
 
-    def run(self, arguments: Repeated = None) -> int:
-        """Run a command line and return the exit code."""
+    def run(self, arguments: list[str]) -> int:
+        """Run the command with these arguments and return the exit code."""
         # A user's own policy lies in the folder in which the command is run. The folder comes last,
         # so that its modules hide no installed ones.
         if "" not in sys.path:
             sys.path.append("")
-        typed = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
+        typed = arguments or ["--help"]
         try:
             command = command_line({*typed[:1]} & {*COMMANDS} or COMMANDS)
             # What made a file is recorded in it: the command line is the context's object.

@@ -13,7 +13,6 @@ from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, PolicySpec
-from swarm_logistics_env.records import read_table
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, slug
@@ -102,8 +101,8 @@ def judge_command(
     setup: Annotated[
         Repeated,
         Option(
-            metavar="NAME=VALUE|FILE",
-            help="A condition for the report to state, or a TOML file of some; may be repeated.",
+            metavar="NAME=VALUE",
+            help="A condition for the report to state; may be repeated.",
         ),
     ] = None,
     processes: ProcessesOption = None,
@@ -175,10 +174,10 @@ def judge_command(
 
     usual = Path("results", "judged", Path(asked).stem)
     directory = out or _free(usual)
-    stated = _stated(setup or [])
+    stated = _pairs("--setup", setup)
     trials = read_trials(
         asked,
-        columns=dict(_pair("--column", text) for text in columns or []),
+        columns=_pairs("--column", columns),
         ignore=ignore or (),
         duration=duration,
         decimal=decimal or ".",
@@ -200,25 +199,14 @@ def _free(directory: Path) -> Path:
     return free
 
 
-def _stated(texts: list[str]) -> dict[str, str]:
-    """Return the conditions that --setup states."""
-    stated: dict[str, str] = {}
-    for text in texts:
-        if "=" in text:
-            stated.update([_pair("--setup", text)])
-        elif Path(text).is_file():
-            found = read_table(Path(text), "file of --setup", StudyError)
-            stated.update((name, str(value)) for name, value in found.items())
-        else:
-            raise StudyError(f"--setup {text}: should be NAME=VALUE, or a TOML file of such")
-    return stated
-
-
-def _pair(option: str, text: str) -> tuple[str, str]:
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not (name and equals and value):
-        raise StudyError(f"{option} {text}: should be NAME=VALUE")
-    return name, value
+def _pairs(option: str, texts: Repeated) -> dict[str, str]:
+    pairs = {}
+    for text in texts or []:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise StudyError(f"{option} {text}: should be NAME=VALUE")
+        pairs[name] = value
+    return pairs
 
 
 def names_policy(asked: str) -> bool:

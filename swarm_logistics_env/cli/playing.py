@@ -15,8 +15,8 @@ from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies import called, known_policies, load
 from swarm_logistics_env.records import becoming
-from swarm_logistics_env.scenario import SOURCES, Scenario
-from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.scenario import SOURCES
+from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import ROLES
 
 from .app import (
@@ -70,12 +70,18 @@ def run_command(
     scheduled = faults_of(faults, scenario)
     names = policies or ["swarm-dt"]
     if film is not None:
-        runs = [(faults or [], scheduled)]
+        each = [(faults or [], scheduled)]
         if twin:
             if not scheduled:
                 raise SetupError("--twin: shows a run without its faults: --fault should be given")
-            runs.insert(0, (["no fault"], []))
-        _write_film(film, scenario, names, seed, runs, until, speed, trust_code)
+            each.insert(0, (["no fault"], []))
+        runs = []
+        for name in names:
+            for words, those in each:
+                title = ", ".join([called(name)[-24:], *words])
+                player = load(name, trust_code=trust_code)
+                runs.append((title, Play(scenario, player, seed, those)))
+        _write_film(film, runs, scenario.duration if until is None else until, speed)
         return
     if twin or until is not None or len(names) > 1:
         raise SetupError("--twin, --until, several --policy: are for a film, with --film FILE.mp4")
@@ -130,7 +136,6 @@ def watch_command(
 
     from swarm_logistics_env.watch import Session
     from swarm_logistics_env.watch.messages import recorded_page
-    from swarm_logistics_env.watch.server import serve
 
     if until is not None and (save is None or not until > 0.0):
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
@@ -148,6 +153,8 @@ def watch_command(
         lambda name: load(given.get(name, name), trust_code=trust_code),
     )
     if save is None:
+        from swarm_logistics_env.watch.server import serve  # needs aiohttp
+
         shows = not no_open and sys.stdout.isatty() and _has_screen()
         serve(session, port, echo, show=webbrowser.open if shows else None)
         return
@@ -163,20 +170,8 @@ def _has_screen() -> bool:
     return sys.platform in ("darwin", "win32") or any(map(os.environ.get, names))
 
 
-def _write_film(
-    out: Path,
-    scenario: Scenario,
-    policies: list[str],
-    seed: int,
-    runs: list[tuple[list[str], list[Fault]]],
-    until: float | None,
-    speed: float,
-    trust_code: bool,
-) -> None:
-    """Write episodes as a film, one beside the other.
-
-    Args:
-        runs: of each policy, the words above it and its faults.
+def _write_film(out: Path, runs: list[tuple[str, Play]], until: float, speed: float) -> None:
+    """Write runs, each with the words above it, as a film, one beside the other.
 
     Raises:
         SetupError: the file's name or the extra for films does not do.
@@ -189,13 +184,7 @@ def _write_film(
     load_pygame()
     from swarm_logistics_env.watch.film import Film, Take
 
-    takes = []
-    for name in policies:
-        for words, faults in runs:
-            play = Play(scenario, load(name, trust_code=trust_code), seed, faults)
-            takes.append(Take(", ".join([called(name)[-24:], *words]), play))
-    end = scenario.duration if until is None else until
-    film = Film(takes, end, speed, FRAME_RATE)
+    film = Film([Take(*run) for run in runs], until, speed, FRAME_RATE)
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
         frames = progress.track(film.frames(), total=film.n_frames, description=out.name)

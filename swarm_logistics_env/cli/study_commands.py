@@ -285,7 +285,7 @@ def study_of(
     out: Path | None,
     seeds: int | None,
     policies: Repeated,
-    trust_code: bool = False,
+    trust_code: bool,
     **fields: object,
 ) -> Study:
     """Return the study of a file or a preset with the options and fields that are given, not None.

@@ -60,9 +60,7 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Texts], *lines
     show(Section(title, tuple(columns), tuple(rows), lines))
 
 
-def show_report(
-    results: StudyResults, out: Path, *, full: bool = False, is_finished: bool = True
-) -> None:
+def show_report(results: StudyResults, out: Path, *, full: bool, is_finished: bool = True) -> None:
     """Print the answer of a study and a sentence for a paper, and write its report into `out`.
 
     Args:

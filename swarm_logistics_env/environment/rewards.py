@@ -32,13 +32,13 @@ class RewardTerms:
             raise SetupError(
                 f'rewards = {weights!r}: should be None or a dict, as {{"delivery": 1.0}}'
             )
-        self.weights = dict(DEFAULT_WEIGHTS if weights is None else weights)
-        for name, weight in self.weights.items():
+        given = DEFAULT_WEIGHTS if weights is None else weights
+        for name, weight in given.items():
             if name not in REWARD_TERMS:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
             finite_number(f"rewards[{name!r}]", weight)
-        self._terms = [(REWARD_TERMS[name], weight) for name, weight in self.weights.items()]
-        self.pays_steadily = not _AT_DELIVERIES.issuperset(self.weights)
+        self._terms = [(REWARD_TERMS[name], weight) for name, weight in given.items()]
+        self.pays_steadily = not _AT_DELIVERIES.issuperset(given)
 
     def begin(self, world: Warehouse) -> None:
         """Store the state at the start of an episode."""

@@ -103,13 +103,13 @@ class Indicators(Part):
     Args:
         weights: "R", "FT", "S", "A" and "P" with their weights.
         references: P_o of the policy to improve on [items].
-        credit: the robots that are paid for a delivery: "team", "deliverer" or "carriers".
+        credit: the robots that are paid for a delivery: "team" or "deliverer".
         constant: whether to pay an indicator's constant.
     """
 
     weights: Annotated[dict[str, float], Field(min_length=1)]
     references: PositiveFloat
-    credit: Literal["team", "deliverer", "carriers"] = "team"
+    credit: Literal["team", "deliverer"] = "team"
     constant: bool = True
 
 

@@ -52,7 +52,7 @@ class Film:
         takes: Sequence[Take],
         until: float,
         speed: float,
-        frame_rate: float = 25.0,
+        frame_rate: float,
         size: int = 480,
     ) -> None:
         if not 1 <= len(takes) <= MOST_TAKES:

@@ -26,7 +26,7 @@ from .session import SPEEDS, Session
 
 Message: TypeAlias = dict[str, Any]
 
-_TOLD = ("seed", "speed", "paused", "mode", "note", "policy", "against", "names")
+_TOLD = ("seed", "speed", "paused", "mode", "note", "policy", "against")
 _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius",
@@ -231,12 +231,24 @@ def recorded_page(session: Session, until: float) -> str:
     return recording.page()
 
 
+# The files of the page and their types, in the order in which a recording has them.
+FILES = {
+    "page.html": "text/html",
+    "page.css": "text/css",
+    "draw.js": "text/javascript",
+    "panel.js": "text/javascript",
+    "page.js": "text/javascript",
+}
+
+
+def text_of_file(name: str) -> str:
+    """Return one of `FILES`."""
+    return resources.files(__package__).joinpath("web", name).read_text(encoding="utf-8")
+
+
 def _page_around(text: str) -> str:
     packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode()
-    page, css, *scripts = (
-        resources.files(__package__).joinpath("web", name).read_text(encoding="utf-8")
-        for name in ("page.html", "page.css", "draw.js", "panel.js", "page.js")
-    )
+    page, css, *scripts = map(text_of_file, FILES)
     script = "\n".join(scripts)
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (

@@ -1,4 +1,7 @@
-"""The server: for this machine, for those who know the token in the address."""
+"""The server: for this machine, for those who know the token in the address.
+
+To import it raises a SetupError where aiohttp is not installed.
+"""
 
 from __future__ import annotations
 
@@ -11,29 +14,32 @@ import secrets
 import threading
 import time
 from collections.abc import Callable
-from importlib import resources
-from typing import TYPE_CHECKING
 
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, how_to_install
 
-from .messages import Message, Recording, changes, encode, fixed_data, frame, obey
+from .messages import (
+    FILES,
+    Message,
+    Recording,
+    changes,
+    encode,
+    fixed_data,
+    frame,
+    obey,
+    text_of_file,
+)
 from .session import Session
 
-if TYPE_CHECKING:
+try:
     from aiohttp import web
+    from aiohttp.http_exceptions import HttpProcessingError
     from aiohttp.typedefs import Handler
+except ImportError as error:
+    raise SetupError(f"watch needs aiohttp ({error}): {how_to_install('watch')}") from None
 
 LOOPBACK = "127.0.0.1"
-_OWN_NAMES = ("localhost", LOOPBACK, "::1")
-_ADDRESS = re.compile(r"[\d.]+|[\da-f.]*:[\da-f:.]*")  # what is written so is no name
-_HOST = re.compile(r"([^\s:/@\[\]]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
-FILES = {
-    "page.html": "text/html",
-    "page.css": "text/css",
-    "draw.js": "text/javascript",
-    "panel.js": "text/javascript",
-    "page.js": "text/javascript",
-}
+# A foreign page may resolve its own name to this machine, but it cannot forge the name in a Host.
+_OWN_HOST = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNORECASE)
 _HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; "
     "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; "
@@ -55,33 +61,18 @@ class WatchServer:
     Args:
         session: the session to show.
         port: the port; 0 takes any that is free.
-        host: the name or address of this machine to listen on; "0.0.0.0" or "::" are all.
 
     Attributes:
         address: the address to open in a browser, once `start` is done.
-
-    Raises:
-        SetupError: aiohttp is not installed.
     """
 
-    def __init__(self, session: Session, port: int, host: str = LOOPBACK) -> None:
-        try:
-            from aiohttp import web
-        except ImportError as error:
-            raise SetupError(f"watch needs aiohttp ({error}): {how_to_install('watch')}") from None
-        self._web = web
-        self.session, self.port, self.host = session, port, host
+    def __init__(self, session: Session, port: int) -> None:
+        self.session, self.port = session, port
         self.token = secrets.token_urlsafe(18)
         self.recording = Recording(session)
         self.address = ""
         self._pages: dict[web.WebSocketResponse, Message] = {}
-
-        @web.middleware
-        async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
-            self._check(request)
-            return await handler(request)
-
-        app = web.Application(middlewares=[guard])
+        app = web.Application(middlewares=[self._guard])
         app.router.add_get("/{token}/live", self._live)
         app.router.add_get("/{token}/recording.html", self._save)
         app.router.add_get("/{token}/{name:.*}", self._file)
@@ -91,23 +82,21 @@ class WatchServer:
         self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
 
     async def start(self) -> None:
-        """Listen on the host.
+        """Listen on this machine.
 
         Raises:
-            SetupError: the port is in use or not allowed, or the host is none of this machine's.
+            SetupError: the port is in use or not allowed.
         """
         await self._runner.setup()
-        site = self._web.TCPSite(self._runner, self.host, self.port)
+        site = web.TCPSite(self._runner, LOOPBACK, self.port)
         try:
             await site.start()
         except OSError as error:
             await self._runner.cleanup()
             told = f"{error.strerror}; --port 0 takes any that is free"
-            raise SetupError(f"host = {self.host}, port = {self.port}: {told}") from None
+            raise SetupError(f"port = {self.port}: {told}") from None
         self.port = self._runner.addresses[0][1]
-        shown = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
-        shown = f"[{shown}]" if ":" in shown else shown
-        self.address = f"http://{shown}:{self.port}/{self.token}/"
+        self.address = f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
     async def play(self) -> None:
         """Let the session go on while a page is open, until this is cancelled.
@@ -138,10 +127,8 @@ class WatchServer:
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
         if len(self._pages) >= _MOST_PAGES:
-            raise self._web.HTTPServiceUnavailable(text="Too many pages are open.\n")
-        page = self._web.WebSocketResponse(
-            max_msg_size=_LONGEST_ORDER, heartbeat=10.0, compress=False
-        )
+            raise web.HTTPServiceUnavailable(text="Too many pages are open.\n")
+        page = web.WebSocketResponse(max_msg_size=_LONGEST_ORDER, heartbeat=10.0, compress=False)
         await page.prepare(request)
         await page.send_str(encode(fixed_data(self.session)))
         self._pages[page] = {}
@@ -158,47 +145,29 @@ class WatchServer:
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"] or "page.html"
-        if name not in FILES or request.path.endswith("/page.html"):
-            raise self._web.HTTPNotFound(text="Not Found\n")
-        text = resources.files(__package__).joinpath("web", name).read_text(encoding="utf-8")
-        return self._web.Response(text=text, content_type=FILES[name], charset="utf-8")
+        if name not in FILES:
+            raise web.HTTPNotFound(text="Not Found\n")
+        return web.Response(text=text_of_file(name), content_type=FILES[name], charset="utf-8")
 
     async def _save(self, request: web.Request) -> web.StreamResponse:
         headers = {"Content-Disposition": 'attachment; filename="run.html"'}
         page = await asyncio.to_thread(self.recording.page)
-        return self._web.Response(text=page, content_type="text/html", headers=headers)
+        return web.Response(text=page, content_type="text/html", headers=headers)
 
-    def _check(self, request: web.Request) -> None:
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
-        own = len(hosts) == 1 and self._is_own(hosts[0])
+        own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0]) is not None
         token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
         known = hmac.compare_digest(token.encode(), self.token.encode())
         if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
             text = "Open the address that swarm-logistics watch printed, on its machine.\n"
-            raise self._web.HTTPForbidden(text=text)
-
-    def _is_own(self, host: str) -> bool:
-        """Return whether a request's Host means this machine.
-
-        A foreign page may resolve its own name to this machine, but it cannot forge this header;
-        and it has a name, so that any address will do where others may reach this machine.
-        """
-        match = _HOST.fullmatch(host)
-        name = match[1].strip("[]").lower() if match else ""
-        if name in (*_OWN_NAMES, self.host.lower()):
-            return True
-        return not is_loopback(self.host) and _ADDRESS.fullmatch(name) is not None
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether only this machine itself reaches it by that name or address."""
-    return host in _OWN_NAMES or host.startswith("127.")
+            raise web.HTTPForbidden(text=text)
+        return await handler(request)
 
 
 def _is_own_error(record: logging.LogRecord) -> bool:
     """Return whether an error is ours: no request that is no HTTP, no page that was closed."""
-    from aiohttp.http_exceptions import HttpProcessingError
-
     others = HttpProcessingError | ConnectionError
     return not (record.exc_info and isinstance(record.exc_info[1], others))
 
@@ -211,27 +180,25 @@ def serve(
     session: Session,
     port: int,
     announce: Callable[[str], None],
-    host: str = LOOPBACK,
     show: Callable[[str], object] | None = None,
 ) -> None:
     """Show a session in the browser until Ctrl-C.
 
     Args:
         announce: is called with a sentence that has the address.
-        host: see `WatchServer`.
         show: is called with the address, in a thread of its own, as a browser may not return.
 
     Raises:
-        SetupError: the port is in use or not allowed, or aiohttp is not installed.
+        SetupError: the port is in use or not allowed.
         PolicyError: the policy returned commands of the wrong shape, or not finite.
     """
 
     async def run() -> None:
-        server = WatchServer(session, port, host)
+        server = WatchServer(session, port)
         await server.start()
         announce(
             f"Open {server.address} in a browser on this machine (from another one: "
-            f"ssh -L {server.port}:127.0.0.1:{server.port} HOST). Ctrl-C ends it."
+            f"ssh -L {server.port}:{LOOPBACK}:{server.port} HOST). Ctrl-C ends it."
         )
         if show is not None:
             threading.Thread(target=show, args=[server.address], daemon=True).start()

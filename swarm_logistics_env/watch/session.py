@@ -83,11 +83,6 @@ class Session:
         """Whether both runs have come to their ends."""
         return self.run.is_over and self.beside.is_over
 
-    @property
-    def names(self) -> tuple[str, str]:
-        """The titles of the two runs."""
-        return self.policy, self.against or f"{self.policy} without faults"
-
     # Time
 
     def play(
@@ -95,8 +90,8 @@ class Session:
         elapsed: float,
         budget: float = math.inf,
         after_step: Callable[[], object] = lambda: None,
-    ) -> int:
-        """Let both runs go on for some wall time; return the number of steps taken.
+    ) -> None:
+        """Let both runs go on for some wall time.
 
         Args:
             elapsed: wall time since the last call [s].
@@ -104,18 +99,16 @@ class Session:
             after_step: is called after every step.
         """
         if self.paused or self.is_over:
-            return 0
+            return
         self._due += elapsed * self.speed / self.scenario.control_period
-        stop, steps = time.perf_counter() + budget, 0
+        stop = time.perf_counter() + budget
         while self._due >= 1.0 and not self.is_over:
             self.advance()
             after_step()
             self._due -= 1.0
-            steps += 1
             if time.perf_counter() >= stop:
                 self._due = min(self._due, 1.0)
                 break
-        return steps
 
     def pause(self) -> None:
         """Pause, or go on."""
@@ -154,8 +147,9 @@ class Session:
 
     def select(self, robot: int | None) -> None:
         """Inspect `robot`; None ends the inspection."""
-        if robot is not None:
-            self._check_there(robot)
+        state = self.state
+        if robot is not None and not (0 <= robot < state.n_robots and state.robot_present[robot]):
+            raise SetupError(f"robot = {robot}: should be one that is in the warehouse")
         self.selected = robot
 
     def choose_mode(self, mode: str) -> None:
@@ -163,9 +157,9 @@ class Session:
         failure_mode(mode)  # raises FaultError if there is none
         self.mode = mode
 
-    def break_robot(self, robot: int | None = None) -> None:
-        """Let `robot` fail from now on in the chosen mode; None means the selected robot."""
-        robot = self._meant(robot)
+    def break_robot(self) -> None:
+        """Let the selected robot fail from now on in the chosen mode."""
+        robot = self._meant()
         if self.mode in self.state.failure_modes[robot]:
             self.note = f"robot {robot} already fails in mode {self.mode}"
             return
@@ -176,9 +170,9 @@ class Session:
         self.events.append(Event(self.state.time, robot, self.mode))
         self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
 
-    def repair_robot(self, robot: int | None = None) -> None:
-        """End all failures of `robot`; None means the selected robot."""
-        robot = self._meant(robot)
+    def repair_robot(self) -> None:
+        """End all failures of the selected robot."""
+        robot = self._meant()
         world = self.run.world
         if not world.state.failed[robot]:
             self.note = f"robot {robot} is sound"
@@ -198,9 +192,9 @@ class Session:
         """Select a robot, and break it, or repair it if it fails."""
         self.select(robot)
         if self.state.failed[robot]:
-            self.repair_robot(robot)
+            self.repair_robot()
         else:
-            self.break_robot(robot)
+            self.break_robot()
 
     # Conditions
 
@@ -249,17 +243,9 @@ class Session:
         if robot is not None and not (robot < len(present) and present[robot]):
             self.selected = None
 
-    def _meant(self, robot: int | None) -> int:
-        if robot is None:
-            robot = self.selected
-        if robot is None:
+    def _meant(self) -> int:
+        if self.selected is None:
             raise SetupError("robot: none is selected, click one first")
-        self._check_there(robot)
         if self.run.is_over:
             raise SetupError("the run is over: begin the next seed, or this one again")
-        return robot
-
-    def _check_there(self, robot: int) -> None:
-        state = self.state
-        if not (0 <= robot < state.n_robots and state.robot_present[robot]):
-            raise SetupError(f"robot = {robot}: should be one that is in the warehouse")
+        return self.selected

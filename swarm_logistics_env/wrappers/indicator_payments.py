@@ -211,10 +211,9 @@ def indicator_of(
     if compared is None:
         return None
     p_o = p_against = references.divisor(compared.reference)
-    performances = {"P_N" if name == "S" else "P_o": p_o}
     if compared.against != compared.reference:
         p_against = references.performance(compared.against)
-        performances["P_S"] = p_against
+    performances = dict(zip(PERFORMANCES[name], (p_o, p_against)))
     share = compared.scale / p_o
     return Payment(share, compared.offset - share * p_against, performances)
 

@@ -12,7 +12,6 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import finite_number
 from swarm_logistics_env.environment.spaces import ArrayStep
 from swarm_logistics_env.errors import SetupError, suggest
-from swarm_logistics_env.warehouse.state import NOBODY
 
 from .indicator_payments import (
     INDICATORS,
@@ -25,7 +24,7 @@ from .indicator_payments import (
 )
 from .wrapper import Condition, Wrapper, changes_of, condition_of
 
-CREDITS = ("team", "deliverer", "carriers")
+CREDITS = ("team", "deliverer")
 
 
 class IndicatorReward(Wrapper):
@@ -76,9 +75,8 @@ class IndicatorReward(Wrapper):
         references: P_o [items], {condition: P}, or `RunningMeans`, which several may share.
         credit: the robots that get the share of a delivery. "team": each robot present gets all
             of it, so that the return of each is the indicator. "deliverer": the robot that
-            delivers. "carriers": those that carried the item since it was requested, in equal
-            parts. In the last two the constant is divided among all robots present, so that the
-            sum of all returns is the indicator.
+            delivers; the constant is divided among all robots present, so that the sum of all
+            returns is the indicator.
         constant: whether to pay the constant.
         own_reward: weight of the wrapped environment's own reward, which is added, for shaping.
 
@@ -118,7 +116,7 @@ class IndicatorReward(Wrapper):
         weights: str | Mapping[str, float],
         *,
         references: float | Mapping[Condition, float] | RunningMeans,
-        credit: Literal["team", "deliverer", "carriers"] = "team",
+        credit: Literal["team", "deliverer"] = "team",
         constant: bool = True,
         own_reward: float = 0.0,
     ) -> None:
@@ -182,11 +180,11 @@ class IndicatorReward(Wrapper):
         for name in self.weights:
             if name not in PERFORMANCES:
                 continue
-            test = self._indicators.get(name)
-            info[name] = test.share * delivered + test.constant if test else 0.0
-            info[f"{name}_tested"] = int(test is not None)
+            test = self._indicators.get(name, Payment())
+            info[name] = test.share * delivered + test.constant
+            info[f"{name}_tested"] = int(name in self._indicators)
             for role in PERFORMANCES[name]:
-                info[f"{name}_{role}"] = test.performances[role] if test else 0.0
+                info[f"{name}_{role}"] = test.performances.get(role, 0.0)
         return info
 
     def begun(self, seed: int) -> None:
@@ -195,7 +193,6 @@ class IndicatorReward(Wrapper):
             self.measured.add(self.condition, self._delivered)
         self._seed, self._is_over = seed, False
         self._paid, self._delivered = Payment(), 0
-        self._carriers = set[int]()  # those that carried the requested item since its request
         self._take_condition()
 
     def after_step(self, outcome: ArrayStep) -> ArrayStep:
@@ -209,8 +206,6 @@ class IndicatorReward(Wrapper):
             self._take_condition()
         if self._paid is not self._due or deliverers:
             self._pay(rewards, deliverers, state.robot_present | terminations)
-        if self.credit == "carriers" and (carrier := state.carrier) != NOBODY:
-            self._carriers.add(carrier)
         self._delivered = state.delivered
         self._is_over = not self.env.agents
         return observations, rewards, terminations, truncations
@@ -227,9 +222,7 @@ class IndicatorReward(Wrapper):
             return
         rewards[present] += once / max(int(np.count_nonzero(present)), 1)
         for robot in deliverers:
-            involved = {robot} | {other for other in self._carriers if present[other]}
-            rewards[list(involved)] += self._due.share / len(involved)
-            self._carriers.clear()
+            rewards[robot] += self._due.share
 
     def _take_condition(self) -> None:
         world = self.unwrapped.warehouse

@@ -52,8 +52,7 @@ TRIALS = "judge lab.csv --column performance=boxes"
 
 
 def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None:
-    Path("setup.toml").write_text('arena = "4 m x 4 m"\nrobots = 8\n')
-    printed = command(f"{TRIALS} --setup setup.toml --setup floor=tiles --full")
+    printed = command(f"{TRIALS} --setup robots=8 --setup floor=tiles --full")
     assert printed.startswith("6 runs in lab.csv\n")
     assert "| wheel, m = 1 | 10.6 [8.4, 12.8] | [6.2, 14.9] | -0.013 [" in printed
     assert "No FT: it needs trials without the robots, fault = removed" in printed
@@ -64,7 +63,7 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     for name in ("report.html", "claims.csv", "figures/answer.svg"):
         assert (out / name).is_file()
     report = (out / "report.md").read_text()
-    assert "| arena | 4 m x 4 m |\n| robots | 8 |\n| floor | tiles |" in report
+    assert "| robots | 8 |\n| floor | tiles |" in report
     # The same trials again are another study beside it.
     assert "so this one is in results/judged/lab-2" in command(TRIALS)
     assert Path("results", "judged", "lab-2", "report.md").is_file()
@@ -77,7 +76,7 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
         ("lab.csv --column performance", "--column performance: should be NAME=VALUE"),
         ("lab.csv --column performance=boxe", "'boxe': did you mean 'boxes'?"),
         ("lab.csv", "has no column 'performance'"),
-        ("lab.csv --setup nowhere.toml", "--setup nowhere.toml: should be NAME=VALUE, or"),
+        ("lab.csv --setup nowhere.toml", "--setup nowhere.toml: should be NAME=VALUE"),
         ("lab.csv --seeds 5", "--seeds is not for a file of trials, and 'lab.csv' is one"),
         ("model.zip", "executes the code"),
         ("homing --column N=robots", "--column is not for a policy, and 'homing' is one"),

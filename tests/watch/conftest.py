@@ -10,7 +10,7 @@ import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.server import LOOPBACK, WatchServer
+from swarm_logistics_env.watch.server import WatchServer
 
 SMALL = Scenario(
     n_robots=6, n_items=8, n_obstacles=1, duration=60.0, warehouse_width=5, warehouse_height=5
@@ -20,8 +20,8 @@ SMALL = Scenario(
 class Served:
     """A server that plays in a thread; its session is changed by orders alone."""
 
-    def __init__(self, host: str = LOOPBACK) -> None:
-        self.server = WatchServer(Session(SMALL, speed=8.0), 0, host)
+    def __init__(self) -> None:
+        self.server = WatchServer(Session(SMALL, speed=8.0), 0)
         self._started = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()))
         self._thread.start()

@@ -46,7 +46,7 @@ def test_same_runs_give_the_same_frames_and_faults_show() -> None:
 
 
 def test_wrong_arguments() -> None:
-    right: dict[str, Any] = {"takes": [take()], "until": 5.0, "speed": 1.0}
+    right: dict[str, Any] = {"takes": [take()], "until": 5.0, "speed": 1.0, "frame_rate": 9.0}
     for name, wrong, words in (
         ("takes", [], "0 runs: should be 1 to 4"),
         ("until", float("nan"), "until = nan"),

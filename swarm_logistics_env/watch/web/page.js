@@ -130,7 +130,7 @@ function showNow(now) {
 function showWords() {
   if (!latest) return;
   const { scenario, selected } = latest;
-  document.title = `${latest.names[0]}, seed ${latest.seed}`;
+  document.title = `${latest.policy}, seed ${latest.seed}`;
   element("pause").textContent = latest.paused ? "go on" : "pause";
   element("speed").value = latest.speed;
   element("mode").value = latest.mode;
