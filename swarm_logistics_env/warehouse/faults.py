@@ -193,13 +193,8 @@ def fault_of(text: str) -> Fault:
             f"fault {text!r}: should be MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200, "
             "with ROBOTS a whole number and ONSET and DURATION in seconds"
         )
-    return Fault(
-        match["mode"],
-        int(match["robots"] or 1),
-        onset=float(match["onset"] or 0),
-        duration=float(match["duration"]) if match["duration"] else None,
-        role=match["role"],
-    )
+    given: dict[str, Any] = match.groupdict()
+    return Fault(**{name: text for name, text in given.items() if text is not None})
 
 
 def text_of(fault: Fault) -> str | None:
