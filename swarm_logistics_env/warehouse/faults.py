@@ -168,13 +168,10 @@ def _read(name: str, given: FaultLike) -> Fault:
         return given
     if isinstance(given, str):
         return fault_of(given)
-    known = Fault.model_fields
-    for field in given:
-        if field not in known:
-            raise FaultError(f"{name}: a fault has no {field!r}{suggest(str(field), known)}")
-    if "mode" not in given:
-        raise FaultError(f'{name}: {dict(given)!r} has no "mode": should name one, as "FM1"')
-    return Fault(**given)
+    try:
+        return Fault(**given)
+    except TypeError as error:  # Python names what is unknown or missing
+        raise FaultError(f"{name}: {error}; known: {', '.join(Fault.model_fields)}") from None
 
 
 def fault_of(text: str) -> Fault:
