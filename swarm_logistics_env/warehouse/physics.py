@@ -246,9 +246,9 @@ class Physics:
             wanted_velocity=np.zeros((n, 2)),
         )
 
-    def begin(self, world: NDArray[np.int64]) -> None:
-        """Make the bodies of a world, given by its words, as its arrays have them now."""
-        build(world.ctypes.data)
+    def begin(self, address: int) -> None:
+        """Make the bodies of the world at `address` as its arrays have them now."""
+        build(address)
         # This is left out at the end of the process, which frees everything anyway.
         finalize(self, _free, packed(self.engine), self.engine, self._kept).atexit = False
 
