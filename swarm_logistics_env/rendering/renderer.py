@@ -144,20 +144,16 @@ def _open_display() -> None:
 
     try:
         pygame.display.init()
+        # SDL falls back to a driver that shows nothing.
+        if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
+            pygame.display.quit()
+            raise pygame.error("SDL found none")
     except pygame.error as error:
-        raise _no_display(str(error)) from error
-    # SDL falls back to a driver that shows nothing.
-    if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
-        pygame.display.quit()
-        raise _no_display("SDL found none")
+        raise SetupError(
+            f"a window needs a display ({error}): use render_mode = 'rgb_array', or set "
+            "SDL_VIDEODRIVER=dummy to go without"
+        ) from error
     pygame.display.set_caption("swarm-logistics")
-
-
-def _no_display(reason: str) -> SetupError:
-    return SetupError(
-        f"a window needs a display ({reason}): use render_mode = 'rgb_array', or set "
-        "SDL_VIDEODRIVER=dummy to go without"
-    )
 
 
 Frame = NDArray[np.uint8]  # (H, W, 3), both even
