@@ -22,7 +22,7 @@ from .logistics import MESSAGE
 from .packing import blank, packed
 from .physics import Physics
 from .state import NOBODY, WarehouseState
-from .structs import Claims, Commands, Nearby, Sensed, StepResult, World, lengths_of, parameters_of
+from .structs import Claims, Commands, Nearby, Parameters, Sensed, StepResult, World, lengths_of
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
@@ -83,7 +83,7 @@ class Warehouse:
         stepping.perceive(self._address, self._rows)
         state.progress.anchoring_seconds[0] = 0.0
         self._save()
-        return self.observe()
+        return self._rows
 
     def step(self, commands: ArrayLike) -> Sensed:
         """Move the world by one control period and return what is sensed after it.
@@ -322,7 +322,7 @@ class Warehouse:
         lengths = lengths_of(scenario)
         self._physics = Physics(scenario)
         self._world = World(
-            parameters=parameters_of(scenario),
+            parameters=Parameters(*(getattr(scenario, name) for name in Parameters._fields)),
             commands=Commands(
                 now=np.zeros(self._command_shape),
                 log=np.empty((self._longest_log * n, n_columns)),
