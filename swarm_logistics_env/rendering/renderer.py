@@ -242,21 +242,18 @@ def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> in
                 process.stdin.close()
         if process.wait() != 0:
             said.seek(0)
-            lines = said.read().decode(errors="replace").strip().splitlines()
-            reason = lines[-1] if lines else f"exit code {process.returncode}"
-            raise SetupError(f"ffmpeg cannot write the film: {reason}")
+            reason = said.read().decode(errors="replace").strip()
+            raise SetupError(f"ffmpeg cannot write the film (exit {process.returncode}): {reason}")
     return count
 
 
 def _ffmpeg() -> str:
     try:
         import imageio_ffmpeg
-    except ImportError as error:
+
+        program: str = imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError) as error:
         raise SetupError(
             f"a film needs imageio-ffmpeg ({error}): {how_to_install('render')}"
         ) from error
-    try:
-        program: str = imageio_ffmpeg.get_ffmpeg_exe()
-    except RuntimeError as error:
-        raise SetupError(f"a film needs ffmpeg: {error}") from error
     return program
