@@ -198,7 +198,8 @@ class _Report:
     """Tells a person once that kernels are being compiled, and how many are, with a bar."""
 
     current: _Report | None = None
-    bar: Progress | None = None  # of this process, once a person was told
+    is_told = False  # in this process
+    bar: Progress | None = None  # of this process, at a terminal, once a person was told
     seconds = 0.0  # of the reports before
 
     def __enter__(self) -> None:
@@ -217,17 +218,19 @@ class _Report:
         is_worker = QUIET in os.environ or multiprocessing.parent_process() is not None
         if is_worker or seconds < _SILENCE:
             return
-        if _Report.bar is None:
-            from rich.console import Console
-            from rich.progress import Progress
-
+        if not _Report.is_told:
+            _Report.is_told = True
             sys.stderr.write("Compiling, which later runs reuse: up to 15 s of a free core.\n")
-            console = Console(stderr=True)
-            _Report.bar = Progress(console=console, transient=True, disable=not console.is_terminal)
-            _Report.bar.add_task("Compiling", total=len(_all_kernels))
-        n_done = sum(bool(each.overloads) for each in _all_kernels)
-        _Report.bar.update(_Report.bar.task_ids[0], completed=n_done)
-        _Report.bar.start()
+            if sys.stderr.isatty():
+                from rich.console import Console
+                from rich.progress import Progress
+
+                _Report.bar = Progress(console=Console(stderr=True), transient=True)
+                _Report.bar.add_task("Compiling", total=len(_all_kernels))
+        if self.bar is not None:
+            n_done = sum(bool(each.overloads) for each in _all_kernels)
+            self.bar.update(self.bar.task_ids[0], completed=n_done)
+            self.bar.start()
 
 
 @functools.cache
