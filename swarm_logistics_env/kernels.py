@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import config, event, types
+from numba.core import config, types
 from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
@@ -39,7 +39,7 @@ _SILENCE = 1.0  # [s] of compiling that nobody is told of
 _HERE = Path(__file__).parent
 _all_kernels: list[Any] = []
 _parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
-_config, _events, _types = cast("tuple[Any, Any, Any]", (config, event, types))  # without types
+_config, _types = cast("tuple[Any, Any]", (config, types))  # without types
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -82,7 +82,10 @@ def _compile(compiled: Any, signature: Any) -> Any:
     compile_it = functools.partial(type(compiled).compile, compiled, signature)
     with global_compiler_lock:
         if _Report.current is not None:
-            return compile_it() if signature in compiled.overloads else _part(compiled, compile_it)
+            if signature not in compiled.overloads:
+                _part(compiled, compile_it)
+                _Report.current.tell()
+            return compile_it()
         if signature in _parts.get(compiled, ()):
             _parts[compiled].remove(signature)
             del compiled.overloads[signature]  # Python cannot call what is only a part
@@ -108,13 +111,13 @@ def _import_without_blas() -> None:
             del sys.modules[blas]
 
 
-def _part(compiled: Any, compile_it: Callable[[], Any]) -> Any:
+def _part(compiled: Any, compile_it: Callable[[], Any]) -> None:
     """Compile what another kernel calls: LLVM is to optimise it there alone, not before as well."""
     compiler, cache, known = compiled._compiler, compiled._cache, set(compiled.overloads)
     compiler.pipeline_class, compiled._insert = _PartCompiler, lambda *_: None
     compiled._cache = NullCache()
     try:
-        return compile_it()
+        compile_it()
     finally:
         compiler.pipeline_class, compiled._cache = Compiler, cache
         del compiled._insert
@@ -191,51 +194,43 @@ def _digest() -> str:
     return digest.hexdigest()
 
 
-class _Report(event.Listener):
-    """Tells a person once that kernels are being compiled and for how long, with a bar."""
+class _Report:
+    """Tells a person once that kernels are being compiled, and how many are, with a bar."""
 
     current: _Report | None = None
-    is_told = False
-    seconds, n_done = 0.0, 0  # of compiling, and kernels that are compiled, in this process
+    is_told = False  # in this process
+    bar: Progress | None = None  # of this process, at a terminal, once a person was told
+    seconds = 0.0  # of the reports before
 
     def __enter__(self) -> None:
-        self._bar: Progress | None = None
-        self._last = time.monotonic()
+        self._start = time.monotonic()
         _Report.current = self
-        _events.register("numba:compile", self)
 
     def __exit__(self, *_: object) -> None:
         _Report.current = None
-        _events.unregister("numba:compile", self)
-        if self._bar is not None:
-            self._bar.stop()
+        _Report.seconds += time.monotonic() - self._start
+        if self.bar is not None:
+            self.bar.stop()
 
-    def on_start(self, event: Any) -> None:
-        """Begin to count the time, as nothing could be loaded."""
-        self._last = time.monotonic()
-
-    def on_end(self, event: Any) -> None:
-        """Count a kernel, and tell a person who has been waiting."""
-        now = time.monotonic()
-        _Report.seconds += now - self._last
-        self._last = now
-        _Report.n_done += event.data["dispatcher"] in _all_kernels
+    def tell(self) -> None:
+        """Tell a person who has been waiting how many kernels are compiled."""
+        seconds = self.seconds + time.monotonic() - self._start
         is_worker = QUIET in os.environ or multiprocessing.parent_process() is not None
-        if is_worker or _Report.seconds < _SILENCE or not self.n_done:
+        if is_worker or seconds < _SILENCE:
             return
-        total = max(len(_all_kernels), self.n_done)
         if not _Report.is_told:
             _Report.is_told = True
             sys.stderr.write("Compiling, which later runs reuse: up to 15 s of a free core.\n")
-        if self._bar is None and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import Progress
+            if sys.stderr.isatty():
+                from rich.console import Console
+                from rich.progress import Progress
 
-            self._bar = Progress(console=Console(stderr=True), transient=True)
-            self._task = self._bar.add_task("Compiling", total=total)
-            self._bar.start()
-        if self._bar is not None:
-            self._bar.update(self._task, completed=self.n_done)
+                _Report.bar = Progress(console=Console(stderr=True), transient=True)
+                _Report.bar.add_task("Compiling", total=len(_all_kernels))
+        if self.bar is not None:
+            n_done = sum(bool(each.overloads) for each in _all_kernels)
+            self.bar.update(self.bar.task_ids[0], completed=n_done)
+            self.bar.start()
 
 
 @functools.cache

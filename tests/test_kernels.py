@@ -22,7 +22,7 @@ print(sum(sum(each.stats.cache_hits.values()) for each in kernels._all_kernels))
 LONG = """
 from swarm_logistics_env import kernels
 kernels._SILENCE = 0.0
-kernels.uniform(1, 2), kernels.gaussian(1, 2)
+kernels.gaussian(1, 2)
 """
 
 

@@ -144,20 +144,16 @@ def _open_display() -> None:
 
     try:
         pygame.display.init()
+        # SDL falls back to a driver that shows nothing.
+        if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
+            pygame.display.quit()
+            raise pygame.error("SDL found none")
     except pygame.error as error:
-        raise _no_display(str(error)) from error
-    # SDL falls back to a driver that shows nothing.
-    if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
-        pygame.display.quit()
-        raise _no_display("SDL found none")
+        raise SetupError(
+            f"a window needs a display ({error}): use render_mode = 'rgb_array', or set "
+            "SDL_VIDEODRIVER=dummy to go without"
+        ) from error
     pygame.display.set_caption("swarm-logistics")
-
-
-def _no_display(reason: str) -> SetupError:
-    return SetupError(
-        f"a window needs a display ({reason}): use render_mode = 'rgb_array', or set "
-        "SDL_VIDEODRIVER=dummy to go without"
-    )
 
 
 Frame = NDArray[np.uint8]  # (H, W, 3), both even
@@ -246,21 +242,18 @@ def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> in
                 process.stdin.close()
         if process.wait() != 0:
             said.seek(0)
-            lines = said.read().decode(errors="replace").strip().splitlines()
-            reason = lines[-1] if lines else f"exit code {process.returncode}"
-            raise SetupError(f"ffmpeg cannot write the film: {reason}")
+            reason = said.read().decode(errors="replace").strip()
+            raise SetupError(f"ffmpeg cannot write the film (exit {process.returncode}): {reason}")
     return count
 
 
 def _ffmpeg() -> str:
     try:
         import imageio_ffmpeg
-    except ImportError as error:
+
+        program: str = imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError) as error:
         raise SetupError(
             f"a film needs imageio-ffmpeg ({error}): {how_to_install('render')}"
         ) from error
-    try:
-        program: str = imageio_ffmpeg.get_ffmpeg_exe()
-    except RuntimeError as error:
-        raise SetupError(f"a film needs ffmpeg: {error}") from error
     return program

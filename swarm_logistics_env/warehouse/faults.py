@@ -11,7 +11,7 @@ import math
 import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from pydantic import (
     model_validator,
 )
 
-from swarm_logistics_env.errors import FaultError, SwarmLogisticsError, suggest
+from swarm_logistics_env.errors import FaultError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator, row_keys
@@ -34,13 +34,14 @@ from .failure_modes import FAILURE_MODES, FailureMode, failure_mode
 from .state import WarehouseState, robots_in_role
 from .structs import Capabilities
 
-ROLES = {
-    "carrier": "carries the requested item",
-    "neighbour": "the carrier sees it with its cameras",
-    "in_area": "in the delivery area",
-    "shuffling": "carries an item that is not requested",
-    "searching": "empty, anywhere else",
-}
+Role = Literal[
+    "carrier",  # carries the requested item
+    "neighbour",  # the carrier sees it with its cameras
+    "in_area",  # in the delivery area
+    "shuffling",  # carries an item that is not requested
+    "searching",  # empty, anywhere else
+]
+ROLES: tuple[str, ...] = get_args(Role)
 
 GRACE = 5e-7  # [s]; times are sums of control periods
 _SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
@@ -61,7 +62,7 @@ class Fault(Record):
         intermittent: for how long [s] it holds, and for how long not, both on average, in turn
             from its onset on; each robot's times are drawn from its own stream (exponential).
             None: it holds without a break.
-        role: a key of `ROLES`: the robots are chosen at the onset by what they are doing then, see
+        role: one of `ROLES`: the robots are chosen at the onset by what they are doing then, see
             `robots_in_role`; None: by the seed.
 
     Raises:
@@ -81,7 +82,7 @@ class Fault(Record):
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
     intermittent: tuple[Seconds, Seconds] | None = None
-    role: str | None = None
+    role: Role | None = None
 
     def __init__(
         self,
@@ -115,8 +116,6 @@ class Fault(Record):
                 raise ValueError(f"a removed robot does not come back: {name} should be None")
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
             raise ValueError(f"robots = {self.robots}: should name each robot once")
-        if self.role is not None and self.role not in ROLES:
-            raise ValueError(f"no role {self.role!r}{suggest(self.role, ROLES)}")
         if self.role is not None and isinstance(self.robots, tuple):
             raise ValueError(f"role = {self.role!r}: robots should be a number, not {self.robots}")
         return self
@@ -168,13 +167,10 @@ def _read(name: str, given: FaultLike) -> Fault:
         return given
     if isinstance(given, str):
         return fault_of(given)
-    known = Fault.model_fields
-    for field in given:
-        if field not in known:
-            raise FaultError(f"{name}: a fault has no {field!r}{suggest(str(field), known)}")
-    if "mode" not in given:
-        raise FaultError(f'{name}: {dict(given)!r} has no "mode": should name one, as "FM1"')
-    return Fault(**given)
+    try:
+        return Fault(**given)
+    except TypeError as error:  # Python names what is unknown or missing
+        raise FaultError(f"{name}: {error}; known: {', '.join(Fault.model_fields)}") from None
 
 
 def fault_of(text: str) -> Fault:
@@ -193,13 +189,8 @@ def fault_of(text: str) -> Fault:
             f"fault {text!r}: should be MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200, "
             "with ROBOTS a whole number and ONSET and DURATION in seconds"
         )
-    return Fault(
-        match["mode"],
-        int(match["robots"] or 1),
-        onset=float(match["onset"] or 0),
-        duration=float(match["duration"]) if match["duration"] else None,
-        role=match["role"],
-    )
+    given: dict[str, Any] = match.groupdict()
+    return Fault(**{name: text for name, text in given.items() if text is not None})
 
 
 def text_of(fault: Fault) -> str | None:

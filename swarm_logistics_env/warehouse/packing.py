@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import itertools
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -21,6 +21,7 @@ from numba.core import types
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
 from numba.np import arrayobj
+from numba.np.numpy_support import from_dtype
 from numpy.typing import NDArray
 
 cgutils: Any = core.cgutils  # without types
@@ -30,19 +31,14 @@ _WORD, _BYTES = ir.IntType(64), 8
 _BY_REFERENCE = sys.platform == "win32" and "ARM" not in sys.version.upper()
 
 
-def _passed(builder: Any, kind: types.Type, value: Any, by_reference: bool) -> list[Any]:
-    if not isinstance(kind, types.BaseTuple):
-        return [value]
-    if by_reference:
-        return [cgutils.alloca_once_value(builder, value)]
-    return list(cgutils.unpack_tuple(builder, value))
-
-
 def _generated(function: Callable[..., Any]) -> Callable[..., int]:
     return cast("Callable[..., int]", intrinsic(function))
 
 
-def _calling(kind: Any, returned: Any) -> Callable[..., int]:
+def _calling(kind: Any) -> Callable[..., int]:
+    is_void = kind == types.void
+    returned = ir.VoidType() if is_void else _WORD
+
     def typed(typing_context: Any, address: types.Type, arguments: types.Type) -> Any:
         arguments = cast("Any", types).unliteral(arguments)
         return kind(types.int64, arguments), generate
@@ -50,13 +46,16 @@ def _calling(kind: Any, returned: Any) -> Callable[..., int]:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         where, packed = values
         given: list[Any] = []
-        for kind, value in zip(
-            signature.args[1], cgutils.unpack_tuple(builder, packed), strict=True
-        ):
-            given += _passed(builder, kind, value, _BY_REFERENCE)
+        passed = cgutils.unpack_tuple(builder, packed)
+        for argument, value in zip(signature.args[1], passed, strict=True):
+            if not isinstance(argument, types.BaseTuple):
+                given.append(value)
+            elif _BY_REFERENCE:
+                given.append(cgutils.alloca_once_value(builder, value))
+            else:
+                given += cgutils.unpack_tuple(builder, value)
         function = ir.FunctionType(returned, [value.type for value in given])
         answer = builder.call(builder.inttoptr(where, function.as_pointer()), given)
-        is_void = isinstance(returned, ir.VoidType)
         return context.get_dummy_value() if is_void else answer
 
     return _generated(typed)
@@ -65,7 +64,7 @@ def _calling(kind: Any, returned: Any) -> Callable[..., int]:
 # Both call the C function at an address with a tuple of arguments. Each is an integer (of any width
 # up to 64 bits, or a pointer), a double, or a tuple of two of the same kind: a structure of 16
 # bytes passed by value. The first returns nothing, the second the pointer that it is given.
-call_at, made_at = _calling(types.void, ir.VoidType()), _calling(types.int64, _WORD)
+call_at, made_at = _calling(types.void), _calling(types.int64)
 
 
 @_generated
@@ -157,26 +156,24 @@ def packed(value: tuple[Any, ...]) -> NDArray[np.int64]:
     Raises:
         TypeError: an array is not what its structure says; compiled code would read beyond it.
     """
-    words: list[int] = []
-    _append_words(value, words)
-    return np.array(words, np.int64)
+    return np.array(list(_words_of(value)), np.int64)
 
 
-def _append_words(value: tuple[Any, ...], words: list[int]) -> None:
+def _words_of(value: tuple[Any, ...]) -> Iterator[int]:
     for (name, kind), part in zip(field_kinds(type(value)).items(), value, strict=True):
         if isinstance(kind, tuple):
             dtype, shape = kind
             if (part.dtype, part.ndim) != (dtype, len(shape)) or not part.flags.carray:
                 what = f"{type(value).__name__}.{name}"
                 raise TypeError(f"{what}: should be {shape} numbers of {dtype}, without gaps")
-            words.append(part.__array_interface__["data"][0])  # faster than part.ctypes
-            words += part.shape
+            yield part.__array_interface__["data"][0]  # faster than part.ctypes
+            yield from part.shape
         elif kind is float:
-            words.append(int(np.float64(part).view(np.int64)))
+            yield int(np.float64(part).view(np.int64))
         elif kind in (int, bool):
-            words.append(int(part))
+            yield int(part)
         else:
-            _append_words(part, words)
+            yield from _words_of(part)
 
 
 class StructureAt(types.Type):
@@ -246,8 +243,7 @@ def _n_words(kind: Any) -> int:
 
 def _compiled_type(kind: Any) -> Any:
     if isinstance(kind, tuple):
-        dtype = types.boolean if kind[0] == np.bool_ else getattr(types, kind[0].name)
-        return types.Array(dtype, len(kind[1]), "C")
+        return types.Array(from_dtype(kind[0]), len(kind[1]), "C")
     scalars = {float: types.float64, int: types.int64, bool: types.boolean}
     return scalars.get(kind) or StructureAt(kind)
 

@@ -10,7 +10,6 @@ address within a control step.
 from __future__ import annotations
 
 import math
-from importlib.metadata import version
 from typing import Any
 from weakref import finalize
 
@@ -19,7 +18,6 @@ from numpy.typing import NDArray
 from pymunk._chipmunk_cffi import ffi, lib  # its functions' addresses have no public name
 from pymunk.batch import BodyFields
 
-from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.scenario import Scenario
 
@@ -246,9 +244,9 @@ class Physics:
             wanted_velocity=np.zeros((n, 2)),
         )
 
-    def begin(self, world: NDArray[np.int64]) -> None:
-        """Make the bodies of a world, given by its words, as its arrays have them now."""
-        build(world.ctypes.data)
+    def begin(self, address: int) -> None:
+        """Make the bodies of the world at `address` as its arrays have them now."""
+        build(address)
         # This is left out at the end of the process, which frees everything anyway.
         finalize(self, _free, packed(self.engine), self.engine, self._kept).atexit = False
 
@@ -275,17 +273,5 @@ def _address(thing: Any) -> int:
     return int(ffi.cast("intptr_t", thing))
 
 
-def _function_addresses() -> Functions:
-    """Return the addresses of pymunk's C functions, by which kernels call them.
-
-    Raises:
-        SetupError: this pymunk lacks one of them.
-    """
-    try:
-        return Functions(*(_address(ffi.addressof(lib, name)) for name in Functions._fields))
-    except AttributeError as error:
-        # pymunk.version is not used, because in pymunk 7.0 it is the version of something else.
-        raise SetupError(f"pymunk {version('pymunk')} lacks a function: {error}") from None
-
-
-_FUNCTION_ADDRESSES = _function_addresses()
+# A pymunk that lacks one raises an AttributeError that names it.
+_FUNCTION_ADDRESSES = Functions(*(_address(ffi.addressof(lib, name)) for name in Functions._fields))

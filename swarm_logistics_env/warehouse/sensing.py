@@ -201,8 +201,7 @@ def sense(world: World, rows: Sensed) -> int:
             scan_solids(pose, reach, world, scan)
         n_anchored += int(sense_robots(me, pose, world, rows[me]))
         sense_items(me, pose, world, rows[me])
-        if touches_solid(pose, world):
-            robots.contact[me] = True
+        robots.contact[me] |= touches_solid(pose, world)
         feel_itself(me, pose, world, rows[me])
         disturb(me, world, rows[me])
         fail_rangers(me, world, rows[me])

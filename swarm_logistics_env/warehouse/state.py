@@ -19,7 +19,7 @@ from .structs import (
     Items,
     Numbers,
     Progress,
-    blank_robots,
+    Robots,
     lengths_of,
 )
 
@@ -68,11 +68,16 @@ class WarehouseState:
 
     def __init__(self, scenario: Scenario) -> None:
         lengths = lengths_of(scenario)
-        self.robots = blank_robots(lengths)
+        self.robots = robots = blank(Robots, lengths)
         self.able = blank(Capabilities, lengths)
         self.items = blank(Items, lengths)
-        self.items.carrier[:] = NOBODY
         self.progress = blank(Progress, lengths)
+        robots.present[:] = True
+        for nobody in (robots.item, robots.memory, robots.last_in_delivery, self.items.carrier):
+            nobody[...] = NOBODY
+        for silent in (robots.timer, robots.told, robots.heard, robots.told_before):
+            silent[...] = np.nan
+        robots.frozen_beams[...] = np.nan
         self.progress.asked_last[0] = NOBODY
         for prefix, structure in (("robot_", self.robots), ("", self.able), ("item_", self.items)):
             for name, array in structure._asdict().items():

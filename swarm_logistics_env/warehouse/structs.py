@@ -8,7 +8,6 @@ of a robot that is absent holds zeros and `NOBODY`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
@@ -18,7 +17,6 @@ from swarm_logistics_env.observations import N_BEAMS
 from swarm_logistics_env.scenario import Scenario
 
 from .failure_modes import FAILURE_MODES
-from .packing import blank
 
 STORED, CARRIED, DELIVERED = 0, 1, 2
 NOBODY = -1
@@ -259,11 +257,6 @@ class World(NamedTuple):
     engine: Engine
 
 
-def parameters_of(scenario: Scenario) -> Parameters:
-    """Return what compiled code reads of a scenario."""
-    return Parameters(*(getattr(scenario, name) for name in Parameters._fields))
-
-
 def lengths_of(scenario: Scenario) -> dict[str, int]:
     """Return the lengths of a world's arrays by the names that their shapes have."""
     n, n_items = scenario.n_robots, scenario.n_items
@@ -280,14 +273,3 @@ def lengths_of(scenario: Scenario) -> dict[str, int]:
         "memory_size": scenario.memory_size,
         "message_size": scenario.message_size,
     }
-
-
-def blank_robots(lengths: Mapping[str, int]) -> Robots:
-    """Return robots without places, sound, silent and with empty hands."""
-    robots = blank(Robots, lengths)
-    robots.present[:] = True
-    for unknown in (robots.item, robots.memory, robots.last_in_delivery):
-        unknown[...] = NOBODY
-    for unset in (robots.timer, robots.told, robots.heard, robots.told_before, robots.frozen_beams):
-        unset[...] = np.nan
-    return robots

@@ -272,12 +272,6 @@ def rank_nearest(nearby: Nearby, count: int, wanted: int) -> int:
 
 
 @inlined_kernel
-def view_square(view_range: float) -> float:
-    """Return the square of how far cameras see; without them not even what lies at the centre."""
-    return view_range**2 if view_range > 0.0 else -1.0
-
-
-@inlined_kernel
 def tell_of_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
     """Fill the block of items in a row from the chosen items."""
     robots, nearby = world.robots, world.nearby
@@ -296,7 +290,9 @@ def tell_of_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed)
 @inlined_kernel
 def choose(me: int, world: World, grid: Grid, n_found: int, purpose: int) -> int:
     """List in `nearby.chosen` what `me` sees, and of robots whom it hears; returns how many."""
-    nearby, limit = world.nearby, view_square(world.able.view_range[me])
+    nearby, view_range = world.nearby, world.able.view_range[me]
+    # Without cameras it does not even see what lies at its centre.
+    limit = view_range**2 if view_range > 0.0 else -1.0
     dropout, n_chosen, step = world.parameters.sensor_dropout, 0, world.progress.step[0]
     for index in range(n_found):
         other, square = grid.members[nearby.place[index]], nearby.square[index]

@@ -125,23 +125,22 @@ class WorldThreadPool:
                     continue
                 while place < told:
                     place += 1
-                    self._take(place - 1, rows, is_eventful=False)
+                    self._take(place - 1, rows)
                 if told < n_worlds:
                     place += 1
-                    is_eventful = bool(self._jobs[told, IS_EVENTFUL])
-                    arrived(told, self._take(told, rows, is_eventful))
+                    arrived(told, self._take(told, rows))
         finally:
             if place < n_worlds:
                 finish(self._address)
             for left in range(place, n_worlds):
                 # One is raised already.
                 with contextlib.suppress(ScenarioError):
-                    self._take(left, rows, bool(self._jobs[left, IS_EVENTFUL]))
+                    self._take(left, rows)
 
-    def _take(self, place: int, rows: Sensed, is_eventful: bool) -> Sensed:
+    def _take(self, place: int, rows: Sensed) -> Sensed:
         world, first = self._worlds[place], self._firsts[place]
         sensed = rows[first : first + world.scenario.n_robots]
-        world.take(sensed, is_eventful)
+        world.take(sensed, bool(self._jobs[place, IS_EVENTFUL]))
         return sensed
 
 

@@ -22,7 +22,7 @@ from .logistics import MESSAGE
 from .packing import blank, packed
 from .physics import Physics
 from .state import NOBODY, WarehouseState
-from .structs import Claims, Commands, Nearby, Sensed, StepResult, World, lengths_of, parameters_of
+from .structs import Claims, Commands, Nearby, Parameters, Sensed, StepResult, World, lengths_of
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
@@ -37,8 +37,6 @@ class Warehouse:
     Attributes:
         scenario: the conditions of this episode.
         state: what is true now, see `WarehouseState`.
-        faults: what affects whom in this episode.
-        n_removed: how many robots were taken out of the arena so far.
         is_eventful: whether something happened that observations do not tell (`stepping.step`).
 
     Example:
@@ -52,12 +50,9 @@ class Warehouse:
     def __init__(self, scenario: Scenario | None = None) -> None:
         self.scenario = _scenario(scenario, Scenario())
         self.state = WarehouseState(self.scenario)
-        self.faults: tuple[Fault, ...] = ()
         self._occurrences: list[Occurrence] = []
-        self.n_removed = 0
         self.is_eventful = False
         self._seed: int | None = None
-        self._words = np.zeros(0, np.int64)
 
     def reset(
         self, seed: int = 0, faults: Sequence[FaultLike] = (), scenario: Scenario | None = None
@@ -75,12 +70,11 @@ class Warehouse:
             ScenarioError: it is none, or items or robots found no room.
         """
         scenario = _scenario(scenario, self.scenario)
-        faults = checked_faults("faults", faults)
-        occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in faults]
+        occurrences = _occurrences(faults, seed, scenario.n_robots)
         state = WarehouseState(scenario)
         self._lay_out(state, scenario, seed)
         self.scenario, self.state, self._seed = scenario, state, seed
-        self.faults, self._occurrences, self.n_removed = faults, occurrences, 0
+        self._occurrences = occurrences
         self._make_room_to_work()
         self._build()
         stepping.begin(self._address)
@@ -89,7 +83,7 @@ class Warehouse:
         stepping.perceive(self._address, self._rows)
         state.progress.anchoring_seconds[0] = 0.0
         self._save()
-        return self.observe()
+        return self._rows
 
     def step(self, commands: ArrayLike) -> Sensed:
         """Move the world by one control period and return what is sensed after it.
@@ -173,10 +167,8 @@ class Warehouse:
             FaultError: a fault names robots that are not there.
             SetupError: the world was never reset.
         """
-        seed, n = self._begun("set_faults"), self.state.n_robots
-        faults = checked_faults("faults", faults)
-        occurrences = [Occurrence(fault, seed, n) for fault in faults]
-        self.faults, self._occurrences = faults, occurrences
+        seed = self._begun("set_faults")
+        self._occurrences = _occurrences(faults, seed, self.state.n_robots)
         self._apply_faults()
         self._remember()
 
@@ -190,13 +182,23 @@ class Warehouse:
         return self._rows
 
     @property
+    def faults(self) -> tuple[Fault, ...]:
+        """What affects whom in this episode."""
+        return tuple(each.fault for each in self._occurrences)
+
+    @property
+    def n_removed(self) -> int:
+        """How many robots were taken out of the arena so far."""
+        return int(np.count_nonzero(~self.state.robot_present))
+
+    @property
     def struck_robots(self) -> tuple[int, ...]:
         """The robots that any fault of this episode names, ascending."""
         return tuple(sorted({int(robot) for each in self._occurrences for robot in each.robots}))
 
     @property
     def address(self) -> int:
-        """The address at which compiled code finds the world, from the first reset on.
+        """The address at which compiled code finds the world, until a step or a change moves it.
 
         Raises:
             SetupError: the world was never reset.
@@ -292,7 +294,7 @@ class Warehouse:
             self.__dict__.update(saved)
             return
         self.__dict__.update(pickle.loads(saved["_memory"]))
-        self._memory, self._words = saved["_memory"], np.zeros(0, np.int64)
+        self._memory = saved["_memory"]
         self._build()
         for commands in saved["_log"]:
             self.step(commands)
@@ -311,7 +313,6 @@ class Warehouse:
         gone = apply_faults(state, self.scenario, self._occurrences)
         for robot in np.flatnonzero(gone & state.robot_present).tolist():
             stepping.remove(self._address, robot)
-            self.n_removed += 1
 
     def _build(self) -> None:
         """Make the bodies, and tell compiled code where everything is."""
@@ -321,7 +322,7 @@ class Warehouse:
         lengths = lengths_of(scenario)
         self._physics = Physics(scenario)
         self._world = World(
-            parameters=parameters_of(scenario),
+            parameters=Parameters(*(getattr(scenario, name) for name in Parameters._fields)),
             commands=Commands(
                 now=np.zeros(self._command_shape),
                 log=np.empty((self._longest_log * n, n_columns)),
@@ -340,18 +341,19 @@ class Warehouse:
             engine=self._physics.engine,
         )
         self._world.claims.robot[:] = NOBODY
-        words = packed(self._world)
-        # In the same place as before, so that others need not ask where after each step.
-        self._words = words if len(self._words) == 0 else self._words
-        self._words[:] = words
+        self._words = packed(self._world)
         self._address: int = self._words.ctypes.data
-        self._physics.begin(self._words)
+        self._physics.begin(self._address)
 
 
 def not_finite(commands: NDArray[np.float64], place: int) -> CommandError:
     """Return the error about the command at that place, row by row."""
     row, column = divmod(place, commands.shape[1])
     return CommandError(f"commands[{row}, {column}] = {commands[row, column]}: should be finite")
+
+
+def _occurrences(faults: Sequence[FaultLike], seed: int, n_robots: int) -> list[Occurrence]:
+    return [Occurrence(fault, seed, n_robots) for fault in checked_faults("faults", faults)]
 
 
 def _scenario(given: Scenario | None, otherwise: Scenario) -> Scenario:

@@ -51,7 +51,7 @@ def test_each_robot_has_its_turn_and_faults_do_not_move_where_things_start() -> 
         ({"mode": "FM9"}, "no failure mode 'FM9'; did you mean 'FM"),
         ({"robots": 0}, "Fault.robots = 0: "),
         ({"robots": (2, 0, 2)}, r"\(2, 0, 2\): should name each robot once"),
-        ({"role": "carier"}, "did you mean 'carrier'"),
+        ({"role": "carier"}, "Fault.role = 'carier': should be 'carrier', "),
         ({"role": "carrier", "robots": (1,)}, "should be a number"),
         ({"onset": float("nan")}, "Fault.onset = nan: "),
         ({"duration": 0.0}, "Fault.duration = 0.0: "),

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Warehouse
-from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.warehouse import physics
 from swarm_logistics_env.warehouse.packing import blank, packed
 from swarm_logistics_env.warehouse.structs import Items
 from tests.warehouse.conftest import EAST, FAR, HOLD, OPEN, STAY, WEST, Build, steps
@@ -121,9 +119,3 @@ def test_an_array_that_is_not_as_declared_is_refused_before_a_kernel_reads_it() 
     for position in others:
         with pytest.raises(TypeError, match=r"Items\.position: should be"):
             packed(items._replace(position=position))
-
-
-def test_a_pymunk_without_the_functions_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(physics, "Functions", NamedTuple("Functions", [("cpSpaceLeap", int)]))
-    with pytest.raises(SetupError, match=r"pymunk 7.* lacks a function: .*cpSpaceLeap"):
-        physics._function_addresses()
