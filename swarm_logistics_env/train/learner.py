@@ -25,7 +25,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
-from swarm_logistics_env.motion.memory import body_of
+from swarm_logistics_env.motion.memory import body_of, in_frame, length_of
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.streams import key, row_keys
@@ -69,9 +69,9 @@ def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.floa
         row[8:] = 0.0
         if requested != NOBODY:
             to_x, to_y = items.position[requested, 0] - x, items.position[requested, 1] - y
-            away = max(math.sqrt(to_x * to_x + to_y * to_y), 1e-9)
-            row[8] = (cos * to_x + sin * to_y) / away
-            row[9] = (cos * to_y - sin * to_x) / away
+            away = max(length_of(to_x, to_y), 1e-9)
+            along, aside = in_frame((cos, sin), to_x, to_y)
+            row[8], row[9] = along / away, aside / away
             row[10] = away / 10.0
             row[11] = max(0.0, 1.0 - away / 2.0)
         if carrier != NOBODY:
