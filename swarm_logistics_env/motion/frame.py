@@ -61,6 +61,9 @@ class MotionView:
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
 
     Attributes:
+        keys: of each row's stream (N,).
+        counts: the decisions of each row in its episode so far (N,).
+        rows: the observations last read (N, D).
         turned: how far each row's frame is turned from its robot's body (N,) [rad].
     """
 
@@ -106,7 +109,7 @@ class MotionView:
             )
         inputs = self._inputs(observations, self.memory, slice(None), self.turned)
         self.counts += 1
-        self._rows = observations
+        self.rows = observations
         return inputs
 
     def peek(
@@ -138,7 +141,7 @@ class MotionView:
         """
         commands = np.zeros((len(outputs), 4))
         given = outputs.astype(np.float64)
-        command_rows(given, self.turned, self._rows, self._period, self.memory, commands)
+        command_rows(given, self.turned, self.rows, self._period, self.memory, commands)
         return commands
 
     def outputs_for(self, commands: NDArray[np.float64]) -> NDArray[np.float64]:

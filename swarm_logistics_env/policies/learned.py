@@ -291,9 +291,7 @@ class LearnedPolicy:
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode."""
-        self._keys = row_keys(seed, STREAM, n_robots)
-        self._frame.begin(self._keys)
-        self._step = 0
+        self._frame.begin(row_keys(seed, STREAM, n_robots))
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D).
@@ -303,22 +301,25 @@ class LearnedPolicy:
         """
         outputs = self._network(self._frame.read(observations))
         if self.card.network.exploration:
-            explore(self._keys, self._step, self._deviations, outputs)
-        self._step += 1
+            explore(self._frame.keys, self._frame.counts, self._deviations, outputs)
         return self._frame.command(outputs)
 
 
 @kernel
 def explore(
     keys: NDArray[np.uint64],
-    count: int,
+    counts: NDArray[np.int64],
     deviations: NDArray[np.float32],
     outputs: NDArray[np.float32],
 ) -> None:
-    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, k) of decision `count`."""
+    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, k).
+
+    Args:
+        counts: the number of decisions of each robot (N,), this one among them.
+    """
     for robot in range(outputs.shape[0]):
         for place in range(outputs.shape[1]):
-            drawn = gaussian(pair_key(keys[robot], place), count)
+            drawn = gaussian(pair_key(keys[robot], place), counts[robot] - 1)
             outputs[robot, place] += np.float32(deviations[place] * drawn)
 
 

@@ -91,7 +91,6 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     Attributes:
         frame: of each robot's motion, with its memory.
-        observations: the latest rows (num_envs, D).
 
     Raises:
         TrainingError, SetupError, ScenarioError, FaultError: the worlds cannot be.
@@ -100,7 +99,6 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def __init__(self, training: Training) -> None:
         worlds = make_worlds(training)
         self.frame = MotionView(training.scenario, training.network.listens)
-        self.observations = np.zeros((worlds.num_envs, 0), np.float32)
         self._known = np.zeros((worlds.num_envs, len(KNOWN)), np.float32)
         self._begun, self._seed = 0, 0
         super().__init__(
@@ -127,9 +125,9 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world."""
-        self.observations = self.venv.reset()
+        observations = self.venv.reset()
         self.frame.begin(self._keys(), self._bodies())
-        return self._read()
+        return self._read(observations)
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
@@ -137,7 +135,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def step_wait(self) -> Any:
         """Step every world."""
-        self.observations, rewards, dones, infos = self.venv.step_wait()
+        observations, rewards, dones, infos = self.venv.step_wait()
         over = np.flatnonzero(dones)
         if over.size:
             last = np.stack([infos[row]["terminal_observation"] for row in over.tolist()])
@@ -146,7 +144,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             for row, read in zip(over.tolist(), ends):
                 infos[row]["terminal_observation"] = read
             self.frame.begin_rows(over, self._keys()[over], self._bodies()[over])
-        return self._read(), rewards, dones, infos
+        return self._read(observations), rewards, dones, infos
 
     def _bodies(self) -> NDArray[np.float64]:
         # Every episode may have robots of another kind.
@@ -155,8 +153,8 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             bodies[rows] = body_of(world.warehouse.scenario)
         return bodies
 
-    def _read(self) -> NDArray[np.float32]:
-        inputs = self.frame.read(self.observations)
+    def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        inputs = self.frame.read(observations)
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
             read_known(world.warehouse.address, self.frame.turned[rows], self._known[rows])
         return np.hstack([inputs, self._known])

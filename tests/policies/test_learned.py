@@ -35,8 +35,8 @@ def test_an_episode_follows_from_its_seed(card: PolicyCard, tensors: Tensors) ->
 def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:
     deviations = np.array([0.1, 1.0, 3.0], np.float32)
     noise, later = np.zeros((2, 400, 3), np.float32)
-    explore(row_keys(0, "noise", 400), 5, deviations, noise)
-    explore(row_keys(0, "noise", 400), 6, deviations, later)
+    explore(row_keys(0, "noise", 400), np.full(400, 6), deviations, noise)
+    explore(row_keys(0, "noise", 400), np.full(400, 7), deviations, later)
     np.testing.assert_allclose(noise.std(axis=0), deviations, rtol=0.15)
     assert np.abs(np.corrcoef(noise.T, later.T) - np.eye(6)).max() < 0.2
 

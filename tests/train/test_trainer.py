@@ -114,7 +114,7 @@ def test_the_view_trains_what_the_policy_plays_and_goes_on_from_a_checkpoint(sma
     frame.begin(view.frame.keys)
     rng = np.random.default_rng(0)
     for _ in range(20):
-        assert (frame.read(view.observations) == inputs[:, : len(INPUTS)]).all()
+        assert (frame.read(view.frame.rows) == inputs[:, : len(INPUTS)]).all()
         outputs = rng.uniform(-1, 1, (3, 3)).astype(np.float32)
         frame.command(outputs)
         inputs, *_ = view.step(outputs)
