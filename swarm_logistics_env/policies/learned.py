@@ -56,7 +56,7 @@ class Network(_Part):
     outputs: tuple[str, ...] = OUTPUTS
     listens: bool = True
     hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
-    activation: Literal["tanh", "relu"] = "tanh"
+    activation: Literal["tanh"] = "tanh"
     exploration: NonNegativeFloat = 0.0
 
     @field_validator("inputs", "outputs")
@@ -124,7 +124,7 @@ class PolicyCard(_Part):
 
 
 class FeedForward:
-    """Dense layers with `tanh` or ReLU between them, in float32.
+    """Dense layers with `tanh` between them, in float32.
 
     Loops rather than numpy's matrix product, whose bits differ with the number of rows: here a
     robot's command does not depend on how many others there are.
@@ -132,26 +132,22 @@ class FeedForward:
     Args:
         weights: one (outputs, inputs) array per layer, as torch has them.
         biases: one (outputs,) array per layer.
-        rectify: ReLU instead of tanh.
     """
 
     def __init__(
         self,
         weights: Sequence[NDArray[np.float32]],
         biases: Sequence[NDArray[np.float32]],
-        *,
-        rectify: bool,
     ) -> None:
         # Transposed, so that a layer's outputs, over which the inner loop runs, lie side by side.
         self._weights = np.concatenate([np.ascontiguousarray(w.T).ravel() for w in weights])
         self._biases = np.concatenate(list(biases))
         self._widths = np.array([weights[0].shape[1], *(len(bias) for bias in biases)])
-        self._rectify = rectify
 
     def __call__(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the outputs (N, outputs) for rows of at least `inputs` columns; it reads these."""
         outputs = np.empty((inputs.shape[0], self._widths[-1]), np.float32)
-        run_network(inputs, self._weights, self._biases, self._widths, self._rectify, outputs)
+        run_network(inputs, self._weights, self._biases, self._widths, outputs)
         return outputs
 
 
@@ -219,7 +215,6 @@ def run_network(
     weights: NDArray[np.float32],
     biases: NDArray[np.float32],
     widths: NDArray[np.int64],
-    rectify: bool,
     outputs: NDArray[np.float32],
 ) -> None:
     """Fill `outputs` (N, widths[-1]); layer l has widths[l] inputs."""
@@ -238,12 +233,8 @@ def run_network(
             weight += n_in * n_out
             bias += n_out
             if layer < n_layers - 1:
-                if rectify:
-                    for place in range(n_out):
-                        total[place] = max(total[place], np.float32(0.0))
-                else:
-                    for place in range(n_out):
-                        total[place] = hyperbolic_tangent(total[place])
+                for place in range(n_out):
+                    total[place] = hyperbolic_tangent(total[place])
             here, there = there, here
         outputs[row] = here[: widths[n_layers]]
 
@@ -275,7 +266,6 @@ class LearnedPolicy:
         self._network = FeedForward(
             [tensors[f"layers.{layer}.weight"] for layer in layers],
             [tensors[f"layers.{layer}.bias"] for layer in layers],
-            rectify=network.activation == "relu",
         )
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = {

@@ -167,7 +167,6 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
 CHECKPOINT = "checkpoint.pt"
 KEPT = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
-ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 
 # What an untrained network says whatever it reads: it drives ahead, so that it meets things. One
 # that trembles on the spot would learn very slowly that searching pays.
@@ -193,10 +192,7 @@ def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
         vf_coef=ppo.value_weight,
         max_grad_norm=ppo.max_grad_norm,
         target_kl=ppo.target_kl,
-        policy_kwargs={
-            "net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)},
-            "activation_fn": ACTIVATIONS[network.activation],
-        },
+        policy_kwargs={"net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)}},
         seed=training.seed,
         device=device,
     )
@@ -297,17 +293,15 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
     """PPO's two networks: the critic reads more columns than the actor, see `NetworkView`."""
 
     def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch, self.activation_fn)
+        self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch)
 
 
 class _TwoReaders(torch.nn.Module):
-    def __init__(
-        self, n_columns: int, widths: dict[str, list[int]], activation: type[torch.nn.Module]
-    ) -> None:
+    def __init__(self, n_columns: int, widths: dict[str, list[int]]) -> None:
         super().__init__()
         self.n_inputs = n_columns - len(KNOWN)
         self.policy_net = torch.nn.Sequential(
-            *create_mlp(self.n_inputs, -1, widths["pi"], activation)
+            *create_mlp(self.n_inputs, -1, widths["pi"], torch.nn.Tanh)
         )
         # Cheaper than tanh, and as good for values.
         self.value_net = torch.nn.Sequential(
