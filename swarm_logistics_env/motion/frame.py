@@ -27,27 +27,23 @@ FIRST_RANDOM_HEADING = 1_000_003  # number in the robot's stream
 OUTPUTS = ("along", "aside", "gripper")
 
 
-def _names() -> tuple[str, ...]:
-    vector = ("along", "aside")
-    return (
-        *(f"wall_{beam}" for beam in range(row.N_BEAMS)),
-        *(f"neighbour_{n}_{part}" for n in range(N_FAR) for part in vector),
-        *(f"near_neighbour_{n}_{part}" for n in range(N_NEAR) for part in vector),
-        *(f"obstacle_{n}_{part}" for n in range(N_OBSTACLES) for part in ("present", *vector)),
-        "requested_present", "requested_along", "requested_aside", "requested_distance",
-        "requested_nearness", "requested_recently_held",
-        "lead_present", "lead_along", "lead_aside", "lead_distance", "lead_timer",
-        "carrying", "carrying_requested", "in_delivery_area", "timer_runs", "timer", "contact",
-        "velocity_along", "velocity_aside", "heading_along", "heading_aside",
-        "home_along", "home_aside", "home_certainty", "failed", "stuck",
-        "whim_along", "whim_aside",
-        "kept_home_along", "kept_home_aside", "kept_home_distance",
-        "cannot_deliver", "cannot_lift", "delivering_in_vain", "items_in_view",
-        "top_speed", "handling_time", "turns_to_drive",
-    )  # fmt: skip
-
-
-INPUTS = _names()
+_VECTOR = ("along", "aside")
+INPUTS: tuple[str, ...] = (
+    *(f"wall_{beam}" for beam in range(row.N_BEAMS)),
+    *(f"neighbour_{n}_{part}" for n in range(N_FAR) for part in _VECTOR),
+    *(f"near_neighbour_{n}_{part}" for n in range(N_NEAR) for part in _VECTOR),
+    *(f"obstacle_{n}_{part}" for n in range(N_OBSTACLES) for part in ("present", *_VECTOR)),
+    "requested_present", "requested_along", "requested_aside", "requested_distance",
+    "requested_nearness", "requested_recently_held",
+    "lead_present", "lead_along", "lead_aside", "lead_distance", "lead_timer",
+    "carrying", "carrying_requested", "in_delivery_area", "timer_runs", "timer", "contact",
+    "velocity_along", "velocity_aside", "heading_along", "heading_aside",
+    "home_along", "home_aside", "home_certainty", "failed", "stuck",
+    "whim_along", "whim_aside",
+    "kept_home_along", "kept_home_aside", "kept_home_distance",
+    "cannot_deliver", "cannot_lift", "delivering_in_vain", "items_in_view",
+    "top_speed", "handling_time", "turns_to_drive",
+)  # fmt: skip
 LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
 
 
@@ -127,11 +123,15 @@ class MotionView:
     ) -> NDArray[np.float32]:
         known.remember(observations, self._period, memory)
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
-        headings = (self.counts[rows] * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+        headings = self.random_headings()[rows]
         read_rows(observations, memory, self.keys[rows], headings, inputs, turned)
         if not self._listens:
             inputs[:, LEAD] = 0.0
         return inputs
+
+    def random_headings(self) -> NDArray[np.int64]:
+        """Return the number of the random direction that each row's next decision has (N,)."""
+        return (self.counts * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
 
     def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.

@@ -34,16 +34,11 @@ SETTLING_TIME = 1.0  # [s], so that the drift is not judged by the noise of the 
 @kernel
 def wall_angle(sensed: NDArray[np.float32]) -> float:
     """Return the direction of the nearest wall in the robot's frame, 0 to pi/2 [rad]; -1: none."""
-    first = row.RANGE_WALLS
-    nearest, farthest = 0, sensed[first]
-    for beam in range(row.N_BEAMS):
-        if sensed[first + beam] < sensed[first + nearest]:
-            nearest = beam
-        farthest = max(farthest, sensed[first + beam])
-    before, after = (nearest - 1) % row.N_BEAMS, (nearest + 1) % row.N_BEAMS
-    a, b, c = sensed[first + before], sensed[first + nearest], sensed[first + after]
+    walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
+    nearest = np.argmin(walls)
+    a, b, c = walls[nearest - 1], walls[nearest], walls[(nearest + 1) % row.N_BEAMS]
     # In a room every robot has a beam that meets nothing, or too long a one to be used.
-    if max(a, c) >= farthest:
+    if max(a, c) >= walls.max():
         return -1.0
     angle = BEAM_ANGLE * nearest
     ax, ay = a * math.cos(angle - BEAM_ANGLE), a * math.sin(angle - BEAM_ANGLE)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionView, random_heading
+from swarm_logistics_env.motion.frame import MotionView, random_heading
 from swarm_logistics_env.motion.memory import drive, length_of
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -232,8 +232,8 @@ class Homing:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
         frame = self._frame
+        numbers = frame.random_headings()
         frame.read(observations)
-        numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
         commands = np.zeros((len(observations), 4))
         self._decide(observations, frame.memory, frame.keys, numbers, self._period, commands)
         return frame.command(frame.outputs_for(commands))
