@@ -185,10 +185,11 @@ def without_prose(source: str) -> str:
     """Return Python source without docstrings, lines that only comment, and blank lines."""
     prose: set[int] = set()
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-            first = node.body[0] if node.body else None
-            if isinstance(first, ast.Expr) and ast.get_docstring(node, clean=False) is not None:
-                prose.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
+        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            continue
+        if ast.get_docstring(node, clean=False) is not None:
+            first = node.body[0]
+            prose.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
     lines = enumerate(source.splitlines(), start=1)
     return "\n".join(
         line.rstrip()
