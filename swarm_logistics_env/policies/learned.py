@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -67,6 +67,11 @@ class Network(_Part):
             raise ValueError(f"should be the {len(right)} names that this version knows")
         return names
 
+    @property
+    def widths(self) -> list[int]:
+        """The numbers of inputs, of each hidden layer's values, and of outputs."""
+        return [len(self.inputs), *self.hidden, len(self.outputs)]
+
 
 class Score(_Part):
     """One measured value with its 95 % interval; a limit that is infinite becomes None.
@@ -121,34 +126,6 @@ class PolicyCard(_Part):
     agent_steps: NonNegativeInt = 0
     scores: tuple[Score, ...] = ()
     scored_with: dict[str, str] = Field(default_factory=dict)
-
-
-class FeedForward:
-    """Dense layers with `tanh` between them, in float32.
-
-    Loops rather than numpy's matrix product, whose bits differ with the number of rows: here a
-    robot's command does not depend on how many others there are.
-
-    Args:
-        weights: one (outputs, inputs) array per layer, as torch has them.
-        biases: one (outputs,) array per layer.
-    """
-
-    def __init__(
-        self,
-        weights: Sequence[NDArray[np.float32]],
-        biases: Sequence[NDArray[np.float32]],
-    ) -> None:
-        # Transposed, so that a layer's outputs, over which the inner loop runs, lie side by side.
-        self._weights = np.concatenate([np.ascontiguousarray(w.T).ravel() for w in weights])
-        self._biases = np.concatenate(list(biases))
-        self._widths = np.array([weights[0].shape[1], *(len(bias) for bias in biases)])
-
-    def __call__(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the outputs (N, outputs) for rows of at least `inputs` columns; it reads these."""
-        outputs = np.empty((inputs.shape[0], self._widths[-1]), np.float32)
-        run_network(inputs, self._weights, self._biases, self._widths, outputs)
-        return outputs
 
 
 @kernel
@@ -217,13 +194,17 @@ def run_network(
     widths: NDArray[np.int64],
     outputs: NDArray[np.float32],
 ) -> None:
-    """Fill `outputs` (N, widths[-1]); layer l has widths[l] inputs."""
+    """Fill `outputs` (N, widths[-1]); layer l has widths[l] inputs.
+
+    Loops rather than numpy's matrix product, whose bits differ with the number of rows: here a
+    robot's command does not depend on how many others there are.
+    """
     n_layers = len(widths) - 1
     widest = widths.max()
     here, there = np.empty(widest, np.float32), np.empty(widest, np.float32)
     places = np.empty(widest, np.int64)
     for row in range(inputs.shape[0]):
-        here[: widths[0]] = inputs[row, : widths[0]]
+        here[: widths[0]] = inputs[row]
         weight, bias = 0, 0
         for layer in range(n_layers):
             n_in, n_out = widths[layer], widths[layer + 1]
@@ -263,10 +244,10 @@ class LearnedPolicy:
         self.tensors = dict(tensors)
         network = card.network
         layers = range(len(network.hidden) + 1)
-        self._network = FeedForward(
-            [tensors[f"layers.{layer}.weight"] for layer in layers],
-            [tensors[f"layers.{layer}.bias"] for layer in layers],
-        )
+        # Transposed, so that a layer's outputs, over which the inner loop runs, lie side by side.
+        self._weights = np.concatenate([tensors[f"layers.{n}.weight"].T.ravel() for n in layers])
+        self._biases = np.concatenate([tensors[f"layers.{n}.bias"] for n in layers])
+        self._widths = np.array(network.widths)
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = {
             "network": network.model_dump(mode="json"),
@@ -289,10 +270,16 @@ class LearnedPolicy:
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
-        outputs = self._network(self._frame.read(observations))
+        outputs = self.outputs_of(self._frame.read(observations))
         if self.card.network.exploration:
             explore(self._frame.keys, self._frame.counts, self._deviations, outputs)
         return self._frame.command(outputs)
+
+    def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the network's outputs (N, k) for rows of its inputs, without noise."""
+        outputs = np.empty((len(inputs), self._widths[-1]), np.float32)
+        run_network(inputs, self._weights, self._biases, self._widths, outputs)
+        return outputs
 
 
 @kernel
@@ -319,9 +306,8 @@ def tensor_shapes(network: Network) -> dict[str, tuple[int, ...]]:
     `layers` are as torch has them, weight (outputs, inputs); `deviations` those of the training's
     noise, of each output.
     """
-    widths = [len(network.inputs), *network.hidden, len(network.outputs)]
-    shapes: dict[str, tuple[int, ...]] = {"deviations": (widths[-1],)}
-    for layer, (n_in, n_out) in enumerate(pairwise(widths)):
+    shapes: dict[str, tuple[int, ...]] = {"deviations": (len(network.outputs),)}
+    for layer, (n_in, n_out) in enumerate(pairwise(network.widths)):
         shapes[f"layers.{layer}.weight"] = (n_out, n_in)
         shapes[f"layers.{layer}.bias"] = (n_out,)
     return shapes

@@ -97,7 +97,7 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
         for parameter in learner.policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
     card = PolicyCard(name="x", network=training.network)
-    ours = LearnedPolicy(card, tensors_of(learner.policy))._network
+    ours = LearnedPolicy(card, tensors_of(learner.policy)).outputs_of
     inputs = np.random.default_rng(0).normal(size=(300, len(INPUTS) + len(KNOWN)))
     # What PPO takes for the most likely action.
     likely, _ = learner.predict(inputs.astype(np.float32), deterministic=True)
