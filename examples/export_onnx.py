@@ -22,7 +22,6 @@ OPERATORS, FORMAT = 17, 8  # old enough for the runtimes of 2022
 def main(trained="ppo-delivery", path="ppo-delivery.onnx"):
     policy: Any = policies.load(trained)
     network, tensors = policy.card.network, policy.tensors
-    activation = {"tanh": "Tanh", "relu": "Relu"}[network.activation]
     nodes, at = [], "inputs"
     for layer in range(len(network.hidden) + 1):
         is_last = layer == len(network.hidden)
@@ -31,7 +30,7 @@ def main(trained="ppo-delivery", path="ppo-delivery.onnx"):
         nodes.append(helper.make_node("Gemm", [at, weight, bias], [total], transB=1))
         if not is_last:
             at = f"layers.{layer}.out"
-            nodes.append(helper.make_node(activation, [total], [at]))
+            nodes.append(helper.make_node("Tanh", [total], [at]))
     real = TensorProto.FLOAT
     model = helper.make_model(
         helper.make_graph(

@@ -67,7 +67,7 @@ def test_the_onnx_file_says_what_the_network_says_on_every_row_of_an_episode(
     while not world.is_over_time:
         inputs = frame.read(rows)
         [said] = session.run(None, {"inputs": inputs})
-        np.testing.assert_allclose(said, policy._network(inputs), rtol=0, atol=1e-5)
+        np.testing.assert_allclose(said, policy.outputs_of(inputs), rtol=0, atol=1e-5)
         rows = world.step(frame.command(said))
 
 

@@ -15,7 +15,7 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.memory import clear_the_way, in_frame, stand_to_handle, steer
+from swarm_logistics_env.motion.memory import in_frame, length_of
 from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
@@ -27,27 +27,23 @@ FIRST_RANDOM_HEADING = 1_000_003  # number in the robot's stream
 OUTPUTS = ("along", "aside", "gripper")
 
 
-def _names() -> tuple[str, ...]:
-    vector = ("along", "aside")
-    return (
-        *(f"wall_{beam}" for beam in range(row.N_BEAMS)),
-        *(f"neighbour_{n}_{part}" for n in range(N_FAR) for part in vector),
-        *(f"near_neighbour_{n}_{part}" for n in range(N_NEAR) for part in vector),
-        *(f"obstacle_{n}_{part}" for n in range(N_OBSTACLES) for part in ("present", *vector)),
-        "requested_present", "requested_along", "requested_aside", "requested_distance",
-        "requested_nearness", "requested_recently_held",
-        "lead_present", "lead_along", "lead_aside", "lead_distance", "lead_timer",
-        "carrying", "carrying_requested", "in_delivery_area", "timer_runs", "timer", "contact",
-        "velocity_along", "velocity_aside", "heading_along", "heading_aside",
-        "home_along", "home_aside", "home_certainty", "failed", "stuck",
-        "whim_along", "whim_aside",
-        "kept_home_along", "kept_home_aside", "kept_home_distance",
-        "cannot_deliver", "cannot_lift", "delivering_in_vain", "items_in_view",
-        "top_speed", "handling_time", "turns_to_drive",
-    )  # fmt: skip
-
-
-INPUTS = _names()
+_VECTOR = ("along", "aside")
+INPUTS: tuple[str, ...] = (
+    *(f"wall_{beam}" for beam in range(row.N_BEAMS)),
+    *(f"neighbour_{n}_{part}" for n in range(N_FAR) for part in _VECTOR),
+    *(f"near_neighbour_{n}_{part}" for n in range(N_NEAR) for part in _VECTOR),
+    *(f"obstacle_{n}_{part}" for n in range(N_OBSTACLES) for part in ("present", *_VECTOR)),
+    "requested_present", "requested_along", "requested_aside", "requested_distance",
+    "requested_nearness", "requested_recently_held",
+    "lead_present", "lead_along", "lead_aside", "lead_distance", "lead_timer",
+    "carrying", "carrying_requested", "in_delivery_area", "timer_runs", "timer", "contact",
+    "velocity_along", "velocity_aside", "heading_along", "heading_aside",
+    "home_along", "home_aside", "home_certainty", "failed", "stuck",
+    "whim_along", "whim_aside",
+    "kept_home_along", "kept_home_aside", "kept_home_distance",
+    "cannot_deliver", "cannot_lift", "delivering_in_vain", "items_in_view",
+    "top_speed", "handling_time", "turns_to_drive",
+)  # fmt: skip
 LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
 
 
@@ -61,6 +57,9 @@ class MotionView:
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
 
     Attributes:
+        keys: of each row's stream (N,).
+        counts: the decisions of each row in its episode so far (N,).
+        rows: the observations last read (N, D).
         turned: how far each row's frame is turned from its robot's body (N,) [rad].
     """
 
@@ -106,7 +105,7 @@ class MotionView:
             )
         inputs = self._inputs(observations, self.memory, slice(None), self.turned)
         self.counts += 1
-        self._rows = observations
+        self.rows = observations
         return inputs
 
     def peek(
@@ -124,11 +123,15 @@ class MotionView:
     ) -> NDArray[np.float32]:
         known.remember(observations, self._period, memory)
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
-        headings = (self.counts[rows] * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
+        headings = self.random_headings()[rows]
         read_rows(observations, memory, self.keys[rows], headings, inputs, turned)
         if not self._listens:
             inputs[:, LEAD] = 0.0
         return inputs
+
+    def random_headings(self) -> NDArray[np.int64]:
+        """Return the number of the random direction that each row's next decision has (N,)."""
+        return (self.counts * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
 
     def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
@@ -137,11 +140,8 @@ class MotionView:
         A differential robot turns its body to where it wants to drive.
         """
         commands = np.zeros((len(outputs), 4))
-        turn_outputs(outputs.astype(np.float64), self.turned, commands)
-        clear_the_way(self._rows, self.memory, commands)
-        stand_to_handle(self._rows, self._period, self.memory, commands)
-        known.note_commands(self._rows, commands, self.memory)
-        steer(self.memory, commands)
+        given = outputs.astype(np.float64)
+        command_rows(given, self.turned, self.rows, self._period, self.memory, commands)
         return commands
 
     def outputs_for(self, commands: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -173,7 +173,7 @@ def read_rows(
         at = read_neighbours(sensed, frame, read, row.N_BEAMS)
         at = read_items(sensed, frame, read, at)
         # The robot that tells the lowest timer may lie: it counts less the more this robot knows.
-        sure = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
+        sure = length_of(own[known.HOME_X], own[known.HOME_Y])
         at = read_lead(sensed, frame, 1.0 - math.tanh(sure), read, at)
         read[at] = sensed[row.CARRYING]
         read[at + 1] = sensed[row.CARRYING_REQUESTED]
@@ -226,7 +226,7 @@ def read_neighbours(
         reach = FAR if is_far else NEAR
         there = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (place if is_far else place - N_FAR)
         x, y = float(sensed[there + 1]), float(sensed[there + 2])
-        away = math.sqrt(x * x + y * y)
+        away = length_of(x, y)
         near = max(0.0, 1.0 - away / reach) / away if away > 0.0 else 0.0
         at = put(read, at, near, frame, x, y)
     return at
@@ -247,7 +247,7 @@ def read_items(
         there = row.ITEMS + row.ITEM_WIDTH * place
         if sensed[there] > 0.5 and sensed[there + 3] > 0.5:
             x, y = float(sensed[there + 1]), float(sensed[there + 2])
-            away = max(math.sqrt(x * x + y * y), 1e-9)
+            away = max(length_of(x, y), 1e-9)
             along, aside = in_frame(frame, x, y)
             read[at], read[at + 1], read[at + 2] = 1.0, along / away, aside / away
             read[at + 3] = away
@@ -268,7 +268,7 @@ def read_lead(
     """Fill the inputs of the lowest timer heard, times `trust`; return the column after them."""
     heard = sensed[row.LOWEST_TIMER] * trust
     x, y = float(sensed[row.LOWEST_TIMER + 1]), float(sensed[row.LOWEST_TIMER + 2])
-    away = math.sqrt(x * x + y * y)
+    away = length_of(x, y)
     unit = heard / away if away > 0.0 else 0.0
     read[at] = heard
     at = put(read, at + 1, unit, frame, x, y)
@@ -284,16 +284,29 @@ def random_heading(key: np.uint64, number: int) -> float:
 
 
 @kernel
-def turn_outputs(
-    outputs: NDArray[np.float64], turned: NDArray[np.float64], commands: NDArray[np.float64]
+def command_rows(
+    outputs: NDArray[np.float64],
+    turned: NDArray[np.float64],
+    rows: NDArray[np.float32],
+    period: float,
+    memory: NDArray[np.float64],
+    commands: NDArray[np.float64],
 ) -> None:
-    """Fill the commands (N, 4) of outputs (N, 3): along, aside, gripper; clipped, no turns."""
+    """Fill the commands (N, 4) of outputs (N, 3) upon rows; memories take note of them."""
     for robot in range(outputs.shape[0]):
-        cos, sin = math.cos(turned[robot]), math.sin(turned[robot])
-        along = min(max(outputs[robot, 0], -1.0), 1.0)
-        aside = min(max(outputs[robot, 1], -1.0), 1.0)
-        longer = max(math.sqrt(along * along + aside * aside), 1.0)
-        commands[robot, 0] = (cos * along - sin * aside) / longer
-        commands[robot, 1] = (sin * along + cos * aside) / longer
-        commands[robot, 2] = 0.0
-        commands[robot, 3] = min(max(outputs[robot, 2], -1.0), 1.0)
+        sensed, own, command = rows[robot], memory[robot], commands[robot]
+        turn_outputs(outputs[robot], turned[robot], command)
+        known.clear_the_way(sensed, own, command)
+        known.stand_to_handle(sensed, period, own, command)
+        known.note_command(sensed, command, own)
+        known.steer(own, command)
+
+
+@kernel
+def turn_outputs(outputs: NDArray[np.float64], turned: float, command: NDArray[np.float64]) -> None:
+    """Fill the command (4,) of outputs (3,): along, aside, gripper; clipped, no turn."""
+    along, aside = min(max(outputs[0], -1.0), 1.0), min(max(outputs[1], -1.0), 1.0)
+    longer = max(length_of(along, aside), 1.0)
+    x, y = in_frame((math.cos(turned), -math.sin(turned)), along, aside)
+    command[0], command[1], command[2] = x / longer, y / longer, 0.0
+    command[3] = min(max(outputs[2], -1.0), 1.0)

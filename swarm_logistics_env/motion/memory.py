@@ -34,23 +34,18 @@ SETTLING_TIME = 1.0  # [s], so that the drift is not judged by the noise of the 
 @kernel
 def wall_angle(sensed: NDArray[np.float32]) -> float:
     """Return the direction of the nearest wall in the robot's frame, 0 to pi/2 [rad]; -1: none."""
-    first = row.RANGE_WALLS
-    nearest, farthest = 0, sensed[first]
-    for beam in range(row.N_BEAMS):
-        if sensed[first + beam] < sensed[first + nearest]:
-            nearest = beam
-        farthest = max(farthest, sensed[first + beam])
-    before, after = (nearest - 1) % row.N_BEAMS, (nearest + 1) % row.N_BEAMS
-    a, b, c = sensed[first + before], sensed[first + nearest], sensed[first + after]
+    walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
+    nearest = np.argmin(walls)
+    a, b, c = walls[nearest - 1], walls[nearest], walls[(nearest + 1) % row.N_BEAMS]
     # In a room every robot has a beam that meets nothing, or too long a one to be used.
-    if max(a, c) >= farthest:
+    if max(a, c) >= walls.max():
         return -1.0
     angle = BEAM_ANGLE * nearest
     ax, ay = a * math.cos(angle - BEAM_ANGLE), a * math.sin(angle - BEAM_ANGLE)
     bx, by = b * math.cos(angle), b * math.sin(angle)
     cx, cy = c * math.cos(angle + BEAM_ANGLE), c * math.sin(angle + BEAM_ANGLE)
     x, y = cx - ax, cy - ay
-    length = max(math.sqrt(x * x + y * y), 1e-6)
+    length = max(length_of(x, y), 1e-6)
     if abs((bx - ax) * y - (by - ay) * x) / length > STRAIGHT:
         return -1.0
     return math.atan2(y, x) % QUARTER
@@ -119,7 +114,7 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
     for robot in range(rows.shape[0]):
         sensed, known = rows[robot], memory[robot]
         x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
-        speed = math.sqrt(x * x + y * y)
+        speed = length_of(x, y)
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
         delivers = sensed[row.CARRYING_REQUESTED] > 0.5
 
@@ -150,6 +145,12 @@ def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float6
         if sure > 0.0:
             known[AWAY] -= period * (home_x * x + home_y * y)
         known[WAS_INSIDE] = 1.0 if is_inside else 0.0
+
+
+@inlined_kernel
+def length_of(x: float, y: float) -> float:
+    """Return the length of a vector."""
+    return math.sqrt(x * x + y * y)
 
 
 @inlined_kernel
@@ -201,7 +202,7 @@ def item_in_reach(sensed: NDArray[np.float32]) -> bool:
     found = False
     for place in range(row.N_ITEMS_IN_VIEW):
         item = row.ITEMS + row.ITEM_WIDTH * place
-        away = math.sqrt(sensed[item + 1] ** 2 + sensed[item + 2] ** 2)
+        away = length_of(sensed[item + 1], sensed[item + 2])
         may_lift = sensed[item + 3] > 0.5 or sensed[item + 4] < 0.5
         found |= sensed[item] > 0.5 and away < SURELY_IN_REACH and may_lift
     return found
@@ -233,7 +234,7 @@ def kept_home(known: NDArray[np.float64]) -> tuple[float, float, float]:
 
     The area has a straight border along a wall, so a robot that saw one goes at a right angle.
     """
-    sure = math.sqrt(known[KEPT_X] ** 2 + known[KEPT_Y] ** 2)
+    sure = length_of(known[KEPT_X], known[KEPT_Y])
     if sure == 0.0:
         return 0.0, 0.0, 0.0
     angle = math.atan2(known[KEPT_Y], known[KEPT_X])
@@ -244,76 +245,67 @@ def kept_home(known: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 @kernel
-def note_commands(
-    rows: NDArray[np.float32], commands: NDArray[np.float64], memory: NDArray[np.float64]
+def note_command(
+    sensed: NDArray[np.float32], command: NDArray[np.float64], own: NDArray[np.float64]
 ) -> None:
-    """Remember the commands (N, 4) that were given upon these rows."""
-    for robot in range(rows.shape[0]):
-        x, y, grips = commands[robot, 0], commands[robot, 1], commands[robot, 3]
-        speed = math.sqrt(x * x + y * y)
-        if speed > 0.05:
-            memory[robot, HEADING_X], memory[robot, HEADING_Y] = x / speed, y / speed
-        memory[robot, HELD] = 1.0 if grips > 0.5 else 0.0
-        if rows[robot, row.CARRYING_REQUESTED] > 0.5 and grips > -0.5:
-            memory[robot, HELD] = 2.0
+    """Remember the command (4,) that was given upon a row."""
+    x, y, grips = command[0], command[1], command[3]
+    speed = length_of(x, y)
+    if speed > 0.05:
+        own[HEADING_X], own[HEADING_Y] = x / speed, y / speed
+    own[HELD] = 1.0 if grips > 0.5 else 0.0
+    if sensed[row.CARRYING_REQUESTED] > 0.5 and grips > -0.5:
+        own[HELD] = 2.0
 
 
 @kernel
 def stand_to_handle(
-    rows: NDArray[np.float32],
+    sensed: NDArray[np.float32],
     period: float,
-    memory: NDArray[np.float64],
-    commands: NDArray[np.float64],
+    own: NDArray[np.float64],
+    command: NDArray[np.float64],
 ) -> None:
-    """Let robots stand in the commands (N, 4) while they lift, put down or deliver.
+    """Let a robot stand in its command (4,) while it lifts, puts down or delivers.
 
-    The world makes them stand anyway; so their memories know that their bodies do not turn.
+    The world makes it stand anyway; so its memory knows that its body does not turn.
     """
-    for robot in range(commands.shape[0]):
-        sensed, own, grips = rows[robot], memory[robot], commands[robot, 3]
-        if own[HANDLING_TIME] <= 0.0:
-            continue
-        own[HANDLES] = max(0.0, own[HANDLES] - period)
-        carries = sensed[row.CARRYING] > 0.5
-        begins = carries and grips < -0.5
-        begins |= not carries and grips > 0.5 and own[CANNOT_LIFT] <= 0.0 and item_in_reach(sensed)
-        is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
-        delivers = sensed[row.CARRYING_REQUESTED] > 0.5 and own[CANNOT_DELIVER] <= 0.0
-        begins |= is_inside and delivers
-        if begins and own[HANDLES] <= 0.0:
-            own[HANDLES] = own[HANDLING_TIME] + period
-        if own[HANDLES] > 0.0:
-            commands[robot, :3] = 0.0
+    if own[HANDLING_TIME] <= 0.0:
+        return
+    own[HANDLES] = max(0.0, own[HANDLES] - period)
+    carries, grips = sensed[row.CARRYING] > 0.5, command[3]
+    begins = carries and grips < -0.5
+    begins |= not carries and grips > 0.5 and own[CANNOT_LIFT] <= 0.0 and item_in_reach(sensed)
+    is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
+    delivers = sensed[row.CARRYING_REQUESTED] > 0.5 and own[CANNOT_DELIVER] <= 0.0
+    begins |= is_inside and delivers
+    if begins and own[HANDLES] <= 0.0:
+        own[HANDLES] = own[HANDLING_TIME] + period
+    if own[HANDLES] > 0.0:
+        command[:3] = 0.0
 
 
 @kernel
-def steer(memory: NDArray[np.float64], commands: NDArray[np.float64]) -> None:
-    """Turn commands (N, 4) to drive in a direction into turns and motion ahead or back.
+def steer(own: NDArray[np.float64], command: NDArray[np.float64]) -> None:
+    """Turn a command (4,) to drive in a direction into a turn and motion ahead or back.
 
-    Of robots that drive in every direction they stay as they are.
+    Of a robot that drives in every direction it stays as it is.
 
     Args:
-        memory: (N, N_COLUMNS); its directions are turned back by the robot's own turn.
-        commands: forward and left as if the drive were holonomic; left becomes 0.
+        own: the robot's memory; its directions are turned back by the robot's own turn.
+        command: forward and left as if the drive were holonomic; left becomes 0.
     """
-    for robot in range(commands.shape[0]):
-        widest = memory[robot, WIDEST_TURN]
-        if widest <= 0.0:
-            continue
-        x, y = commands[robot, 0], commands[robot, 1]
-        speed = math.sqrt(x * x + y * y)
-        if speed < 1e-6:
-            continue
-        angle, way = math.atan2(y, x), 1.0
-        if abs(angle) > 0.5 * math.pi:
-            # It drives as well backwards, so that it never turns by more than a quarter.
-            angle, way = angle - math.copysign(math.pi, angle), -1.0
-        turn = min(max(angle, -widest), widest)
-        # It drives along its mean direction in the period, and slower the more that is off.
-        commands[robot, 0] = way * speed * max(0.0, math.cos(angle - 0.5 * turn))
-        commands[robot, 1] = 0.0
-        commands[robot, 2] = turn / widest
-        turn_back(turn, memory[robot])
+    widest, speed = own[WIDEST_TURN], length_of(command[0], command[1])
+    if widest <= 0.0 or speed < 1e-6:
+        return
+    angle, way = math.atan2(command[1], command[0]), 1.0
+    if abs(angle) > 0.5 * math.pi:
+        # It drives as well backwards, so that it never turns by more than a quarter.
+        angle, way = angle - math.copysign(math.pi, angle), -1.0
+    turn = min(max(angle, -widest), widest)
+    # It drives along its mean direction in the period, and slower the more that is off.
+    command[0] = way * speed * max(0.0, math.cos(angle - 0.5 * turn))
+    command[1], command[2] = 0.0, turn / widest
+    turn_back(turn, own)
 
 
 @kernel
@@ -332,33 +324,36 @@ _PUT_DOWN_TIME = 0.5  # [s] before the end, at which the item that was in the wa
 
 @kernel
 def clear_the_way(
-    rows: NDArray[np.float32], memory: NDArray[np.float64], commands: NDArray[np.float64]
+    sensed: NDArray[np.float32], own: NDArray[np.float64], command: NDArray[np.float64]
 ) -> None:
-    """Replace the commands (N, 4) of caged robots, which their memories (N, N_COLUMNS) tell."""
-    for robot in range(rows.shape[0]):
-        left = memory[robot, CLEARING]
-        if left <= 0.0:
-            continue
-        sensed = rows[robot]
-        requested, other = nearest_items(sensed)
-        x, y, speed, gripper = 0.0, 0.0, 0.0, -1.0
-        if sensed[row.CARRYING_REQUESTED] < 0.5 and sensed[row.CARRYING] > 0.5:
-            x, y = memory[robot, HEADING_X], memory[robot, HEADING_Y]
-            if requested >= 0:
-                x, y = -sensed[requested + 1], -sensed[requested + 2]
-            speed = 1.0
-            gripper = 1.0 if left > _PUT_DOWN_TIME else -1.0
-        elif sensed[row.CARRYING] < 0.5 and other >= 0:
-            x, y = sensed[other + 1], sensed[other + 2]
-            away = math.sqrt(x * x + y * y)
-            speed = min(1.0, 2.0 * away)
-            alone = requested < 0 or (
-                sensed[requested + 1] ** 2 + sensed[requested + 2] ** 2 > _OUT_OF_REACH**2
-            )
-            gripper = 1.0 if alone and away < _IN_REACH else -1.0
-        length = max(math.sqrt(x * x + y * y), 1e-9)
-        commands[robot, 0], commands[robot, 1] = speed * x / length, speed * y / length
-        commands[robot, 2], commands[robot, 3] = 0.0, gripper
+    """Replace the command (4,) of a caged robot, which its memory tells."""
+    if own[CLEARING] <= 0.0:
+        return
+    requested, other = nearest_items(sensed)
+    x, y, speed, gripper = 0.0, 0.0, 0.0, -1.0
+    if sensed[row.CARRYING_REQUESTED] < 0.5 and sensed[row.CARRYING] > 0.5:
+        x, y = own[HEADING_X], own[HEADING_Y]
+        if requested >= 0:
+            x, y = -sensed[requested + 1], -sensed[requested + 2]
+        speed = 1.0
+        gripper = 1.0 if own[CLEARING] > _PUT_DOWN_TIME else -1.0
+    elif sensed[row.CARRYING] < 0.5 and other >= 0:
+        x, y = sensed[other + 1], sensed[other + 2]
+        away = length_of(x, y)
+        speed = min(1.0, 2.0 * away)
+        alone = requested < 0 or (
+            sensed[requested + 1] ** 2 + sensed[requested + 2] ** 2 > _OUT_OF_REACH**2
+        )
+        gripper = 1.0 if alone and away < _IN_REACH else -1.0
+    drive(x, y, speed, gripper, command)
+
+
+@kernel
+def drive(x: float, y: float, speed: float, gripper: float, command: NDArray[np.float64]) -> None:
+    """Fill one robot's command (4,): `speed` in the direction (x, y), of any length; no turn."""
+    length = max(length_of(x, y), 1e-9)
+    command[0], command[1] = speed * x / length, speed * y / length
+    command[2], command[3] = 0.0, gripper
 
 
 @kernel

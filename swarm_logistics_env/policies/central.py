@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies.routes import (
     BLOCKED,
+    CELL,
     CROWDED,
     cell_at,
     cost_to_go,
@@ -26,9 +27,7 @@ from swarm_logistics_env.policies.routes import (
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
-CELL = 0.125  # [m]
 MARGIN = 0.03  # [m] kept from what a laden robot must not touch
-LOOKAHEAD = 16  # cells
 REPLAN = 0.3  # [s]
 PATIENCE = 2.0  # [s] without getting nearer, until another robot is sent
 DISTRUST = 30.0  # [s]
@@ -82,10 +81,10 @@ class Central:
         others = state.robot_present.copy()
         if worker != NOBODY:
             others[worker] = False
-        goals, is_under_item = self._waiting_places(state, others)
+        goals = self._waiting_places(state, others)
         gripper = np.where(state.robot_item == NOBODY, 0.0, -1.0)  # nobody hoards
         self._stock(state, others, goals, gripper)
-        velocity = self._drift(state, goals, is_under_item, worker)
+        velocity = self._drift(state, goals, worker)
         if worker != NOBODY:
             velocity[worker] = self._on_its_way(state, worker, others)
             # Of several items in reach the requested one comes first, so no other gets lifted.
@@ -104,8 +103,8 @@ class Central:
 
     def _waiting_places(
         self, state: WarehouseState, others: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return where each robot should wait (N, 2) [m], and which have an item to wait under.
+    ) -> NDArray[np.float64]:
+        """Return where each robot should wait (N, 2) [m], and note under which item.
 
         They are spread out. Unladen robots drive under items, which laden ones have to go around
         anyway. Who has no item waits at the wall.
@@ -127,9 +126,8 @@ class Central:
                 break
             item[robot] = _loneliest(state, robot, candidates, is_taken)
             is_taken[item[robot]] = True
-        has_item = item != NOBODY
         at_the_wall = _rank_and_file(len(item), self._scenario)
-        return np.where(has_item[:, None], state.item_position[item], at_the_wall), has_item
+        return np.where((item != NOBODY)[:, None], state.item_position[item], at_the_wall)
 
     # -- who -----------------------------------------------------------------------------------
 
@@ -176,7 +174,7 @@ class Central:
         if self._planned_at < 0:
             return np.inf
         x, y = state.robot_position[self._worker].tolist()
-        return float(self._far[cell_at(self._far, CELL, x, y)]) * CELL
+        return float(self._far[cell_at(self._far, x, y)]) * CELL
 
     def _to_item(self, state: WarehouseState) -> float:
         """Return how far the worker is from the item of its task [m]."""
@@ -196,7 +194,7 @@ class Central:
         if state.time >= self._planned_at + REPLAN - 1e-6:
             self._cost, self._far = self._ways(state, others, NOBODY if carries else item)
             self._planned_at = state.time
-        waypoint = lookahead(self._cost, self._far, CELL, x, y, LOOKAHEAD)
+        waypoint = lookahead(self._cost, self._far, x, y)
         if carries and waypoint[0] >= scenario.storage_width - CELL:
             waypoint = (waypoint[0] + 1.0, waypoint[1])  # no braking at the edge
         return self._towards(state.robot_position[worker], np.array(waypoint))
@@ -220,7 +218,6 @@ class Central:
         cost = costmap(
             scenario.warehouse_width,
             scenario.warehouse_height,
-            CELL,
             scenario.robot_radius,
             around,
         )
@@ -228,7 +225,7 @@ class Central:
         if carries:
             goal[:, int(scenario.storage_width / CELL) :] = True
         else:
-            goal[cell_at(cost, CELL, *state.item_position[item].tolist())] = True
+            goal[cell_at(cost, *state.item_position[item].tolist())] = True
         return cost, cost_to_go(cost, goal)
 
     # -- how -----------------------------------------------------------------------------------
@@ -237,7 +234,6 @@ class Central:
         self,
         state: WarehouseState,
         goals: NDArray[np.float64],
-        is_under_item: NDArray[np.bool_],
         worker: int,
     ) -> NDArray[np.float64]:
         """Return velocities (N, 2), in top speeds, of robots on their way to where they wait."""
@@ -251,9 +247,9 @@ class Central:
         if worker != NOBODY:
             push[:, worker] *= 3.0
         shove = np.einsum("ij,ijk->ik", push, between)
-        is_there = is_under_item & (np.linalg.norm(position - goals, axis=1) < 0.1)
+        is_at_goal = np.linalg.norm(position - goals, axis=1) < 0.1
         # A robot that waits under an item blocks nobody whom the item does not block as well.
-        shove[is_there] = 0.0
+        shove[is_at_goal & (self._waits_under != NOBODY)] = 0.0
         # Pass on the right, so that two who meet get past each other.
         velocity += shove + 0.5 * np.stack([shove[:, 1], -shove[:, 0]], axis=1)
         norm = np.linalg.norm(velocity, axis=1, keepdims=True)

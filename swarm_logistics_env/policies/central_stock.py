@@ -14,13 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.policies.central import (
-    CELL,
-    LOOKAHEAD,
-    REPLAN,
-    Central,
-)
-from swarm_logistics_env.policies.routes import lookahead
+from swarm_logistics_env.policies.central import REPLAN, Central
+from swarm_logistics_env.policies.routes import CELL, lookahead
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 # Lengths in m.
@@ -116,5 +111,5 @@ class CentralStock(Central):
         x, y = position.tolist()
         if x >= edge:
             return min(edge + DEPTH, self._scenario.warehouse_width), y
-        way_x, way_y = lookahead(self._home_cost, self._home_far, CELL, x, y, LOOKAHEAD)
+        way_x, way_y = lookahead(self._home_cost, self._home_far, x, y)
         return way_x + (DEPTH if way_x > edge - CELL else 0.0), way_y

@@ -35,24 +35,11 @@ def read_policy(path: Path) -> LearnedPolicy:
     from safetensors import SafetensorError, safe_open
 
     try:
-        with path.open("rb") as file:
-            start = file.read(9)
         size = path.stat().st_size
-    except OSError as error:
-        raise PolicyError(f"cannot read the policy file {path}: {error.strerror}") from error
-    # A pickle, or the zip in which torch and stable-baselines3 wrap one, is refused unread. The
-    # length at the start of a safetensors file may look like a pickle, but a brace follows it.
-    is_pickle = start[:1] == b"\x80" and start[8:] != b"{"
-    if is_pickle or start.startswith(b"PK\x03\x04"):
-        raise PolicyError(
-            f"{path} carries a pickle, which executes code when it is read: a policy file should "
-            "be safetensors, as `swarm-logistics train` writes it"
-        )
-    if size > LARGEST_FILE:
-        raise PolicyError(
-            f"{path} has {size} bytes: a policy file should have at most {LARGEST_FILE}"
-        )
-    try:
+        if size > LARGEST_FILE:
+            raise PolicyError(
+                f"{path} has {size} bytes: a policy file should have at most {LARGEST_FILE}"
+            )
         with safe_open(path, framework="numpy") as file:
             header = file.metadata() or {}
             if CARD not in header:
@@ -61,6 +48,9 @@ def read_policy(path: Path) -> LearnedPolicy:
                     "`swarm-logistics train` wrote"
                 )
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - no dict
+    except OSError as error:
+        reason = error.strerror or error
+        raise PolicyError(f"cannot read the policy file {path}: {reason}") from error
     except (SafetensorError, TypeError) as error:
         raise PolicyError(f"{path} is cut short or no safetensors file: {error}") from None
     try:

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion import memory as known
-from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, MotionView, random_heading
+from swarm_logistics_env.motion.frame import MotionView, random_heading
+from swarm_logistics_env.motion.memory import drive, length_of
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -73,16 +74,8 @@ def decide_homing(
             else:
                 x, y = search_direction(sensed, own, x, y, is_inside)
                 x, y = x + push_x, y + push_y
-                speed = min(1.0, max(math.sqrt(x * x + y * y), 0.3))
+                speed = min(1.0, max(length_of(x, y), 0.3))
         drive(x, y, speed, gripper, commands[robot])
-
-
-@kernel
-def drive(x: float, y: float, speed: float, gripper: float, command: NDArray[np.float64]) -> None:
-    """Fill one robot's command (4,): `speed` in the direction (x, y), of any length; no turn."""
-    length = max(math.sqrt(x * x + y * y), 1e-9)
-    command[0], command[1] = speed * x / length, speed * y / length
-    command[2], command[3] = 0.0, gripper
 
 
 @kernel
@@ -94,7 +87,7 @@ def away_from_neighbours(
     for place in range(row.N_NEIGHBOURS):
         there = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * place
         x, y = sensed[there + 1], sensed[there + 2]
-        away = math.sqrt(x * x + y * y)
+        away = length_of(x, y)
         if 0.0 < away < reach:
             push_x -= (1.0 - away / reach) * x / away
             push_y -= (1.0 - away / reach) * y / away
@@ -123,7 +116,7 @@ def fetch(
 ) -> tuple[float, float, float, float]:
     """Return the direction, speed and gripper of a robot on its way to the item in a column."""
     x, y = sensed[item + 1], sensed[item + 2]
-    away = max(math.sqrt(x * x + y * y), 1e-6)
+    away = max(length_of(x, y), 1e-6)
     speed, gripper = min(1.0, away / (2.0 * period)), 1.0 if away < GRIP_RANGE else -1.0
     return x / away + 0.5 * push_x, y / away + 0.5 * push_y, speed, gripper
 
@@ -148,7 +141,7 @@ def search_direction(
     spread_x, spread_y = away_from_neighbours(sensed, SPREAD_RANGE, SPREAD_GAIN)
     x += wall_x + spread_x
     y += wall_y + spread_y
-    home = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
+    home = length_of(own[known.HOME_X], own[known.HOME_Y])
     if is_inside and home > 0.5:
         x -= own[known.HOME_X] / home
         y -= own[known.HOME_Y] / home
@@ -160,7 +153,7 @@ def home_direction(
     sensed: NDArray[np.float32], own: NDArray[np.float64], x: float, y: float
 ) -> tuple[float, float]:
     """Return the direction in which a laden robot goes that drives in direction (x, y)."""
-    home = math.sqrt(own[known.HOME_X] ** 2 + own[known.HOME_Y] ** 2)
+    home = length_of(own[known.HOME_X], own[known.HOME_Y])
     trust = 1.0
     if home > 0.5:
         x = HOME_SHARE * own[known.HOME_X] / home + (1.0 - HOME_SHARE) * x
@@ -168,7 +161,7 @@ def home_direction(
         trust = 1.0 / home if home < SURE else 0.0
     if sensed[row.LOWEST_TIMER] > 0.5:
         lead_x, lead_y = sensed[row.LOWEST_TIMER + 1], sensed[row.LOWEST_TIMER + 2]
-        away = math.sqrt(lead_x * lead_x + lead_y * lead_y)
+        away = length_of(lead_x, lead_y)
         if away > 0.0:
             x += trust * lead_x / away
             y += trust * lead_y / away
@@ -180,7 +173,7 @@ def freest_direction(
     sensed: NDArray[np.float32], own: NDArray[np.float64], x: float, y: float
 ) -> tuple[float, float]:
     """Return the direction that is nearest to the wanted (x, y) and meets no item or wall."""
-    length = max(math.sqrt(x * x + y * y), 1e-9)
+    length = max(length_of(x, y), 1e-9)
     x, y = x / length, y / length
     most, best_x, best_y = -1e9, x, y
     for number in range(N_DIRECTIONS):
@@ -239,8 +232,8 @@ class Homing:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
         frame = self._frame
+        numbers = frame.random_headings()
         frame.read(observations)
-        numbers = ((frame.counts - 1) * self._period / RANDOM_HEADING_TIME + 1e-9).astype(np.int64)
         commands = np.zeros((len(observations), 4))
         self._decide(observations, frame.memory, frame.keys, numbers, self._period, commands)
         return frame.command(frame.outputs_for(commands))

@@ -27,12 +27,12 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as known
 from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, random_heading
+from swarm_logistics_env.motion.memory import drive, length_of
 from swarm_logistics_env.policies.homing import (
     AVOID_GAIN,
     AVOID_RANGE,
     Homing,
     away_from_neighbours,
-    drive,
     fetch,
     freest_direction,
     home_direction,
@@ -106,7 +106,7 @@ def decide_homing_stock(
                 gripper = 0.0
                 x, y = hold_direction(sensed, own, home_x, home_y, is_inside, period)
                 if is_inside:
-                    speed = min(1.0, math.sqrt(x * x + y * y))
+                    speed = min(1.0, length_of(x, y))
                 else:
                     x, y = freest_direction(sensed, own, x + push_x, y + push_y)
         else:
@@ -122,7 +122,7 @@ def decide_homing_stock(
                     x, y = home_direction(sensed, own, x, y)
                 x, y = search_direction(sensed, own, x, y, is_inside)
                 x, y = x + push_x, y + push_y
-                speed = min(1.0, max(math.sqrt(x * x + y * y), 0.3))
+                speed = min(1.0, max(length_of(x, y), 0.3))
         drive(x, y, speed, gripper, commands[robot])
 
 
@@ -142,7 +142,7 @@ def is_gap(sensed: NDArray[np.float32], own: NDArray[np.float64], is_inside: boo
     if is_inside or own[known.AWAY] >= NEAR:
         return False
     x, y = sensed[row.ITEMS + 1], sensed[row.ITEMS + 2]
-    return bool(sensed[row.ITEMS] < 0.5 or math.sqrt(x * x + y * y) > GAP)
+    return bool(sensed[row.ITEMS] < 0.5 or length_of(x, y) > GAP)
 
 
 @kernel

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -56,7 +56,7 @@ class Network(_Part):
     outputs: tuple[str, ...] = OUTPUTS
     listens: bool = True
     hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
-    activation: Literal["tanh", "relu"] = "tanh"
+    activation: Literal["tanh"] = "tanh"
     exploration: NonNegativeFloat = 0.0
 
     @field_validator("inputs", "outputs")
@@ -66,6 +66,11 @@ class Network(_Part):
         if names != right:
             raise ValueError(f"should be the {len(right)} names that this version knows")
         return names
+
+    @property
+    def widths(self) -> list[int]:
+        """The numbers of inputs, of each hidden layer's values, and of outputs."""
+        return [len(self.inputs), *self.hidden, len(self.outputs)]
 
 
 class Score(_Part):
@@ -121,38 +126,6 @@ class PolicyCard(_Part):
     agent_steps: NonNegativeInt = 0
     scores: tuple[Score, ...] = ()
     scored_with: dict[str, str] = Field(default_factory=dict)
-
-
-class FeedForward:
-    """Dense layers with `tanh` or ReLU between them, in float32.
-
-    Loops rather than numpy's matrix product, whose bits differ with the number of rows: here a
-    robot's command does not depend on how many others there are.
-
-    Args:
-        weights: one (outputs, inputs) array per layer, as torch has them.
-        biases: one (outputs,) array per layer.
-        rectify: ReLU instead of tanh.
-    """
-
-    def __init__(
-        self,
-        weights: Sequence[NDArray[np.float32]],
-        biases: Sequence[NDArray[np.float32]],
-        *,
-        rectify: bool,
-    ) -> None:
-        # Transposed, so that a layer's outputs, over which the inner loop runs, lie side by side.
-        self._weights = np.concatenate([np.ascontiguousarray(w.T).ravel() for w in weights])
-        self._biases = np.concatenate(list(biases))
-        self._widths = np.array([weights[0].shape[1], *(len(bias) for bias in biases)])
-        self._rectify = rectify
-
-    def __call__(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the outputs (N, outputs) for rows of at least `inputs` columns; it reads these."""
-        outputs = np.empty((inputs.shape[0], self._widths[-1]), np.float32)
-        run_network(inputs, self._weights, self._biases, self._widths, self._rectify, outputs)
-        return outputs
 
 
 @kernel
@@ -219,16 +192,19 @@ def run_network(
     weights: NDArray[np.float32],
     biases: NDArray[np.float32],
     widths: NDArray[np.int64],
-    rectify: bool,
     outputs: NDArray[np.float32],
 ) -> None:
-    """Fill `outputs` (N, widths[-1]); layer l has widths[l] inputs."""
+    """Fill `outputs` (N, widths[-1]); layer l has widths[l] inputs.
+
+    Loops rather than numpy's matrix product, whose bits differ with the number of rows: here a
+    robot's command does not depend on how many others there are.
+    """
     n_layers = len(widths) - 1
     widest = widths.max()
     here, there = np.empty(widest, np.float32), np.empty(widest, np.float32)
     places = np.empty(widest, np.int64)
     for row in range(inputs.shape[0]):
-        here[: widths[0]] = inputs[row, : widths[0]]
+        here[: widths[0]] = inputs[row]
         weight, bias = 0, 0
         for layer in range(n_layers):
             n_in, n_out = widths[layer], widths[layer + 1]
@@ -238,12 +214,8 @@ def run_network(
             weight += n_in * n_out
             bias += n_out
             if layer < n_layers - 1:
-                if rectify:
-                    for place in range(n_out):
-                        total[place] = max(total[place], np.float32(0.0))
-                else:
-                    for place in range(n_out):
-                        total[place] = hyperbolic_tangent(total[place])
+                for place in range(n_out):
+                    total[place] = hyperbolic_tangent(total[place])
             here, there = there, here
         outputs[row] = here[: widths[n_layers]]
 
@@ -272,11 +244,10 @@ class LearnedPolicy:
         self.tensors = dict(tensors)
         network = card.network
         layers = range(len(network.hidden) + 1)
-        self._network = FeedForward(
-            [tensors[f"layers.{layer}.weight"] for layer in layers],
-            [tensors[f"layers.{layer}.bias"] for layer in layers],
-            rectify=network.activation == "relu",
-        )
+        # Transposed, so that a layer's outputs, over which the inner loop runs, lie side by side.
+        self._weights = np.concatenate([tensors[f"layers.{n}.weight"].T.ravel() for n in layers])
+        self._biases = np.concatenate([tensors[f"layers.{n}.bias"] for n in layers])
+        self._widths = np.array(network.widths)
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = {
             "network": network.model_dump(mode="json"),
@@ -291,9 +262,7 @@ class LearnedPolicy:
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode."""
-        self._keys = row_keys(seed, STREAM, n_robots)
-        self._frame.begin(self._keys)
-        self._step = 0
+        self._frame.begin(row_keys(seed, STREAM, n_robots))
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D).
@@ -301,24 +270,33 @@ class LearnedPolicy:
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
-        outputs = self._network(self._frame.read(observations))
+        outputs = self.outputs_of(self._frame.read(observations))
         if self.card.network.exploration:
-            explore(self._keys, self._step, self._deviations, outputs)
-        self._step += 1
+            explore(self._frame.keys, self._frame.counts, self._deviations, outputs)
         return self._frame.command(outputs)
+
+    def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the network's outputs (N, k) for rows of its inputs, without noise."""
+        outputs = np.empty((len(inputs), self._widths[-1]), np.float32)
+        run_network(inputs, self._weights, self._biases, self._widths, outputs)
+        return outputs
 
 
 @kernel
 def explore(
     keys: NDArray[np.uint64],
-    count: int,
+    counts: NDArray[np.int64],
     deviations: NDArray[np.float32],
     outputs: NDArray[np.float32],
 ) -> None:
-    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, k) of decision `count`."""
+    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, k).
+
+    Args:
+        counts: the number of decisions of each robot (N,), this one among them.
+    """
     for robot in range(outputs.shape[0]):
         for place in range(outputs.shape[1]):
-            drawn = gaussian(pair_key(keys[robot], place), count)
+            drawn = gaussian(pair_key(keys[robot], place), counts[robot] - 1)
             outputs[robot, place] += np.float32(deviations[place] * drawn)
 
 
@@ -328,9 +306,8 @@ def tensor_shapes(network: Network) -> dict[str, tuple[int, ...]]:
     `layers` are as torch has them, weight (outputs, inputs); `deviations` those of the training's
     noise, of each output.
     """
-    widths = [len(network.inputs), *network.hidden, len(network.outputs)]
-    shapes: dict[str, tuple[int, ...]] = {"deviations": (widths[-1],)}
-    for layer, (n_in, n_out) in enumerate(pairwise(widths)):
+    shapes: dict[str, tuple[int, ...]] = {"deviations": (len(network.outputs),)}
+    for layer, (n_in, n_out) in enumerate(pairwise(network.widths)):
         shapes[f"layers.{layer}.weight"] = (n_out, n_in)
         shapes[f"layers.{layer}.bias"] = (n_out,)
     return shapes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import hashlib
 import inspect
@@ -152,10 +153,7 @@ def modules_used(*kinds: type) -> dict[str, Path]:
         packages = {OWN_PACKAGE, kind.__module__.partition(".")[0]}
         for base in kind.__mro__:
             if base.__module__.partition(".")[0] in packages:
-                try:
-                    _follow(base.__module__, Path(inspect.getfile(base)), packages, used)
-                except (TypeError, OSError):  # typed into an interpreter
-                    continue
+                _begin(base, packages, used)
     return used
 
 
@@ -165,17 +163,11 @@ def function_digest(function: object) -> str:
     Whatever that module imports from its own package counts as well, unless this is the package.
     An object that is no function has the module of its class. Empty if there is no source.
     """
-    function = getattr(function, "func", function)  # functools.partial
-    if not (inspect.isroutine(function) or inspect.isclass(function)):
-        function = type(function)
-    name = str(getattr(function, "__module__", ""))
+    found: Any = getattr(function, "func", function)  # functools.partial
+    if not (inspect.isroutine(found) or inspect.isclass(found)):
+        found = type(found)
     used: dict[str, Path] = {}
-    try:
-        _follow(
-            name, Path(inspect.getfile(function)), {name.partition(".")[0]} - {OWN_PACKAGE}, used
-        )
-    except (TypeError, OSError):  # typed into an interpreter
-        return ""
+    _begin(found, {str(found.__module__).partition(".")[0]} - {OWN_PACKAGE}, used)
     return _digest(used)
 
 
@@ -193,16 +185,23 @@ def without_prose(source: str) -> str:
     """Return Python source without docstrings, lines that only comment, and blank lines."""
     prose: set[int] = set()
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-            first = node.body[0] if node.body else None
-            if isinstance(first, ast.Expr) and ast.get_docstring(node, clean=False) is not None:
-                prose.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
+        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            continue
+        if ast.get_docstring(node, clean=False) is not None:
+            first = node.body[0]
+            prose.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
     lines = enumerate(source.splitlines(), start=1)
     return "\n".join(
         line.rstrip()
         for number, line in lines
         if number not in prose and line.strip() and not line.lstrip().startswith("#")
     )
+
+
+def _begin(found: Any, packages: set[str], used: dict[str, Path]) -> None:
+    """Add the module of a class or function to `used`, if it has one, and those that it imports."""
+    with contextlib.suppress(TypeError, OSError):  # typed into an interpreter
+        _follow(found.__module__, Path(inspect.getfile(found)), packages, used)
 
 
 def _follow(name: str, path: Path, packages: set[str], used: dict[str, Path]) -> None:

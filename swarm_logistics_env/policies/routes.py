@@ -9,34 +9,36 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import kernel
 
+CELL = 0.125  # [m]
+LOOKAHEAD = 16  # cells
 BLOCKED = 40.0  # times the cost of an open cell: a way through is better than none
 CROWDED = 4.0
 
 
 @kernel
 def costmap(
-    width: float, height: float, cell: float, radius: float, discs: NDArray[np.float64]
+    width: float, height: float, radius: float, discs: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the cost of each cell (rows, columns) for the centre of a robot of `radius` [m].
 
     The cost is 1 in the open and `BLOCKED` along the walls. `discs` (S, 4) are x, y and radius
     [m] and the cost within.
     """
-    rows, columns = math.ceil(height / cell), math.ceil(width / cell)
+    rows, columns = math.ceil(height / CELL), math.ceil(width / CELL)
     cost = np.ones((rows, columns))
     for disc in range(discs.shape[0]):
         x, y, reach = discs[disc, 0], discs[disc, 1], discs[disc, 2]
-        for row in range(max(int((y - reach) / cell), 0), min(int((y + reach) / cell) + 1, rows)):
+        for row in range(max(int((y - reach) / CELL), 0), min(int((y + reach) / CELL) + 1, rows)):
             for column in range(
-                max(int((x - reach) / cell), 0), min(int((x + reach) / cell) + 1, columns)
+                max(int((x - reach) / CELL), 0), min(int((x + reach) / CELL) + 1, columns)
             ):
-                dx, dy = (column + 0.5) * cell - x, (row + 0.5) * cell - y
+                dx, dy = (column + 0.5) * CELL - x, (row + 0.5) * CELL - y
                 if dx * dx + dy * dy < reach * reach:
                     cost[row, column] = max(cost[row, column], discs[disc, 3])
     for row in range(rows):
-        y = (row + 0.5) * cell
+        y = (row + 0.5) * CELL
         for column in range(columns):
-            x = (column + 0.5) * cell
+            x = (column + 0.5) * CELL
             if x < radius or y < radius or x > width - radius or y > height - radius:
                 cost[row, column] = BLOCKED
     return cost
@@ -81,31 +83,29 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
 
 
 @kernel
-def cell_at(grid: NDArray[np.float64], cell: float, x: float, y: float) -> tuple[int, int]:
+def cell_at(grid: NDArray[np.float64], x: float, y: float) -> tuple[int, int]:
     """Return row and column of the cell of a grid in which (x, y) [m] lies, or that is nearest."""
     rows, columns = grid.shape
-    return min(max(int(y / cell), 0), rows - 1), min(max(int(x / cell), 0), columns - 1)
+    return min(max(int(y / CELL), 0), rows - 1), min(max(int(x / CELL), 0), columns - 1)
 
 
 @kernel
 def lookahead(
     cost: NDArray[np.float64],
     far: NDArray[np.float64],
-    cell: float,
     x: float,
     y: float,
-    n_cells: int,
 ) -> tuple[float, float]:
     """Return the point [m] to head for from (x, y) [m]: the farthest cell ahead in a straight line.
 
     A line counts as straight as long as no cell on it costs more than those the way leads through.
     """
     rows, columns = cost.shape
-    first = cell_at(cost, cell, x, y)
+    first = cell_at(cost, x, y)
     row, column = first
-    goal_x, goal_y = (column + 0.5) * cell, (row + 0.5) * cell
+    goal_x, goal_y = (column + 0.5) * CELL, (row + 0.5) * CELL
     dearest = 1.0
-    for step in range(n_cells):
+    for step in range(LOOKAHEAD):
         next_row, next_column, least = row, column, far[row, column] + 1e-9
         for down in range(-1, 2):
             for right in range(-1, 2):
@@ -120,13 +120,13 @@ def lookahead(
             break
         row, column = next_row, next_column
         dearest = max(dearest, cost[row, column])
-        to_x, to_y = (column + 0.5) * cell, (row + 0.5) * cell
+        to_x, to_y = (column + 0.5) * CELL, (row + 0.5) * CELL
         length = math.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
-        n_samples = int(length / (0.4 * cell)) + 1
+        n_samples = int(length / (0.4 * CELL)) + 1
         is_open = True
         for sample in range(1, n_samples + 1):
             part = sample / n_samples
-            r, c = cell_at(cost, cell, x + part * (to_x - x), y + part * (to_y - y))
+            r, c = cell_at(cost, x + part * (to_x - x), y + part * (to_y - y))
             if (r, c) != first and cost[r, c] > dearest:
                 is_open = False
                 break

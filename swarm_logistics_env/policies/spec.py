@@ -7,6 +7,7 @@ import functools
 import importlib
 import inspect
 import json
+import operator
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -327,9 +328,7 @@ def _imported(name: str) -> Callable[..., Policy] | None:
             sys.path.append(folder)
         module = path.stem
     try:
-        found: Any = importlib.import_module(module)
-        for part in attribute.split("."):
-            found = getattr(found, part)
+        found = operator.attrgetter(attribute)(importlib.import_module(module))
     except Exception as error:  # of code that is not ours, too
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error

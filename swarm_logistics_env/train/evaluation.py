@@ -28,7 +28,6 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Arm
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
-from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.warehouse import Fault
 
@@ -83,19 +82,18 @@ FIRST_SEED = 1_000_000
 REFERENCES = ("swarm-dt", "homing")  # scripted policies that a training is shown beside
 
 
-def evaluate(
-    policy: Policy, scenario: Scenario, asked: Evaluation, threads: int = 1
-) -> dict[str, float]:
+def evaluate(policy: Policy, training: Training) -> dict[str, float]:
     """Return what `policy` delivers on the evaluation's seeds, without faults and with each.
 
     Returns:
         "P": the mean P_o [items]; of each mode, as "P_FM1" and "R_FM1", the mean P_F and R, which
         is nan where nothing was delivered without faults.
     """
-    scenario = scenario.replace(n_robots=asked.n_robots)
+    asked = training.evaluation
+    scenario = training.scenario.replace(n_robots=asked.n_robots)
     kinds: list[Sequence[Fault]] = [(), *((Fault(m, k),) for m, k in asked.faults.items())]
     seeds = range(FIRST_SEED, FIRST_SEED + asked.seeds)
-    p_o, *others = performances(policy, scenario, kinds, seeds, threads)
+    p_o, *others = performances(policy, scenario, kinds, seeds, training.threads)
     means = {"P": float(p_o.mean())}
     for (mode, m), p_f in zip(asked.faults.items(), others):
         r = spi.robustness(p_o, p_f, n=asked.n_robots, m=m).value if p_o.any() else math.nan
@@ -105,8 +103,7 @@ def evaluate(
 
 def reference_means(training: Training) -> dict[str, dict[str, float]]:
     """Return what the scripted policies measure on the evaluation's seeds, by their names."""
-    asked, threads = training.evaluation, training.threads
-    return {name: evaluate(load(name), training.scenario, asked, threads) for name in REFERENCES}
+    return {name: evaluate(load(name), training) for name in REFERENCES}
 
 
 def performances(

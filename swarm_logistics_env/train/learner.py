@@ -25,7 +25,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
-from swarm_logistics_env.motion.memory import body_of
+from swarm_logistics_env.motion.memory import body_of, in_frame, length_of
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.streams import key, row_keys
@@ -69,9 +69,9 @@ def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.floa
         row[8:] = 0.0
         if requested != NOBODY:
             to_x, to_y = items.position[requested, 0] - x, items.position[requested, 1] - y
-            away = max(math.sqrt(to_x * to_x + to_y * to_y), 1e-9)
-            row[8] = (cos * to_x + sin * to_y) / away
-            row[9] = (cos * to_y - sin * to_x) / away
+            away = max(length_of(to_x, to_y), 1e-9)
+            along, aside = in_frame((cos, sin), to_x, to_y)
+            row[8], row[9] = along / away, aside / away
             row[10] = away / 10.0
             row[11] = max(0.0, 1.0 - away / 2.0)
         if carrier != NOBODY:
@@ -91,7 +91,6 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     Attributes:
         frame: of each robot's motion, with its memory.
-        observations: the latest rows (num_envs, D).
 
     Raises:
         TrainingError, SetupError, ScenarioError, FaultError: the worlds cannot be.
@@ -100,7 +99,6 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def __init__(self, training: Training) -> None:
         worlds = make_worlds(training)
         self.frame = MotionView(training.scenario, training.network.listens)
-        self.observations = np.zeros((worlds.num_envs, 0), np.float32)
         self._known = np.zeros((worlds.num_envs, len(KNOWN)), np.float32)
         self._begun, self._seed = 0, 0
         super().__init__(
@@ -127,9 +125,9 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world."""
-        self.observations = self.venv.reset()
+        observations = self.venv.reset()
         self.frame.begin(self._keys(), self._bodies())
-        return self._read()
+        return self._read(observations)
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
@@ -137,7 +135,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def step_wait(self) -> Any:
         """Step every world."""
-        self.observations, rewards, dones, infos = self.venv.step_wait()
+        observations, rewards, dones, infos = self.venv.step_wait()
         over = np.flatnonzero(dones)
         if over.size:
             last = np.stack([infos[row]["terminal_observation"] for row in over.tolist()])
@@ -146,7 +144,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             for row, read in zip(over.tolist(), ends):
                 infos[row]["terminal_observation"] = read
             self.frame.begin_rows(over, self._keys()[over], self._bodies()[over])
-        return self._read(), rewards, dones, infos
+        return self._read(observations), rewards, dones, infos
 
     def _bodies(self) -> NDArray[np.float64]:
         # Every episode may have robots of another kind.
@@ -155,8 +153,8 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             bodies[rows] = body_of(world.warehouse.scenario)
         return bodies
 
-    def _read(self) -> NDArray[np.float32]:
-        inputs = self.frame.read(self.observations)
+    def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        inputs = self.frame.read(observations)
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
             read_known(world.warehouse.address, self.frame.turned[rows], self._known[rows])
         return np.hstack([inputs, self._known])
@@ -169,7 +167,6 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
 CHECKPOINT = "checkpoint.pt"
 KEPT = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
-ACTIVATIONS: dict[str, type[torch.nn.Module]] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 
 # What an untrained network says whatever it reads: it drives ahead, so that it meets things. One
 # that trembles on the spot would learn very slowly that searching pays.
@@ -195,10 +192,7 @@ def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
         vf_coef=ppo.value_weight,
         max_grad_norm=ppo.max_grad_norm,
         target_kl=ppo.target_kl,
-        policy_kwargs={
-            "net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)},
-            "activation_fn": ACTIVATIONS[network.activation],
-        },
+        policy_kwargs={"net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)}},
         seed=training.seed,
         device=device,
     )
@@ -299,17 +293,15 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
     """PPO's two networks: the critic reads more columns than the actor, see `NetworkView`."""
 
     def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch, self.activation_fn)
+        self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch)
 
 
 class _TwoReaders(torch.nn.Module):
-    def __init__(
-        self, n_columns: int, widths: dict[str, list[int]], activation: type[torch.nn.Module]
-    ) -> None:
+    def __init__(self, n_columns: int, widths: dict[str, list[int]]) -> None:
         super().__init__()
         self.n_inputs = n_columns - len(KNOWN)
         self.policy_net = torch.nn.Sequential(
-            *create_mlp(self.n_inputs, -1, widths["pi"], activation)
+            *create_mlp(self.n_inputs, -1, widths["pi"], torch.nn.Tanh)
         )
         # Cheaper than tanh, and as good for values.
         self.value_net = torch.nn.Sequential(

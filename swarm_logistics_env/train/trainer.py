@@ -90,9 +90,8 @@ def train(
         log.references = log.references or reference_means(training)
         total, done = training.agent_steps, learner.num_timesteps
         with ProgressBar(training.name, total, "agent-steps", done=done) as progress:
-            callback = TrainingCallback(training, log, out, progress)
-            learner.learn(total - done, [callback, *callbacks], reset_num_timesteps=False)
-            callback.end()
+            own = TrainingCallback(training, log, out, progress)
+            learner.learn(total - done, [own, *callbacks], reset_num_timesteps=False)
     learner.env.close()
     tensors = tensors_of(learner.policy)
     card = _card(training, learner.num_timesteps, log, command)
@@ -122,7 +121,7 @@ class TrainingLog:
     references: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
     cpu_seconds: float = 0.0
-    versions: dict[str, str] | None = None
+    versions: dict[str, str] = field(default_factory=dict)
 
     @property
     def best(self) -> dict[str, float]:
@@ -176,8 +175,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
             self._save()
         self._cpu = time.process_time()
 
-    def end(self) -> None:
-        """Evaluate and save the policy at the end of the training."""
+    def _on_training_end(self) -> None:
         self._log.cpu_seconds += time.process_time() - self._cpu
         if self._log.curve[-1]["agent_steps"] < self.num_timesteps:
             self._evaluate()
@@ -192,9 +190,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         training, log = self._training, self._log
         tensors = tensors_of(self.model.policy)
         card = _card(training, self.num_timesteps, log)
-        means = evaluate(
-            LearnedPolicy(card, tensors), training.scenario, training.evaluation, training.threads
-        )
+        means = evaluate(LearnedPolicy(card, tensors), training)
         row = {
             "agent_steps": self.num_timesteps,
             "seconds": round(time.monotonic() - self._start, 1),
@@ -216,7 +212,7 @@ def _card(training: Training, agent_steps: int, log: TrainingLog, command: str =
         about=training.about,
         network=training.network,
         command=command,
-        versions=log.versions or versions(),
+        versions=log.versions,
         scenario=training.scenario.model_dump(mode="json", exclude_defaults=True),
         training=training.model_dump(mode="json", exclude_defaults=True),
         seed=training.seed,

@@ -44,7 +44,7 @@ def go_on(memory: Memory, rows: Any, seconds: float) -> None:
 def hold(memory: Memory, rows: Any, times: int, gripper: float = 1.0) -> None:
     """Hold on to what is in view, and learn what came of it."""
     for _ in range(times):
-        known.note_commands(rows, np.array([[0.0, 0.0, 0.0, gripper]]), memory)
+        known.note_command(rows[0], np.array([0.0, 0.0, 0.0, gripper]), memory[0])
         known.remember(rows, 0.1, memory)
 
 
@@ -102,14 +102,14 @@ def test_a_robot_that_lifts_stands_so_that_its_memory_does_not_turn(
     memory[0, known.HOME_X] = 1.0
     rows = sensed(item_at=0.1)
     for _ in range(7):  # the step in which it closes, those of the handling time, and one more
-        commands = np.array([[0.0, 1.0, 0.0, 1.0]])
-        known.stand_to_handle(rows, 0.1, memory, commands)
-        known.steer(memory, commands)
-        assert commands[0].tolist() == [0.0, 0.0, 0.0, 1.0]
+        command = np.array([0.0, 1.0, 0.0, 1.0])
+        known.stand_to_handle(rows[0], 0.1, memory[0], command)
+        known.steer(memory[0], command)
+        assert command.tolist() == [0.0, 0.0, 0.0, 1.0]
     assert memory[0, known.HOME_X] == 1.0
-    commands = np.array([[0.0, 1.0, 0.0, -1.0]])
-    known.stand_to_handle(rows, 0.1, memory, commands)
-    assert commands[0, 1] == 1.0, "it stood in vain, and drives on"
+    command = np.array([0.0, 1.0, 0.0, -1.0])
+    known.stand_to_handle(rows[0], 0.1, memory[0], command)
+    assert command[1] == 1.0, "it stood in vain, and drives on"
 
 
 @pytest.mark.parametrize(

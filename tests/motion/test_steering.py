@@ -16,14 +16,14 @@ def test_it_gets_to_drive_where_it_wants_to_and_remembers_that_it_turned(directi
     memory[0, known.HOME_X], memory[0, known.WIDEST_TURN] = 2.0, 0.6
     heading, wanted = 0.0, direction
     for _ in range(10):
-        commands = np.array([[math.cos(wanted), math.sin(wanted), 0.0, 1.0]])
-        steer(memory, commands)
-        assert abs(commands[0, 2]) <= 1.0
-        assert commands[0, [1, 3]].tolist() == [0.0, 1.0]
-        heading += 0.6 * commands[0, 2]
+        command = np.array([math.cos(wanted), math.sin(wanted), 0.0, 1.0])
+        steer(memory[0], command)
+        assert abs(command[2]) <= 1.0
+        assert command[[1, 3]].tolist() == [0.0, 1.0]
+        heading += 0.6 * command[2]
         wanted = direction - heading
-    assert abs(commands[0, 0]) == pytest.approx(1.0)
-    driven = heading if commands[0, 0] > 0 else heading + math.pi
+    assert abs(command[0]) == pytest.approx(1.0)
+    driven = heading if command[0] > 0 else heading + math.pi
     assert math.cos(driven - direction) == pytest.approx(1.0)
     home = math.atan2(memory[0, known.HOME_Y], memory[0, known.HOME_X])
     assert math.cos(home + heading) == pytest.approx(1.0)

@@ -41,7 +41,7 @@ number = 7
 
 @pytest.fixture
 def card() -> PolicyCard:
-    network = Network(hidden=(8, 6), activation="relu", exploration=0.5)
+    network = Network(hidden=(8, 6), exploration=0.5)
     return PolicyCard(name="small", network=network, seed=3, versions={"numpy": "2"})
 
 

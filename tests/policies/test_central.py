@@ -10,6 +10,7 @@ from swarm_logistics_env import Fault, Scenario, Warehouse, run_episode
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import decide, mask_unreachable_commands, start
+from swarm_logistics_env.warehouse.state import NOBODY
 
 SMALL = Scenario(
     n_robots=6, n_items=20, warehouse_width=6.0, warehouse_height=4.0, duration=60.0, restock=True
@@ -90,7 +91,8 @@ def test_where_items_are_few_the_others_line_up_at_the_wall() -> None:
     world.reset(0)
     policy: Any = load("central")
     start(policy, scenario, 0)
-    places, has_item = policy._waiting_places(world.state, np.arange(12) != 4)
+    places = policy._waiting_places(world.state, np.arange(12) != 4)
+    has_item = policy._waits_under != NOBODY
     assert has_item.sum() == 2  # the requested item is left out
     assert not has_item[4]
     assert (places[~has_item, 0] < 0.6).all()

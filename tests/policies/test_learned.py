@@ -1,16 +1,13 @@
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
+from swarm_logistics_env.motion import INPUTS
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.policies import PolicyCard, identity
 from swarm_logistics_env.policies.learned import (
-    FeedForward,
     LearnedPolicy,
     explore,
     hyperbolic_tangent,
@@ -35,8 +32,8 @@ def test_an_episode_follows_from_its_seed(card: PolicyCard, tensors: Tensors) ->
 def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:
     deviations = np.array([0.1, 1.0, 3.0], np.float32)
     noise, later = np.zeros((2, 400, 3), np.float32)
-    explore(row_keys(0, "noise", 400), 5, deviations, noise)
-    explore(row_keys(0, "noise", 400), 6, deviations, later)
+    explore(row_keys(0, "noise", 400), np.full(400, 6), deviations, noise)
+    explore(row_keys(0, "noise", 400), np.full(400, 7), deviations, later)
     np.testing.assert_allclose(noise.std(axis=0), deviations, rtol=0.15)
     assert np.abs(np.corrcoef(noise.T, later.T) - np.eye(6)).max() < 0.2
 
@@ -53,20 +50,14 @@ def test_identity_follows_weights_and_network_alone(card: PolicyCard, tensors: T
     assert identity(LearnedPolicy(card, moved)) != told
 
 
-@pytest.mark.parametrize("rectify", [False, True])
-def test_it_is_the_network_of_its_layers(rectify: bool) -> None:
-    rng, widths = np.random.default_rng(0), (20, 16, 9, 4)
-    rows = rng.normal(size=(50, widths[0])).astype(np.float32)
+def test_it_is_the_network_of_its_layers(card: PolicyCard, tensors: Tensors) -> None:
+    rows = np.random.default_rng(0).normal(0, 1 / 9, (50, len(INPUTS))).astype(np.float32)
     rows[:, 5:9] = 0.0
-    weights = [rng.normal(size=(n_out, n_in)) / 3 for n_in, n_out in pairwise(widths)]
-    biases = [rng.normal(size=n_out) for n_out in widths[1:]]
     value = rows.astype(np.float64)
-    for layer, (weight, bias) in enumerate(zip(weights, biases)):
-        value = value @ weight.T + bias
-        if layer < 2:
-            value = np.maximum(value, 0.0) if rectify else np.tanh(value)
-    layers = ([array.astype(np.float32) for array in arrays] for arrays in (weights, biases))
-    outputs = FeedForward(*layers, rectify=rectify)(rows)
+    for layer in range(3):
+        value = value @ tensors[f"layers.{layer}.weight"].T + tensors[f"layers.{layer}.bias"]
+        value = np.tanh(value) if layer < 2 else value
+    outputs = LearnedPolicy(card, tensors).outputs_of(rows)
     np.testing.assert_allclose(outputs, value, rtol=0, atol=5e-6)
 
 

@@ -8,16 +8,22 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.policies.routes import BLOCKED, CROWDED, cost_to_go, costmap, lookahead
+from swarm_logistics_env.policies.routes import (
+    BLOCKED,
+    CELL,
+    CROWDED,
+    cost_to_go,
+    costmap,
+    lookahead,
+)
 
-CELL = 0.1
 NOTHING = np.zeros((0, 2))
 
 
 def grid(solid: NDArray[np.float64], crowd: NDArray[np.float64] = NOTHING) -> NDArray[np.float64]:
     discs = [[*place, 0.25, BLOCKED] for place in solid.tolist()]
     discs += [[*place, 0.25, CROWDED] for place in crowd.tolist()]
-    return costmap(4.0, 2.0, CELL, 0.1, np.array(discs).reshape(-1, 4))
+    return costmap(4.0, 2.0, 0.1, np.array(discs).reshape(-1, 4))
 
 
 def wall(height: float) -> NDArray[np.float64]:
@@ -30,9 +36,9 @@ def travelled(cost: NDArray[np.float64], x: float, y: float) -> list[tuple[float
     goal[:, -3:] = True
     far = cost_to_go(cost, goal)
     places = [(x, y)]
-    while x < 3.7:
+    while x < 3.6:
         assert len(places) < 400
-        to_x, to_y = lookahead(cost, far, CELL, x, y, 10)
+        to_x, to_y = lookahead(cost, far, x, y)
         length = math.dist((x, y), (to_x, to_y))
         stride = min(0.05, length)
         x, y = x + stride * (to_x - x) / length, y + stride * (to_y - y) / length
@@ -42,10 +48,10 @@ def travelled(cost: NDArray[np.float64], x: float, y: float) -> list[tuple[float
 
 def test_costs_mark_what_is_in_the_way() -> None:
     cost = grid(np.array([[1.0, 1.0]]), np.array([[3.0, 1.0]]))
-    assert cost.shape == (20, 40)
-    assert cost[10, [10, 20, 30]].tolist() == [BLOCKED, 1.0, CROWDED]
-    assert cost[0, 20] == cost[19, 20] == cost[10, 0] == cost[10, 39] == BLOCKED
-    marked = np.argwhere(cost[2:18, 2:20] == BLOCKED) + 2.5
+    assert cost.shape == (16, 32)
+    assert cost[8, [8, 16, 24]].tolist() == [BLOCKED, 1.0, CROWDED]
+    assert cost[0, 16] == cost[15, 16] == cost[8, 0] == cost[8, 31] == BLOCKED
+    marked = np.argwhere(cost[2:14, 2:16] == BLOCKED) + 2.5
     assert len(marked) > 10
     assert (np.hypot(*(marked * CELL - 1.0).T) < 0.25).all()
 

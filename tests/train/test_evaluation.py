@@ -43,7 +43,9 @@ def test_an_episode_follows_from_its_seed_alone(threads: int) -> None:
     assert found.any()
 
 
-def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_seed_of_a_score_is_measured_on_the_way(
+    small: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     seeds = set()
 
     def noted(scenario: Scenario, policy: Any, seed: int, faults: Any) -> Any:
@@ -52,7 +54,7 @@ def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(evaluation, "run_episode", noted)
     asked = Evaluation(seeds=3, n_robots=6, faults={"FM1": 1})
-    evaluation.evaluate(policies.load("swarm-dt"), SCENARIO, asked)
+    evaluation.evaluate(policies.load("swarm-dt"), small(scenario=SCENARIO, evaluation=asked))
     assert len(seeds) == 3
     assert seeds.isdisjoint(range(MOST_SEEDS))
 

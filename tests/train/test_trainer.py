@@ -97,7 +97,7 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
         for parameter in learner.policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
     card = PolicyCard(name="x", network=training.network)
-    ours = LearnedPolicy(card, tensors_of(learner.policy))._network
+    ours = LearnedPolicy(card, tensors_of(learner.policy)).outputs_of
     inputs = np.random.default_rng(0).normal(size=(300, len(INPUTS) + len(KNOWN)))
     # What PPO takes for the most likely action.
     likely, _ = learner.predict(inputs.astype(np.float32), deterministic=True)
@@ -114,7 +114,7 @@ def test_the_view_trains_what_the_policy_plays_and_goes_on_from_a_checkpoint(sma
     frame.begin(view.frame.keys)
     rng = np.random.default_rng(0)
     for _ in range(20):
-        assert (frame.read(view.observations) == inputs[:, : len(INPUTS)]).all()
+        assert (frame.read(view.frame.rows) == inputs[:, : len(INPUTS)]).all()
         outputs = rng.uniform(-1, 1, (3, 3)).astype(np.float32)
         frame.command(outputs)
         inputs, *_ = view.step(outputs)
