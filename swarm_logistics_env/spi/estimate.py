@@ -129,6 +129,22 @@ class Estimate:
             return "inconclusive"
         return "supported" if self.probability > 0.5 else "refuted"
 
+    def __str__(self) -> str:
+        """Return sign, value, interval and verdict in one line."""
+        shown = SIGNS["unaffected" if self.identical else self.verdict]
+        limits = ""
+        if self.low is not None and self.high is not None and not self.identical:
+            limits = f" [{self.low:.3f}, {self.high:.3f}]"
+        unit = "paired seed" if self.paired else "run"
+        n = f"{self.n_seeds} {unit}{'' if self.n_seeds == 1 else 's'}"
+        n += "" if self.paired else " a condition"
+        n = n if self.n_trainings is None else f"{self.n_trainings} trainings x {n}"
+        p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
+        return (
+            f"{shown.mark} {self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
+            f"{shown.word} ({n}{p})"
+        )
+
 
 # The two differences of two seeds are close to each other by chance so often, counts being whole
 # numbers, that their spread says nothing.

@@ -71,6 +71,7 @@ def test_three_trainings_are_too_few_for_a_verdict_and_none_plans_seeds() -> Non
     assert found.verdict == "inconclusive"
     assert "few_trainings" in found.flags
     assert found.low is not None
+    assert "3 trainings x 20 paired seeds" in str(found)
     assert spi.seeds_for_power(found, 0.1) is None
     assert spi.minimum_detectable_effect(found) is None
     assert "more trainings" in str(spi.no_plan_because(found, 0.1))
