@@ -56,7 +56,7 @@ def train_command(
 
 
 def _show_training(path: Path) -> None:
-    from swarm_logistics_env.train.trainer import BEST, CURVE
+    from swarm_logistics_env.train.trainer import BEST, PICTURE
 
     card = read_card(path)
     rows = tuple(
@@ -76,5 +76,5 @@ def _show_training(path: Path) -> None:
             rows,
             "low, high: limits of the 95 % interval",
         )
-    echo(f"Curve: {path.parent / CURVE}")
+    echo(f"Curve: {path.parent / PICTURE}")
     echo(f"Best on the evaluation's seeds: {path.parent / BEST}")

@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
@@ -17,6 +18,7 @@ from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.records import becoming
+from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import (
     enter,
     evaluate,
@@ -36,8 +38,9 @@ from swarm_logistics_env.train.learner import (
 from swarm_logistics_env.train.training import Training
 
 CHECKPOINT_EVERY = 20.0  # seconds
-CURVE = "curve.csv"
+CURVE, PICTURE = "curve.csv", "curve.png"
 BEST = "best.safetensors"  # the policy as it was at the best evaluation
+MILLION = 1e6
 
 
 def train(
@@ -52,9 +55,9 @@ def train(
 
     What is in `out` afterwards: the policy file NAME.safetensors, as it was at the end, and
     best.safetensors, as it was when it measured the highest P; training.json, how it was made;
-    curve.csv and tensorboard/, what was measured on the way (see `TrainingLog`); scores/, the study
-    behind the card; and the checkpoint, from which the same call goes on after a crash. The result
-    is the same, bit by bit, as without one (on a CPU).
+    curve.csv and curve.png, what was measured on the way (see `TrainingLog`); tensorboard/;
+    scores/, the study behind the card; and the checkpoint, from which the same call goes on after a
+    crash. The result is the same, bit by bit, as without one (on a CPU).
 
     Args:
         out: directory of this training.
@@ -93,6 +96,8 @@ def train(
             own = TrainingCallback(training, log, out, progress)
             learner.learn(total - done, [own, *callbacks], reset_num_timesteps=False)
     learner.env.close()
+    asked = training.evaluation
+    log.draw(out / PICTURE, f"{training.name}, N = {asked.n_robots}", asked.seeds)
     tensors = tensors_of(learner.policy)
     card = _card(training, learner.num_timesteps, log, command)
     path = out / f"{training.name}.safetensors"
@@ -142,6 +147,23 @@ class TrainingLog:
 
         with becoming(directory / CURVE, TrainingError) as part:
             DataFrame(self.curve).to_csv(part, index=False, na_rep="nan")
+
+    def draw(self, picture: Path, title: str, seeds: int) -> None:
+        """Draw P over agent-steps as a PNG, with a line for each scripted policy."""
+        steps = [row["agent_steps"] / MILLION for row in self.curve]
+        p = [row["P"] for row in self.curve]
+
+        def curve(canvas: Any) -> None:
+            axes = canvas.subplots()
+            axes.plot(steps, p, MARKERS[0] + "-", color=COLOURS[0])
+            for name, measured in self.references.items():
+                axes.axhline(measured["P"], color=INK, linestyle="--", linewidth=0.8)
+                axes.annotate(name, (steps[-1], measured["P"]), ha="right", va="bottom")
+            y_label = f"P, mean over {seeds} seeds [items]"
+            axes.set(title=title, xlabel="million agent-steps", ylabel=y_label, ylim=(0.0, None))
+
+        _, png = images(curve, 0.62 * WIDTH)
+        picture.write_bytes(png)
 
 
 class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check

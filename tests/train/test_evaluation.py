@@ -71,3 +71,6 @@ def test_the_best_evaluation_is_the_highest_and_the_curve_is_written(tmp_path: P
     log.write(tmp_path)
     with (tmp_path / "curve.csv").open(newline="") as file:
         assert [float(row["P"]) for row in csv.DictReader(file)] == [1.0, 40.0, 90.0, 80.0]
+    pytest.importorskip("matplotlib")
+    log.draw(tmp_path / "curve.png", "ppo", seeds=4)
+    assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
