@@ -63,7 +63,7 @@ def presence(world: Warehouse, before: Before) -> Earned:
 ### An indicator
 @ spi/definitions.py @def scalability(
 def kept(p_o, p_f, **asked):
-    terms = {"p_f": (p_f, 1.0, 0.0), "p_o": (p_o, 0.0, 1.0)}
+    terms = {"p_f": (p_f, 1.0), "p_o": (p_o, 0.0)}
     return judge("K", terms, offset=0.0, **asked)
 @ spi/definitions.py @        Definition(
         Definition(

@@ -130,7 +130,7 @@ class Estimate:
         return "supported" if self.probability > 0.5 else "refuted"
 
     def __str__(self) -> str:
-        """Return sign, value, interval and verdict in one line."""
+        """Return value, interval and verdict in one line."""
         shown = SIGNS["unaffected" if self.identical else self.verdict]
         limits = ""
         if self.low is not None and self.high is not None and not self.identical:
@@ -141,7 +141,7 @@ class Estimate:
         n = n if self.n_trainings is None else f"{self.n_trainings} trainings x {n}"
         p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
         return (
-            f"{shown.mark} {self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
+            f"{self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
             f"{shown.word} ({n}{p})"
         )
 
