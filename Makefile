@@ -50,7 +50,7 @@ tables: $(STUDY)/installed
 test: check
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
 	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p verification.interpreted --numprocesses=2 --cov --cov-append --cov-report= \
-		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends or in_a_run or delivers_with or kept_though)"
+		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends or in_a_run or delivers_with or kept_though or requested_once or delivers_more or that_fail)"
 	$(DEV)/bin/python -m coverage report --fail-under=92
 
 # For every commit, within a minute: mypy runs beside the fastest tests, which interpret the kernels.
@@ -66,7 +66,7 @@ QUICK := tests/warehouse/test_kinematics.py tests/studies/test_plan.py tests/ver
 
 # What reaches every line of the kernels in seconds, without the compiler.
 KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py kinematics.py layout.py grid.py) \
-	$(addprefix tests/policies/test_,swarm_dt.py routes.py) tests/motion
+	$(addprefix tests/policies/test_,swarm_dt.py routes.py homing.py) tests/motion
 
 check: $(DEV)/installed
 	$(DEV)/bin/ruff check .

@@ -25,6 +25,7 @@ settings.register_profile(
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 
 ROOT = Path(__file__).parents[1]
+PACKAGE = Path(swarm_logistics_env.__file__).parent
 # Beside an installed package (`make test-lowest`) there is no source tree to read.
 if not (ROOT / "swarm_logistics_env").is_dir():
     collect_ignore = ["test_imports.py", "test_packaging.py", "verification/test_mutants.py"]
@@ -40,11 +41,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return
     for module in pkgutil.walk_packages(swarm_logistics_env.__path__, "swarm_logistics_env."):
         importlib.import_module(module.name)
-    whole = (ROOT / "tests", ROOT / "tests" / "verification")
-    items.sort(key=lambda item: item.path.parent not in whole)
+    items.sort(key=lambda item: mirrors(item.path))
     for item in items:
-        if item.path.parent in whole:
+        if not mirrors(item.path):
             item.add_marker("no_cover")
+
+
+def mirrors(test: Path) -> bool:
+    """Return whether a file of tests is of one module or folder of the package."""
+    name = test.stem.removeprefix("test_") if test.parent == ROOT / "tests" else test.parent.name
+    return any((PACKAGE / f"{name}{suffix}").exists() for suffix in ("", ".py"))
 
 
 SMALL: dict[str, Any] = {

@@ -98,13 +98,22 @@ EDITS = {
     heading: re.findall(r"^@ (\S+)(?: @(.*))?\n((?:(?!@ ).*\n)+)", edits, flags=re.MULTILINE)
     for heading, edits in re.findall(r"### (.*)\n((?:(?!###).*\n)+)", RECIPES)
 }
-# Kernels read these: the interpreter runs them, as compiling takes longer.
+# Kernels read these.
 OF_KERNELS = ("A scenario parameter", "An observation column")
 
-AS_COMPILED = """
+# Compiling would take longer.
+INTERPRETED = """
+import sys
 from pathlib import Path
 
 import numpy as np
+from verification.interpreted import interpret_kernels
+
+np.seterr(over="ignore", divide="ignore")
+interpret_kernels()
+"""
+
+OF_POLICIES_AND_STUDIES = """
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.wrappers import HalfSpeed
@@ -133,14 +142,8 @@ assert (walking.performance()["mean"] > 0).all()
 print(policies.identity(policies.load("swarm-dt")))
 """
 
-INTERPRETED = """
-import sys
-import numpy as np
-from verification.interpreted import interpret_kernels
+OF_A_STEP = """
 from swarm_logistics_env import Scenario, Warehouse, observations, swarm_logistics_v0
-
-np.seterr(over="ignore", divide="ignore")
-interpret_kernels()
 
 
 def rows(**fields):
@@ -168,7 +171,7 @@ assert "| 140 | `speed` | m/s | [0, 2] | without direction |" in page
 """
 
 
-def run(folder: Path, recipes: Iterable[str], script: str, **variables: str) -> str:
+def run(folder: Path, recipes: Iterable[str], script: str) -> str:
     """Follow recipes in a copy of the package in that folder, and return what a script prints."""
     package = folder / PACKAGE.name
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("*.lock", "*.tmp.*"))
@@ -180,8 +183,8 @@ def run(folder: Path, recipes: Iterable[str], script: str, **variables: str) -> 
         assert found, f"{file}: {mark}"
         place.write_text(f"{before}\n{lines}{found[1:]}{after}", encoding="utf-8")
     paths = {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
-    settings = {**os.environ, **paths, "PYTHONWARNINGS": "error", **variables}
-    command = [sys.executable, "-c", script, str(ROOT / "docs")]
+    settings = {**os.environ, **paths, "PYTHONWARNINGS": "error", "NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, "-c", INTERPRETED + script, str(ROOT / "docs")]
     done = subprocess.run(
         command, cwd=folder, env=settings, capture_output=True, text=True, check=False
     )
@@ -203,11 +206,15 @@ def test_a_recipe_names_the_files_that_it_changes(recipe: str) -> None:
 
 
 def test_what_the_recipes_add_works(tmp_path: Path) -> None:
-    said = run(tmp_path, [name for name in EDITS if not name.startswith(OF_KERNELS)], AS_COMPILED)
+    said = run(
+        tmp_path,
+        [name for name in EDITS if not name.startswith(OF_KERNELS)],
+        OF_POLICIES_AND_STUDIES,
+    )
     # Whoever adds a policy leaves the identities of the others, and with them stored runs, alone.
     assert said.strip() == policies.identity(policies.load("swarm-dt"))
 
 
 def test_what_the_recipes_add_to_kernels_works(tmp_path: Path) -> None:
     recipes = [recipe for recipe in EDITS if recipe.startswith(OF_KERNELS)]
-    run(tmp_path, recipes, INTERPRETED, NUMBA_DISABLE_JIT="1")
+    run(tmp_path, recipes, OF_A_STEP)
