@@ -49,7 +49,7 @@ tables: $(STUDY)/installed
 
 test: check
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
-	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p verification.interpreted --numprocesses=2 --cov --cov-append --cov-report= \
+	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p verification.interpreted --cov --cov-append --cov-report= \
 		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends or in_a_run or delivers_with or kept_though or requested_once or delivers_more or that_fail)"
 	$(DEV)/bin/python -m coverage report --fail-under=92
 

@@ -56,6 +56,7 @@ def images(draw: Draw, height: float) -> tuple[str, bytes]:
         canvas = NewCanvas(figsize=(WIDTH, height), layout="constrained")
         draw(canvas)
         canvas.savefig(svg, format="svg", metadata=_NO_METADATA)
+        canvas.set_layout_engine("none")  # the same places, which take long to find
         canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
     return svg.getvalue(), png.getvalue()
 

@@ -28,7 +28,7 @@ def study(
 @pytest.mark.parametrize("k", [5, 10])
 def test_an_interval_holds_the_truth_in_93_of_100_studies(kind: str, k: int) -> None:
     # Two standard errors of 400 studies are .02.
-    assert trainings_coverage(kind, k, 10, 0.1, studies=400).share >= 0.93 - 0.02
+    assert trainings_coverage(kind, k, 10, 0.1, studies=300).share >= 0.93 - 0.02
 
 
 def test_trainings_or_seeds_that_do_not_differ_leave_the_interval_of_the_others() -> None:
