@@ -16,7 +16,7 @@ import swarm_logistics_env
 from swarm_logistics_env.studies import Study
 
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
-settings.register_profile("default", max_examples=200, derandomize=True, deadline=None)
+settings.register_profile("default", max_examples=100, derandomize=True, deadline=None)
 settings.register_profile("nightly", max_examples=2000, deadline=None)
 # Only whether there is an example that fails, not the simplest: see verification.mutants.
 settings.register_profile(
