@@ -162,7 +162,9 @@ def judge_command(
         if tally.left:
             why = f"Stopped after {minutes:g} min, {tally.left} runs are left"
             say(f"{why}; the same command goes on:", str(context.obj))
-        elif not plays_benchmark and any(v.conclusion == "inconclusive" for v in results.verdicts):
+        elif not (plays_benchmark or policy.trainings or trust_code) and any(
+            v.conclusion == "inconclusive" for v in results.verdicts
+        ):
             more = max(JUDGE_SEEDS, 2 * most)
             say(
                 "What is open needs more seeds, from the start:",

@@ -13,7 +13,7 @@ Robots sense and remember what those of `homing` do, and six simple mechanisms a
 * A robot that never entered the area goes to the lowest timer heard.
 
 All constants are fitted, for the most deliveries in the paper's world with `restock` at N = 25.
-Only seeds from 400,000 to 400,045 were used. Like `homing` it needs the holonomic drive.
+Only seeds from 400,000 to 400,045 were used.
 """
 
 from __future__ import annotations

@@ -209,6 +209,7 @@ class PolicySpec(Record):
         elif makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         elif makers and self.name.endswith(SB3_SUFFIX):
+            _filed(self.name, self.trusted)  # refuses what nobody trusts
             found = _model(Path(self.name))
         else:
             found = _loaded(self.name, canonical_json(self.parameters), self.trusted)

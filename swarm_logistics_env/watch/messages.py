@@ -54,10 +54,10 @@ def fixed_data(session: Session) -> Message:
 def frame(session: Session) -> Message:
     """Return what is true now. Lengths in mm, times in s, angles in mrad; x right, y up.
 
-    `arenas` has for each of the two runs: `poses` (3 N numbers: x, y, heading of each robot, or
-    None where it is absent), `robots` ([activity, age of its timer in 1/8 of the limit or None,
-    mark, robot it follows] of each), `items` (x, y of each that is stored), `requested` ([x, y,
-    carrier] of the item asked for, or None) and `deliveries` (their times).
+    For each of the two runs, with its number 0 or 1 behind the name: `poses` (3 N numbers: x, y,
+    heading of each robot, or None where it is absent), `robots` ([activity, age of its timer in 1/8
+    of the limit or None, mark, robot it follows] of each), `items` (x, y of each that is stored),
+    `requested` ([x, y, carrier] of the item asked for, or None) and `deliveries` (their times).
     """
     frame: Message = {
         **{name: getattr(session, name) for name in _TOLD},

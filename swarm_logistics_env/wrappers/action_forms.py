@@ -28,7 +28,7 @@ class MotionFrame(Wrapper):
     neighbours, items and the lowest timer, relative to the direction in which the robot drives,
     and what it remembers, such as the way to the delivery area. Actions become rows of
     `motion.OUTPUTS`: along and aside, fractions of the top speed, and the gripper, all within -1
-    and 1. The frame never turns the body, so this is for the holonomic drive. It is what
+    and 1. A robot of the differential drive turns to where it wants to go. It is what
     `swarm-logistics train` learns on; rows of absent robots are zeros.
 
     Args:

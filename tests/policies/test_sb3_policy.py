@@ -62,6 +62,8 @@ def test_a_study_reads_it_where_somebody_trusts_it_and_no_file_says_so(
     text = str(model)
     with pytest.raises(PolicyError, match="executes the code in it"):
         PolicySpec.of(text).load()
+    with pytest.raises(PolicyError, match="executes the code in it"):
+        PolicySpec.of(text).load({"of another task": object})
     assert isinstance(PolicySpec.of(text).replace(trusted=True).load(), Policy)
     study = study_of("quick", None, 1, [text], trust_code=True)
     assert study.plan().cases[0].policy.trusted
