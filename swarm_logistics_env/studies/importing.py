@@ -29,8 +29,7 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
 
     Swarm sizes without fault, failure modes and the values of each parameter become a table each;
     the values of everything else that the file varies make tables of their own. A parameter's x_o
-    is its value in the first row without a fault. With seeds the study is paired, without them it is
-    not.
+    is its value in the first row without a fault. With seeds the study is paired, else it is not.
 
     Args:
         trials: of the file.
