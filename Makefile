@@ -23,7 +23,7 @@ INSTALLED := .venvs/lowest .venvs/newest
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
-	@echo "make tables          play the studies behind docs/results.md (half an hour; with the learners of make interop, if there), write its tables, the README's numbers and what judge ranks beside"
+	@echo "make tables          play the studies behind docs/results.md (half an hour; with the learners of make interop, if there), write its tables, the README's numbers and the scores of judge --benchmark"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make quick           lint, types and the fastest tests, within a minute: for every commit"
 	@echo "make check           lint and types only"

@@ -171,7 +171,7 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
             yield
             return
         if Path(compiled.py_func.__code__.co_filename).is_relative_to(_HERE):
-            # numba looks at the file's time alone, not at kernels and constants of other files.
+            # numba looks at the kernel's own file alone, not at what it takes from others.
             compiled._cache._cache_file._source_stamp = _digest()
     from filelock import FileLock
 

@@ -98,10 +98,10 @@ EDITS = {
     heading: re.findall(r"^@ (\S+)(?: @(.*))?\n((?:(?!@ ).*\n)+)", edits, flags=re.MULTILINE)
     for heading, edits in re.findall(r"### (.*)\n((?:(?!###).*\n)+)", RECIPES)
 }
-# Kernels read these.
-OF_KERNELS = ("A scenario parameter", "An observation column")
+# What these add is read by kernels.
+KERNEL_RECIPES = ("A scenario parameter", "An observation column")
 
-# Compiling would take longer.
+# The interpreter runs the kernels, as compiling takes longer.
 INTERPRETED = """
 import sys
 from pathlib import Path
@@ -113,7 +113,7 @@ np.seterr(over="ignore", divide="ignore")
 interpret_kernels()
 """
 
-OF_POLICIES_AND_STUDIES = """
+CHECK_POLICIES_AND_STUDIES = """
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.wrappers import HalfSpeed
@@ -142,7 +142,7 @@ assert (walking.performance()["mean"] > 0).all()
 print(policies.identity(policies.load("swarm-dt")))
 """
 
-OF_A_STEP = """
+CHECK_STEPS = """
 from swarm_logistics_env import Scenario, Warehouse, observations, swarm_logistics_v0
 
 
@@ -208,13 +208,13 @@ def test_a_recipe_names_the_files_that_it_changes(recipe: str) -> None:
 def test_what_the_recipes_add_works(tmp_path: Path) -> None:
     said = run(
         tmp_path,
-        [name for name in EDITS if not name.startswith(OF_KERNELS)],
-        OF_POLICIES_AND_STUDIES,
+        [name for name in EDITS if not name.startswith(KERNEL_RECIPES)],
+        CHECK_POLICIES_AND_STUDIES,
     )
     # Whoever adds a policy leaves the identities of the others, and with them stored runs, alone.
     assert said.strip() == policies.identity(policies.load("swarm-dt"))
 
 
 def test_what_the_recipes_add_to_kernels_works(tmp_path: Path) -> None:
-    recipes = [recipe for recipe in EDITS if recipe.startswith(OF_KERNELS)]
-    run(tmp_path, recipes, OF_A_STEP)
+    recipes = [recipe for recipe in EDITS if recipe.startswith(KERNEL_RECIPES)]
+    run(tmp_path, recipes, CHECK_STEPS)

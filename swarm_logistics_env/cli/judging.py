@@ -162,6 +162,7 @@ def judge_command(
         if tally.left:
             why = f"Stopped after {minutes:g} min, {tally.left} runs are left"
             say(f"{why}; the same command goes on:", str(context.obj))
+        # Several trainings and untrusted code need options that this command does not repeat.
         elif not (plays_benchmark or policy.trainings or trust_code) and any(
             v.conclusion == "inconclusive" for v in results.verdicts
         ):
