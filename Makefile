@@ -19,6 +19,9 @@ TASKS     := .venvs/tasks
 
 INSTALLED := .venvs/lowest .venvs/newest
 
+# Tests start many processes, and each would compile all sources again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark interop interop-calls tasks docs docs-check dist absolute-links format clean
 
 help:
@@ -51,7 +54,7 @@ test: check
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
 	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p verification.interpreted --cov --cov-append --cov-report= \
 		$(KERNELS) -k "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or program_ends or in_a_run or delivers_with or kept_though or requested_once or delivers_more or that_fail)"
-	$(DEV)/bin/python -m coverage report --fail-under=92
+	$(DEV)/bin/python -m coverage report --fail-under=94
 
 # For every commit, within a minute: mypy runs beside the fastest tests, which interpret the kernels.
 quick: $(DEV)/installed
