@@ -116,6 +116,10 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Return a picture or show it; see `SwarmLogisticsEnv.render`."""
         return self.env.render()
 
+    def state(self) -> NDArray[np.float32]:
+        """Return the whole warehouse as one vector, see `SwarmLogisticsEnv.state`."""
+        return self.env.state()
+
     def close(self) -> None:
         """Release what rendering holds; harmless when called twice."""
         self.env.close()

@@ -50,6 +50,7 @@ class SwarmLogisticsEnv(DictView):
     Attributes:
         next_seed: the seed of the next episode if a reset gives none; it follows from the seed
             of the episode before.
+        is_begun: whether there was a reset.
 
     Raises:
         ArgumentError: there is no such argument; it is a ScenarioError and a TypeError.
@@ -91,6 +92,7 @@ class SwarmLogisticsEnv(DictView):
         self._renderer: Renderer | None = None
         self.warehouse = Warehouse(self.scenario)
         self.agents: list[str] = []
+        self.is_begun = False
         self.possible_agents = agent_names(range(self.scenario.n_robots))
         self._spaces = Spaces(self.scenario)
         self._rewards = RewardTerms(rewards)
@@ -142,6 +144,7 @@ class SwarmLogisticsEnv(DictView):
         observations = self.warehouse.reset(seed, faults, scenario)
         self.next_seed = key(seed, "the episode that follows") >> 1
         self._rewards.begin(self.warehouse)
+        self.is_begun = True
         self._present = self.warehouse.state.robot_present.copy()
         self._n_removed = self.warehouse.n_removed
         self.agents = agent_names(np.flatnonzero(self._present).tolist())

@@ -160,6 +160,7 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
 
     agents: list[str]
     warehouse: Warehouse
+    is_begun: bool
 
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -245,10 +246,9 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         )
 
     def refuse_to_step(self) -> NoReturn:
-        """Raise the SetupError that says what to do before a step."""
-        raise SetupError(
-            "step before reset or after the end of the episode: call reset(seed) first"
-        )
+        """Raise the SetupError that says why nobody can take a step."""
+        when = "after the end of the episode" if self.is_begun else "before reset"
+        raise SetupError(f"step {when}: call reset(seed) first")
 
     def _infos(self, agents: list[str]) -> Infos:
         # Robots do not sense who failed; infos are for those who train or evaluate them.

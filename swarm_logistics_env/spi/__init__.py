@@ -9,13 +9,16 @@ from .equivalence import Equivalence, equivalence
 from .estimate import Estimate, Options, Verdict
 from .inputs import IndicatorError
 from .multiplicity import (
+    FaultBudget,
     Spending,
     adjust,
     adjusted_p_values,
+    fault_budget,
     holm,
     look_alphas,
 )
 from .power import (
+    lower_decile_of_power,
     minimum_detectable_effect,
     no_plan_because,
     seeds_against_stalls,
@@ -39,6 +42,7 @@ from .trials import Trial, Trials, read_trials
 __all__ = [
     "Equivalence",
     "Estimate",
+    "FaultBudget",
     "IndicatorError",
     "Interval",
     "Options",
@@ -51,11 +55,13 @@ __all__ = [
     "adjust",
     "adjusted_p_values",
     "equivalence",
+    "fault_budget",
     "fault_tolerance",
     "holm",
     "interquartile_mean",
     "kaplan_meier",
     "look_alphas",
+    "lower_decile_of_power",
     "mean_interval",
     "median_interval",
     "minimum_detectable_effect",
@@ -77,18 +83,14 @@ __all__ = [
 ]
 
 # Public names that went with 0.3.0, and where to look instead.
-_BUDGET = "read the verdicts of spi.robustness at m = 1, 2, ... up to the first not supported"
 _TWO_CHECKS = "use check_policy, or check_wrapper"
 REMOVED = {
-    "spi.FaultBudget": _BUDGET,
     "spi.ScalingFit": "fit a law to P over N with scipy.optimize.curve_fit",
     "spi.SelfRepair": "use spi.repair_times with spi.kaplan_meier",
     "spi.Simulation": "judge the real runs alone",
     "spi.compare_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
-    "spi.fault_budget": _BUDGET,
     "spi.fit_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
     "spi.karp_flatt": "use spi.scalability: S = 1 where nothing is serial",
-    "spi.lower_decile_of_power": "use spi.seeds_for_power with a larger power",
     "spi.mean_with_simulation": "use spi.mean_interval of the real runs alone",
     "spi.self_repair": "use spi.repair_times with spi.kaplan_meier",
     "testing.check_conservation": f"{_TWO_CHECKS}; verification/invariants.py counts items",

@@ -123,6 +123,16 @@ class Estimate:
         """On theta > threshold, one-sided (1 - confidence)/2 on each side, unadjusted."""
         return self.verdict_for(self.p_value)
 
+    @property
+    def answer(self) -> Verdict:
+        """The verdict; of identical runs what their exact value says, which is no evidence.
+
+        Gates ask for it: "is it above the threshold?" has an answer there.
+        """
+        if not self.identical:
+            return self.verdict
+        return "supported" if self.value > self.threshold else "refuted"
+
     def verdict_for(self, p_value: float | None) -> Verdict:
         """Return the verdict at a two-sided p, e.g. one that Holm adjusted; None: inconclusive."""
         if p_value is None or self.probability is None or not p_value < 1.0 - self.confidence:

@@ -10,7 +10,7 @@ import numpy as np
 
 from .equivalence import Equivalence
 from .estimate import Estimate
-from .inputs import IndicatorError, Numbers, between_0_and_1, finite
+from .inputs import IndicatorError, Numbers, between_0_and_1, count, finite
 from .ratio import MIN_SEEDS
 from .summaries import STALL_MARGIN, critical_with_hidden
 
@@ -21,6 +21,7 @@ MAX_SEEDS = 1_000_000
 # Of counts like those under FM4 a small pilot shows too little of the tail as well: 0.61 to 0.72
 # for 10 seeds, 0.66 to 0.74 for 20, 0.78 for 100, 0.79 to 0.80 for thousands.
 PLANNED_LIMIT = 0.6
+UNLUCKY_LIMIT = 0.9  # confidence limit of the spread that one pilot in ten exceeds
 # Beyond this critical t, as of two seeds at an early look, the statistic's normal part is lost
 # beside its chi-squared one, and the noncentral t would be summed over so many terms.
 _FAR_OUT = 1e3
@@ -39,12 +40,14 @@ def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float |
     from scipy.optimize import brentq
 
     _check_power(estimate, power)
-    spread = _spread_limit(estimate) / estimate.mean_denominator
+    spread = _spread_limit(estimate, PLANNED_LIMIT) / estimate.mean_denominator
     if not spread:
         return None
 
     def excess(distance: float) -> float:
-        return power - min(_power_at(estimate, side * distance, n) for side in (-1, 1))
+        return power - min(
+            _power_at(estimate, side * distance, n, PLANNED_LIMIT) for side in (-1, 1)
+        )
 
     n, enough = estimate.n_seeds, spread
     while excess(enough) > 0.0:
@@ -57,10 +60,10 @@ def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> in
 
     The spread is the 60 % upper confidence limit of the estimate's, so that the power is `power` on
     average over pilots of normal differences (0.6 to 0.75 after 10 or 20 seeds of counts as skewed
-    as those under FM4). The plan counts the skewness that the pilot shows and the stalls that a
-    verdict has to exclude. Take the effect from elsewhere (the paper's value, or the least one that
-    matters), never the one just observed. If samples are not paired, the result is the number of
-    seeds per sample.
+    as those under FM4); `lower_decile_of_power` is the power that nine pilots of ten keep. The plan
+    counts the skewness that the pilot shows and the stalls that a verdict has to exclude. Take the
+    effect from elsewhere (the paper's value, or the least one that matters), never the one just
+    observed. If samples are not paired, the result is the number of seeds per sample.
 
     Args:
         estimate: The pilot, from at least two seeds.
@@ -79,7 +82,7 @@ def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> in
         return None
 
     distance = effect - estimate.threshold
-    return _least_seeds(lambda n: _power_at(estimate, distance, n) >= power)
+    return _least_seeds(lambda n: _power_at(estimate, distance, n, PLANNED_LIMIT) >= power)
 
 
 def seeds_for_equivalence(equivalence: Equivalence, power: float = 0.8) -> int | None:
@@ -102,7 +105,7 @@ def seeds_for_equivalence(equivalence: Equivalence, power: float = 0.8) -> int |
         return None
 
     def enough(n: int) -> bool:
-        each = (_power_at(test, -test.threshold, n) for test in tests)
+        each = (_power_at(test, -test.threshold, n, PLANNED_LIMIT) for test in tests)
         return sum(each) - 1.0 >= power
 
     return _least_seeds(enough)
@@ -123,6 +126,22 @@ def seeds_against_stalls(estimate: Estimate) -> int | None:
     return max(math.floor(fewest), estimate.n_seeds) + 1
 
 
+def lower_decile_of_power(estimate: Estimate, effect: float, n_seeds: int) -> float | None:
+    """Power that `n_seeds` have or exceed in nine pilots of ten if the indicator is `effect`.
+
+    With the 90 % upper confidence limit of the estimate's spread. None where `no_plan_because`
+    says why.
+
+    Raises:
+        IndicatorError: effect not finite, n_seeds below 2.
+    """
+    if count("n_seeds", n_seeds) < 2:
+        raise IndicatorError(f"n_seeds = {n_seeds}: should be at least 2")
+    if no_plan_because(estimate, effect) is not None:
+        return None
+    return _power_at(estimate, effect - estimate.threshold, n_seeds, UNLUCKY_LIMIT)
+
+
 def no_plan_because(estimate: Estimate, effect: float) -> str | None:
     """Why no number of seeds can be named for `effect`; None where one can."""
     finite("effect", effect)
@@ -138,7 +157,7 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
         return f"an effect of {effect:g} lies at the threshold: no number of seeds finds it"
     # Large samples need (z_confidence + z_power)^2 sd^2 / distance^2 seeds, about 8 at 80 %.
     distance = abs(effect - estimate.threshold) * estimate.mean_denominator
-    if 8.0 * (_spread_limit(estimate) / distance) ** 2 > MAX_SEEDS:
+    if 8.0 * (_spread_limit(estimate, PLANNED_LIMIT) / distance) ** 2 > MAX_SEEDS:
         return f"an effect of {effect:g} needs more than {MAX_SEEDS:,} seeds"
     return None
 
@@ -158,24 +177,24 @@ def _check_power(estimate: Estimate, power: float) -> None:
         raise IndicatorError(f"power = {power}: should exceed the one-sided error {error:g}")
 
 
-def _spread_limit(estimate: Estimate) -> float:
-    """60 % upper confidence limit of the standard deviation of D; 0 where there is none."""
+def _spread_limit(estimate: Estimate, confidence: float) -> float:
+    """Upper confidence limit of the standard deviation of D; 0 where there is none."""
     from scipy.special import chdtri
 
     sd, df = estimate.difference_sd, estimate.degrees_of_freedom
     if not sd or df is None:
         return 0.0
-    return sd * math.sqrt(df / float(chdtri(df, PLANNED_LIMIT)))
+    return sd * math.sqrt(df / float(chdtri(df, confidence)))
 
 
-def _power_at(estimate: Estimate, distance: float, n_seeds: int) -> float:
-    """Power of so many seeds at a distance from the threshold, with the limit of the spread."""
+def _power_at(estimate: Estimate, distance: float, n_seeds: int, confidence: float) -> float:
+    """Power of so many seeds at a distance from the threshold, with that limit of the spread."""
     from scipy.special import chdtr, nctdtr
 
     assert estimate.degrees_of_freedom is not None
     # Welch's degrees of freedom grow with n - 1, as the paired ones do.
     df = estimate.degrees_of_freedom * (n_seeds - 1) / (estimate.n_seeds - 1)
-    standard_error = _spread_limit(estimate) / math.sqrt(n_seeds)
+    standard_error = _spread_limit(estimate, confidence) / math.sqrt(n_seeds)
     noncentrality = abs(distance) * estimate.mean_denominator / standard_error
     # Skewness g, of a long tail of D on the far side of the threshold, spreads the statistic: mean
     # and spread of the seeds then move together (as those of gamma variables, whose excess kurtosis

@@ -182,6 +182,7 @@ def test_gymnasium_writes_a_film(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     env = gymnasium.make("SwarmLogistics-v0", n_robots=2, render_mode="rgb_array", **BRIEF)
     film: Any = gymnasium.wrappers.RecordVideo(env, str(tmp_path / "films"))
     film.reset(seed=0)
+    np.testing.assert_array_equal(film.unwrapped.state(), film.unwrapped.env.state())
     for _ in range(5):
         film.step(film.action_space.sample())
     film.close()

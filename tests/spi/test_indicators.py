@@ -158,7 +158,8 @@ def test_a_cap_blocks_the_side_on_which_it_can_move_the_indicator(
 def test_the_same_runs_have_an_exact_value_that_is_no_evidence() -> None:
     r = spi.robustness(MANY, MANY, n=25, m=2, identical=True)
     assert (r.value, r.low, r.high) == (0.08, 0.08, 0.08)
-    assert (r.verdict, r.p_value) == ("inconclusive", None)
+    assert (r.verdict, r.answer, r.p_value) == ("inconclusive", "supported", None)
     assert r.flags == ("identical",)
+    assert spi.relative_change(MANY, MANY, identical=True).answer == "refuted"  # 0 is not above 0
     with pytest.raises(IndicatorError, match="identical = True, but p_f and p_o differ"):
         spi.robustness(MANY, HALF, n=25, m=2, identical=True)

@@ -1,4 +1,4 @@
-"""Families of verdicts, and looks at a growing study."""
+"""Families of verdicts, looks at a growing study, and the fault budget."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ def estimate(p_value: float | None, probability: float | None = None, **more: An
 
 P_O = np.array([40.0, 38, 41, 39, 42])
 ROBUST = spi.robustness(P_O, [40.0, 39, 41, 38, 42], n=25, m=2)
+BROKEN = spi.robustness(P_O, [12.0, 15, 10, 11, 14], n=25, m=2)
 SAME = spi.robustness(P_O, P_O, n=25, m=1, identical=True)
+UNCLEAR = spi.robustness(P_O, [45.0, 20, 38, 50, 30], n=25, m=2)
 
 
 def test_adjusted_verdicts_keep_their_direction_and_what_is_untested_counts() -> None:
@@ -38,6 +40,24 @@ def test_adjusted_verdicts_keep_their_direction_and_what_is_untested_counts() ->
 def test_identical_runs_stand_outside_the_family() -> None:
     assert spi.adjusted_p_values([SAME, ROBUST, SAME]) == (None, ROBUST.p_value, None)
     assert spi.adjust([SAME, ROBUST]) == ("inconclusive", "supported")
+
+
+@pytest.mark.parametrize(
+    ("by_m", "robots", "limit"),
+    [
+        ({1: ROBUST, 2: BROKEN, 3: ROBUST}, 1, 2),  # supported again at 3 does not count
+        ({1: UNCLEAR, 2: ROBUST}, 0, 1),  # nor does a verdict that is only not refuted
+        ({3: ROBUST, 1: ROBUST, 2: ROBUST}, 3, None),  # all supported: a lower bound
+        ({1: ROBUST, 3: ROBUST}, 1, 2),  # untested in between
+        ({1: SAME, 2: ROBUST, 3: BROKEN}, 2, 3),  # the same runs: exactly within it
+    ],
+)
+def test_the_first_unsupported_number_ends_the_fault_budget(
+    by_m: dict[int, spi.Estimate], robots: int, limit: int | None
+) -> None:
+    verdicts = [each.verdict for each in (ROBUST, BROKEN, UNCLEAR)]
+    assert verdicts == ["supported", "refuted", "inconclusive"]
+    assert spi.fault_budget(by_m) == (robots, limit)
 
 
 def test_published_boundaries() -> None:
@@ -71,6 +91,9 @@ def test_looks_keep_the_error_that_peeking_inflates() -> None:
         (spi.holm, [0.5, 1.1], "p_values"),
         (spi.holm, [float("nan")], "p_values"),
         (spi.adjust, [estimate(0.01, 0.9), estimate(0.01, 0.9, confidence=0.9)], "confidence"),
+        (spi.fault_budget, {}, "is empty"),
+        (spi.fault_budget, {0: ROBUST}, "m = 0"),
+        (spi.fault_budget, {1: spi.relative_change(P_O, P_O)}, "indicator at m = 1 is change"),
         (spi.look_alphas, (20, 10), "looks"),
         (lambda alpha: spi.look_alphas((10,), alpha=alpha), 5, "alpha = 5"),
         (lambda name: spi.look_alphas([10], spending=name), "pocock", "spending = 'pocock'"),

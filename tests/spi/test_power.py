@@ -81,6 +81,7 @@ def test_textbook_sample_sizes() -> None:
 )
 def test_no_number_comes_with_a_reason(pilot: spi.Estimate, effect: float, reason: str) -> None:
     assert spi.seeds_for_power(pilot, effect) is None
+    assert spi.lower_decile_of_power(pilot, effect, 20) is None
     assert reason in (spi.no_plan_because(pilot, effect) or "")
 
 
@@ -89,19 +90,23 @@ def test_what_cannot_be_is_named() -> None:
         spi.minimum_detectable_effect(PILOT, power=0.02)
     with pytest.raises(spi.IndicatorError, match="effect = nan"):
         spi.seeds_for_power(PILOT, float("nan"))
+    with pytest.raises(spi.IndicatorError, match="n_seeds = 1"):
+        spi.lower_decile_of_power(PILOT, 0.1, 1)
 
 
 @pytest.mark.parametrize("n_pilot", [5, 10, 20])
 def test_a_promised_power_of_80_percent_is_kept_on_average(n_pilot: int) -> None:
     mean, sd, effect = 40.0, 6.0, 0.08
     draws = np.random.default_rng(n_pilot).normal(0.0, sd, (400, n_pilot))
-    achieved = []
+    achieved, least = [], list[float]()
     for difference in draws:
         pilot = spi.relative_change(np.full(n_pilot, mean), mean + difference)
         pilot = dataclasses.replace(pilot, **PLAIN)
         n = spi.seeds_for_power(pilot, effect) or 0
         achieved.append(nct.sf(t.ppf(0.975, n - 1), n - 1, effect * mean / sd * math.sqrt(n)))
+        least.append(spi.lower_decile_of_power(pilot, effect, n) or 0.0)
     assert 0.76 < np.mean(achieved) < 0.86
+    assert np.median(least) == pytest.approx(np.quantile(achieved, 0.1), abs=0.06)
 
 
 def test_a_plan_counts_what_stalls_may_hide() -> None:
