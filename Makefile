@@ -139,7 +139,7 @@ clean:
 	rm -rf .venvs build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch
+$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,onnx
 $(STUDY)/installed: EXTRAS := study
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := hypothesis pytest torch torchrl

@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import FAILURE_MODES, Scenario, Warehouse, policies
-from swarm_logistics_env.motion import MotionView
-from swarm_logistics_env.policies import PolicyCard, SwarmDT
-from swarm_logistics_env.policies.learned import STREAM
+from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.studies import Study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -47,28 +44,6 @@ def test_a_loop_of_ones_own_learns_on_the_frame_of_motion() -> None:
     assert len(own) == len(scripted) == 2
     assert sum(scripted) > 0
     assert sum(own) > 0  # an untrained one delivers nothing
-
-
-def test_the_onnx_file_says_what_the_network_says_on_every_row_of_an_episode(
-    tmp_path: Path,
-) -> None:
-    pytest.importorskip("onnx", reason="needs the extra dev")
-    onnxruntime = pytest.importorskip("onnxruntime", reason="needs the extra dev")
-    path = tmp_path / "p.onnx"
-    main("export_onnx", trained="ppo-delivery", path=path)
-    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
-    policy: Any = policies.load("ppo-delivery")
-    about = session.get_modelmeta().custom_metadata_map
-    assert PolicyCard.from_json(about["card"]) == policy.card
-    assert about["deviations"].split() == list(map(str, policy.tensors["deviations"].tolist()))
-    world = Warehouse(Scenario(n_robots=25, duration=20.0))
-    rows, frame = world.reset(3), MotionView(world.scenario)
-    frame.begin(row_keys(3, STREAM, 25))
-    while not world.is_over_time:
-        inputs = frame.read(rows)
-        [said] = session.run(None, {"inputs": inputs})
-        np.testing.assert_allclose(said, policy.outputs_of(inputs), rtol=0, atol=1e-5)
-        rows = world.step(frame.command(said))
 
 
 def test_each_robot_of_a_mixed_swarm_does_what_its_policy_does_upon_the_same_rows() -> None:

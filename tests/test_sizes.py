@@ -43,11 +43,11 @@ def test_no_two_modules_have_one_name() -> None:
 
 ROOT = PACKAGE.parent
 MOST = {
-    "lines of code of the package": 16_170,
-    "tokens of the package": 147_000,
+    "lines of code of the package": 16_210,
+    "tokens of the package": 147_400,
     "files of the package": 124,
     "lines of code of studies and report": 3_610,
-    "lines of tests": 14_500,
+    "lines of tests": 14_540,
     "lines of verification, benchmarks, interop and the scripts of docs": 4_700,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }

@@ -9,7 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.policies.files import read_card
+    from swarm_logistics_env.policies.files import read_card, write_onnx
     from swarm_logistics_env.policies.learned import PolicyCard
     from swarm_logistics_env.policies.policy import Policy, identity
     from swarm_logistics_env.policies.spec import (
@@ -35,11 +35,12 @@ __all__ = [
     "known_policies",
     "load",
     "read_card",
+    "write_onnx",
 ]
 
 # Imported when first asked for: an environment needs no policy.
 _HOMES = {
-    "files": {"read_card"},
+    "files": {"read_card", "write_onnx"},
     "learned": {"PolicyCard"},
     "policy": {"Policy", "identity"},
     "spec": {"NAMES", "SUFFIXES", "PolicySpec", "called", "known_policies", "load"},
@@ -48,8 +49,6 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    if name == "write_onnx":
-        raise ImportError("policies.write_onnx was removed in 0.3.0: see examples/export_onnx.py")
     for home, names in _HOMES.items():
         if name in names:
             return getattr(importlib.import_module(f"{__name__}.{home}"), name)

@@ -1,7 +1,7 @@
-"""Files of trained policies, in two formats.
+"""Files of trained policies, in three formats.
 
-Safetensors with the card as JSON in the header execute nothing. Models that stable-baselines3
-saved execute the code in them when they are read.
+Safetensors with the card as JSON in the header execute nothing. ONNX is for robots and programs
+without Python. Models that stable-baselines3 saved execute the code in them when they are read.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.errors import PolicyError, how_to_install
+from swarm_logistics_env.motion.frame import LEAD, OUTPUTS
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
+from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.scenario import Scenario
 
@@ -82,6 +84,71 @@ def write_policy(path: Path, card: PolicyCard, tensors: Mapping[str, NDArray[np.
     )
     with becoming(path, PolicyError) as part:
         part.write_bytes(content)
+
+
+# Both are old enough for the runtimes of 2022.
+OPERATORS, FORMAT = 17, 8
+DEVIATIONS = "deviations"  # in the metadata
+
+
+def write_onnx(policy: Policy, path: Path | str) -> None:
+    """Write the network of a trained policy as an ONNX file.
+
+    Its input "inputs" is float32 (robots, inputs), in the order of its card; its output "outputs"
+    is float32 (robots, 3), `motion.OUTPUTS`. What makes inputs of observations and a memory, and
+    commands of outputs, is `motion.MotionView`; docs/training.md has an example. The metadata hold
+    the card, and as "deviations" three numbers: the standard deviations of the noise that is added
+    to the outputs at each step, zeros for a policy that does not explore.
+
+    Args:
+        policy: a trained one, as `policies.load("ppo-delivery")`.
+        path: of the file, which is replaced.
+
+    Raises:
+        PolicyError: the policy is no trained one, the package onnx is missing, or the file cannot
+            be written.
+    """
+    if not isinstance(policy, LearnedPolicy):
+        raise PolicyError(
+            f"policy = {type(policy).__name__}: should be a trained one, as "
+            'policies.load("ppo-delivery") returns, since scripts have no network'
+        )
+    try:
+        from onnx import TensorProto, checker, helper, numpy_helper
+    except ModuleNotFoundError as error:
+        raise PolicyError(
+            f"to write ONNX needs the package onnx ({error}): {how_to_install('onnx')}"
+        ) from error
+    network, tensors = policy.card.network, dict(policy.tensors)
+    deviations = tensors.pop(DEVIATIONS) * np.float32(network.exploration)
+    if not network.listens:
+        # Such a policy reads zeros there. Without their weights it may be given anything.
+        tensors["layers.0.weight"] = tensors["layers.0.weight"].copy()
+        tensors["layers.0.weight"][:, LEAD] = 0.0
+    nodes, at = [], "inputs"
+    for layer in range(len(network.hidden) + 1):
+        is_last = layer == len(network.hidden)
+        weight, bias = f"layers.{layer}.weight", f"layers.{layer}.bias"
+        total = "outputs" if is_last else f"layers.{layer}.sum"
+        nodes.append(helper.make_node("Gemm", [at, weight, bias], [total], transB=1))
+        if not is_last:
+            at = f"layers.{layer}.out"
+            nodes.append(helper.make_node("Tanh", [total], [at]))
+    real = TensorProto.FLOAT
+    graph = helper.make_graph(
+        nodes,
+        policy.card.name,
+        [helper.make_tensor_value_info("inputs", real, ["robots", len(network.inputs)])],
+        [helper.make_tensor_value_info("outputs", real, ["robots", len(OUTPUTS)])],
+        [numpy_helper.from_array(np.ascontiguousarray(t), n) for n, t in tensors.items()],
+    )
+    version = helper.make_opsetid("", OPERATORS)
+    model = helper.make_model(graph, opset_imports=[version], ir_version=FORMAT)
+    about = {CARD: policy.card.to_json(), DEVIATIONS: " ".join(map(str, deviations.tolist()))}
+    helper.set_model_props(model, about)
+    checker.check_model(model)
+    with becoming(Path(path), PolicyError) as part:
+        part.write_bytes(model.SerializeToString())
 
 
 SB3_SUFFIX = ".zip"

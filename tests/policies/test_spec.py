@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_logistics_env import Scenario, Warehouse, policies, run_episode
+from swarm_logistics_env import Scenario, Warehouse, run_episode
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.policies import NAMES, Policy, load
@@ -46,11 +46,6 @@ def test_what_is_no_policy_is_refused_with_the_reason(
 ) -> None:
     with pytest.raises(PolicyError, match=complaint):
         load(name, **parameters)  # type: ignore[arg-type]  # none of them is called trust_code
-
-
-def test_what_was_removed_says_where_it_went() -> None:
-    with pytest.raises(ImportError, match=r"removed in 0.3.0: see examples/export_onnx.py"):
-        policies.write_onnx  # noqa: B018 - it raises
 
 
 def fresh(name: str, n_robots: int) -> Any:

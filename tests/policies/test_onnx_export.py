@@ -1,0 +1,65 @@
+"""Trained policies as ONNX files."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Scenario, Warehouse, policies
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.motion import INPUTS, MotionView
+from swarm_logistics_env.policies import PolicyCard
+from swarm_logistics_env.policies.files import CARD, DEVIATIONS, write_onnx
+from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy
+from swarm_logistics_env.streams import row_keys
+
+
+def session_of(policy: Any, path: Path) -> Any:
+    onnxruntime = pytest.importorskip("onnxruntime")
+    write_onnx(policy, path)
+    return onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+
+
+def test_scripts_and_a_missing_package_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(PolicyError, match="policy = SwarmDT: should be a trained one"):
+        write_onnx(policies.load("swarm-dt"), tmp_path / "p.onnx")
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    with pytest.raises(PolicyError, match=r"pip install -c constraints.txt '.\[onnx\]'"):
+        write_onnx(policies.load("ppo-delivery"), tmp_path / "p.onnx")
+
+
+def test_it_says_what_the_network_says_on_every_row_of_an_episode(tmp_path: Path) -> None:
+    policy: Any = policies.load("ppo-delivery")
+    session = session_of(policy, tmp_path / "p.onnx")
+    about = session.get_modelmeta().custom_metadata_map
+    assert PolicyCard.from_json(about[CARD]) == policy.card
+    noise = policy.tensors["deviations"] * np.float32(policy.card.network.exploration)
+    assert about[DEVIATIONS].split() == list(map(str, noise.tolist()))
+    world = Warehouse(Scenario(n_robots=25, duration=20.0))
+    rows, frame = world.reset(3), MotionView(world.scenario)
+    frame.begin(row_keys(3, STREAM, 25))
+    while not world.is_over_time:
+        inputs = frame.read(rows)
+        [said] = session.run(None, {"inputs": inputs})
+        np.testing.assert_allclose(said, policy.outputs_of(inputs), rtol=0, atol=1e-5)
+        rows = world.step(frame.command(said))
+
+
+def test_one_that_does_not_listen_ignores_timers(
+    card: PolicyCard, tensors: dict[str, NDArray[np.float32]], tmp_path: Path
+) -> None:
+    deaf = card.replace(network=card.network.replace(listens=False))
+    session = session_of(LearnedPolicy(deaf, tensors), tmp_path / "p.onnx")
+    rng = np.random.default_rng(0)
+    inputs = rng.normal(size=(5, len(INPUTS))).astype(np.float32)
+    told = inputs.copy()
+    lead = [place for place, name in enumerate(INPUTS) if name.startswith("lead_")]
+    told[:, lead] = rng.normal(size=(5, len(lead)))
+    np.testing.assert_array_equal(*(session.run(None, {"inputs": x})[0] for x in (inputs, told)))
