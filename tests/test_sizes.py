@@ -44,7 +44,7 @@ def test_no_two_modules_have_one_name() -> None:
 ROOT = PACKAGE.parent
 MOST = {
     "lines of code of the package": 16_210,
-    "tokens of the package": 147_400,
+    "tokens of the package": 147_430,
     "files of the package": 124,
     "lines of code of studies and report": 3_610,
     "lines of tests": 14_540,

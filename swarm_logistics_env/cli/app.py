@@ -54,7 +54,7 @@ class Application:
         # so that its modules hide no installed ones.
         if "" not in sys.path:
             sys.path.append("")
-        typed = arguments or ["--help"]
+        typed = [*arguments, "--help"] if arguments in ([], ["study"]) else arguments
         try:
             command = command_line({*typed[:1]} & {*COMMANDS} or COMMANDS)
             # What made a file is recorded in it: the command line is the context's object.

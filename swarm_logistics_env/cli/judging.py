@@ -109,11 +109,11 @@ def judge_command(
     full: FullOption = False,
     trust_code: TrustOption = False,
 ) -> None:
-    """Judge trials of real robots or of another simulator; or a policy, until it is clear.
+    """Judge a policy until its verdicts are clear, or recorded trials.
 
-    Columns of trials are robots, fault, faulty and delivered (or performance); where they apply
-    seed, policy, onset and any parameter; or time, with a delivery a row. Without seeds the study
-    is unpaired.
+    Trials are of real robots or of another simulator. Their columns are robots, fault, faulty and
+    delivered (or performance); where they apply seed, policy, onset and any parameter; or time,
+    with a delivery a row. Without seeds the study is unpaired.
 
     A policy is played in a warehouse in which delivered items come back, so that P has no cap.
     """
@@ -252,9 +252,10 @@ def attack_command(
     ] = None,
     processes: ProcessesOption = None,
 ) -> None:
-    """Search for the fault that costs most: mode, role at the onset, time and duration.
+    """Search for the fault that costs most.
 
-    What it finds bounds the worst fault from one side: there may be worse ones.
+    It tries modes, roles at the onset, times and durations. What it finds bounds the worst fault
+    from one side: there may be worse ones.
     """
     from swarm_logistics_env.attack import MODES, Attack, attack
 

@@ -65,7 +65,7 @@ def run_command(
     speed: Annotated[float, Option(help="How many times real time the film plays.")] = 4.0,
     trust_code: TrustOption = False,
 ) -> None:
-    """Play one episode and print what it delivered, or write it as a film."""
+    """Play one episode and print what it delivered, or write a film."""
     scenario = scenario_of(preset, scenario_file, changes)
     scheduled = faults_of(faults, scenario)
     names = policies or ["swarm-dt"]
@@ -131,7 +131,7 @@ def watch_command(
     ] = None,
     trust_code: TrustOption = False,
 ) -> None:
-    """Watch two runs side by side in the browser; inspect, break and repair robots."""
+    """Watch two runs in the browser; inspect, break and repair robots."""
     import webbrowser
 
     from swarm_logistics_env.watch import Session
@@ -205,7 +205,7 @@ def list_command(
         bool, Option("--json", help="Of a scenario: JSON, which --scenario reads.")
     ] = False,
 ) -> None:
-    """List policies, trainings, failure modes, studies, or the conditions of a scenario."""
+    """List policies, trainings, failure modes, studies or a scenario."""
     from swarm_logistics_env.studies import Study
     from swarm_logistics_env.studies.presets import PRESETS
 

@@ -99,7 +99,7 @@ def run_command(
     full: FullOption = False,
     trust_code: TrustOption = False,
 ) -> None:
-    """Play the runs that are missing, then print the answer and write the report."""
+    """Play what is missing, print the answer, write the report."""
     part = Shard.parse(shard) if shard else None
     if until_clear and seeds is None:
         seeds = MOST_SEEDS
@@ -184,7 +184,7 @@ def plan_command(
     ] = None,
     trust_code: TrustOption = False,
 ) -> None:
-    """Print the conditions and count the runs; of a study that was run, the seeds that it needs."""
+    """Print the conditions and count the runs. Of a study that was run: the seeds it needs."""
     if Path(asked).is_dir():
         if policies:
             raise StudyError("--policy: a study that was run has its own policies")
@@ -206,7 +206,7 @@ def plan_command(
 def report_command(
     directory: DirectoryArgument, full: FullOption = False, trust_code: TrustOption = False
 ) -> None:
-    """Print the answer and write the report of a study again, from its store alone."""
+    """Print the answer and write the report again. Nothing is played."""
     stored = Study.stored(directory, trust_code=trust_code)
     say(str(stored.plan()))
     echo()
@@ -229,7 +229,7 @@ def compare_command(
     ] = None,
     trust_code: TrustOption = False,
 ) -> None:
-    """Compare two studies, condition by condition; end with 1 if a gate fails."""
+    """Compare two studies by condition; end with 1 if a gate fails."""
     gates = [Gate.parse(text) for text in fail_if or []]
     before, after = (
         Study.stored(directory, trust_code=trust_code).findings() for directory in (old, new)
@@ -274,7 +274,7 @@ def merge_command(
 def export_command(
     directory: DirectoryArgument, to: Annotated[Path, Option(help="File to write, .csv.")]
 ) -> None:
-    """Write every stored run as one row, sorted by key, without wall times."""
+    """Write every stored run as one row, sorted by key. Wall times are left out."""
     with Runs.existing(directory) as runs:
         count, digest = export(runs, to)
     echo(f"{count} runs in {to}, SHA-256 {digest}")

@@ -171,7 +171,8 @@ class PolicySpec(Record):
     def trainings(self) -> tuple[Self, ...]:
         """The trainings that its name stands for, see `trainings_of`; empty: it is one policy."""
         return tuple(
-            type(self)(name=name, trusted=self.trusted) for name in trainings_of(self.name)
+            type(self)(name=name, parameters=self.parameters, trusted=self.trusted)
+            for name in trainings_of(self.name)
         )
 
     @property

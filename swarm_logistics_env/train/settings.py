@@ -101,13 +101,14 @@ class Indicators(Part):
     """Indicators as the reward: arguments of `wrappers.IndicatorReward`.
 
     Args:
-        weights: "R", "FT", "S", "A" and "P" with their weights.
+        weights: "R", "A" and "P" with their weights. FT and S need the P of other swarms as well:
+            give them to `wrappers.IndicatorReward` in a loop of your own.
         references: P_o of the policy to improve on [items].
         credit: the robots that are paid for a delivery: "team" or "deliverer".
         constant: whether to pay an indicator's constant.
     """
 
-    weights: Annotated[dict[str, float], Field(min_length=1)]
+    weights: Annotated[dict[Literal["R", "A", "P"], float], Field(min_length=1)]
     references: PositiveFloat
     credit: Literal["team", "deliverer"] = "team"
     constant: bool = True

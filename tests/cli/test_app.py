@@ -75,6 +75,9 @@ def test_a_help_page_shows_each_help_text_in_full(
     for text in [parsed.help, *(getattr(one, "help", "") for one in parsed.params)]:
         assert "".join((text or "").split()) in page
     assert words != ["study", "run", "--help"] or ",".join(PRESETS) in page
+    is_group = hasattr(parsed, "commands")  # in which no command's sentence is cut
+    assert not is_group or page.count("...") == 1
+    assert words != ["study", "--help"] or page == "".join(command("study").split())
 
 
 OWN = """

@@ -24,7 +24,7 @@ from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
 from swarm_logistics_env.train.evaluation import versions
 from swarm_logistics_env.train.learner import KNOWN, NetworkView, make_learner, tensors_of
-from swarm_logistics_env.train.settings import Indicators, Scores
+from swarm_logistics_env.train.settings import Scores
 from swarm_logistics_env.train.trainer import train
 
 
@@ -142,7 +142,6 @@ def test_a_policy_follows_from_its_seed_whatever_callbacks_see_or_stop(
     [
         ({}, "gpu", r"device = 'gpu': should be left out or one of \['cpu'\] here"),
         ({}, "cuda", r"device = 'cuda': should be left out or one of \['cpu'\] here"),
-        ({"indicators": Indicators(weights={"Q": 1.0}, references=9.0)}, "cpu", "no indicator 'Q'"),
     ],
 )
 def test_nothing_is_begun_that_cannot_be(
