@@ -51,7 +51,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Measure coverage with the tests that mirror the package: it takes a quarter of the time."""
+    """Measure coverage with the tests that mirror the package alone: measured ones are slower."""
     with contextlib.nullcontext() if mirrors(item.path) else _uncovered():
         return (yield)
 

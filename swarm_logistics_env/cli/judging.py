@@ -237,7 +237,8 @@ def _show_benchmark(results: StudyResults, out: Path) -> None:
 
 def attack_command(
     policy: Annotated[
-        str, Argument(metavar="POLICY", help="Name, path of a file, module:Class or my.py:Class.")
+        str,
+        Argument(metavar="POLICY", help="Name, .safetensors file, module:Class or my.py:Class."),
     ],
     robots: Annotated[int, Option(min=1, help="How many robots fail.")] = 2,
     modes: Annotated[Repeated, Option("--mode", help="Mode to search; may be repeated.")] = None,

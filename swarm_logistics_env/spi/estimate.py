@@ -55,8 +55,8 @@ SIGNS = {
 class Estimate:
     """One indicator over n seeds: theta = mean(num) / mean(den) + offset, with its judgement.
 
-    Everything but `value` and the description of the input is None at n = 1, and where
-    the runs compared are the same runs.
+    Everything but `value` and the description of the input is None at n = 1; where the runs
+    compared are the same runs, `low` and `high` are `value`, and there is no p.
 
     Attributes:
         indicator: Which indicator this is.

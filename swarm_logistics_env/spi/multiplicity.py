@@ -148,7 +148,8 @@ def _simpson(points: Numbers) -> Numbers:
 class FaultBudget(NamedTuple):
     """Robots that may fail by one mode, and the m that ended the search.
 
-    `limit` is None where every m tested was supported: the budget is then a lower bound.
+    At `limit` R > 0 is not supported: refuted, open or not tested. It is None where every m up to
+    the largest was supported. The budget is a lower bound but where R is refuted at `limit`.
     """
 
     robots: int

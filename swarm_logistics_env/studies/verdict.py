@@ -147,7 +147,7 @@ class Verdict:
         equivalence: whether P is unchanged; None: blocked, or not asked.
         saturated: whether it rests on a P that is capped.
         margin: the largest change that counts as none, as a share of P_o.
-        p_holm, verdict_holm: of the estimate under Holm; None: unaffected, or blocked family.
+        p_holm, verdict_holm: of the estimate under Holm; None: unaffected, blocked family, or no p.
         equivalence_holm: verdict of the equivalence under Holm; None as `equivalence`.
         stopped_at: number of seeds at which it was clear, in a study that runs until then; None: it
             is not, or the study is another.

@@ -101,8 +101,9 @@ class Indicators(Part):
     """Indicators as the reward: arguments of `wrappers.IndicatorReward`.
 
     Args:
-        weights: "R", "A" and "P" with their weights. FT and S need the P of other swarms as well:
-            give them to `wrappers.IndicatorReward` in a loop of your own.
+        weights: "R", "A" and "P" with their weights. FT needs P of a smaller swarm too, and S a
+            swarm that grows: give them to `wrappers.IndicatorReward` in a loop of your own. A is
+            of episodes in which one parameter differs.
         references: P_o of the policy to improve on [items].
         credit: the robots that are paid for a delivery: "team" or "deliverer".
         constant: whether to pay an indicator's constant.

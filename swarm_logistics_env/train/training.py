@@ -51,9 +51,8 @@ class Training(Part):
             result depends on it.
         seed: the number that decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
-        rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`. With `indicators` it is
-            added to them.
-        indicators: the indicators that are paid instead of the task reward; none: the task reward.
+        rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`.
+        indicators: the indicators that are paid beside the task reward; none: the task reward.
         conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
         ppo: settings of the learner.

@@ -93,10 +93,10 @@ class Capabilities(NamedTuple):
     max_turn_rate: Annotated[Numbers, "N"]  # [rad/s]
     ranger_range: Annotated[Numbers, "N"]  # [m], 0 when blind
     view_range: Annotated[Numbers, "N"]  # [m]
-    lifts: Annotated[Flags, "N"]
-    delivers: Annotated[Flags, "N"]
-    sends: Annotated[Flags, "N"]
-    hears: Annotated[Flags, "N"]
+    lifts: Annotated[Flags, "N"]  # False: takes up no item
+    delivers: Annotated[Flags, "N"]  # False: nothing that it brings counts
+    sends: Annotated[Flags, "N"]  # False: nobody hears its timer and message
+    hears: Annotated[Flags, "N"]  # False: it hears no timer and no message
     honest: Annotated[Flags, "N"]  # False: tells timer 0 always
     obeys: Annotated[Flags, "N"]  # False: ignores its commands, the gripper's too
     releases_inside: Annotated[Flags, "N"]  # False: lets nothing go inside the delivery area

@@ -95,7 +95,7 @@ class Warehouse:
                 (N, 4 + M): the message to broadcast, zeros if left out.
 
         Returns:
-            Observations (N, D) float32, an array of the caller's own.
+            Observations (N, D) float32, a new array, which `observe` returns too: change a copy.
 
         Raises:
             CommandError: wrong shape, not numbers, or not finite; the world is as it was.

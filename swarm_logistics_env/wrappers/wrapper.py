@@ -107,9 +107,10 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
     """An environment around an environment, which changes nothing; a base for subclasses.
 
     A subclass overrides `plan`, which decides the conditions of an episode, `begun`,
-    `before_step`, `after_step`, or the array methods; the dict methods call these. All other
-    attributes are the wrapped environment's. `SwarmVecEnv` steps its worlds in threads only if
-    no wrapper overrides `step_arrays`.
+    `before_step`, `after_step`, or the array methods; the dict methods call these. One that
+    changes observations overrides `reset_arrays` beside `after_step`, and changes a copy. All
+    other attributes are the wrapped environment's. `SwarmVecEnv` steps its worlds in threads
+    only if no wrapper overrides `step_arrays`.
 
     Args:
         env: a `SwarmLogisticsEnv` or a wrapper of one.
