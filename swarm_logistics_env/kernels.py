@@ -237,7 +237,7 @@ class _Report:
 def _warn_of_no_cache() -> None:
     warnings.warn(
         "compiled code can be kept nowhere, so every process compiles for itself, which takes "
-        "about 13 seconds: set NUMBA_CACHE_DIR to a folder that can be written",
+        "up to 15 seconds: set NUMBA_CACHE_DIR to a folder that can be written",
         stacklevel=8,
     )
 

@@ -1,7 +1,7 @@
 """The four Swarm Performance Indicators, the relative change, and a table with a row of each.
 
-Plan, tests, gates, wording, figures, rewards and help texts read the table. A new indicator is a
-function and a row.
+Plan, tests, gates, wording, figures and help texts read the table. A new indicator is a function
+and a row; what `IndicatorReward` pays for is in `wrappers.indicator_payments.comparison`.
 """
 
 from __future__ import annotations

@@ -112,7 +112,7 @@ class _Family:
         self._runs, self._open = runs, list(members)
         self._found: dict[Comparison, Verdict] = {}
         for n_seeds in runs.looks:
-            # A failed run blocks a comparison for good: it stays in the family and gets no seeds.
+            # A failed run blocks a comparison in this call: it stays in the family, without seeds.
             playing = [c for c in self._open if c not in self._found or self._found[c].estimate]
             self.wanted = runs.missing([arm.case for c in playing for arm in c.arms], n_seeds)
             if not (self.wanted and self._found):

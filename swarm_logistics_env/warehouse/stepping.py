@@ -54,6 +54,9 @@ def remove(address: int, robot: int) -> None:
 def step(address: int, rows: Sensed) -> bool:
     """Take a control step in the world at `address` and fill the observation rows (N, D).
 
+    In this order: robots are driven and moved, messages sent, items carried, put down, lifted and
+    delivered, then all is sensed; if faults begin or end, `Warehouse.take` senses after them.
+
     Returns whether there is something to tell: a delivery, faults that begin or end, no room for
     an item, a full log, the end of the time or of the requests, a change before the step, or a
     command that is refused, which leaves the world as it was.
