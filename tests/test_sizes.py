@@ -47,7 +47,7 @@ MOST = {
     "tokens of the package": 147_430,
     "files of the package": 124,
     "lines of code of studies and report": 3_610,
-    "lines of tests": 14_540,
+    "lines of tests": 14_545,
     "lines of verification, benchmarks, interop and the scripts of docs": 4_700,
     "lines of studies, report and tasks with Any, cast, object or type: ignore": 25,
 }

@@ -101,6 +101,11 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     tables.main()
     assert page.read_text() == first
     assert played == [0] * 11
+    # Nor does what is played anew change a digit.
+    monkeypatch.setattr(tables, "OUT", tmp_path / "anew")
+    tables.main()
+    assert page.read_text() == first
+    assert sum(played) > 20
 
 
 def test_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> None:
