@@ -19,9 +19,6 @@ PARTS = {"swarm-dt": 20, "ppo-delivery": 5}
 class Mixed:
     def __init__(self):
         self.parts: list[Any] = [policies.load(name) for name in PARTS]
-        # What tells this policy from others of its class, in a study that goes on.
-        own = [policies.identity(part) for part in self.parts]
-        self.parameters = {"parts": list(zip(PARTS.values(), own))}
 
     def configure(self, scenario):
         for part in self.parts:

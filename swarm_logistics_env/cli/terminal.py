@@ -120,6 +120,8 @@ def say_what_was_played(tally: Tally) -> None:
     """Print how many runs were played, in which time, and what failed."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
     why = f", the first with {plain(tally.error)}" if tally.error else ""
+    for change in tally.changes:
+        say(f"Runs that were stored before do not count: {change}.")
     say(
         f"{tally.played} runs played in {tally.seconds:.1f} s{rate}; {tally.kept} were kept from "
         f"before; {tally.failed} failed{why}"

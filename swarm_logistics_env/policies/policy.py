@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-import ast
-import contextlib
-import functools
-import hashlib
-import inspect
-import json
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -17,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.fingerprint import PACKAGE, fingerprint
+from swarm_logistics_env.records import Record, canonical_json
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
@@ -103,140 +97,32 @@ def mask_unreachable_commands(commands: NDArray[Any], state: WarehouseState) -> 
     return masked
 
 
-OWN_PACKAGE = __name__.partition(".")[0]
-# These hold messages and validation, so that they decide nothing that a policy does. The package
-# itself imports all that it offers, whatever a policy uses of it.
-WITHOUT_BEHAVIOUR = frozenset({OWN_PACKAGE, f"{OWN_PACKAGE}.errors", f"{OWN_PACKAGE}.records"})
-
-
 def identity(policy: Policy) -> str:
     """Return text that changes whenever the policy's behaviour may have changed.
 
-    It is the policy's own attribute `identity` if it has one. Otherwise it names the class, its
-    `parameters`, and a digest of the code (see `code_digest`).
+    It is the policy's own attribute `identity` if it has one. Otherwise it is the JSON of
+    `identity_parts`. Ask for it before the policy's first episode.
     """
-    own = getattr(policy, "identity", None)
-    if own is not None:
-        return str(own)
+    parts = identity_parts(policy)
+    return str(parts["identity"]) if "identity" in parts else canonical_json(parts)
+
+
+def identity_parts(policy: Policy, files: Iterable[Path] = ()) -> dict[str, Any]:
+    """Return what identifies a policy, by name.
+
+    Of a policy of this package that is its class and its `parameters`, as a task's code version
+    tells the rest; of any other one its class and its `fingerprint`.
+
+    Args:
+        files: Python files that it was loaded from.
+    """
+    stated = getattr(policy, "identity", None)
+    if stated is not None:
+        return {"identity": str(stated)}
     kind = type(policy)
+    if kind.__module__.partition(".")[0] != PACKAGE.name:
+        return {"class": kind.__qualname__, **fingerprint(policy, files)}
     parameters: Any = getattr(policy, "parameters", {})
     if isinstance(parameters, Record):
         parameters = parameters.model_dump(mode="json")
-    return json.dumps(
-        {
-            "class": f"{kind.__module__}:{kind.__qualname__}",
-            "parameters": parameters,
-            "source": code_digest(kind),
-        },
-        sort_keys=True,
-        default=repr,
-    )
-
-
-@functools.cache
-def code_digest(*kinds: type) -> str:
-    """Return 16 hexadecimal digits that change with the code which classes use.
-
-    That code is the modules of `modules_used`. Docstrings, lines that only comment and blank lines
-    do not count. The digest is empty if the source of no class can be found.
-    """
-    return _digest(modules_used(*kinds))
-
-
-def modules_used(*kinds: type) -> dict[str, Path]:
-    """Return name and file of the modules of classes and of their base classes.
-
-    Whatever these import from their own package and from this one, directly or not, is among them.
-    """
-    used: dict[str, Path] = {}
-    for kind in kinds:
-        packages = {OWN_PACKAGE, kind.__module__.partition(".")[0]}
-        for base in kind.__mro__:
-            if base.__module__.partition(".")[0] in packages:
-                _begin(base, packages, used)
-    return used
-
-
-def function_digest(function: object) -> str:
-    """Return 16 hexadecimal digits that change with the module of a function.
-
-    Whatever that module imports from its own package counts as well, unless this is the package.
-    An object that is no function has the module of its class. Empty if there is no source.
-    """
-    found: Any = getattr(function, "func", function)  # functools.partial
-    if not (inspect.isroutine(found) or inspect.isclass(found)):
-        found = type(found)
-    used: dict[str, Path] = {}
-    _begin(found, {str(found.__module__).partition(".")[0]} - {OWN_PACKAGE}, used)
-    return _digest(used)
-
-
-def _digest(used: dict[str, Path]) -> str:
-    digest = hashlib.sha256()
-    for name, path in sorted(used.items()):
-        content = path.read_bytes()
-        if path.suffix == ".py":
-            content = without_prose(content.decode()).encode()
-        digest.update(name.encode() + b"\0" + content + b"\0")
-    return digest.hexdigest()[:16] if used else ""
-
-
-def without_prose(source: str) -> str:
-    """Return Python source without docstrings, lines that only comment, and blank lines."""
-    prose: set[int] = set()
-    for node in ast.walk(ast.parse(source)):
-        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-            continue
-        if ast.get_docstring(node, clean=False) is not None:
-            first = node.body[0]
-            prose.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
-    lines = enumerate(source.splitlines(), start=1)
-    return "\n".join(
-        line.rstrip()
-        for number, line in lines
-        if number not in prose and line.strip() and not line.lstrip().startswith("#")
-    )
-
-
-def _begin(found: Any, packages: set[str], used: dict[str, Path]) -> None:
-    """Add the module of a class or function to `used`, if it has one, and those that it imports."""
-    with contextlib.suppress(TypeError, OSError):  # typed into an interpreter
-        _follow(found.__module__, Path(inspect.getfile(found)), packages, used)
-
-
-def _follow(name: str, path: Path, packages: set[str], used: dict[str, Path]) -> None:
-    """Add a module to `used`, and those of `packages` that it imports."""
-    used[name] = path
-    if path.suffix != ".py":
-        return
-    parent = name if path.name == "__init__.py" else name.rpartition(".")[0]
-    for imported in _imported(ast.parse(path.read_text(encoding="utf-8")), parent):
-        # What is imported may be a module, or something in the module that is named before it.
-        for module in (imported, imported.rpartition(".")[0]):
-            found = _file_of(module) if module.partition(".")[0] in packages else None
-            if found is not None:
-                if module not in used and module not in WITHOUT_BEHAVIOUR:
-                    _follow(module, found, packages, used)
-                break
-
-
-def _imported(tree: ast.AST, parent: str) -> Iterator[str]:
-    """Return the full name of everything that is imported anywhere in a module of `parent`."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            above = parent.split(".")[: 1 - node.level or None] if node.level else []
-            base = ".".join([*above, node.module] if node.module else above)
-            yield from (f"{base}.{alias.name}" for alias in node.names)
-
-
-def _file_of(module: str) -> Path | None:
-    """Return the file of a module whose package is loaded; None if there is none."""
-    package, *rest = module.split(".")
-    for folder in getattr(sys.modules.get(package), "__path__", ()):
-        place = Path(folder, *rest)
-        for file in (place / "__init__.py", place.with_suffix(".py")):
-            if file.is_file():
-                return file
-    return None
+    return {"class": f"{kind.__module__}:{kind.__qualname__}", "parameters": parameters}

@@ -9,7 +9,7 @@ import inspect
 import json
 import operator
 import re
-import sys
+import uuid
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -19,8 +19,10 @@ from typing import Any, Self
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.fingerprint import UNSTABLE, changed_files, changes
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
+from swarm_logistics_env.policies.code_files import file_of_module, import_file
 from swarm_logistics_env.policies.files import (
     SB3_SUFFIX,
     SUFFIX,
@@ -31,7 +33,7 @@ from swarm_logistics_env.policies.files import (
 )
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
-from swarm_logistics_env.policies.policy import Policy, check_policy, identity
+from swarm_logistics_env.policies.policy import Policy, check_policy, identity_parts
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.records import Record, canonical_json
 
@@ -170,10 +172,11 @@ class PolicySpec(Record):
     @property
     def trainings(self) -> tuple[Self, ...]:
         """The trainings that its name stands for, see `trainings_of`; empty: it is one policy."""
-        return tuple(
-            type(self)(name=name, parameters=self.parameters, trusted=self.trusted)
-            for name in trainings_of(self.name)
-        )
+        return tuple(map(self.training, trainings_of(self.name)))
+
+    def training(self, name: str) -> Self:
+        """Return the training of that name."""
+        return type(self)(name=name, parameters=self.parameters, trusted=self.trusted)
 
     @property
     def is_text(self) -> bool:
@@ -186,62 +189,101 @@ class PolicySpec(Record):
         """Whether to load it runs code that its name leads to, so that somebody has to trust it."""
         return self.made is None and (":" in self.name or self.name.endswith(SB3_SUFFIX))
 
-    def load(self, makers: Makers = NO_MAKERS) -> Policy:
-        """Return the policy as no run has used it: an object is copied, a file read once.
+    def load(self, makers: Makers = NO_MAKERS, planned: str | None = None) -> Policy:
+        """Return the policy as no run has used it: an object is copied, a file read once a plan.
 
         Args:
             makers: what makes the policies that a task knows by name; none for the warehouse, to
                 which `NAMES` belong.
+            planned: the identity that it had when its runs were planned; None: whatever it is.
 
         Raises:
-            PolicyError: it cannot be found or built.
+            PolicyError: it cannot be found or built, or is not what was planned.
         """
-        found: Policy
         if self.made is None and self.name in makers:
-            try:
-                found = makers[self.name](**self.parameters)
-            except TypeError as error:
-                raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
-            return found
-        if self.made is not None:
-            if not makers:
-                check_policy(self.made)
-            found = self.made
-        elif makers and self.name in NAMES:
-            raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
-        elif makers and self.name.endswith(SB3_SUFFIX):
-            _filed(self.name, self.trusted)  # refuses what nobody trusts
-            found = _model(Path(self.name))
-        else:
-            found = _loaded(self.name, canonical_json(self.parameters), self.trusted)
+            return self._make(makers)
+        policy = self._make(makers) if planned is None else self._as_planned(makers, planned)
         try:
-            return copy.deepcopy(found)
+            return copy.deepcopy(policy)
         except Exception as error:  # of code that is not ours
             raise PolicyError(
                 f"policy {self.name!r} cannot be copied ({type(error).__name__}): should keep "
                 "arrays, not an environment, as each run gets a copy"
             ) from error
 
+    def _as_planned(self, makers: Makers, planned: str) -> Policy:
+        if self.made is not None:
+            # Its class may have come to this process by its content; files of it are read here.
+            if files := changed_files(planned, self._identity_of(self.made)):
+                raise self._other_than_planned(f"{', '.join(files)} changed")
+            return self._make(makers)
+        key = (self.name, canonical_json(self.parameters), planned)
+        if key not in _planned_policies:
+            _planned_policies[key] = self.refuse_other(planned, makers)
+        return _planned_policies[key]
+
+    def refuse_other(self, planned: str, makers: Makers = NO_MAKERS) -> Policy:
+        """Return the policy as it is made now, which has to be the one that was planned.
+
+        Raises:
+            PolicyError: it cannot be found or built, or has another identity than `planned`.
+        """
+        policy = self._make(makers)
+        if change := changes(planned, self._identity_of(policy)):
+            raise self._other_than_planned(change)
+        return policy
+
+    def _other_than_planned(self, change: str) -> PolicyError:
+        return PolicyError(
+            f"policy {self.title!r} is not what was planned: {change}; start the study anew"
+        )
+
+    def _make(self, makers: Makers) -> Policy:
+        """Return the policy as its text or its maker says now."""
+        if self.made is not None:
+            if not makers:
+                check_policy(self.made)
+            made: Policy = self.made
+            return made
+        if self.name in makers:
+            try:
+                made = makers[self.name](**self.parameters)
+            except TypeError as error:
+                raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
+            return made
+        if makers and self.name in NAMES:
+            raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
+        if makers and self.name.endswith(SB3_SUFFIX):
+            _filed(self.name, self.trusted)  # refuses what nobody trusts
+            return StableBaselinesModel(Path(self.name))
+        return load(self.name, trust_code=self.trusted, **self.parameters)
+
     def identity(self, makers: Makers = NO_MAKERS) -> str:
         """Return text that changes whenever the policy's behaviour may have; `makers` as `load`.
 
-        Of several trainings it is a JSON object with that of each by its name.
+        Of several trainings it is a JSON list of their names and identities.
         """
         if self.trainings:
-            return canonical_json({one.name: one.identity(makers) for one in self.trainings})
-        found = identity(self.load(makers))
-        # A class of one's own need not tell its parameters.
-        if not self.parameters:
-            return found
-        return canonical_json({"given": self.parameters, "policy": found})
+            return canonical_json([(one.name, one.identity(makers)) for one in self.trainings])
+        text = self._identity_of(self._make(makers))
+        if self.made is None and text != (again := self._identity_of(self._make(makers))):
+            # What is another one each time cannot be compared with what was played before.
+            return canonical_json(json.loads(again) | {"value": UNSTABLE + uuid.uuid4().hex})
+        return text
+
+    def _identity_of(self, policy: Policy) -> str:
+        file = _code_file(self.name) if self.made is None else None
+        parts = identity_parts(policy, [file] if file else ())
+        # Two functions may make objects of one class; a class need not keep its parameters.
+        if self.made is None and ":" in self.name:
+            parts["made by"] = self.name.rpartition(":")[2]
+        if self.parameters:
+            parts["given"] = self.parameters
+        return str(parts["identity"]) if parts.keys() == {"identity"} else canonical_json(parts)
 
 
-_model = functools.lru_cache(maxsize=8)(StableBaselinesModel)
-
-
-@functools.lru_cache(maxsize=8)
-def _loaded(name: str, parameters: str, trusted: bool) -> Policy:
-    return load(name, trust_code=trusted, **json.loads(parameters))
+# By text, parameters and identity: policies that are what was planned, whatever changes later.
+_planned_policies: dict[tuple[str, str, str], Policy] = {}
 
 
 def known_policies() -> Iterator[tuple[str, str, str]]:
@@ -260,7 +302,6 @@ def known_policies() -> Iterator[tuple[str, str, str]]:
 ALL = "@all"
 
 
-@functools.cache
 def trainings_of(name: str) -> tuple[str, ...]:
     """Return the names of all trainings of one recipe: those of "ppo-robust@all", or of files.
 
@@ -319,22 +360,29 @@ def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
     return None
 
 
-def _imported(name: str) -> Callable[..., Policy] | None:
-    module, colon, attribute = name.partition(":")
+def _code_file(name: str) -> Path | None:
+    """Return the user's own Python file that a text names: "my.py:Class" or "module:Class"."""
+    module, colon, _ = name.rpartition(":")
     if not colon:
         return None
-    path = Path(module)
-    if path.suffix == ".py":
-        # A file of this folder or another, in which it finds its neighbours.
-        if (folder := str(path.parent.resolve())) not in sys.path:
-            sys.path.append(folder)
-        module = path.stem
+    return Path(module) if module.endswith(".py") else file_of_module(module)
+
+
+def _imported(name: str) -> Callable[..., Policy] | None:
+    module, colon, attribute = name.rpartition(":")
+    if not colon:
+        return None
     try:
-        found = operator.attrgetter(attribute)(importlib.import_module(module))
+        file = _code_file(name)
+        loaded = importlib.import_module(module) if file is None else import_file(file)
     except Exception as error:  # of code that is not ours, too
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
-    if not callable(found):
-        raise PolicyError(f"policy {name!r} is a {type(found).__name__}: should be a class")
-    made: Callable[..., Policy] = found
-    return made
+    try:
+        maker: Callable[..., Policy] = operator.attrgetter(attribute)(loaded)
+    except AttributeError:
+        meant = suggest(attribute, vars(loaded))
+        raise PolicyError(f"policy {name!r}: {module} has no {attribute}{meant}") from None
+    if not callable(maker):
+        raise PolicyError(f"policy {name!r} is a {type(maker).__name__}: should be a class")
+    return maker

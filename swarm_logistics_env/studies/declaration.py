@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import to_json
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.fingerprint import UNSTABLE, changes
 from swarm_logistics_env.spi.equivalence import MARGIN
 
 from .plan import Origin, Plan
@@ -115,6 +116,17 @@ class StoredStudy(BaseModel):
                 "(finished runs are kept), then it will"
             )
         return found
+
+    def changes(self, plan: Plan) -> Iterator[str]:
+        """Yield sentences on why stored runs are not those of a plan."""
+        if self.code != plan.code:
+            yield f"the code of the task {self.specification.task} changed"
+        for part, before in self.identities.items():
+            now = plan.identities.get(part, before)
+            if UNSTABLE in now:
+                yield f"{part} is another one each time it is made; an `identity` would name it"
+            elif change := changes(before, now):
+                yield f"{part}: {change}"
 
 
 def note(runs: Runs, plan: Plan, declared: Declaration) -> None:

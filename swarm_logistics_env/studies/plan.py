@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, pairwise, product
@@ -215,6 +215,13 @@ def make_plan(
         if one.removed and one.changed.setting.onset
     }
     return Plan(specification, comparisons, code or task.code(), identities, nulls)
+
+
+def refuse_changed_policies(runs: Iterable[Run]) -> None:
+    """Raise PolicyError if the policy of a run is not the one any more that was planned."""
+    cases = {(run.case.policy, run.case.identity): run.case for run in runs}
+    for case in cases.values():
+        case.policy.refuse_other(case.identity, case.task.policies)
 
 
 def _asked(specification: Specification, cases: Sequence[Case]) -> Iterator[Comparison]:

@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
 import traceback
@@ -22,6 +23,8 @@ from functools import partial
 from multiprocessing.connection import Connection
 from types import ModuleType
 from unittest.mock import patch
+
+import cloudpickle
 
 from swarm_logistics_env.errors import StudyError, how_to_install, suggest
 from swarm_logistics_env.kernels import QUIET
@@ -44,6 +47,7 @@ class Tally:
         seconds: wall-clock time [s].
         error: what the first that failed raised, without its traceback; None: none failed.
         left: runs that the time did not suffice for.
+        changes: sentences on why runs that were stored before do not count any more.
     """
 
     played: int
@@ -52,6 +56,7 @@ class Tally:
     seconds: float
     error: str | None = None
     left: int = 0
+    changes: tuple[str, ...] = ()
 
 
 def play(
@@ -166,7 +171,7 @@ def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
     theirs, ours = context.Pipe(duplex=False)
     pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
     try:
-        with patch.dict(os.environ, _ONE_THREAD), _interrupts_ignored():
+        with patch.dict(os.environ, _ONE_THREAD), _without_main(), _interrupts_ignored():
             started = [pool.submit(os.getpid) for _ in range(count)]
         try:
             started[0].result()
@@ -180,6 +185,17 @@ def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
         ours.close()
         pool.shutdown(cancel_futures=True)
         theirs.close()
+
+
+@contextmanager
+def _without_main() -> Generator[None, None, None]:
+    """Start workers that do not execute the main script again: what it defines travels with runs.
+
+    So a script needs no guard, and it may be a notebook or come from standard input.
+    """
+    main = sys.modules["__main__"]
+    with patch.object(main, "__spec__", None), patch.object(main, "__file__", None, create=True):
+        yield
 
 
 def _end_with_parent(connection: Connection) -> None:
@@ -207,14 +223,15 @@ def _interrupts_ignored() -> Generator[None, None, None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _pickled(run: Run, dumps: Callable[[Run], bytes] = pickle.dumps) -> bytes:
+def _pickled(run: Run) -> bytes:
     try:
-        return dumps(run)
+        message: bytes = cloudpickle.dumps(run)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise StudyError(
             f"policy {run.case.policy.title!r} cannot be sent to another process "
             f"({str(error).splitlines()[0]}): use one process"
         ) from error
+    return message
 
 
 def _play(message: bytes) -> Outcome:
@@ -254,7 +271,7 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
         limit = QUEUED_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
         while pending or waiting:
             while waiting and len(pending) < limit:
-                message = _pickled(waiting[0], ray.cloudpickle.dumps)
+                message = _pickled(waiting[0])
                 pending[sent.remote(message)] = waiting.popleft()
             for task in ray.wait(list(pending), num_returns=1)[0]:
                 run = pending.pop(task)

@@ -15,7 +15,7 @@ from swarm_logistics_env.tasks.task import Run, Task, refuse_untrusted
 
 from .declaration import Declaration, StoredStudy, note
 from .importing import imported_plan
-from .plan import Plan, Shard, make_plan
+from .plan import Plan, Shard, make_plan, refuse_changed_policies
 from .play import Engine, Tally, engine_named, play
 from .presets import load_preset
 from .results import CELL_COLUMNS, VERDICT_COLUMNS, StudyResults, frame, judge
@@ -156,11 +156,15 @@ class Study:
         start, left = time.monotonic(), 0
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
+            noted = StoredStudy.of(store)
+            changed = tuple(noted.changes(plan)) if noted and len(store) else ()
             note(store, plan, self._declared(store))
             kept = len({run.key for run in whole} & store.succeeded())
             tried: set[str] = set()
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
+                if not tried:
+                    refuse_changed_policies(missing)
                 finished = play(missing, engine, store, self.specification.name, end)
                 errors += finished
                 tried |= {run.key for run in missing}
@@ -168,7 +172,8 @@ class Study:
                     break
         failed = [error for error in errors if error is not None]
         first = failed[0].strip().splitlines()[-1] if failed else None
-        return Tally(len(errors), len(failed), kept, time.monotonic() - start, first, left)
+        seconds = time.monotonic() - start
+        return Tally(len(errors), len(failed), kept, seconds, first, left, changed)
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs

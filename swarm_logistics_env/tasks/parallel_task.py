@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import uuid
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from importlib.metadata import packages_distributions, version
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -14,9 +14,9 @@ from gymnasium.spaces import flatten
 from pydantic import ConfigDict, PositiveFloat, PositiveInt
 
 from swarm_logistics_env.errors import FaultError, StudyError, suggest
-from swarm_logistics_env.policies.policy import function_digest, without_prose
+from swarm_logistics_env.fingerprint import PACKAGE, UNSTABLE, fingerprint, package_code
 from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.records import Record, canonical_json
 
 from .parallel_policies import (
     Gain,
@@ -25,7 +25,6 @@ from .parallel_policies import (
     agent_actions,
     agents_by_row,
     in_words,
-    name_of,
     observation_rows,
     performance_of,
 )
@@ -42,7 +41,7 @@ from .parallel_wrappers import (
 from .task import Case, Fields, Outcome, TaskScenario, digest_of
 
 # These files decide what a run in somebody else's environment gives.
-ENVIRONMENT_SOURCES = (
+ENVIRONMENT_CODE = (
     "streams.py",
     "tasks/parallel_policies.py",
     "tasks/parallel_task.py",
@@ -124,6 +123,7 @@ class ParallelTask:
         self.name, self._make_env, self._size = name, make_env, size
         self._failures, self._gain = dict(failures), performance
         self._references, self._period = references, period
+        self._nonce = UNSTABLE + uuid.uuid4().hex
         for mode, value in failures.items():
             _check_failure(mode, value)
         if references is not None and references[0] == references[1]:
@@ -146,27 +146,30 @@ class ParallelTask:
     def code(self) -> str:
         """Return a digest of what decides a run: settings, code, and the libraries' versions.
 
-        The code is the modules of the factory, of the performance and of their own package as far
-        as they import it; the libraries are those that the environment's classes come from.
+        The code is the fingerprints of the factory and of the performance; the libraries are those
+        that the environment's classes come from.
         """
-        settings = repr((
-            name_of(self._make_env), self._size, name_of(self._gain), self._references,
-            self._failures, self._period, self.default,
-        ))  # fmt: skip
+        settings = canonical_json([
+            self._fingerprint(self._make_env), self._fingerprint(self._gain), self._size,
+            repr((self._references, self._failures, self._period, self.default)),
+        ])  # fmt: skip
         if settings not in _codes:
-            package = Path(__file__).parents[1]
             with closing(self._made(self.default, ())) as env:
                 classes = type(env.unwrapped).__mro__
             # This package's own code is known by its sources.
-            modules = {kind.__module__.partition(".")[0] for kind in classes} - {package.name}
+            modules = {kind.__module__.partition(".")[0] for kind in classes} - {PACKAGE.name}
             installed = packages_distributions()
             names = sorted({name for module in modules for name in installed.get(module, ())})
             versions = ", ".join(f"{name} {version(name)}" for name in names)
-            sources = ((package / name).read_text("utf-8") for name in ENVIRONMENT_SOURCES)
-            own = function_digest(self._make_env), function_digest(self._gain)
-            digest = digest_of(settings, versions, *own, *map(without_prose, sources))
+            digest = digest_of(settings, versions, package_code(*ENVIRONMENT_CODE))
             _codes[settings] = f"{digest[:16]} ({versions})"
         return _codes[settings]
+
+    def _fingerprint(self, function: Value) -> Value:
+        parts = fingerprint(function)
+        # What cannot be compared is played again by another process, not by this one's workers.
+        is_unstable = parts["value"].startswith(UNSTABLE)
+        return parts | {"value": self._nonce} if is_unstable else parts
 
     def vary(self, base: TaskScenario, fields: Fields) -> ParallelScenario:
         """Return a scenario with some fields changed.
@@ -207,7 +210,7 @@ class ParallelTask:
         # The sets of one seed are nested: the largest holds them all.
         failed = failing_rows(seed, n_robots, max((fault.robots for fault in faults), default=0))
         absent = failed if any(fault.mode == REMOVED for fault in faults) else ()
-        player: Value = case.policy.load(self.policies)
+        player: Value = case.policy.load(self.policies, case.identity)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
         with closing(self._made(scenario, absent)) as env:

@@ -222,11 +222,13 @@ class Case:
     @cached_property
     def trainings(self) -> tuple[Case, ...]:
         """The case of each training of its policy; this one alone if that is one policy."""
-        several = self.policy.trainings
-        if not several:
+        if not self.policy.trainings:
             return (self,)
-        identities = json.loads(self.identity)
-        return tuple(replace(self, policy=one, identity=identities[one.name]) for one in several)
+        # Those that were planned; more files of such names may be there by now.
+        return tuple(
+            replace(self, policy=self.policy.training(name), identity=identity)
+            for name, identity in json.loads(self.identity)
+        )
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from swarm_logistics_env.episode import Play, run_episode
+from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.errors import ScenarioError, StudyError
-from swarm_logistics_env.policies.policy import code_digest
+from swarm_logistics_env.fingerprint import EPISODE_CODE, package_code
 from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
+from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 
 from .task import Case, Fields, Outcome, TaskScenario
 
@@ -46,10 +46,10 @@ class WarehouseTask:
     def code(self) -> str:
         """Return the digest of the code that decides an episode, 16 hexadecimal digits.
 
-        Its modules are those that the warehouse and `run_episode` use; policies have identities of
-        their own. Docstrings, comments on lines of their own and blank lines do not count.
+        Its files are `fingerprint.EPISODE_CODE`. Docstrings, comments on lines of their own and
+        blank lines do not count.
         """
-        return code_digest(Play, Warehouse)
+        return package_code(*EPISODE_CODE)
 
     def vary(self, base: TaskScenario, fields: Fields) -> Scenario:
         """Return `base` with `fields` changed; "preset" starts from that preset instead.
@@ -74,7 +74,9 @@ class WarehouseTask:
         assert isinstance(case.scenario, Scenario)
         faults = [fault for fault in case.faults if isinstance(fault, Fault)]
         # A policy of its own: one that remembers must not make rows depend on the order of runs.
-        episode = run_episode(case.scenario, case.policy.load(), seed, faults, policy_seed)
+        episode = run_episode(
+            case.scenario, case.policy.load(planned=case.identity), seed, faults, policy_seed
+        )
         return Outcome(
             delivery_times=episode.delivery_times,
             ended_at=episode.ended_at,

@@ -97,7 +97,7 @@ def test_a_policy_of_ones_own_that_cannot_be_made_is_one_sentence(command: Comma
     Path("own_policy.py").write_text(OWN)
     for name, said in (
         ("own_policy:Unmade", "'own_policy:Unmade' cannot be made: KeyError: 'gain'"),
-        ("own_policy:Laxy", "module 'own_policy' has no attribute 'Laxy'"),
+        ("own_policy:Laxy", "'own_policy:Laxy': own_policy has no Laxy"),
         ("own_policy", "no policy 'own_policy' (a name, 'my.py:Class', 'package.module:Class'"),
     ):
         assert said in command(f"run --policy {name} {SMALL}", code=2)

@@ -93,7 +93,7 @@ class Remembering(SwarmDT):
 
 def test_other_behaviour_meets_the_same_worlds_and_nothing_is_remembered() -> None:
     scenario = Scenario(n_robots=3, n_items=5, warehouse_width=3, warehouse_height=3, duration=10)
-    same = Case(PolicySpec.of(Remembering()), "identity", scenario, task=WAREHOUSE)
+    same = Case(PolicySpec.of(Remembering()), "remembering", scenario, task=WAREHOUSE)
     other = replace(same, behaviour=1)
     played = [(seed, one) for seed in (0, 1) for one in (same, other, same)]
     outcomes = [Run(one, WAREHOUSE.code(), seed).play() for seed, one in played]

@@ -206,10 +206,14 @@ def test_time_that_is_over_leaves_runs_for_the_same_call(sizes: dict[str, Any]) 
 
 
 def test_a_policy_that_cannot_travel_and_a_study_in_memory(sizes: dict[str, Any]) -> None:
-    class Local(SwarmDT):
-        identity = "local"
+    class Rooted(SwarmDT):
+        def __reduce_ex__(self, protocol: object) -> Any:
+            raise TypeError("has roots")
 
-    study = Study(**{**sizes, "policies": [Local()], "seeds": 1})
+        def __deepcopy__(self, memo: object) -> Rooted:
+            return Rooted()
+
+    study = Study(**{**sizes, "policies": [Rooted()], "seeds": 1})
     with pytest.raises(StudyError, match="nothing has been run"):
         study.results()
     with pytest.raises(StudyError, match="use one process"):

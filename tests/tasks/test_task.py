@@ -11,14 +11,12 @@ import pytest
 
 import swarm_logistics_env
 from swarm_logistics_env import Scenario, policies
-from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import ScenarioError, StudyError
+from swarm_logistics_env.fingerprint import EPISODE_CODE
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
-from swarm_logistics_env.policies.policy import modules_used, without_prose
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Case
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
-from swarm_logistics_env.warehouse import Warehouse
 from tests.tasks.lane import LANE
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
@@ -47,14 +45,6 @@ def test_the_warehouse_is_varied_by_presets_and_its_cases_are_its_own() -> None:
         WAREHOUSE.vary(Scenario(), {"preset": "dot"})
 
 
-def test_prose_does_not_count() -> None:
-    bare = "def f(x: int) -> int:\n    return x  # kept\nclass A:\n    b = '''text\n# inside'''\n"
-    told = bare.replace("int:\n", 'int:\n    """Tell.\n\n    More.\n    """\n\n')
-    told = '"""Module."""\n\n# why\n' + told.replace("A:\n", "A:\n    # note\n")
-    assert without_prose(told) == without_prose(bare)
-    assert without_prose(bare.replace("x  #", "x + 1  #")) != without_prose(bare)
-
-
 def test_covers_all_that_an_episode_loads() -> None:
     """A module that decides what a run gives must make stored runs stale when it changes."""
     script = (
@@ -66,14 +56,17 @@ def test_covers_all_that_an_episode_loads() -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     loaded = {Path(line).relative_to(PACKAGE).as_posix() for line in done.stdout.split()}
-    used = modules_used(Play, Warehouse).values()
-    covered = {path.relative_to(PACKAGE).as_posix() for path in used}
-    # Policies have identities of their own; these hold messages, validation and names only.
-    others = {name for name in loaded - covered if name.split("/")[0] not in ("motion", "policies")}
-    assert others <= {
-        "errors.py", "records.py", "environment/__init__.py", "environment/registration.py"
+    covered = {
+        path.relative_to(PACKAGE).as_posix()
+        for pattern in EPISODE_CODE
+        for path in PACKAGE.glob(pattern)
+    }
+    # These hold messages, validation and names only.
+    assert loaded - covered <= {
+        "errors.py", "records.py", "fingerprint.py", "environment/__init__.py",
+        "environment/registration.py",
     }  # fmt: skip
-    assert {"warehouse/physics.py", "policies/policy.py", "kernels.py"} <= covered <= loaded
+    assert {"warehouse/physics.py", "policies/homing.py", "kernels.py"} <= covered
 
 
 def test_clearing_is_a_rate_that_no_number_of_items_caps() -> None:
