@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
+import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -206,3 +209,57 @@ def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
     noisier = task_of(failures={**FAILURES, "noisy": 0.1})
     others = [task_of(performance=costs), SCORED, noisier, task_of(period=0.5), SMALLER]
     assert len({task.code() for task in (task_of(), *others)}) == 6
+
+
+def test_a_task_is_known_by_what_its_functions_hold() -> None:
+    def closed(length: int) -> ParallelTask:
+        return task_of(make_env=lambda n_robots: Lane(n_robots, length))
+
+    def partly(length: int) -> ParallelTask:
+        return task_of(make_env=functools.partial(Lane, length=length))
+
+    for made in (closed, partly):
+        assert made(6).code() == made(6).code() != made(8).code()
+        study = {"seeds": 1, "policies": ["random"], "sizes": [{"values": [2, 4]}]}
+        keys = [Study(task=made(6), **study).plan().runs[0].key for _ in range(2)]
+        assert keys[0] == keys[1]
+    assert closed(6).code() != partly(6).code()
+
+
+def test_a_task_has_one_code_version_in_every_process_and_folder(tmp_path: Path) -> None:
+    script = (
+        "import functools\nfrom pettingzoo.test.example_envs import generated_agents_parallel_v0\n"
+        "from swarm_logistics_env.tasks import ParallelTask\n"
+        "def make(n_robots, names): return generated_agents_parallel_v0.env()\n"
+        "print(ParallelTask(functools.partial(make, names={'a', 'b', 'c'}), name='x', n_robots=4,"
+        " steps=5).code())\n"
+    )
+    (tmp_path / "elsewhere").mkdir()
+    codes = set()
+    for folder, hash_seed in ((tmp_path, "1"), (tmp_path / "elsewhere", "2")):
+        (folder / "mine.py").write_text(script)
+        done = subprocess.run(
+            [sys.executable, "mine.py"],
+            cwd=folder,
+            env={**os.environ, "PYTHONHASHSEED": hash_seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        codes.add(done.stdout)
+    assert len(codes) == 1
+
+
+def test_a_task_that_cannot_be_compared_plays_in_its_workers_and_counts_for_no_other() -> None:
+    def made() -> ParallelTask:
+        lock = threading.RLock()
+
+        def make_env(n_robots: int) -> Lane:
+            with lock:
+                return Lane(n_robots)
+
+        return task_of(make_env=make_env)
+
+    task = made()
+    assert task.code() == task.code() != made().code()
+    assert only_run(task).play().error is None
