@@ -20,8 +20,6 @@ from swarm_logistics_env.fingerprint import (
     changes,
     fingerprint,
     package_code,
-    source_digests,
-    without_prose,
 )
 from swarm_logistics_env.records import canonical_json
 
@@ -75,6 +73,11 @@ def test_objects_of_one_class_differ_exactly_if_their_contents_do(left: Any, rig
 def test_what_differs_in_kind_shape_order_or_code_is_another_value(one: Any, other: Any) -> None:
     assert value_of(one) != value_of(other)
     assert value_of(one) == value_of(one)
+
+
+def files_of(path: Path) -> dict[str, str]:
+    files: dict[str, str] = fingerprint(None, [path])["files"]
+    return files
 
 
 def scaled(gain: float) -> Any:
@@ -171,11 +174,11 @@ def test_a_file_counts_with_the_neighbours_that_its_text_names(tmp_path: Path) -
     }
     for name, text in files.items():
         (tmp_path / name).write_text(text)
-    before = source_digests([package / "mine.py"])
+    before = files_of(package / "mine.py")
     assert before.keys() == {"__init__.py", "mine.py", "deep.py", "later.py", "beside.py"}
     for name in files:
         (tmp_path / name).write_text(f"{files[name]}Y = 2\n")
-        after = source_digests([package / "mine.py"])
+        after = files_of(package / "mine.py")
         changed = {file for file in before | after if before.get(file) != after.get(file)}
         expected = (
             {Path(name).name} if Path(name).name in before and "unused" not in name else set()
@@ -184,23 +187,20 @@ def test_a_file_counts_with_the_neighbours_that_its_text_names(tmp_path: Path) -
         (tmp_path / name).write_text(files[name])
 
 
-def test_prose_and_encoding_do_not_count(tmp_path: Path) -> None:
-    bare = "def f(x: int) -> int:\n    return x  # kept\nclass A:\n    b = '''text\n# inside'''\n"
-    told = bare.replace("int:\n", 'int:\n    """Tell.\n\n    More.\n    """\n\n')
-    told = '"""Module."""\n\n# why\n' + told.replace("A:\n", "A:\n    # note\n")
-    assert without_prose(told) == without_prose(bare)
-    assert without_prose(bare.replace("x  #", "x + 1  #")) != without_prose(bare)
+def test_comments_and_encoding_do_not_count(tmp_path: Path) -> None:
+    bare = "def f(x: int) -> int:\n    return x\nclass A:\n    b = '''text\n# inside'''\n"
     contents = (
         bare.encode(),
         bare.encode("utf-8-sig"),
-        bare.replace("\n", "\r\n").encode(),
+        bare.replace("return x", "# why\n\n    return x  # what").encode(),
         ("# coding: latin-1\n# B\u00e4r\n" + bare).encode("latin-1"),
+        bare.replace("# inside", "# within").encode(),
     )
     digests = []
     for content in contents:
         (tmp_path / "mine.py").write_bytes(content)
-        digests.append(source_digests([tmp_path / "mine.py"]))
-    assert all(digest == digests[0] for digest in digests)
+        digests.append(files_of(tmp_path / "mine.py"))
+    assert [digest == digests[0] for digest in digests] == [True, True, True, True, False]
 
 
 def test_changes_are_told_by_the_file() -> None:
@@ -221,7 +221,6 @@ def test_changes_are_told_by_the_file() -> None:
 @pytest.mark.parametrize(
     ("name", "old", "new", "counts"),
     [
-        ("policies/swarm_dt.py", "# It turns towards", "# Turns towards", False),
         ("errors.py", "class ", "MORE = 1\n\n\nclass ", False),
         ("report/answer.py", "import ", "import os\nimport ", False),
         ("policies/swarm_dt.py", "2.0 * drawn - 1.0", "1.9 * drawn - 1.0", True),
@@ -232,13 +231,13 @@ def test_changes_are_told_by_the_file() -> None:
 def test_the_code_version_is_that_of_what_decides_an_episode(
     monkeypatch: pytest.MonkeyPatch, name: str, old: str, new: str, counts: bool
 ) -> None:
-    file, read = PACKAGE / name, Path.read_bytes
+    file, read = PACKAGE / name, Path.read_text
     assert old in file.read_text()
 
-    def read_changed(path: Path) -> bytes:
-        content = read(path)
-        return content.replace(old.encode(), new.encode(), 1) if path == file else content
+    def read_changed(path: Path, encoding: str) -> str:
+        content = read(path, encoding)
+        return content.replace(old, new, 1) if path == file else content
 
     before = package_code(*EPISODE_CODE)
-    monkeypatch.setattr(Path, "read_bytes", read_changed)
+    monkeypatch.setattr(Path, "read_text", read_changed)
     assert (package_code.__wrapped__(*EPISODE_CODE) != before) == counts

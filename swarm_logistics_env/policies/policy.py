@@ -9,8 +9,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.code_files import PACKAGE
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.fingerprint import PACKAGE, fingerprint
+from swarm_logistics_env.fingerprint import fingerprint
 from swarm_logistics_env.records import Record, canonical_json
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState

@@ -18,11 +18,11 @@ from typing import Any, Self
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
+from swarm_logistics_env.code_files import file_of_module, import_file
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.fingerprint import UNSTABLE, changed_files, changes
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
-from swarm_logistics_env.policies.code_files import file_of_module, import_file
 from swarm_logistics_env.policies.files import (
     SB3_SUFFIX,
     SUFFIX,

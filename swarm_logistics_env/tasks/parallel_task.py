@@ -13,8 +13,9 @@ import numpy as np
 from gymnasium.spaces import flatten
 from pydantic import ConfigDict, PositiveFloat, PositiveInt
 
+from swarm_logistics_env.code_files import PACKAGE
 from swarm_logistics_env.errors import FaultError, StudyError, suggest
-from swarm_logistics_env.fingerprint import PACKAGE, UNSTABLE, fingerprint, package_code
+from swarm_logistics_env.fingerprint import UNSTABLE, fingerprint, package_code
 from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
 from swarm_logistics_env.records import Record, canonical_json
 

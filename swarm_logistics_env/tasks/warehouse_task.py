@@ -46,8 +46,7 @@ class WarehouseTask:
     def code(self) -> str:
         """Return the digest of the code that decides an episode, 16 hexadecimal digits.
 
-        Its files are `fingerprint.EPISODE_CODE`. Docstrings, comments on lines of their own and
-        blank lines do not count.
+        Its files are `fingerprint.EPISODE_CODE`.
         """
         return package_code(*EPISODE_CODE)
 

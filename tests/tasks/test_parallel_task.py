@@ -220,7 +220,7 @@ def test_a_task_is_known_by_what_its_functions_hold() -> None:
 
     for made in (closed, partly):
         assert made(6).code() == made(6).code() != made(8).code()
-        study = {"seeds": 1, "policies": ["random"], "sizes": [{"values": [2, 4]}]}
+        study: dict[str, Any] = {"seeds": 1, "policies": ["random"], "sizes": [{"values": [2, 4]}]}
         keys = [Study(task=made(6), **study).plan().runs[0].key for _ in range(2)]
         assert keys[0] == keys[1]
     assert closed(6).code() != partly(6).code()

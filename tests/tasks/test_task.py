@@ -63,7 +63,7 @@ def test_covers_all_that_an_episode_loads() -> None:
     }
     # These hold messages, validation and names only.
     assert loaded - covered <= {
-        "errors.py", "records.py", "fingerprint.py", "environment/__init__.py",
+        "errors.py", "records.py", "code_files.py", "fingerprint.py", "environment/__init__.py",
         "environment/registration.py",
     }  # fmt: skip
     assert {"warehouse/physics.py", "policies/homing.py", "kernels.py"} <= covered

@@ -1,4 +1,4 @@
-"""Python files that a policy's text names: each is that file, whatever else has its name.
+"""Python files of the user's own: a path is that file, whatever else has its name.
 
 What such a file imports from its own folder is found there, and is kept apart from modules of the
 same names that others imported. The folder is never on Python's path.
@@ -7,12 +7,16 @@ same names that others imported. The folder is never on Python's path.
 from __future__ import annotations
 
 import builtins
+import contextlib
 import functools
 import hashlib
 import importlib.util
+import site
 import sys
+import sysconfig
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.machinery import (
     EXTENSION_SUFFIXES,
@@ -20,6 +24,7 @@ from importlib.machinery import (
     ExtensionFileLoader,
     FileFinder,
     ModuleSpec,
+    PathFinder,
     SourceFileLoader,
 )
 from importlib.util import module_from_spec, spec_from_file_location
@@ -29,10 +34,9 @@ from typing import Any
 
 import cloudpickle
 
-from swarm_logistics_env.fingerprint import import_root, is_installed, is_users_own, source_digests
-
+PACKAGE = Path(__file__).parent
 _lock = threading.RLock()
-_loaded: dict[Path, tuple[Mapping[str, str], ModuleType]] = {}  # by file, with its digests
+_loaded: dict[Path, tuple[Mapping[Path, object], ModuleType]] = {}  # by file, with its sources
 
 
 def import_file(path: Path) -> ModuleType:
@@ -48,9 +52,9 @@ def import_file(path: Path) -> ModuleType:
     if not path.is_file():
         raise FileNotFoundError(f"there is no file {path}")
     with _lock:
-        digests = source_digests([path])
-        if path not in _loaded or _loaded[path][0] != digests:
-            _loaded[path] = digests, _Folder(import_root(path)).execute(path)
+        sources = source_files([path])
+        if path not in _loaded or _loaded[path][0] != sources:
+            _loaded[path] = sources, _Folder(_import_root(path)).execute(path)
         return _loaded[path][1]
 
 
@@ -75,6 +79,76 @@ def file_of_module(name: str) -> Path | None:
             if path.is_file() and is_users_own(str(path.resolve())):
                 return path
     return None
+
+
+def source_files(paths: Iterable[Path]) -> dict[Path, CodeType | bytes]:
+    """Return the code of Python files, and of the neighbours which they name.
+
+    A neighbour lies in the folder of a file, or in one of its package. So a module that is imported
+    only while a function runs is among them. What is no Python that can be compiled is bytes.
+    """
+    sources: dict[Path, CodeType | bytes] = {}
+    waiting = deque(paths)
+    while waiting:
+        path = waiting.popleft()
+        if path not in sources and path.is_file():
+            sources[path] = content = path.read_bytes()
+            with contextlib.suppress(SyntaxError, ValueError):  # it cannot be imported either
+                sources[path] = code = compile(content, path.name, "exec", dont_inherit=True)
+                names = {part for name in names_in(code) for part in name.split(".")}
+                waiting += (file for name, file in _neighbours(path) if name in names)
+    return sources
+
+
+def names_in(code: CodeType) -> set[str]:
+    """Return the names that code and the functions within it use, and its texts."""
+    inner = (part for part in code.co_consts if isinstance(part, CodeType))
+    texts = (part for part in code.co_consts if isinstance(part, str))
+    return {*code.co_names, *texts}.union(*map(names_in, inner))
+
+
+def _neighbours(path: Path) -> Iterator[tuple[str, Path]]:
+    """Yield the name and file of all modules that may be imported from where a file lies."""
+    folder, root = path.parent, _import_root(path)
+    while True:
+        for file in sorted(folder.iterdir()):
+            if file.name.endswith((".py", *EXTENSION_SUFFIXES)):
+                yield file.name.partition(".")[0], file
+            elif (file / "__init__.py").is_file():
+                yield from ((file.name, module) for module in sorted(file.rglob("*.py")))
+        if folder == root:
+            return
+        folder = folder.parent
+
+
+def _import_root(path: Path) -> Path:
+    """Return the folder from which the module in a file is imported, above all of its packages."""
+    folder = path.parent
+    while (folder / "__init__.py").is_file() and folder != folder.parent:
+        folder = folder.parent
+    return folder
+
+
+def is_users_own(file: str | None) -> bool:
+    """Return whether a module's file is neither Python's nor of this or an installed package."""
+    if file is None:
+        return True  # typed into an interpreter or a notebook
+    path = Path(file).absolute()
+    return not any(path.is_relative_to(folder) for folder in _installed())
+
+
+@functools.cache
+def _is_installed(name: str) -> bool:
+    """Return whether Python or an installed package has a module of that name."""
+    folders = [str(folder) for folder in _installed()]
+    return name in sys.stdlib_module_names or PathFinder.find_spec(name, folders) is not None
+
+
+@functools.cache
+def _installed() -> tuple[Path, ...]:
+    names = ("stdlib", "platstdlib", "purelib", "platlib")
+    folders = [sysconfig.get_path(name) for name in names]
+    return (PACKAGE, *map(Path, [*folders, *site.getsitepackages(), site.getusersitepackages()]))
 
 
 class _Loader(SourceFileLoader):
@@ -158,7 +232,10 @@ class _Folder:
         if changed != self._changed:
             files = {file.stem for file in self._path.glob("*.py") if file.stem.isidentifier()}
             files |= {file.parent.name for file in self._path.glob("*/__init__.py")}
-            self._changed, self._known = changed, {name for name in files if not is_installed(name)}
+            self._changed, self._known = (
+                changed,
+                {name for name in files if not _is_installed(name)},
+            )
         return self._known
 
     @contextmanager

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarm_logistics_env.code_files import import_file
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import load
-from swarm_logistics_env.policies.code_files import import_file
 
 MINE = """import queue
 from gains import GAIN
