@@ -43,6 +43,8 @@ class Application:
     def __call__(self) -> None:
         """Run the command line in `sys.argv`."""
         prepare_output()
+        # A notebook sets it for what is started there, and the backend may not be installed here.
+        os.environ.pop("MPLBACKEND", None)
         code = self.run(sys.argv[1:])
         try:
             sys.stdout.flush()

@@ -33,7 +33,7 @@ def test_every_text_is_written_in_every_encoding(text: str, encoding: str) -> No
         prepare_output()
         sys.stdout.write(f"{text}→")
         sys.stdout.flush()
-    shown = written.getvalue().decode(encoding)
+        shown = written.getvalue().decode(encoding)
     assert shown.endswith(("→", "->"))
     if text.encode(encoding, "ignore").decode(encoding) == text:
         assert shown[: len(text)] == text
