@@ -155,10 +155,15 @@ def read_table(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> 
     """
     kind, parse = ("JSON", json.loads) if path.suffix == ".json" else ("TOML", tomllib.loads)
     try:
-        found = parse(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8-sig")  # Windows' editors put a mark first
+        if "\0" in text:  # UTF-16 without its mark
+            raise UnicodeError
+        found = parse(text)
     except OSError as error:
         raise error_type(f"cannot read the {what} {path}: {error.strerror}") from error
-    except ValueError as error:  # of Unicode, JSON and TOML
+    except UnicodeError:
+        raise error_type(f"the {what} {path} is not UTF-8 text: save it as UTF-8") from None
+    except ValueError as error:  # of JSON and TOML
         reason = str(error).splitlines()[0]
         raise error_type(f"the {what} {path} is not {kind}: {reason}") from error
     except RecursionError:

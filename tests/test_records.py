@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import pytest
 from pydantic import Field, PositiveFloat
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.records import Record, read_table
 
 
 class Lamp(Record):
@@ -49,3 +50,19 @@ def test_json_there_and_back() -> None:
     for text in ("nonsense", '{"power": 0}', '{"colour": 1}'):
         with pytest.raises(PolicyError, match="Lamp"):
             Lamp.from_json(text)
+
+
+TABLES = {"lamp.toml": 'name = "Grün"\r\n', "lamp.json": '{"name": "Grün"}\r\n'}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_is_read_as_editors_save_it_or_told_how_to_save(name: str, tmp_path: Path) -> None:
+    file = tmp_path / name
+    for encoding in ("utf-8", "utf-8-sig"):
+        file.write_text(TABLES[name], encoding=encoding, newline="")
+        assert read_table(file, "lamp", PolicyError) == {"name": "Grün"}
+    for encoding in ("utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp1252", "cp437"):
+        file.write_text(TABLES[name], encoding=encoding, newline="")
+        said = rf"^the lamp .*{name} is not UTF-8 text: save it as UTF-8$"
+        with pytest.raises(PolicyError, match=said):
+            read_table(file, "lamp", PolicyError)

@@ -100,7 +100,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
     [
         ("", "is empty: should have a row of column names"),
         (HEAD, "holds no trial"),
-        ("\udcff", "cannot be read as CSV in UTF-8"),
+        ("\udcff", "is not UTF-8 text: save it as CSV UTF-8"),
         ("robots,p\n4,\x001\n", r"line 2: holds '\x00': should be plain text"),
         ("trial,robots\n1,8\n", "has no column 'performance', or time"),
         ("robots,fault,broken,boxes\n4,jam,1,2\n", "by --column performance=NAME --column faulty="),
