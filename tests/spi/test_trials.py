@@ -155,5 +155,5 @@ def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
         with pytest.raises(spi.IndicatorError) as caught:
             read(tmp_path, HEAD + GOOD, **asked)
         assert words in str(caught.value)
-    with pytest.raises(spi.IndicatorError, match="cannot read .*nowhere.csv: No such file"):
+    with pytest.raises(spi.IndicatorError, match=r"cannot read .*nowhere\.csv: No such file"):
         spi.read_trials(tmp_path / "nowhere.csv")
