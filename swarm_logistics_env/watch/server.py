@@ -68,7 +68,7 @@ _KEPT_ALIVE = 15.0  # [s] between two requests
 class _Connection:
     """A connection, which aiohttp serves, and which is dropped if too many are silent for long."""
 
-    def __init__(self, served: asyncio.Protocol, silent: dict[asyncio.BaseTransport, None]) -> None:
+    def __init__(self, served: asyncio.Protocol, silent: dict[asyncio.Transport, None]) -> None:
         self._served, self._silent = served, silent
 
     def connection_made(self, transport: asyncio.Transport) -> None:
@@ -86,7 +86,7 @@ class _Connection:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._served, name)
 
-    def _drop(self, transport: asyncio.BaseTransport) -> None:
+    def _drop(self, transport: asyncio.Transport) -> None:
         if transport in self._silent:
             del self._silent[transport]
             transport.abort()

@@ -133,6 +133,7 @@ function showWords() {
   const { scenario, selected } = latest;
   document.title = `${latest.policy}, seed ${latest.seed}`;
   element("pause").textContent = latest.paused ? "go on" : "pause";
+  for (const id of ["pause", "step"]) element(id).disabled = !recorded && Boolean(latest.failure);
   element("speed").value = latest.speed;
   element("mode").value = latest.mode;
   element("policy").value = latest.policy;
