@@ -88,7 +88,7 @@ def closing(*numbers: int) -> Any:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="closes streams as a POSIX shell does")
-@pytest.mark.parametrize("closed", [(1,), (2,), (0, 1, 2), ()])
+@pytest.mark.parametrize("closed", [(1,), (0, 1, 2), ()])
 def test_nothing_is_lost_where_nobody_reads(closed: Sequence[int], folder: Path) -> None:
     Path("t.csv").write_text(TRIALS)
     streams: dict[str, Any] = {"preexec_fn": closing(*closed)}
