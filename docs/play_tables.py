@@ -6,7 +6,6 @@ Costs are not measured here: their table is written from what `make benchmark` l
 """
 
 import json
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from swarm_logistics_env.cli.judging import ENTRIES
 from swarm_logistics_env.report import benchmark, drawing, section
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.play import usable_cores
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, grouped
 
@@ -33,7 +33,7 @@ BENCHMARK = ROOT / "results" / "benchmark" / "benchmark.json"
 # Nothing was fitted, tuned or chosen on the seeds of these tables: defaults were fitted on those
 # from 0 on; recipes and medians were chosen on some from 700,000 and from 1,000,000 on.
 FIRST_SEED = 20_000
-PROCESSES = os.cpu_count() or 1
+PROCESSES = usable_cores()
 # Studies in examples/ that are tables of the page.
 EXAMPLES = (
     "clearing", "ladder", "ladder_restocked", "leans", "shipped_policies", "robust_policy",

@@ -6,7 +6,9 @@ A record is frozen, has no unknown fields, and says in one sentence what is wron
 from __future__ import annotations
 
 import json
+import os
 import re
+import secrets
 import tomllib
 import unicodedata
 from collections.abc import Callable, Iterator
@@ -28,18 +30,22 @@ from swarm_logistics_env.errors import SwarmLogisticsError, suggest
 
 @contextmanager
 def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path]:
-    """Give a path beside `path`, of the same ending; the file written there takes its place.
+    """Give the path of an empty file beside `path`, of the same ending, which takes its place.
 
-    If the block fails, an older file at `path` stays as it was, and nothing is left beside it. What
-    is no plain file, as /dev/stdout, is written itself.
+    Nobody else has that file, whoever writes `path` at the same time. If the block fails, an older
+    file at `path` stays as it was, and nothing is left beside it. What is no plain file, as
+    /dev/stdout, is written itself.
 
     Raises:
         The `error_type`: the file cannot be written; names it and the reason.
     """
     is_plain = path.is_file() or not path.exists()
     whole = path.resolve()  # a link stays a link
-    part = whole.with_name(f".{path.stem[:80]}.part{path.suffix}") if is_plain else path
+    name = f".{path.stem[:40]}.{secrets.token_hex(8)}.part{path.suffix}"
+    part = whole.with_name(name) if is_plain else path
     try:
+        if is_plain:  # with the usual rights, and never through a link
+            os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         try:
             yield part
             if is_plain:
@@ -155,10 +161,15 @@ def read_table(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> 
     """
     kind, parse = ("JSON", json.loads) if path.suffix == ".json" else ("TOML", tomllib.loads)
     try:
-        found = parse(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8-sig")  # Windows' editors put a mark first
+        if "\0" in text:  # UTF-16 without its mark
+            raise UnicodeError
+        found = parse(text)
     except OSError as error:
         raise error_type(f"cannot read the {what} {path}: {error.strerror}") from error
-    except ValueError as error:  # of Unicode, JSON and TOML
+    except UnicodeError:
+        raise error_type(f"the {what} {path} is not UTF-8 text: save it as UTF-8") from None
+    except ValueError as error:  # of JSON and TOML
         reason = str(error).splitlines()[0]
         raise error_type(f"the {what} {path} is not {kind}: {reason}") from error
     except RecursionError:

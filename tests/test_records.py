@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import pytest
 from pydantic import Field, PositiveFloat
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.records import Record, becoming, read_table
 
 
 class Lamp(Record):
@@ -49,3 +53,82 @@ def test_json_there_and_back() -> None:
     for text in ("nonsense", '{"power": 0}', '{"colour": 1}'):
         with pytest.raises(PolicyError, match="Lamp"):
             Lamp.from_json(text)
+
+
+TABLES = {"lamp.toml": 'name = "Grün"\r\n', "lamp.json": '{"name": "Grün"}\r\n'}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_is_read_as_editors_save_it_or_told_how_to_save(name: str, tmp_path: Path) -> None:
+    file = tmp_path / name
+    for encoding in ("utf-8", "utf-8-sig"):
+        file.write_text(TABLES[name], encoding=encoding, newline="")
+        assert read_table(file, "lamp", PolicyError) == {"name": "Grün"}
+    for encoding in ("utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp1252", "cp437"):
+        file.write_text(TABLES[name], encoding=encoding, newline="")
+        said = rf"^the lamp .*{name} is not UTF-8 text: save it as UTF-8$"
+        with pytest.raises(PolicyError, match=said):
+            read_table(file, "lamp", PolicyError)
+
+
+WRITE = """
+import sys
+from pathlib import Path
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.records import becoming
+
+for number in range(200):
+    with becoming(Path("x.csv"), PolicyError) as part:
+        with part.open("w") as file:
+            for _ in range(100):
+                file.write(sys.argv[1])
+"""
+
+
+def test_processes_that_write_one_file_at_once_all_succeed(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", WRITE]
+    writing = [subprocess.Popen([*command, sign], cwd=tmp_path) for sign in "abcd"]
+    assert [one.wait() for one in writing] == [0] * 4
+    assert (tmp_path / "x.csv").read_text() in [100 * sign for sign in "abcd"]
+    assert [one.name for one in tmp_path.iterdir()] == ["x.csv"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links and modes of POSIX")
+def test_a_file_that_is_written_goes_through_no_link_and_has_the_usual_mode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    monkeypatch.setattr("secrets.token_hex", lambda length: "00")
+    (tmp_path / ".x.00.part.csv").symlink_to(victim)
+    (tmp_path / ".x.part.csv").symlink_to(victim)
+    with (
+        pytest.raises(PolicyError, match=r"cannot write .*x\.csv"),
+        becoming(tmp_path / "x.csv", PolicyError) as part,
+    ):
+        part.write_text("theirs")
+    monkeypatch.undo()
+    before = os.umask(0o027)
+    try:
+        with becoming(tmp_path / "x.csv", PolicyError) as part:
+            part.write_text("theirs")
+    finally:
+        os.umask(before)
+    assert victim.read_text() == "mine"
+    assert (tmp_path / "x.csv").stat().st_mode & 0o777 == 0o640
+    assert (tmp_path / ".x.00.part.csv").is_symlink()  # and is not removed either
+
+
+def test_a_block_that_fails_leaves_nothing_beside_the_older_file(tmp_path: Path) -> None:
+    file = tmp_path / ("ü" * 100 + ".csv")
+    file.write_text("older")
+
+    def fail() -> None:
+        with becoming(file, PolicyError) as part:
+            assert part.suffix == ".csv"
+            part.write_text("newer")
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    assert [one.read_text() for one in tmp_path.iterdir()] == ["older"]

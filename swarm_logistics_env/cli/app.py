@@ -20,6 +20,8 @@ from swarm_logistics_env.records import plain, read_table
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.warehouse.faults import Fault, fault_of
 
+from .output import prepare_output
+
 # In the order of use, as the help shows them. A module is imported when its command is called.
 COMMANDS = {
     "watch": ("playing", "watch_command"),
@@ -40,6 +42,9 @@ class Application:
 
     def __call__(self) -> None:
         """Run the command line in `sys.argv`."""
+        prepare_output()
+        # A notebook sets it for what is started there, and the backend may not be installed here.
+        os.environ.pop("MPLBACKEND", None)
         code = self.run(sys.argv[1:])
         try:
             sys.stdout.flush()

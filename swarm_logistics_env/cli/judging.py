@@ -21,7 +21,8 @@ from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy
-from swarm_logistics_env.studies.importing import import_results
+from swarm_logistics_env.studies.importing import import_results, origin_of
+from swarm_logistics_env.studies.plan import Origin
 from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.runs import FILE_NAME
@@ -175,8 +176,6 @@ def judge_command(
         say_what_was_played(tally)
         raise Exit(1 if tally.failed else 0)
 
-    usual = Path("results", "judged", Path(asked).stem)
-    directory = out or _free(usual)
     stated = _pairs("--setup", setup)
     trials = read_trials(
         asked,
@@ -185,18 +184,29 @@ def judge_command(
         duration=duration,
         decimal=decimal or ".",
     )
-    count = import_results(trials, directory, stated)
+    origin = origin_of(trials, stated)
+    usual = Path("results", "judged", Path(asked).stem)
+    directory = out or _free(usual, origin)
+    if not _holds(directory, origin):
+        import_results(trials, directory, stated)
     if directory not in (out, usual):
         echo(f"{usual} holds an earlier judgement, so this one is in {directory}")
-    imported = StoredStudy.existing(directory).imported
-    echo("\n".join([f"{count} runs in {asked}", *(imported.notes if imported else ()), ""]))
+    echo("\n".join([f"{len(trials.rows)} runs in {asked}", *origin.notes, ""]))
     show_report(Study.stored(directory).findings(), directory, full=full)
 
 
-def _free(directory: Path) -> Path:
-    """Return a directory that holds no study yet: that one, or one with a number."""
+def _holds(directory: Path, origin: Origin) -> bool:
+    """Return whether a directory holds the study of these trials already."""
+    try:
+        return StoredStudy.existing(directory).imported == origin
+    except StudyError:  # none, or none that reads
+        return False
+
+
+def _free(directory: Path, origin: Origin) -> Path:
+    """Return a directory that holds no other study: that one, or one with a number."""
     number, free = 1, directory
-    while (free / FILE_NAME).exists():
+    while (free / FILE_NAME).exists() and not _holds(free, origin):
         number += 1
         free = directory.with_name(f"{directory.name}-{number}")
     return free

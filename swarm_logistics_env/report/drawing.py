@@ -5,9 +5,13 @@ The colours are those of Okabe and Ito, and every series has a marker of its own
 
 from __future__ import annotations
 
+import contextlib
 import io
+import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -46,7 +50,7 @@ DOTS_PER_INCH = 200
 
 def images(draw: Draw, height: float) -> tuple[str, bytes]:
     """Return a drawing of the given height [inch] as SVG and as PNG; equal ones as equal bytes."""
-    import matplotlib as mpl
+    mpl = _matplotlib()
     from matplotlib.figure import Figure as NewCanvas
 
     svg, png = io.StringIO(), io.BytesIO()
@@ -59,6 +63,23 @@ def images(draw: Draw, height: float) -> tuple[str, bytes]:
         canvas.set_layout_engine("none")  # the same places, which take long to find
         canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
     return svg.getvalue(), png.getvalue()
+
+
+def _matplotlib() -> ModuleType:
+    """Import matplotlib, also where MPLBACKEND names a backend that is not installed.
+
+    It is that of a notebook, if a script is started there. Nothing here is drawn with it.
+    """
+    if "matplotlib" in sys.modules:
+        return sys.modules["matplotlib"]
+    backend = os.environ.pop("MPLBACKEND", None)
+    import matplotlib as mpl
+
+    if backend is not None:
+        os.environ["MPLBACKEND"] = backend
+        with contextlib.suppress(ValueError):
+            mpl.rcParams["backend"] = backend  # others may draw with it
+    return mpl
 
 
 class Point(NamedTuple):

@@ -115,8 +115,10 @@ def _lines(path: Path) -> tuple[list[str], str]:
     try:
         content = path.read_bytes()
         text = content.decode("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise IndicatorError(f"{path} cannot be read as CSV in UTF-8: {error}") from error
+    except OSError as error:
+        raise IndicatorError(f"cannot read {path}: {error.strerror}") from error
+    except UnicodeDecodeError:
+        raise IndicatorError(f"{path} is not UTF-8 text: save it as CSV UTF-8") from None
     lines = text.splitlines()
     for number, line in enumerate(lines, 1):
         for sign in line.replace("\t", ""):

@@ -39,16 +39,7 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
     Raises:
         StudyError: a trial stands alone, or nothing that it can be relative to is there.
     """
-    conditions = grouped(trials.rows, lambda row: row.condition)
-    origin = Origin(
-        file=trials.file,
-        digest=trials.digest,
-        paired=trials.paired,
-        seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
-        setup=tuple((setup or {}).items()),
-        trials=tuple(replace(rows[0], times=None) for rows in conditions.values()),
-        notes=(*trials.notes, *_without_removed(trials)),
-    )
+    conditions, origin = _conditions(trials), origin_of(trials, setup)
     specification = Specification(
         name=file_name(Path(trials.file).stem),
         task=RECORDED.name,
@@ -70,6 +61,23 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
                 runs.add(run, _outcome(row))
         note(runs, plan, Declaration.model_validate(specification))
     return len(trials.rows)
+
+
+def origin_of(trials: Trials, setup: Mapping[str, str] | None = None) -> Origin:
+    """Return what a study of trials notes of their source: equal ones are the same study."""
+    return Origin(
+        file=trials.file,
+        digest=trials.digest,
+        paired=trials.paired,
+        seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
+        setup=tuple((setup or {}).items()),
+        trials=tuple(replace(rows[0], times=None) for rows in _conditions(trials).values()),
+        notes=(*trials.notes, *_without_removed(trials)),
+    )
+
+
+def _conditions(trials: Trials) -> dict[tuple[object, ...], list[Trial]]:
+    return grouped(trials.rows, lambda row: row.condition)
 
 
 def _without_removed(trials: Trials) -> Iterator[str]:

@@ -94,7 +94,7 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
     Args:
         name: "local": this process; "process": worker processes on this machine; "ray": a cluster.
         processes: the number of worker processes, or of cores of a local cluster; None means one
-            for each core.
+            for each core that this process may use. On Windows there are 61 at most.
         address: the address of the Ray cluster; None starts one on this machine.
 
     Raises:
@@ -109,10 +109,23 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
             raise StudyError(f"engine local: is one process, not {processes}")
         return serial
     if name == "process":
-        return partial(_in_processes, processes or os.cpu_count() or 1)
+        return partial(_in_processes, min(processes or usable_cores(), _MOST_WORKERS))
     if address is not None and processes is not None:
         raise StudyError("engine ray: a cluster that runs already has its own number of cores")
     return partial(_on_ray, address, processes)
+
+
+# More handles cannot be waited for at once.
+_MOST_WORKERS = 61 if sys.platform == "win32" else sys.maxsize
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use; `taskset` and queues of clusters limit them."""
+    if hasattr(os, "process_cpu_count"):  # from Python 3.13 on
+        return os.process_cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 # One thread per worker: n workers with n threads each would wait for each other.

@@ -71,10 +71,7 @@ class Runs:
             # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
             place = f"{path.absolute().as_uri()}?immutable=1"
         elif path is not None:
-            try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise StudyError(f"cannot write to {path.parent}: {error.strerror}") from error
+            _make_folder(path.parent)
         with self._explained():
             # Autocommit: transactions are opened by hand, one per run.
             self._connection = sqlite3.connect(
@@ -119,10 +116,9 @@ class Runs:
         path = out / FILE_NAME
         if path.exists():
             raise StudyError(f"{out} holds a study already: {way} into a new directory")
-        with becoming(path, StudyError) as part:
-            part.unlink(missing_ok=True)  # what one left that was killed
-            with cls(part) as runs:
-                yield runs
+        _make_folder(out)
+        with becoming(path, StudyError) as part, cls(part) as runs:
+            yield runs
 
     def __enter__(self) -> Self:
         return self
@@ -292,6 +288,13 @@ def _described(run: Run) -> dict[str, object]:
         "code": run.code,
         "seed": run.seed,
     }
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(f"cannot write to {folder}: {error.strerror}") from error
 
 
 def export(runs: Runs, path: Path) -> tuple[int, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import json
 import re
@@ -26,7 +27,7 @@ from .session import SPEEDS, Session
 
 Message: TypeAlias = dict[str, Any]
 
-_TOLD = ("seed", "speed", "paused", "mode", "note", "policy", "against")
+_TOLD = ("seed", "speed", "paused", "mode", "note", "failure", "policy", "against")
 _SHAPE = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius",
@@ -123,6 +124,21 @@ def obey(session: Session, text: str) -> None:
         first = error.errors(include_url=False, include_context=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise SetupError(f"order {where}: {first['msg']}") from None
+
+
+def rehearse(session: Session) -> None:
+    """Do with a copy of a session what a page may ask for, so that all of it is compiled."""
+    # A policy that fails tells the page so, once it plays.
+    with contextlib.suppress(Exception, SystemExit):
+        copy = Session(
+            session.scenario, session.policy, session.against, session.seed, load=session.load
+        )
+        for mode in ("FM4", "removed"):
+            copy.choose_mode(mode)
+            copy.select(0)
+            copy.break_robot()
+            copy.step()
+            frame(copy)
 
 
 def _arena(play: Play) -> Message:

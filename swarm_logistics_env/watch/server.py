@@ -14,6 +14,7 @@ import secrets
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, how_to_install
 
@@ -26,6 +27,7 @@ from .messages import (
     fixed_data,
     frame,
     obey,
+    rehearse,
     text_of_file,
 )
 from .session import Session
@@ -53,6 +55,70 @@ _HEADERS = {
 _LONGEST_ORDER = 4096  # bytes
 _MOST_PAGES = 16
 _FRAME_PERIOD = 0.05  # [s]
+_HEARTBEAT = (
+    10.0  # [s] between signs of life of a page; it is closed half as long after a missing one
+)
+_PATIENCE = 10.0  # [s] with a page that does not take a message
+# Connections that are no page, as one that asks for nothing: each costs a file of this process.
+_MOST_SILENT = 32
+_LONGEST_SILENCE = 60.0  # [s]
+_KEPT_ALIVE = 15.0  # [s] between two requests
+
+
+class _Connection:
+    """A connection, which aiohttp serves, and which is dropped if too many are silent for long."""
+
+    def __init__(self, served: asyncio.Protocol, silent: dict[asyncio.Transport, None]) -> None:
+        self._served, self._silent = served, silent
+
+    def connection_made(self, transport: asyncio.Transport) -> None:
+        self._silent[transport] = None
+        if len(self._silent) > _MOST_SILENT:
+            self._drop(next(iter(self._silent)))  # the oldest
+        asyncio.get_running_loop().call_later(_LONGEST_SILENCE, self._drop, transport)
+        self._served.connection_made(transport)
+        self._transport = transport
+
+    def connection_lost(self, error: Exception | None) -> None:
+        self._silent.pop(self._transport, None)
+        self._served.connection_lost(error)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._served, name)
+
+    def _drop(self, transport: asyncio.Transport) -> None:
+        if transport in self._silent:
+            del self._silent[transport]
+            transport.abort()
+
+
+class _Page:
+    """A page that is open, and what it knows of the session.
+
+    It is told the next thing once it has taken the last one, and dropped if it does not for long.
+    """
+
+    def __init__(self, socket: web.WebSocketResponse, transport: asyncio.Transport) -> None:
+        self._socket, self._transport = socket, transport
+        self._known: Message = {}
+        self._sending: asyncio.Task[None] | None = None
+        self._since = 0.0
+
+    def tell(self, now: Message) -> None:
+        """Send what has changed, unless the page still takes what changed before."""
+        moment = time.monotonic()
+        if self._sending is not None and not self._sending.done():
+            if moment > self._since + _PATIENCE:
+                self._transport.abort()
+            return
+        message = changes(self._known, now)
+        if message:
+            self._known, self._since = now, moment
+            self._sending = asyncio.create_task(self._send(encode(message)))
+
+    async def _send(self, text: str) -> None:
+        with contextlib.suppress(ConnectionError):
+            await self._socket.send_str(text)
 
 
 class WatchServer:
@@ -71,7 +137,9 @@ class WatchServer:
         self.token = secrets.token_urlsafe(18)
         self.recording = Recording(session)
         self.address = ""
-        self._pages: dict[web.WebSocketResponse, Message] = {}
+        self._pages: set[_Page] = set()
+        self._silent: dict[asyncio.Transport, None] = {}  # the oldest first
+        self._listening: asyncio.Server | None = None
         app = web.Application(middlewares=[self._guard])
         app.router.add_get("/{token}/live", self._live)
         app.router.add_get("/{token}/recording.html", self._save)
@@ -79,31 +147,35 @@ class WatchServer:
         app.on_response_prepare.append(_add_headers)
         logger = logging.getLogger(__name__)
         logger.addFilter(_is_own_error)
-        self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
+        self._runner = web.AppRunner(
+            app, access_log=None, logger=logger, shutdown_timeout=0.5, keepalive_timeout=_KEPT_ALIVE
+        )
 
     async def start(self) -> None:
-        """Listen on this machine.
+        """Listen on this machine, and compile what a page may ask for.
 
         Raises:
             SetupError: the port is in use or not allowed.
         """
         await self._runner.setup()
-        site = web.TCPSite(self._runner, LOOPBACK, self.port)
         try:
-            await site.start()
+            self._listening = await asyncio.get_running_loop().create_server(
+                self._accept, LOOPBACK, self.port, backlog=_MOST_SILENT
+            )
         except OSError as error:
             await self._runner.cleanup()
             told = f"{error.strerror}; --port 0 takes any that is free"
             raise SetupError(f"port = {self.port}: {told}") from None
-        self.port = self._runner.addresses[0][1]
+        self.port = self._listening.sockets[0].getsockname()[1]
+        rehearse(self.session)
         self.address = f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
-    async def play(self) -> None:
-        """Let the session go on while a page is open, until this is cancelled.
+    def _accept(self) -> Any:
+        assert self._runner.server is not None
+        return _Connection(self._runner.server(), self._silent)
 
-        Raises:
-            PolicyError: the policy returned commands of the wrong shape, or not finite.
-        """
+    async def play(self) -> None:
+        """Let the session go on while a page is open, until this is cancelled."""
         before = time.monotonic()
         try:
             while True:
@@ -112,36 +184,40 @@ class WatchServer:
                 elapsed, before = now - before, now
                 if self._pages:
                     self.session.play(elapsed, _FRAME_PERIOD, self.recording.note)
-                    await self._tell()
+                    message = frame(self.session)
+                    for page in self._pages:
+                        page.tell(message)
         finally:
+            if self._listening is not None:
+                self._listening.close()
             await self._runner.cleanup()
-
-    async def _tell(self) -> None:
-        now = frame(self.session)
-        for page, known in list(self._pages.items()):
-            message = changes(known, now)
-            if message:
-                self._pages[page] = now
-                with contextlib.suppress(ConnectionError):
-                    await page.send_str(encode(message))
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
         if len(self._pages) >= _MOST_PAGES:
             raise web.HTTPServiceUnavailable(text="Too many pages are open.\n")
-        page = web.WebSocketResponse(max_msg_size=_LONGEST_ORDER, heartbeat=10.0, compress=False)
-        await page.prepare(request)
-        await page.send_str(encode(fixed_data(self.session)))
-        self._pages[page] = {}
+        socket = web.WebSocketResponse(
+            max_msg_size=_LONGEST_ORDER, heartbeat=_HEARTBEAT, compress=False
+        )
+        transport = request.transport
+        await socket.prepare(request)
+        if transport is None:
+            return socket  # it has gone meanwhile
+        self._silent.pop(transport, None)
+        page = _Page(socket, transport)
         try:
-            async for message in page:
+            self._pages.add(page)
+            await socket.send_str(encode(fixed_data(self.session)))
+            async for message in socket:
                 try:
                     obey(self.session, message.data if isinstance(message.data, str) else "")
                 except SwarmLogisticsError as error:
-                    await page.send_str(encode({"problem": str(error)}))
+                    await socket.send_str(encode({"problem": str(error)}))
                 self.recording.note()
         finally:
-            self._pages.pop(page, None)
-        return page
+            self._pages.discard(page)
+            # What it has not taken would keep the connection open.
+            asyncio.get_running_loop().call_later(_PATIENCE, transport.abort)
+        return socket
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"] or "page.html"
@@ -190,7 +266,6 @@ def serve(
 
     Raises:
         SetupError: the port is in use or not allowed.
-        PolicyError: the policy returned commands of the wrong shape, or not finite.
     """
 
     async def run() -> None:

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.errors import SetupError, suggest
+from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, suggest
+from swarm_logistics_env.records import plain
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES, failure_mode
 from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults, failed_robots
 from swarm_logistics_env.warehouse.state import WarehouseState
 
+_PACKAGE = Path(__file__).parents[1]
+_LONGEST_REASON = 500  # characters
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 
 
@@ -41,6 +48,8 @@ class Session:
         selected: the robot that is inspected, or None.
         events: the failures and repairs of robots in this episode.
         note: a sentence about what happened last.
+        failure: the error of a policy that has stopped this episode, and where it was raised;
+            empty: none has.
 
     Raises:
         FaultError, ScenarioError: as `Warehouse.reset`.
@@ -64,7 +73,7 @@ class Session:
         self.paused, self.mode = False, "FM4"
         self.set_speed(speed)
         self.selected: int | None = None
-        self.note = ""
+        self.note = self.failure = ""
         self._due = 0.0  # control periods
         self._begin(scenario, seed, policy, against)
 
@@ -91,19 +100,19 @@ class Session:
         budget: float = math.inf,
         after_step: Callable[[], object] = lambda: None,
     ) -> None:
-        """Let both runs go on for some wall time.
+        """Let both runs go on for some wall time, until a policy fails: see `failure`.
 
         Args:
             elapsed: wall time since the last call [s].
             budget: the most time to compute [s]; steps that do not fit into it are left out.
             after_step: is called after every step.
         """
-        if self.paused or self.is_over:
+        if self.paused or self.is_over or self.failure:
             return
         self._due += elapsed * self.speed / self.scenario.control_period
         stop = time.perf_counter() + budget
-        while self._due >= 1.0 and not self.is_over:
-            self.advance()
+        while self._due >= 1.0 and not (self.is_over or self.failure):
+            self._try_to_advance()
             after_step()
             self._due -= 1.0
             if time.perf_counter() >= stop:
@@ -115,9 +124,10 @@ class Session:
         self.paused = not self.paused
 
     def step(self) -> None:
-        """Pause, and take one control period."""
+        """Pause, and take one control period, unless a policy has failed."""
         self.paused = True
-        self.advance()
+        if not self.failure:
+            self._try_to_advance()
 
     def set_speed(self, speed: float) -> None:
         """Play that many times as fast as real time, one of `SPEEDS`."""
@@ -131,12 +141,12 @@ class Session:
         for name in filter(None, (policy, against)):
             if name not in self.choices:
                 raise SetupError(f"no policy {name!r} to choose{suggest(name, self.choices)}")
-        self._begin(self.scenario, self.seed, policy, against)
+        self._begin_again(self.scenario, self.seed, policy, against)
         self.note = f"seed {self.seed} again"
 
     def next_seed(self) -> None:
         """Begin an episode with the next seed."""
-        self._begin(self.scenario, self.seed + 1, self.policy, self.against)
+        self._begin_again(self.scenario, self.seed + 1, self.policy, self.against)
         self.note = f"seed {self.seed}"
 
     def restart(self) -> None:
@@ -201,7 +211,7 @@ class Session:
     def resize(self, n_robots: int) -> None:
         """Begin the episode again with a swarm of that size."""
         scenario = self.scenario.replace(n_robots=n_robots)
-        self._begin(scenario, self.seed, self.policy, self.against)
+        self._begin_again(scenario, self.seed, self.policy, self.against)
         self.note = f"swarm size {n_robots}: a swarm cannot grow in a run, so it began again"
 
     def set_delivery_width(self, width: float) -> None:
@@ -227,6 +237,18 @@ class Session:
         ]
         self._look_after_selection()
 
+    def _begin_again(self, scenario: Scenario, seed: int, policy: str, against: str | None) -> None:
+        with _policy_errors_explained():
+            self._begin(scenario, seed, policy, against)
+        self.failure = ""
+
+    def _try_to_advance(self) -> None:
+        try:
+            with _policy_errors_explained():
+                self.advance()
+        except SwarmLogisticsError as error:
+            self.failure = str(error)
+
     def advance(self) -> None:
         """Take one control period in both runs."""
         self.run.step()
@@ -249,3 +271,21 @@ class Session:
         if self.run.is_over:
             raise SetupError("the run is over: begin the next seed, or this one again")
         return self.selected
+
+
+@contextmanager
+def _policy_errors_explained() -> Iterator[None]:
+    """Let whatever a policy raises be a SetupError that says what and where; log the traceback."""
+    try:
+        yield
+    except SwarmLogisticsError:
+        raise
+    except (Exception, SystemExit) as error:
+        logging.getLogger(__name__).warning("A policy has failed.", exc_info=True)
+        what = plain(traceback.format_exception_only(error)[-1].strip())
+        frames = traceback.extract_tb(error.__traceback__)
+        foreign = [at for at in frames if not Path(at.filename).is_relative_to(_PACKAGE)]
+        # The policy's own line, not that of a library that it calls.
+        own = [at for at in foreign if at.filename == foreign[0].filename] or frames
+        place = f"{plain(Path(own[-1].filename).name)} line {own[-1].lineno}"
+        raise SetupError(f"{what[:_LONGEST_REASON]}, {place}") from error

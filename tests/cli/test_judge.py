@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from swarm_logistics_env.cli import judging
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.presets import PRESETS
 from tests.cli.conftest import Command
@@ -64,10 +65,32 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
         assert (out / name).is_file()
     report = (out / "report.md").read_text()
     assert "| robots | 8 |\n| floor | tiles |" in report
-    # The same trials again are another study beside it.
+    # With other words on the conditions they are another study beside it.
     assert "so this one is in results/judged/lab-2" in command(TRIALS)
     assert Path("results", "judged", "lab-2", "report.md").is_file()
     assert "holds a study already" in command(f"{TRIALS} --out {out}", code=2)
+
+
+@pytest.mark.parametrize("place", ["", "--out mine"])
+def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
+    place: str, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = f"{TRIALS} {place}"
+    with monkeypatch.context() as patched:
+        patched.setattr(judging, "show_report", lambda *_, **__: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            command(words)
+    first = command(words)
+    assert "For a paper: lab: " in first
+    assert first.endswith(command(words))
+    (out,) = {path.parent for path in Path().rglob("study.sqlite")}
+    assert (out / "report.html").is_file()
+    Path("lab.csv").write_text(LAB + "8;wheel;1;9.5\n")
+    if place:
+        assert "holds a study already" in command(words, code=2)
+    else:
+        (out / "study.sqlite").write_bytes(b"damaged")
+        assert "so this one is in results/judged/lab-2" in command(words)
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
     [
         ("", "is empty: should have a row of column names"),
         (HEAD, "holds no trial"),
-        ("\udcff", "cannot be read as CSV in UTF-8"),
+        ("\udcff", "is not UTF-8 text: save it as CSV UTF-8"),
         ("robots,p\n4,\x001\n", r"line 2: holds '\x00': should be plain text"),
         ("trial,robots\n1,8\n", "has no column 'performance', or time"),
         ("robots,fault,broken,boxes\n4,jam,1,2\n", "by --column performance=NAME --column faulty="),
@@ -155,5 +155,5 @@ def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
         with pytest.raises(spi.IndicatorError) as caught:
             read(tmp_path, HEAD + GOOD, **asked)
         assert words in str(caught.value)
-    with pytest.raises(spi.IndicatorError, match="cannot be read"):
+    with pytest.raises(spi.IndicatorError, match=r"cannot read .*nowhere\.csv: No such file"):
         spi.read_trials(tmp_path / "nowhere.csv")

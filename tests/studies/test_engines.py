@@ -17,9 +17,10 @@ import pytest
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies import Study, play
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.plan import Shard
+from swarm_logistics_env.studies.play import engine_named
 from swarm_logistics_env.tasks.task import Case, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from tests.conftest import SMALL
@@ -32,6 +33,26 @@ def test_two_processes(played: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert Study(out=out, **SMALL).run("process", processes=2).failed == 0
     assert digest(out, tmp_path) == digest(played, tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no CPUs to choose here")
+def test_there_are_as_many_workers_as_this_process_may_use_cores(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def cores() -> object:
+        engine: Any = engine_named("process")
+        return engine.args[0]
+
+    before = os.sched_getaffinity(0)
+    assert cores() == len(before)
+    os.sched_setaffinity(0, {min(before)})  # as taskset does
+    try:
+        assert cores() == 1
+    finally:
+        os.sched_setaffinity(0, before)
+    monkeypatch.setattr(play, "_MOST_WORKERS", 61)
+    monkeypatch.setattr(play, "usable_cores", lambda: 128)
+    assert cores() == 61
 
 
 def test_two_shards_merged(played: Path, tmp_path: Path) -> None:

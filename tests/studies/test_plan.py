@@ -154,9 +154,9 @@ def test_file_says_what_python_says_and_a_bad_one_is_named(tmp_path: Path) -> No
     assert Study.from_file(path, seeds=5).plan().seeds == range(5)
     with pytest.raises(StudyError, match=r"cannot read the study file .*none\.toml"):
         Study.from_file(tmp_path / "none.toml")
-    for text in (b"seeds = ", b"\xed\xb0\x80"):
+    for text, said in ((b"seeds = ", "TOML"), (b"\xed\xb0\x80", "UTF-8 text")):
         path.write_bytes(text)
-        with pytest.raises(StudyError, match=r"small\.toml.* is not TOML"):
+        with pytest.raises(StudyError, match=rf"small\.toml.* is not {said}"):
             Study.from_file(path)
 
 

@@ -161,5 +161,5 @@ def test_a_new_store_is_there_once_it_is_whole_and_never_in_part(tmp_path: Path)
     with pytest.raises(StudyError, match="holds a study already: merge into a new directory"):
         made(stopped=False)
     out = out / FILE_NAME / "in"
-    with pytest.raises(StudyError, match=f"cannot write {out}"):
+    with pytest.raises(StudyError, match=f"cannot write to {out}"):
         made(stopped=False)

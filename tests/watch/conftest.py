@@ -20,8 +20,8 @@ SMALL = Scenario(
 class Served:
     """A server that plays in a thread; its session is changed by orders alone."""
 
-    def __init__(self) -> None:
-        self.server = WatchServer(Session(SMALL, speed=8.0), 0)
+    def __init__(self, session: Session | None = None) -> None:
+        self.server = WatchServer(session or Session(SMALL, speed=8.0), 0)
         self._started = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()))
         self._thread.start()

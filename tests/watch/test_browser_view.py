@@ -62,6 +62,37 @@ def test_page_tells_that_the_server_has_gone(browser: Browser) -> None:
     browser.wait_for("element('state').textContent.includes('has gone')")
 
 
+BACKGROUND = "getComputedStyle(element('state')).backgroundColor"
+
+
+def test_page_warns_of_a_policy_that_failed_and_of_nothing_before(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "stumbling_policy.py").write_text(
+        "class Stumbling:\n    def reset(self, n_robots, seed): ...\n"
+        "    def act(self, observations): raise ValueError('<b>boom</b>')\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    served = Served(Session(SMALL, "stumbling_policy:Stumbling"))
+    try:
+        wait = "window.WebSocket = class {}"
+        script = browser.call("Page.addScriptToEvaluateOnNewDocument", source=wait)
+        browser.open(served.server.address)
+        browser.wait_for("element('state').textContent.includes('Connecting')")
+        calm = browser.value(BACKGROUND)
+        browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
+        browser.open(served.server.address)
+        said = "ValueError: <b>boom</b>, stumbling_policy.py line 3"
+        browser.wait_for(f"element('state').textContent.includes({said!r})")
+        assert browser.value(BACKGROUND) != calm
+        assert browser.value("element('step').disabled")
+        browser.value("order({ do: 'compare', policy: 'homing', against: null })")
+        browser.wait_for("element('state').hidden && latest.time > 1")
+        assert browser.console == []
+    finally:
+        served.stop()
+
+
 def test_recording_plays_from_a_file(browser: Browser, tmp_path: Path) -> None:
     session = Session(SMALL, faults=[Fault("FM4", [1], onset=5.0)])
     file = tmp_path / "run.html"

@@ -10,8 +10,12 @@ import os
 import random
 import signal
 import socket
+import subprocess
+import sys
+import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -19,8 +23,8 @@ import aiohttp
 import pytest
 
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.server import WatchServer, serve
+from swarm_logistics_env.watch import Session, server
+from swarm_logistics_env.watch.server import LOOPBACK, WatchServer, serve
 from tests.watch.conftest import SMALL, Served
 
 
@@ -44,8 +48,19 @@ def ask(served: Served, name: str, **headers: str) -> tuple[int, bytes, dict[str
     return found
 
 
-def messages(served: Served, orders: list[str], enough: int) -> list[dict[str, Any]]:
-    """Send orders and return the messages that come, until a problem or `enough` of them."""
+def messages(
+    served: Served, orders: list[str], enough: int | Callable[[dict[str, Any]], bool]
+) -> list[dict[str, Any]]:
+    """Send orders and return the messages that come, until a problem or `enough` of them.
+
+    Args:
+        enough: how many, or whether a message is the last.
+    """
+
+    def is_last(got: list[dict[str, Any]]) -> bool:
+        if isinstance(enough, int):
+            return len(got) >= enough
+        return bool(got) and enough(got[-1])
 
     async def talk() -> list[dict[str, Any]]:
         got: list[dict[str, Any]] = []
@@ -53,7 +68,7 @@ def messages(served: Served, orders: list[str], enough: int) -> list[dict[str, A
         async with aiohttp.ClientSession() as client, client.ws_connect(live) as page:
             for order in orders:
                 await page.send_str(order)
-            while len(got) < enough and not (got and "problem" in got[-1]):
+            while not is_last(got) and not (got and "problem" in got[-1]):
                 got.append(json.loads((await page.receive(30)).data))
         return got
 
@@ -113,7 +128,9 @@ def test_serves_no_other_file(asked: Served, name: str) -> None:
 
 
 def test_listens_on_loopback_only(asked: Served) -> None:
-    assert {site[0] for site in asked.server._runner.addresses} == {"127.0.0.1"}
+    listening = asked.server._listening
+    assert listening is not None
+    assert {socket.getsockname()[0] for socket in listening.sockets} == {"127.0.0.1"}
 
 
 def test_the_page_is_shown_once_it_is_served() -> None:
@@ -227,3 +244,165 @@ def test_malformed_requests_neither_stop_it_nor_leak_a_path(
 def test_where_it_cannot_listen_is_told_in_a_sentence(asked: Served) -> None:
     with pytest.raises(SetupError, match="in use; --port 0 takes any that is free"):
         asyncio.run(WatchServer(Session(SMALL), asked.server.port).start())
+
+
+RAISING = """
+import numpy as np
+
+class Raising:
+    def reset(self, n_robots, seed): self.left = 5
+    def act(self, observations):
+        self.left -= 1
+        if not self.left: raise ValueError("boom in my controller")
+        return np.zeros((len(observations), 4))
+class Leaving(Raising):
+    def reset(self, n_robots, seed): raise SystemExit(3)
+"""
+
+
+def test_a_policy_that_fails_is_told_to_the_page_and_the_server_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "raising_policy.py").write_text(RAISING)
+    monkeypatch.syspath_prepend(tmp_path)
+    session = Session(SMALL, "raising_policy:Raising", speed=8.0)
+    session.choices = (*session.choices, "raising_policy:Leaving")
+    served = Served(session)
+    try:
+        got = messages(served, [], lambda message: bool(message.get("failure")))
+        said = "ValueError: boom in my controller, raising_policy.py line 8"
+        assert got[-1]["failure"] == said
+        order = json.dumps({"do": "compare", "policy": "raising_policy:Leaving"})
+        got = messages(served, [order], 99)
+        assert got[-1]["problem"] == "SystemExit: 3, raising_policy.py line 11"
+        order = json.dumps({"do": "compare", "policy": "homing"})
+        got = messages(served, [order], lambda message: message.get("time", 0.0) > 3.0)
+        assert {"policy": "homing", "failure": ""}.items() <= {
+            name: value for message in got[-20:] for name, value in message.items()
+        }.items()
+    finally:
+        served.stop()
+
+
+COLD = """
+import asyncio, json, sys
+import aiohttp
+from swarm_logistics_env import FAILURE_MODES, Scenario, kernels
+from swarm_logistics_env.watch import Session
+from swarm_logistics_env.watch.server import WatchServer
+
+def compiled():
+    return {str(one): len(one.overloads) for one in kernels._all_kernels}
+
+async def use():
+    policies = sys.argv[1:]
+    server = WatchServer(Session(Scenario(restock=True), *policies, speed=64.0), 0)
+    await server.start()
+    before = compiled()
+    playing = asyncio.create_task(server.play())
+    async with aiohttp.ClientSession() as client:
+        async with client.ws_connect(server.address + "live") as page:
+            orders = [{"do": "select", "robot": 3}, {"do": "widen", "width": 1.5}]
+            for robot, mode in enumerate(FAILURE_MODES):
+                orders += [{"do": "choose", "mode": mode}, {"do": "toggle", "robot": robot}]
+            orders += [{"do": "select", "robot": 3}, {"do": "repair"}, {"do": "step"}]
+            orders += [{"do": "resize", "n_robots": 7}, {"do": "next"}, {"do": "pause"}]
+            for order in orders:
+                await page.send_str(json.dumps(order))
+                message = {}
+                while message.get("time", 0.0) < 1.0 and order["do"] == "toggle":
+                    message = await page.receive_json(timeout=30)
+                    assert "problem" not in message, message
+            while message.get("seed") != 1:
+                message = await page.receive_json(timeout=30)
+            while message.get("time", 0.0) < 5.0:
+                message = await page.receive_json(timeout=30)
+        async with client.get(server.address + "recording.html") as answer:
+            assert answer.status == 200
+    playing.cancel()
+    await asyncio.gather(playing, return_exceptions=True)
+    after = compiled()
+    print({name: n for name, n in after.items() if n != before[name]})
+
+asyncio.run(use())
+"""
+
+
+@pytest.mark.parametrize("names", [["ppo-delivery"], ["central", "homing"]])
+def test_nothing_is_compiled_once_the_address_is_known(names: list[str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", COLD, *names], capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "{}\n", done.stderr
+
+
+def silent(served: Served, request: str) -> socket.socket:
+    """Return a connection that asks once, and neither reads nor answers after that."""
+    one = socket.socket()
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    one.settimeout(20)
+    one.connect((LOOPBACK, served.server.port))
+    one.sendall(request.format(token=served.server.token, port=served.server.port).encode())
+    return one
+
+
+def n_open(served: Served) -> int:
+    """Return how many connections the server has."""
+    inner = served.server._runner.server
+    assert inner is not None
+    return len(inner.connections)
+
+
+PAGE = (
+    "GET /{token}/live HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\n"
+    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+)
+SILENT = {
+    "pages": PAGE,
+    "files": "GET /{token}/draw.js HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n" * 20,
+    "half a request": "GET /{token}/ HTTP/1.1\r\nHost: loc",
+    "nothing": "",
+}
+
+
+@pytest.mark.parametrize("kind", SILENT)
+def test_connections_that_neither_read_nor_answer_end_and_shut_nobody_out(
+    kind: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("_HEARTBEAT", "_PATIENCE", "_LONGEST_SILENCE"):
+        monkeypatch.setattr(server, name, 0.5)
+    served = Served()
+    waiting = [silent(served, SILENT[kind]) for _ in range(16 if kind == "pages" else 100)]
+    try:
+        if kind == "pages":  # as many as there may be, so that others have to wait
+            while n_open(served) < 16:
+                time.sleep(0.05)
+        else:
+            assert ask(served, "")[0] == 200
+            assert len(messages(served, [], 3)) == 3
+        while n_open(served):
+            time.sleep(0.05)
+        assert len(messages(served, [], 3)) == 3
+    finally:
+        served.stop()
+        for one in waiting:
+            one.close()
+    assert len(capfd.readouterr().err) < 1000
+
+
+def test_a_page_that_reads_nothing_is_dropped_and_holds_up_no_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(server, "_PATIENCE", 0.5)
+    monkeypatch.setattr(server, "frame", lambda session: {"long": f"{time.time()}" * 20_000})
+    served = Served()
+    slow = silent(served, PAGE)
+    try:
+        while n_open(served) != 1:
+            time.sleep(0.05)
+        got = messages(served, [], lambda _: n_open(served) == 1)
+        assert len(got) > 5
+    finally:
+        served.stop()
+        slow.close()

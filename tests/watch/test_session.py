@@ -5,6 +5,7 @@ import json
 import re
 import zlib
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -193,3 +194,102 @@ def test_a_recording_begins_anew_with_each_episode() -> None:
     (packed,) = re.findall(r'id="recording">([^<]+)<', recording.page())
     first, *others = json.loads(zlib.decompress(base64.b64decode(packed)))["frames"]
     assert (first["seed"], first["time"], others) == (2, 0.0, [])
+
+
+BROKEN = """
+import json
+import sys
+
+import numpy as np
+
+class Sound:
+    steps = 0
+    def reset(self, n_robots, seed): ...
+    def act(self, observations):
+        self.steps += 1
+        if self.steps > 5:
+            self.fail()
+        return np.zeros((len(observations), 4))
+    def fail(self): ...
+class Raising(Sound):
+    def fail(self): raise ValueError("boom in my controller")
+class InALibrary(Sound):
+    def fail(self): json.loads("nonsense")
+class Leaving(Sound):
+    def fail(self): sys.exit("enough")
+class Escaping(Sound):
+    def fail(self): raise RuntimeError("\\x1b[31m" + "long" * 10_000)
+class Short(Sound):
+    def act(self, observations): return np.zeros((len(observations), 3))
+class NotBegun(Sound):
+    def reset(self, n_robots, seed): {}["gain"]
+class NotMade(Sound):
+    def __init__(self): raise SystemExit
+"""
+
+
+@pytest.fixture
+def broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Session]:
+    """Makes a session in which a sound policy may be compared with one that is broken."""
+    (tmp_path / "broken_policy.py").write_text(BROKEN)
+    monkeypatch.syspath_prepend(tmp_path)
+    return lambda name: Session(SMALL, "homing", f"broken_policy:{name}")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("Raising", "ValueError: boom in my controller, broken_policy.py line 17"),
+        ("InALibrary", "JSONDecodeError: Expecting value: "),
+        ("InALibrary", ", broken_policy.py line 19"),
+        ("Leaving", "SystemExit: enough, broken_policy.py line 21"),
+        ("Escaping", r"RuntimeError: \x1b[31mlong"),
+        ("Escaping", "lo, broken_policy.py line 23"),
+        ("Short", "Short at 0 s: commands of shape (8, 3): should be (8, 4)"),
+    ],
+)
+def test_a_policy_that_fails_stops_its_episode_alone_and_says_where(
+    name: str, said: str, broken: Callable[[str], Session]
+) -> None:
+    session = broken(name)
+    session.play(5.0)
+    assert said in session.failure
+    assert len(session.failure) < 600
+    assert frame(session)["failure"] == session.failure
+    time = session.state.time
+    session.play(5.0)
+    session.step()
+    assert session.state.time == time
+    assert not session.is_over
+    session.select(1)
+    session.break_robot()  # nothing else is lost
+    session.restart()
+    assert (session.failure, session.state.time) == ("", 0.0)
+    session.pause()
+    session.play(5.0)
+    assert said in session.failure
+    session.compare("homing")
+    session.play(5.0)
+    assert session.failure == ""
+    assert session.state.time == pytest.approx(5.0, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("NotBegun", "KeyError: 'gain', broken_policy.py line 27"),
+        ("NotMade", "SystemExit, broken_policy.py line 29"),
+    ],
+)
+def test_a_policy_that_cannot_begin_leaves_the_session_as_it_is(
+    name: str, said: str, broken: Callable[[str], Session]
+) -> None:
+    session = broken("Sound")
+    session.choices = (*session.choices, f"broken_policy:{name}")
+    session.play(1.0)
+    run, beside = session.run, session.beside
+    with pytest.raises(SetupError, match=re.escape(said)):
+        session.compare("homing", f"broken_policy:{name}")
+    assert (session.run, session.beside) == (run, beside)
+    session.play(1.0)
+    assert session.failure == ""

@@ -41,15 +41,15 @@ function connect() {
   socket.onmessage = ({ data }) => receive(JSON.parse(data));
   socket.onopen = () => { retries = 0; frames = []; latest = null; };
   socket.onclose = () => {
-    tell("The server has gone. Start swarm-logistics watch again and open the address that it prints.");
+    tell("The server has gone. Start swarm-logistics watch again and open the address that it prints.", "lost");
     setTimeout(connect, Math.min(2000, 250 * 2 ** retries++));
   };
 }
 
-function tell(text) {
+function tell(text, kind) {
   element("state").textContent = text;
   element("state").hidden = !text;
-  document.body.classList.toggle("lost", Boolean(text));
+  for (const one of ["lost", "failed"]) document.body.classList.toggle(one, kind === one);
 }
 
 function receive(message) {
@@ -61,7 +61,8 @@ function receive(message) {
   } else {
     take(message);
     showWords();
-    tell("");
+    const { failure } = latest;
+    tell(failure && `The policy has failed: ${failure}. Choose another one, or begin again.`, failure && "failed");
   }
 }
 
@@ -132,6 +133,7 @@ function showWords() {
   const { scenario, selected } = latest;
   document.title = `${latest.policy}, seed ${latest.seed}`;
   element("pause").textContent = latest.paused ? "go on" : "pause";
+  for (const id of ["pause", "step"]) element(id).disabled = !recorded && Boolean(latest.failure);
   element("speed").value = latest.speed;
   element("mode").value = latest.mode;
   element("policy").value = latest.policy;

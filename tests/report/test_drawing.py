@@ -1,0 +1,35 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+DRAW = """
+import os
+from swarm_logistics_env.report.drawing import images
+
+svg, png = images(lambda canvas: canvas.subplots().plot([1, 2]), 2.0)
+import matplotlib
+assert svg.startswith("<?xml") and png.startswith(b"\\x89PNG")
+print(os.environ["MPLBACKEND"], matplotlib.rcParams["backend"])
+"""
+
+
+@pytest.mark.parametrize(
+    ("backend", "left"),
+    [
+        ("module://matplotlib_inline.backend_inline", None),  # of a notebook
+        ("no_such_backend", None),
+        ("TkAgg", "tkagg"),
+    ],
+)
+def test_figures_are_drawn_whatever_backend_is_set(backend: str, left: str | None) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", DRAW],
+        env={**os.environ, "MPLBACKEND": backend}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    named, used = done.stdout.split()
+    assert named == backend
+    assert left is None or used.lower() == left
