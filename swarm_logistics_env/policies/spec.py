@@ -21,6 +21,7 @@ from pydantic import Field, JsonValue, field_validator, model_serializer
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
+from swarm_logistics_env.policies.current_folder import name_module
 from swarm_logistics_env.policies.files import (
     SB3_SUFFIX,
     SUFFIX,
@@ -329,6 +330,8 @@ def _imported(name: str) -> Callable[..., Policy] | None:
         if (folder := str(path.parent.resolve())) not in sys.path:
             sys.path.append(folder)
         module = path.stem
+    else:
+        name_module(module)
     try:
         found = operator.attrgetter(attribute)(importlib.import_module(module))
     except Exception as error:  # of code that is not ours, too

@@ -25,6 +25,7 @@ from unittest.mock import patch
 
 from swarm_logistics_env.errors import StudyError, how_to_install, suggest
 from swarm_logistics_env.kernels import QUIET
+from swarm_logistics_env.policies.current_folder import found_here, look_here
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.tasks.task import Outcome, Run
 
@@ -110,10 +111,15 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
     return partial(_on_ray, address, processes)
 
 
-# One thread per worker: n workers with n threads each would wait for each other.
-_ONE_THREAD = dict.fromkeys(
-    ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
-)
+# Environment of workers. One thread each: n workers with n threads would wait for each other. And
+# Python looks for none of its own modules in the current folder before it gets this process's path.
+_OF_WORKERS = dict.fromkeys(
+    (
+        "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS",
+        "PYTHONSAFEPATH",
+    ),
+    "1",
+)  # fmt: skip
 
 
 def _in_processes(count: int, runs: Iterable[Run]) -> Played:
@@ -147,7 +153,7 @@ def _played(
             first = waiting.popleft()
             message = _pickled(first)
             try:
-                playing[pool.submit(_play, message)] = first
+                playing[pool.submit(_play, message, found_here())] = first
             except BrokenProcessPool:  # a worker died between two runs
                 interrupted.append(first)
         for future in wait(playing, return_when=FIRST_COMPLETED).done:
@@ -164,9 +170,10 @@ def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
     """Start worker processes, and end them at once with the block, or when this process dies."""
     context = multiprocessing.get_context("spawn")
     theirs, ours = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
+    with patch.dict(os.environ, _OF_WORKERS):
+        pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
     try:
-        with patch.dict(os.environ, _ONE_THREAD), _interrupts_ignored():
+        with patch.dict(os.environ, _OF_WORKERS), _interrupts_ignored():
             started = [pool.submit(os.getpid) for _ in range(count)]
         try:
             started[0].result()
@@ -217,8 +224,10 @@ def _pickled(run: Run, dumps: Callable[[Run], bytes] = pickle.dumps) -> bytes:
         ) from error
 
 
-def _play(message: bytes) -> Outcome:
+def _play(message: bytes, found: tuple[str, ...] | None) -> Outcome:
     os.environ[QUIET] = "1"
+    if found is not None:
+        look_here(found)
     try:
         run: Run = pickle.loads(message)
     except Exception:  # noqa: BLE001 - a policy that only the parent can import
@@ -255,7 +264,7 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
         while pending or waiting:
             while waiting and len(pending) < limit:
                 message = _pickled(waiting[0], ray.cloudpickle.dumps)
-                pending[sent.remote(message)] = waiting.popleft()
+                pending[sent.remote(message, found_here())] = waiting.popleft()
             for task in ray.wait(list(pending), num_returns=1)[0]:
                 run = pending.pop(task)
                 try:
