@@ -61,6 +61,8 @@ class Application:
             sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
             return _complain("stopped", 130)
+        except SystemExit as error:  # no command of ours ends so, and 0 would say that all is well
+            raise RuntimeError("a policy or a task called sys.exit()") from error
         except Exception as error:
             sentence = _sentence(error)
             if sentence is None:

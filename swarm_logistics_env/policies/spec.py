@@ -18,7 +18,12 @@ from typing import Any, Self
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
-from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.errors import (
+    RAISED_BY_OTHERS,
+    PolicyError,
+    SwarmLogisticsError,
+    suggest,
+)
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
 from swarm_logistics_env.policies.current_folder import name_module
@@ -92,7 +97,7 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         return policy
     except SwarmLogisticsError:
         raise
-    except Exception as error:  # of code that is not ours
+    except RAISED_BY_OTHERS as error:  # of code that is not ours
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be made: {kind}: {error}") from error
 
@@ -217,7 +222,7 @@ class PolicySpec(Record):
             found = _loaded(self.name, canonical_json(self.parameters), self.trusted)
         try:
             return copy.deepcopy(found)
-        except Exception as error:  # of code that is not ours
+        except RAISED_BY_OTHERS as error:  # of code that is not ours
             raise PolicyError(
                 f"policy {self.name!r} cannot be copied ({type(error).__name__}): should keep "
                 "arrays, not an environment, as each run gets a copy"
@@ -334,7 +339,7 @@ def _imported(name: str) -> Callable[..., Policy] | None:
         name_module(module)
     try:
         found = operator.attrgetter(attribute)(importlib.import_module(module))
-    except Exception as error:  # of code that is not ours, too
+    except RAISED_BY_OTHERS as error:  # of code that is not ours, too
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
     if not callable(found):

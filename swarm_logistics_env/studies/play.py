@@ -23,7 +23,7 @@ from multiprocessing.connection import Connection
 from types import ModuleType
 from unittest.mock import patch
 
-from swarm_logistics_env.errors import StudyError, how_to_install, suggest
+from swarm_logistics_env.errors import RAISED_BY_OTHERS, StudyError, how_to_install, suggest
 from swarm_logistics_env.kernels import QUIET
 from swarm_logistics_env.policies.current_folder import found_here, look_here
 from swarm_logistics_env.progress_bar import ProgressBar
@@ -230,7 +230,7 @@ def _play(message: bytes, found: tuple[str, ...] | None) -> Outcome:
         look_here(found)
     try:
         run: Run = pickle.loads(message)
-    except Exception:  # noqa: BLE001 - a policy that only the parent can import
+    except RAISED_BY_OTHERS:  # a policy that only the parent can import
         return Outcome(error=traceback.format_exc())
     return run.play()
 
