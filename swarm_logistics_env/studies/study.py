@@ -122,8 +122,11 @@ class Study:
         address: str | None = None,
         shard: Shard | None = None,
         minutes: float | None = None,
+        run_limit: float | None = None,
     ) -> Tally:
         """Play the runs that are missing, and those that failed before; each is kept at once.
+
+        It gives up where nothing works: see `play`.
 
         Args:
             engine: the engine that plays them: "local" (this process), "process", "ray", or an
@@ -133,6 +136,8 @@ class Study:
             address: the address of the Ray cluster; None starts one on this machine.
             shard: the part to play, if other machines play the others; None means all.
             minutes: begin no further run after this time; the same call goes on. None: no end.
+            run_limit: wall-clock time after which a worker process ends a run, which has failed
+                then [s]; None: an hour.
 
         Raises:
             StudyError: the store or the engine cannot be used, or the store is another study's.
@@ -147,7 +152,7 @@ class Study:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         if engine is None or isinstance(engine, str):
             usual = "process" if (processes or 1) > 1 else "local"
-            engine = engine_named(engine or usual, processes, address)
+            engine = engine_named(engine or usual, processes, address, run_limit)
         if self.specification.until_clear and shard:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
@@ -161,14 +166,25 @@ class Study:
             tried: set[str] = set()
             # A run that failed in this call is not tried again.
             while missing := self._missing(whole, store, tried):
-                finished = play(missing, engine, store, self.specification.name, end)
+                works = bool(kept) or None in errors
+                finished = play(
+                    missing, engine, store, self.specification.name, end, has_worked=works
+                )
                 errors += finished
                 tried |= {run.key for run in missing}
                 if left := len(missing) - len(finished):
                     break
         failed = [error for error in errors if error is not None]
-        first = failed[0].strip().splitlines()[-1] if failed else None
-        return Tally(len(errors), len(failed), kept, time.monotonic() - start, first, left)
+        is_late = end is not None and time.monotonic() > end
+        return Tally(
+            len(errors),
+            len(failed),
+            kept,
+            time.monotonic() - start,
+            next(iter(failed), None),
+            left,
+            gave_up=bool(left) and not (is_late or kept or None in errors),
+        )
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs
