@@ -14,7 +14,7 @@ from gymnasium.spaces import flatten
 from pydantic import ConfigDict, PositiveFloat, PositiveInt
 
 from swarm_logistics_env.errors import FaultError, StudyError, suggest
-from swarm_logistics_env.policies.policy import function_digest, without_prose
+from swarm_logistics_env.policies.policy import function_digest, one_thread, without_prose
 from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
 from swarm_logistics_env.records import Record
 
@@ -210,7 +210,7 @@ class ParallelTask:
         player: Value = case.policy.load(self.policies)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
-        with closing(self._made(scenario, absent)) as env:
+        with closing(self._made(scenario, absent)) as env, one_thread():
             agents = agents_by_row(env, n_robots, absent)
             # Who is not there cannot fail otherwise.
             broken = FailingRobots(env, () if absent else faults, self._failures, self._period)

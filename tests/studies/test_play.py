@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.studies import Study
@@ -133,3 +134,37 @@ def test_a_limit_is_refused_that_no_worker_could_keep(sizes: dict[str, Any], eng
         Study(**sizes).run(engine, run_limit=3.0)
     with pytest.raises(StudyError, match="run_limit = -1: should be above 0 s"):
         Study(**sizes).run("process", run_limit=-1.0)
+
+
+class Threaded(SwarmDT):
+    """Decides by the number of threads in which torch computes."""
+
+    identity = "threaded"
+
+    def act(self, observations: Any) -> Any:
+        import torch
+
+        return super().act(observations) * (torch.get_num_threads() - 1.0)
+
+
+def test_torch_computes_in_one_thread_whoever_plays(sizes: dict[str, Any]) -> None:
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        study = Study(**{**sizes, "policies": [Threaded()], "seeds": 1})
+        assert study.run().failed == 0
+        digests = set(study.results()["digest"])
+        again = Study(**{**sizes, "policies": [Threaded()], "seeds": 1})
+        assert again.run("process", processes=1).failed == 0
+        assert set(again.results()["digest"]) == digests
+        scenario: Any = study.specification.scenario
+        assert run_episode(scenario, Threaded(), 0).digest in digests
+        play = Play(scenario, Threaded(), 0)  # as a film and `watch` do
+        start = play.world.state.robot_position.copy()
+        while not play.is_over:
+            play.step()
+        assert (play.world.state.robot_position == start).all()
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)

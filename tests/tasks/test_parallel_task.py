@@ -15,7 +15,7 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks import Case, Outcome, ParallelTask, Run, SumOfInfos, SumOfRewards
-from tests.tasks.lane import FAILURES, LANE, OF_LANE, Lane
+from tests.tasks.lane import FAILURES, LANE, OF_LANE, Lane, Walker
 
 FAULT = {"modes": ["silent"], "robots": [1]}
 
@@ -206,3 +206,28 @@ def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
     noisier = task_of(failures={**FAILURES, "noisy": 0.1})
     others = [task_of(performance=costs), SCORED, noisier, task_of(period=0.5), SMALLER]
     assert len({task.code() for task in (task_of(), *others)}) == 6
+
+
+class Threaded(Walker):
+    """Walks where torch computes in one thread, and stays else."""
+
+    identity = "threaded"
+
+    def act(self, observations: Any) -> Any:
+        import torch
+
+        return super().act(observations) * (torch.get_num_threads() == 1)
+
+
+def test_torch_computes_in_one_thread() -> None:
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        whole, threaded = (
+            only_run(LANE, policies=[policy]).play().delivered for policy in ("walker", Threaded())
+        )
+        assert threaded == whole > 0
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)
