@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import re
+import sys
 import time
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -137,34 +139,33 @@ def test_a_limit_is_refused_that_no_worker_could_keep(sizes: dict[str, Any], eng
 
 
 class Threaded(SwarmDT):
-    """Decides by the number of threads in which torch computes."""
+    """Decides by the number of threads in which torch computes; a worker has no torch here."""
 
     identity = "threaded"
 
     def act(self, observations: Any) -> Any:
-        import torch
+        torch: Any = sys.modules.get("torch")
+        n_threads = 1 if torch is None else torch.get_num_threads()
+        return super().act(observations) * (n_threads == 1)
 
-        return super().act(observations) * (torch.get_num_threads() - 1.0)
 
-
-def test_torch_computes_in_one_thread_whoever_plays(sizes: dict[str, Any]) -> None:
-    torch = pytest.importorskip("torch")
-    before = torch.get_num_threads()
-    torch.set_num_threads(2)
-    try:
-        study = Study(**{**sizes, "policies": [Threaded()], "seeds": 1})
-        assert study.run().failed == 0
-        digests = set(study.results()["digest"])
-        again = Study(**{**sizes, "policies": [Threaded()], "seeds": 1})
-        assert again.run("process", processes=1).failed == 0
-        assert set(again.results()["digest"]) == digests
-        scenario: Any = study.specification.scenario
-        assert run_episode(scenario, Threaded(), 0).digest in digests
-        play = Play(scenario, Threaded(), 0)  # as a film and `watch` do
-        start = play.world.state.robot_position.copy()
-        while not play.is_over:
-            play.step()
-        assert (play.world.state.robot_position == start).all()
-        assert torch.get_num_threads() == 2
-    finally:
-        torch.set_num_threads(before)
+def test_torch_computes_in_one_thread_whoever_plays(
+    sizes: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch: Any = ModuleType("torch")
+    n_threads = [4]
+    torch.get_num_threads = lambda: n_threads[0]
+    torch.set_num_threads = lambda count: n_threads.__setitem__(0, count)
+    monkeypatch.setitem(sys.modules, "torch", torch)
+    fields = {**sizes, "policies": [Threaded()], "seeds": 1}
+    here, in_worker = Study(**fields), Study(**fields)
+    assert here.run().failed == in_worker.run("process", processes=1).failed == 0
+    digests = here.results()["digest"].tolist()
+    assert in_worker.results()["digest"].tolist() == digests
+    scenario: Any = here.specification.scenario
+    assert run_episode(scenario, Threaded(), 0).digest in digests
+    play = Play(scenario, Threaded(), 0)  # as a film and `watch` do
+    start = play.world.state.robot_position.copy()
+    play.step()
+    assert (play.world.state.robot_position != start).any()
+    assert n_threads == [4]
