@@ -8,6 +8,7 @@ import re
 import shlex
 import shutil
 import subprocess
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +18,7 @@ import pytest
 
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.page import axis, watch_command
 from swarm_logistics_env.studies import Study
@@ -170,6 +171,9 @@ def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word()
         *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100+50")
     ]
     assert commands["FM1"] is None
+    arm = plan.cells[0][2]
+    model = replace(arm, case=replace(arm.case, policy=PolicySpec(name="model.zip")))
+    assert "--policy model.zip --trust-code" in str(watch_command(model))
     given = {"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}}
     own = Study(policies=[SwarmDT(), given], sizes=[{"values": [2, 3]}]).plan()
     assert {watch_command(arm) for _, _, arm in own.cells} == {None}
