@@ -61,19 +61,17 @@ def import_file(path: Path) -> ModuleType:
 def file_of_module(name: str) -> Path | None:
     """Return the file of a module that Python would import, if it is the user's own Python file.
 
-    It is looked up in the current folder last. None: another kind of module, or none.
+    None: another kind of module, or none.
     """
     top, *rest = name.split(".")
     try:
         spec = importlib.util.find_spec(top)
     except ValueError:  # a module that no file made
         return None
-    if spec is None:
-        stems = [Path(top, *rest)]
-    elif rest:
-        stems = [Path(folder, *rest) for folder in spec.submodule_search_locations or ()]
-    else:
-        stems = [Path(spec.origin.removesuffix(".py"))] if spec.origin else []
+    stems = [Path(spec.origin.removesuffix(".py"))] if spec and spec.origin else []
+    if rest:
+        folders = spec.submodule_search_locations if spec else None
+        stems = [Path(folder, *rest) for folder in folders or ()]
     for stem in stems:
         for path in (stem.with_suffix(".py"), stem / "__init__.py"):
             if path.is_file() and is_users_own(str(path.resolve())):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import CommandError, PolicyError
-from swarm_logistics_env.policies.policy import Policy, decide, start
+from swarm_logistics_env.policies.policy import Policy, decide, one_thread, start
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.faults import FaultLike
@@ -122,12 +122,13 @@ def run_episode(
         >>> run_episode(Scenario(duration=10.0), policies.load("swarm-dt"), seed=0).ended_at
         10.0
     """
-    play = Play(scenario, policy, seed, faults, policy_seed)
-    world = play.world
     digest = hashlib.blake2b(digest_size=16)
-    while not play.is_over:
-        play.step()
-        digest.update(world.state.robot_position.tobytes())
+    with one_thread():  # once for all steps, as each change takes a while
+        play = Play(scenario, policy, seed, faults, policy_seed)
+        world = play.world
+        while not play.is_over:
+            play.step()
+            digest.update(world.state.robot_position.tobytes())
     state = world.state
     delivery_times = np.array(state.delivery_times, dtype=np.float64)
     digest.update(delivery_times.tobytes())

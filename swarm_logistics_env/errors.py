@@ -45,6 +45,11 @@ class StudyError(SwarmLogisticsError):
     """A study whose specification, store or request cannot be."""
 
 
+# What code that is not ours may raise: sys.exit() in a policy ends its run alone. Ctrl-C, which is
+# a KeyboardInterrupt, ends all.
+RAISED_BY_OTHERS = (Exception, SystemExit, GeneratorExit)
+
+
 def how_to_install(extra: str) -> str:
     """Return the end of an error message about a package of one of the extras that is missing."""
     return f"in a clone, pip install -c constraints.txt '.[{extra}]'"

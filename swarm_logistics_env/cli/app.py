@@ -16,6 +16,7 @@ import typer
 from typer import Exit, Option, echo
 
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
+from swarm_logistics_env.policies.current_folder import look_here
 from swarm_logistics_env.records import plain, read_table
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.warehouse.faults import Fault, fault_of
@@ -55,10 +56,7 @@ class Application:
 
     def run(self, arguments: list[str]) -> int:
         """Run the command with these arguments and return the exit code."""
-        # A user's own policy lies in the folder in which the command is run. The folder comes last,
-        # so that its modules hide no installed ones.
-        if "" not in sys.path:
-            sys.path.append("")
+        look_here()  # a user's own policy lies in the folder in which the command is run
         typed = [*arguments, "--help"] if arguments in ([], ["study"]) else arguments
         try:
             command = command_line({*typed[:1]} & {*COMMANDS} or COMMANDS)
@@ -68,6 +66,8 @@ class Application:
             sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
             return _complain("stopped", 130)
+        except SystemExit as error:  # no command of ours ends so, and 0 would say that all is well
+            raise RuntimeError("a policy or a task called sys.exit()") from error
         except Exception as error:
             sentence = _sentence(error)
             if sentence is None:

@@ -33,6 +33,7 @@ from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustOption,
 from .study_commands import (
     ClearingOption,
     FullOption,
+    LimitOption,
     ProcessesOption,
     run_study,
     study_of,
@@ -107,6 +108,7 @@ def judge_command(
         ),
     ] = None,
     processes: ProcessesOption = None,
+    run_limit: LimitOption = None,
     full: FullOption = False,
     trust_code: TrustOption = False,
 ) -> None:
@@ -127,6 +129,7 @@ def judge_command(
         "--minutes": minutes,
         "--clearing": clearing,
         "--benchmark": plays_benchmark,
+        "--run-limit": run_limit,
     }
     is_policy = names_policy(asked)
     for option, given in (of_trials if is_policy else of_policy).items():
@@ -140,7 +143,8 @@ def judge_command(
         policy = PolicySpec.of(asked).replace(trusted=trust_code)
         for one in policy.trainings or (policy,):
             one.load()  # what is wrong with it is said before anything is written
-        engine = engine_named("local" if processes == 1 else "process", processes)
+        name = "local" if processes == 1 else "process"
+        engine = engine_named(name, processes, run_limit=run_limit)
         if plays_benchmark:
             place = out or Path("results", "benchmark", slug(policy.title))
             study = study_of(benchmark.STUDY, place, None, [asked], trust_code)
@@ -160,11 +164,11 @@ def judge_command(
             _show_benchmark(results, place)
         else:
             show_report(results, place, full=full, is_finished=not tally.left)
-        if tally.left:
+        if tally.left and not tally.gave_up:
             why = f"Stopped after {minutes:g} min, {tally.left} runs are left"
             say(f"{why}; the same command goes on:", str(context.obj))
         # Several trainings and untrusted code need options that this command does not repeat.
-        elif not (plays_benchmark or policy.trainings or trust_code) and any(
+        elif not (tally.left or plays_benchmark or policy.trainings or trust_code) and any(
             v.conclusion == "inconclusive" for v in results.verdicts
         ):
             more = max(JUDGE_SEEDS, 2 * most)

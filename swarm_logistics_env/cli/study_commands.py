@@ -47,6 +47,14 @@ PolicyOption = Annotated[
 ProcessesOption = Annotated[
     int | None, Option(min=1, help="Worker processes; all cores if not given.")
 ]
+LimitOption = Annotated[
+    float | None,
+    Option(
+        metavar="SECONDS",
+        help="Time after which a run has failed; an hour if not given. It needs --processes 2 "
+        "or more.",
+    ),
+]
 FullOption = Annotated[bool, Option("--full", help="Print every table, not the answer alone.")]
 ClearingOption = Annotated[
     bool,
@@ -96,6 +104,7 @@ def run_command(
     shard: Annotated[
         str | None, Option(metavar="I/N", help="Play part I of N alone, kept in OUT/shard-I-of-N.")
     ] = None,
+    run_limit: LimitOption = None,
     full: FullOption = False,
     trust_code: TrustOption = False,
 ) -> None:
@@ -120,7 +129,7 @@ def run_command(
     out = out or Path("results", chosen.specification.name + ending)
     chosen.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
-    player = engine_named(engine, processes, address)
+    player = engine_named(engine, processes, address, run_limit)
     say(str(chosen.plan()))
     echo()
     if chosen.is_exploratory():

@@ -117,7 +117,7 @@ def _power(test: Verdict, effect: float | None) -> Texts:
 
 
 def say_what_was_played(tally: Tally) -> None:
-    """Print how many runs were played, in which time, and what failed."""
+    """Print how many runs were played, in which time, what failed, and where it was given up."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
     why = f", the first with {plain(tally.error)}" if tally.error else ""
     for change in tally.changes:
@@ -126,3 +126,9 @@ def say_what_was_played(tally: Tally) -> None:
         f"{tally.played} runs played in {tally.seconds:.1f} s{rate}; {tally.kept} were kept from "
         f"before; {tally.failed} failed{why}"
     )
+    if tally.gave_up:
+        say(
+            "Stopped, as nothing works: runs of every condition have failed and none succeeded, so "
+            f"the other {tally.left} were not played. The first failed at {plain(tally.place)}. "
+            "The same command plays all of them again."
+        )

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import PolicyError, how_to_install
+from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError, how_to_install
 from swarm_logistics_env.motion.frame import LEAD, OUTPUTS
 from swarm_logistics_env.observations import n_columns
+from swarm_logistics_env.policies.current_folder import everything_here
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.records import becoming
@@ -175,8 +176,9 @@ class StableBaselinesModel:
             ) from None
         try:
             self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-            self._model: Any = PPO.load(path, device="cpu")
-        except Exception as error:  # whatever the code in a file that is none raises
+            with everything_here():
+                self._model: Any = PPO.load(path, device="cpu")
+        except RAISED_BY_OTHERS as error:  # whatever the code in a file that is none raises
             reason = (str(error) or type(error).__name__).splitlines()[0]
             raise PolicyError(f"{path} is no PPO model of stable-baselines3: {reason}") from error
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import contextlib
+import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -51,6 +53,25 @@ def check_policy(policy: object) -> None:
         )
 
 
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Let torch, if it is loaded, compute in one thread, and in as many as before afterwards.
+
+    Its sums are other bits with another number of threads, so that a run would depend on who plays
+    it; and networks as small as those of robots are slower on several.
+    """
+    torch: Any = sys.modules.get("torch")
+    n_threads = 1 if torch is None else torch.get_num_threads()
+    if n_threads == 1:
+        yield
+        return
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(n_threads)
+
+
 def start(policy: Policy, scenario: Scenario, seed: int) -> None:
     """Let `policy` begin an episode.
 
@@ -59,9 +80,10 @@ def start(policy: Policy, scenario: Scenario, seed: int) -> None:
     """
     check_policy(policy)
     configure = getattr(policy, "configure", None)
-    if configure is not None:
-        configure(scenario)
-    policy.reset(scenario.n_robots, seed)
+    with one_thread():
+        if configure is not None:
+            configure(scenario)
+        policy.reset(scenario.n_robots, seed)
 
 
 def decide(
@@ -72,10 +94,11 @@ def decide(
     A policy that needs the state is a central controller: its commands reach robots that hear.
     They are checked where they are used, by `Warehouse.step`.
     """
-    if getattr(policy, "needs_state", False):
-        # The protocol knows the one argument that all policies take.
-        return mask_unreachable_commands(policy.act(observations, state), state)  # type: ignore[call-arg]
-    return policy.act(observations)
+    with one_thread():
+        if getattr(policy, "needs_state", False):
+            # The protocol knows the one argument that all policies take.
+            return mask_unreachable_commands(policy.act(observations, state), state)  # type: ignore[call-arg]
+        return policy.act(observations)
 
 
 def mask_unreachable_commands(commands: NDArray[Any], state: WarehouseState) -> NDArray[Any]:

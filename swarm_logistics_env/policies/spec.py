@@ -19,10 +19,16 @@ from typing import Any, Self
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
 from swarm_logistics_env.code_files import file_of_module, import_file
-from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError, suggest
+from swarm_logistics_env.errors import (
+    RAISED_BY_OTHERS,
+    PolicyError,
+    SwarmLogisticsError,
+    suggest,
+)
 from swarm_logistics_env.fingerprint import UNSTABLE, changed_files, changes
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
+from swarm_logistics_env.policies.current_folder import name_module
 from swarm_logistics_env.policies.files import (
     SB3_SUFFIX,
     SUFFIX,
@@ -93,7 +99,7 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         return policy
     except SwarmLogisticsError:
         raise
-    except Exception as error:  # of code that is not ours
+    except RAISED_BY_OTHERS as error:  # of code that is not ours
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be made: {kind}: {error}") from error
 
@@ -205,7 +211,7 @@ class PolicySpec(Record):
         policy = self._make(makers) if planned is None else self._as_planned(makers, planned)
         try:
             return copy.deepcopy(policy)
-        except Exception as error:  # of code that is not ours
+        except RAISED_BY_OTHERS as error:  # of code that is not ours
             raise PolicyError(
                 f"policy {self.name!r} cannot be copied ({type(error).__name__}): should keep "
                 "arrays, not an environment, as each run gets a copy"
@@ -372,10 +378,12 @@ def _imported(name: str) -> Callable[..., Policy] | None:
     module, colon, attribute = name.rpartition(":")
     if not colon:
         return None
+    if not module.endswith(".py"):
+        name_module(module)
     try:
         file = _code_file(name)
         loaded = importlib.import_module(module) if file is None else import_file(file)
-    except Exception as error:  # of code that is not ours, too
+    except RAISED_BY_OTHERS as error:  # of code that is not ours, too
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
     try:

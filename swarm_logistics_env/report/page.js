@@ -213,7 +213,7 @@ function showRun() {
   place.hidden = !data.paired;  // unpaired trials have nothing in common but their place
   const runs = chosen.arms.map(([symbol, name, condition]) => {
     const { p, command } = data.conditions[condition];
-    const shown = command ? `<code>${escaped(command)} --seed ${seed}</code>` : "";
+    const shown = command ? `<code>${escaped(command)} --seed ${seed}</code>` : ". No command plays this run.";
     return `${escaped(symbol)}, ${escaped(name)}: P = ${p[chosen.seed] ?? "no run"}${shown}`;
   });
   place.innerHTML = `<b>Seed ${seed}</b><br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;

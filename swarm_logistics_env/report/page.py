@@ -87,6 +87,8 @@ def watch_command(arm: Arm) -> str | None:
     if case.task.name != DEFAULT or case.behaviour or not case.policy.is_text:
         return None
     words = ["swarm-logistics", "watch", "--policy", case.policy.name]
+    # A class that is typed is trusted by that; the code in a file is not.
+    words += ["--trust-code"] if case.policy.runs_code and ":" not in case.policy.name else []
     default = case.task.default.model_dump(mode="json")
     for name, value in case.scenario.model_dump(mode="json").items():
         if value != default[name]:

@@ -5,37 +5,39 @@ Whichever engine plays them, the outcomes are the same; their order is not.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import pickle
-import signal
+import re
 import sys
+import sysconfig
 import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing.connection import Connection
+from pathlib import Path
 from types import ModuleType
-from unittest.mock import patch
-
-import cloudpickle
 
 from swarm_logistics_env.errors import StudyError, how_to_install, suggest
-from swarm_logistics_env.kernels import QUIET
+from swarm_logistics_env.policies.current_folder import found_here
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.tasks.task import Outcome, Run
 
 from .runs import Runs
+from .worker_processes import Played, in_processes, pickled, play_pickled
 
-Played = Generator[tuple[Run, Outcome], None, None]
 Engine = Callable[[Iterable[Run]], Played]
 NAMES = ("local", "process", "ray")
+
+
+# Lines of a traceback, and the beginnings of files that are not a user's own.
+_FRAME = re.compile(r'File "(.+?)", line (\d+)')
+_NOT_OWN = (
+    str(Path(__file__).parents[1]), "<",
+    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,9 @@ class Tally:
     Attributes:
         played: runs played now; failed: those of them that failed; kept: found in the store.
         seconds: wall-clock time [s].
-        error: what the first that failed raised, without its traceback; None: none failed.
-        left: runs that the time did not suffice for.
+        traceback: of the first that failed; None: none failed.
+        left: runs that the time did not suffice for, or that were given up.
+        gave_up: whether it stopped because nothing worked, see `play`.
         changes: sentences on why runs that were stored before do not count any more.
     """
 
@@ -54,32 +57,71 @@ class Tally:
     failed: int
     kept: int
     seconds: float
-    error: str | None = None
+    traceback: str | None = None
     left: int = 0
+    gave_up: bool = False
     changes: tuple[str, ...] = ()
+
+    @property
+    def error(self) -> str | None:
+        """What the first run that failed raised, without its traceback; None: none failed."""
+        return self.traceback and self.traceback.strip().splitlines()[-1]
+
+    @property
+    def place(self) -> str:
+        """File and line at which it did, outside this package and the libraries if possible."""
+        frames = _FRAME.findall(self.traceback or "")
+        own = [frame for frame in frames if not frame[0].startswith(_NOT_OWN)]
+        return ":".join([*frames, *own][-1]) if frames else "no file"
 
 
 def play(
-    runs: Sequence[Run], engine: Engine, store: Runs, title: str, end: float | None = None
+    runs: Sequence[Run],
+    engine: Engine,
+    store: Runs,
+    title: str,
+    end: float | None = None,
+    *,
+    has_worked: bool = True,
 ) -> list[str | None]:
     """Play runs and keep each in the store at once; show a progress bar.
 
     Args:
         end: when to stop (`time.monotonic`) [s]; None: when all are played.
+        has_worked: whether a run of the study has succeeded. While none has, it stops as soon as
+            every condition has failed, at more than one seed, in as many runs as a condition has.
 
     Returns:
         What each run raised, as they finished; None: it succeeded.
     """
     errors: list[str | None] = []
+    failed: list[Run] = []
     # Closed at once where this stops early, so that no worker outlives it.
     with closing(engine(runs)) as finished, ProgressBar(title, len(runs), "runs") as progress:
         for run, outcome in finished:
             store.add(run, outcome)
             errors.append(outcome.error)
-            progress.reach(len(errors), f"{len(errors) - errors.count(None)} failed")
+            if outcome.error is None:
+                has_worked = True
+            else:
+                failed.append(run)
+            progress.reach(len(errors), f"{len(failed)} failed")
+            if not has_worked and _is_hopeless(runs, failed):
+                break
             if end is not None and time.monotonic() > end:
                 break
     return errors
+
+
+def _is_hopeless(runs: Sequence[Run], failed: Sequence[Run]) -> bool:
+    """Return whether these failures, without a success, say that all the others will fail."""
+    cases, seeds = {run.case.key for run in runs}, {run.seed for run in runs}
+    # A fault or a size alone, or a single seed, may be what a policy cannot do.
+    return (
+        len(failed) >= len(runs) / len(cases)
+        and {run.case.key for run in failed} == cases
+        and len({run.seed for run in failed}) >= min(2, len(seeds))
+    )
 
 
 def serial(runs: Iterable[Run]) -> Played:
@@ -88,7 +130,15 @@ def serial(runs: Iterable[Run]) -> Played:
         yield run, run.play()
 
 
-def engine_named(name: str, processes: int | None = None, address: str | None = None) -> Engine:
+RUN_LIMIT = 3600.0  # [s], far more than an episode takes, and less than for ever
+
+
+def engine_named(
+    name: str,
+    processes: int | None = None,
+    address: str | None = None,
+    run_limit: float | None = None,
+) -> Engine:
     """Return an engine.
 
     Args:
@@ -96,6 +146,8 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
         processes: the number of worker processes, or of cores of a local cluster; None means one
             for each core that this process may use. On Windows there are 61 at most.
         address: the address of the Ray cluster; None starts one on this machine.
+        run_limit: wall-clock time after which a worker process ends a run, which has failed then
+            [s]; None: `RUN_LIMIT`. Other engines wait for ever.
 
     Raises:
         StudyError: there is no such engine, or it has no use for one of the arguments.
@@ -104,12 +156,17 @@ def engine_named(name: str, processes: int | None = None, address: str | None = 
         raise StudyError(f"no engine {name!r}{suggest(name, NAMES)}")
     if address is not None and name != "ray":
         raise StudyError(f"engine {name}: only ray has an address")
+    if run_limit is not None and name != "process":
+        raise StudyError(f"engine {name}: only process, whose workers can be ended, has run_limit")
+    if run_limit is not None and not 0.0 < run_limit <= threading.TIMEOUT_MAX:
+        raise StudyError(f"run_limit = {run_limit:g}: should be above 0 s")
     if name == "local":
         if processes not in (None, 1):
             raise StudyError(f"engine local: is one process, not {processes}")
         return serial
     if name == "process":
-        return partial(_in_processes, min(processes or usable_cores(), _MOST_WORKERS))
+        count = min(processes or usable_cores(), _MOST_WORKERS)
+        return partial(in_processes, count, run_limit or RUN_LIMIT)
     if address is not None and processes is not None:
         raise StudyError("engine ray: a cluster that runs already has its own number of cores")
     return partial(_on_ray, address, processes)
@@ -126,134 +183,6 @@ def usable_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-# One thread per worker: n workers with n threads each would wait for each other.
-_ONE_THREAD = dict.fromkeys(
-    ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
-)
-
-
-def _in_processes(count: int, runs: Iterable[Run]) -> Played:
-    """Play the runs in `count` worker processes.
-
-    When a worker dies, each run that was being played is played once more, alone in a new worker; a
-    run that ends this worker as well is an outcome with an error.
-
-    Raises:
-        StudyError: a run cannot be sent to another process, or no worker comes up.
-    """
-    waiting = deque(runs)
-    while waiting:
-        with workers(min(count, len(waiting))) as pool:
-            interrupted = yield from _played(pool, waiting, count)
-        for run in interrupted:
-            with workers(1) as alone:
-                ended_again = yield from _played(alone, deque([run]), 1)
-            if ended_again:
-                yield run, Outcome(error="WorkerDied: two worker processes ended in this run\n")
-
-
-def _played(
-    pool: ProcessPoolExecutor, waiting: deque[Run], at_once: int
-) -> Generator[tuple[Run, Outcome], None, list[Run]]:
-    """Yield runs with their outcomes until none waits; return those that a dead worker played."""
-    playing: dict[Future[Outcome], Run] = {}
-    interrupted: list[Run] = []
-    while playing or (waiting and not interrupted):
-        while waiting and not interrupted and len(playing) < at_once:
-            first = waiting.popleft()
-            message = _pickled(first)
-            try:
-                playing[pool.submit(_play, message)] = first
-            except BrokenProcessPool:  # a worker died between two runs
-                interrupted.append(first)
-        for future in wait(playing, return_when=FIRST_COMPLETED).done:
-            run = playing.pop(future)
-            try:
-                yield run, future.result()
-            except BrokenProcessPool:
-                interrupted.append(run)
-    return interrupted
-
-
-@contextmanager
-def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
-    """Start worker processes, and end them at once with the block, or when this process dies."""
-    context = multiprocessing.get_context("spawn")
-    theirs, ours = context.Pipe(duplex=False)
-    pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
-    try:
-        with patch.dict(os.environ, _ONE_THREAD), _without_main(), _interrupts_ignored():
-            started = [pool.submit(os.getpid) for _ in range(count)]
-        try:
-            started[0].result()
-        except BrokenProcessPool:
-            raise StudyError(
-                "a worker process ended before its first run; in a script, run the study "
-                'under `if __name__ == "__main__":`, or use one process'
-            ) from None
-        yield pool
-    finally:
-        ours.close()
-        pool.shutdown(cancel_futures=True)
-        theirs.close()
-
-
-@contextmanager
-def _without_main() -> Generator[None, None, None]:
-    """Start workers that do not execute the main script again: what it defines travels with runs.
-
-    So a script needs no guard, and it may be a notebook or come from standard input.
-    """
-    main = sys.modules["__main__"]
-    with patch.object(main, "__spec__", None), patch.object(main, "__file__", None, create=True):
-        yield
-
-
-def _end_with_parent(connection: Connection) -> None:
-    """End this worker when the parent closes its end of the pipe, which its death does as well."""
-
-    def watch() -> None:
-        try:
-            connection.recv()
-        except (EOFError, OSError):
-            os._exit(0)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-@contextmanager
-def _interrupts_ignored() -> Generator[None, None, None]:
-    """Start workers that ignore SIGINT: the parent alone decides how the study stops."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _pickled(run: Run) -> bytes:
-    try:
-        message: bytes = cloudpickle.dumps(run)
-    except (pickle.PicklingError, AttributeError, TypeError) as error:
-        raise StudyError(
-            f"policy {run.case.policy.title!r} cannot be sent to another process "
-            f"({str(error).splitlines()[0]}): use one process"
-        ) from error
-    return message
-
-
-def _play(message: bytes) -> Outcome:
-    os.environ[QUIET] = "1"
-    try:
-        run: Run = pickle.loads(message)
-    except Exception:  # noqa: BLE001 - a policy that only the parent can import
-        return Outcome(error=traceback.format_exc())
-    return run.play()
 
 
 RETRIES = 1  # after a worker's death, as local processes do
@@ -279,13 +208,13 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
     ray, ours = _connected(address, cores)
     pending: dict[Hashable, Run] = {}
     try:
-        sent = ray.remote(num_cpus=1, max_retries=RETRIES)(_play)
+        sent = ray.remote(num_cpus=1, max_retries=RETRIES)(play_pickled)
         # A policy travels with every run, so only a few runs are sent at a time.
         limit = QUEUED_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
         while pending or waiting:
             while waiting and len(pending) < limit:
-                message = _pickled(waiting[0])
-                pending[sent.remote(message)] = waiting.popleft()
+                message = pickled(waiting[0])
+                pending[sent.remote(message, found_here())] = waiting.popleft()
             for task in ray.wait(list(pending), num_returns=1)[0]:
                 run = pending.pop(task)
                 try:

@@ -122,17 +122,21 @@ class Study:
         address: str | None = None,
         shard: Shard | None = None,
         minutes: float | None = None,
+        run_limit: float | None = None,
     ) -> Tally:
         """Play the runs that are missing, and those that failed before; each is kept at once.
+
+        It gives up where nothing works: see `play`.
 
         Args:
             engine: the engine that plays them: "local" (this process), "process", "ray", or an
                 engine of your own; None means this process, or `processes` of them.
-            processes: the number of worker processes; a script has to call this below
-                `if __name__ == "__main__":` then.
+            processes: the number of worker processes.
             address: the address of the Ray cluster; None starts one on this machine.
             shard: the part to play, if other machines play the others; None means all.
             minutes: begin no further run after this time; the same call goes on. None: no end.
+            run_limit: wall-clock time after which a worker process ends a run, which has failed
+                then [s]; None: an hour.
 
         Raises:
             StudyError: the store or the engine cannot be used, or the store is another study's.
@@ -147,7 +151,7 @@ class Study:
             raise StudyError(f"the study in {self.out} was imported: run into a new directory")
         if engine is None or isinstance(engine, str):
             usual = "process" if (processes or 1) > 1 else "local"
-            engine = engine_named(engine or usual, processes, address)
+            engine = engine_named(engine or usual, processes, address, run_limit)
         if self.specification.until_clear and shard:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
@@ -165,15 +169,26 @@ class Study:
             while missing := self._missing(whole, store, tried):
                 if not tried:
                     refuse_changed_policies(missing)
-                finished = play(missing, engine, store, self.specification.name, end)
+                works = bool(kept) or None in errors
+                finished = play(
+                    missing, engine, store, self.specification.name, end, has_worked=works
+                )
                 errors += finished
                 tried |= {run.key for run in missing}
                 if left := len(missing) - len(finished):
                     break
         failed = [error for error in errors if error is not None]
-        first = failed[0].strip().splitlines()[-1] if failed else None
-        seconds = time.monotonic() - start
-        return Tally(len(errors), len(failed), kept, seconds, first, left, changed)
+        is_late = end is not None and time.monotonic() > end
+        return Tally(
+            len(errors),
+            len(failed),
+            kept,
+            time.monotonic() - start,
+            next(iter(failed), None),
+            left,
+            gave_up=bool(left) and not (is_late or kept or None in errors),
+            changes=changed,
+        )
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs

@@ -16,6 +16,7 @@ from pydantic import ConfigDict, PositiveFloat, PositiveInt
 from swarm_logistics_env.code_files import PACKAGE
 from swarm_logistics_env.errors import FaultError, StudyError, suggest
 from swarm_logistics_env.fingerprint import UNSTABLE, fingerprint, package_code
+from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
 from swarm_logistics_env.records import Record, canonical_json
 
@@ -214,7 +215,7 @@ class ParallelTask:
         player: Value = case.policy.load(self.policies, case.identity)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
-        with closing(self._made(scenario, absent)) as env:
+        with closing(self._made(scenario, absent)) as env, one_thread():
             agents = agents_by_row(env, n_robots, absent)
             # Who is not there cannot fail otherwise.
             broken = FailingRobots(env, () if absent else faults, self._failures, self._period)

@@ -20,7 +20,8 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, NonNegativeFlo
 from pydantic.dataclasses import dataclass as validated
 
 from swarm_logistics_env import streams
-from swarm_logistics_env.errors import StudyError, suggest
+from swarm_logistics_env.errors import RAISED_BY_OTHERS, StudyError, suggest
+from swarm_logistics_env.policies.current_folder import name_module
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.records import canonical_json
 
@@ -263,7 +264,7 @@ class Run:
                     "the package changed while the study ran"
                 )
             outcome = task.play(self.case, self.seed, self.policy_seed)
-        except Exception:  # noqa: BLE001 - kept as the run's outcome, and blocks the verdict
+        except RAISED_BY_OTHERS:  # kept as the run's outcome, and blocks the verdict
             outcome = Outcome(error=traceback.format_exc())
         return replace(outcome, wall_seconds=time.perf_counter() - start)
 
@@ -294,9 +295,10 @@ def task_of(source: object) -> Task:
             raise StudyError(
                 f"no task {source!r} (a name or 'package.module:OBJECT'){suggest(source, NAMES)}"
             )
+        name_module(module)
         try:
             found = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError, ValueError) as error:
+        except (ImportError, AttributeError, ValueError, SystemExit) as error:
             raise StudyError(f"task {source!r} cannot be imported: {error}") from None
     if not isinstance(found, Task):
         raise StudyError(f"{source!r} is no task: should have the attributes of tasks.Task")

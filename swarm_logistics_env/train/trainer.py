@@ -16,6 +16,7 @@ from stable_baselines3.common.logger import configure
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
+from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.records import becoming
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
@@ -79,9 +80,19 @@ def train(
         )
     device, view = device_of(device), NetworkView(training)
     enter(out, training, command)
-    # Small networks gain little from more threads and lose much if cores are shared; the sums would
-    # depend on the number of threads as well.
-    torch.set_num_threads(1)
+    with one_thread():
+        return _trained(training, out, command, device, view, callbacks)
+
+
+def _trained(
+    training: Training,
+    out: Path,
+    command: str,
+    device: str,
+    view: NetworkView,
+    callbacks: Sequence[BaseCallback],
+) -> Path:
+    """Train a policy, or go on with it, and return the path of its file; see `train`."""
     state = read_checkpoint(out)
     learner, log = make_learner(training, view, device), TrainingLog()
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))

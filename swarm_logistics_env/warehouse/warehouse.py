@@ -187,6 +187,19 @@ class Warehouse:
         return tuple(each.fault for each in self._occurrences)
 
     @property
+    def numbered_faults(self) -> tuple[Fault, ...]:
+        """`faults`, each with the numbers of its robots: one by role stays as it is until it holds.
+
+        Given to `set_faults`, they change nothing.
+        """
+        return tuple(
+            each.fault.replace(robots=tuple(each.robots.tolist()), role=None)
+            if len(each.robots)
+            else each.fault
+            for each in self._occurrences
+        )
+
+    @property
     def n_removed(self) -> int:
         """How many robots were taken out of the arena so far."""
         return int(np.count_nonzero(~self.state.robot_present))

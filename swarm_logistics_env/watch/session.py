@@ -6,7 +6,7 @@ import logging
 import math
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from swarm_logistics_env.records import plain
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES, failure_mode
-from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults, failed_robots
+from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults
 from swarm_logistics_env.warehouse.state import WarehouseState
 
 _PACKAGE = Path(__file__).parents[1]
@@ -175,7 +175,7 @@ class Session:
             return
         now = round(self.state.time, 9)
         fault = Fault(self.mode, [robot], onset=now)
-        self._set_faults([*self.run.world.faults, fault])
+        self._change_faults(lambda faults: [*faults, fault])
         self._look_after_selection()
         self.events.append(Event(self.state.time, robot, self.mode))
         self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
@@ -183,18 +183,19 @@ class Session:
     def repair_robot(self) -> None:
         """End all failures of the selected robot."""
         robot = self._meant()
-        world = self.run.world
-        if not world.state.failed[robot]:
+        state = self.state
+        if not state.failed[robot]:
             self.note = f"robot {robot} is sound"
             return
-        kept = []
-        for fault in world.faults:
-            if fault.is_active(world.state.time) and isinstance(fault.robots, tuple):
-                others = [other for other in fault.robots if other != robot]
-                kept += [fault.replace(robots=tuple(others))] if others else []
-            else:
-                kept.append(fault)
-        self._set_faults(kept)
+
+        def without_robot(faults: Iterable[Fault]) -> Iterator[Fault]:
+            for fault in faults:
+                if not (fault.is_active(state.time) and isinstance(fault.robots, tuple)):
+                    yield fault
+                elif others := tuple(other for other in fault.robots if other != robot):
+                    yield fault.replace(robots=others)
+
+        self._change_faults(lambda faults: [*without_robot(faults)])
         self.events.append(Event(self.state.time, robot, None))
         self.note = f"robot {robot} is repaired"
 
@@ -222,19 +223,15 @@ class Session:
         self.note = f"delivery area {width:g} m wide"
 
     def _begin(self, scenario: Scenario, seed: int, policy: str, against: str | None) -> None:
-        # The faults name their robots, so that each robot can be repaired by itself.
-        robots = [failed_robots(fault, seed, scenario.n_robots).tolist() for fault in self._planned]
-        faults = [fault.replace(robots=tuple(r)) for fault, r in zip(self._planned, robots)]
+        faults = self._planned
         run = Play(scenario, self.load(policy), seed, faults)
-        other, others_faults = (policy, []) if against is None else (against, faults)
+        other, others_faults = (policy, ()) if against is None else (against, faults)
         self.beside = Play(scenario, self.load(other), seed, others_faults)
         self.run, self.seed, self._due = run, seed, 0.0
         self.policy, self.against = policy, against
-        self.events: list[Event] = [
-            Event(fault.onset, robot, fault.mode)
-            for fault, those in zip(faults, robots)
-            for robot in those
-        ]
+        self.events: list[Event] = []
+        self._untold = [*faults]
+        self._tell_of_faults()
         self._look_after_selection()
 
     def _begin_again(self, scenario: Scenario, seed: int, policy: str, against: str | None) -> None:
@@ -253,12 +250,24 @@ class Session:
         """Take one control period in both runs."""
         self.run.step()
         self.beside.step()
+        self._tell_of_faults()
         self._look_after_selection()
 
-    def _set_faults(self, faults: Sequence[Fault]) -> None:
-        self.run.world.set_faults(faults)
+    def _tell_of_faults(self) -> None:
+        """Note whom the faults strike: those by role have chosen only once they hold."""
+        if not self._untold:
+            return
+        world = self.run.world
+        for fault, numbered in zip(world.faults, world.numbered_faults):
+            if fault in self._untold and isinstance(numbered.robots, tuple):
+                self._untold.remove(fault)
+                self.events += [Event(fault.onset, one, fault.mode) for one in numbered.robots]
+
+    def _change_faults(self, changed: Callable[[Sequence[Fault]], Sequence[Fault]]) -> None:
+        # The faults name their robots, so that each robot can be repaired by itself.
+        self.run.world.set_faults(changed(self.run.world.numbered_faults))
         if self.against is not None and not self.beside.is_over:
-            self.beside.world.set_faults(faults)
+            self.beside.world.set_faults(changed(self.beside.world.numbered_faults))
 
     def _look_after_selection(self) -> None:
         robot, present = self.selected, self.state.robot_present

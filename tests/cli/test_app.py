@@ -88,6 +88,8 @@ class Lazy:
     def act(self, observations): return np.zeros((len(observations), 4))
 class Torn(Lazy):
     def act(self, observations): raise ZeroDivisionError('the motor is gone')
+class Leaving(Lazy):
+    def act(self, observations): raise SystemExit(0)
 class Unmade(Lazy):
     def __init__(self): {}['gain']
 """
@@ -103,6 +105,8 @@ def test_a_policy_of_ones_own_that_cannot_be_made_is_one_sentence(command: Comma
         assert said in command(f"run --policy {name} {SMALL}", code=2)
     with pytest.raises(ZeroDivisionError, match="the motor is gone"):  # its traceback says where
         command(f"run --policy own_policy:Torn {SMALL}")
+    with pytest.raises(RuntimeError, match=r"called sys.exit\(\)"):
+        command(f"run --policy own_policy:Leaving {SMALL}")
 
 
 def test_policy_of_ones_own_is_found_where_the_command_is_run(

@@ -152,8 +152,13 @@ def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(command:
     words = "--processes 1 --seeds 3 --out card"
     printed = command(f"judge judged_policy:Failing {words}", code=1)
     assert "P: no run has succeeded." in printed
-    assert "12 failed, the first with RuntimeError: no more" in printed.splitlines()[-1]
-    assert "3 of 3 runs failed" in Path("card", "report.md").read_text()
+    *_, played, stopped = printed.splitlines()
+    # Of 12: each of the four conditions at the first seed, and one of them at the next.
+    assert "5 failed, the first with RuntimeError: no more" in played
+    assert "Stopped, as nothing works" in stopped
+    assert "the other 7 were not played" in stopped
+    assert "judged_policy.py:8. The same command" in stopped
+    assert "2 of 3 runs failed" in Path("card", "report.md").read_text()
     assert "failed" in command("judge judged_policy:Failing --benchmark --processes 1", code=1)
     said = command("judge judged_policy:Short --processes 1 --out short", code=2)
     assert "commands of shape (4, 3): should be (4, 4)" in said

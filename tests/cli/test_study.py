@@ -150,7 +150,8 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     assert Path("results/mine-homing/report.html").exists()
     Path("broken_policy.py").write_text(BROKEN)
     printed = command(f"{RUN} --policy broken_policy:Broken --restock --out broken", code=1)
-    assert "4 failed, the first with RuntimeError: a wheel came off" in printed
+    assert "3 failed, the first with RuntimeError: a wheel came off" in printed
+    assert "Stopped, as nothing works" in printed
     assert "2 of 2 runs failed" in Path("broken", "report.md").read_text()
 
 

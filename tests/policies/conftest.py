@@ -30,6 +30,9 @@ class Still:
         def reset(self, n_robots, seed): ...
         def act(self, observations): ...
 
+class Leaving:
+    def __init__(self): raise SystemExit(0)
+
 class NoPolicy: ...
 
 class Named(Still):
@@ -63,6 +66,7 @@ def file(card: PolicyCard, tensors: Tensors, tmp_path: Path) -> Path:
 def own_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     path = tmp_path / "own_policies.py"
     path.write_text(OWN_MODULE)
+    (tmp_path / "leaving_module.py").write_text("raise SystemExit(0)\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "own_policies", raising=False)

@@ -8,6 +8,7 @@ import re
 import shlex
 import shutil
 import subprocess
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,11 +17,15 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.episode import Play
+from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.page import axis, watch_command
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.watch import Session, messages
+from swarm_logistics_env.watch.messages import recorded_page
+from tests.conftest import SMALL
 from verification.browser import Browser
 
 HOSTILE = "</script><script>alert(1)</script>"
@@ -108,6 +113,54 @@ def test_command_of_a_run_plays_the_stored_one(
     assert f"P = {delivered} items" in capsys.readouterr().out
 
 
+# All manners of a fault that a text can say.
+MANNERS: list[dict[str, Any]] = [
+    {"modes": ["FM1"]},
+    {"modes": ["FM1+FM4"], "robots": [2]},
+    {"modes": ["FM2"], "onsets": [2.5], "duration": 4.0},
+    {"modes": ["FM4"], "onsets": [4.0], "role": "searching"},
+    {"modes": ["FM3+FM4"], "robots": [2], "onsets": [4.0], "duration": 5.0, "role": "carrier"},
+    {"modes": ["motor_wear"], "onsets": [0.1]},
+]
+
+
+@pytest.mark.parametrize("manner", MANNERS)
+def test_command_of_a_run_plays_it_in_run_and_watch_whatever_its_faults(
+    manner: dict[str, Any],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shown: list[Session] = []
+
+    def keep_session(session: Session, until: float) -> str:
+        shown.append(session)
+        return recorded_page(session, until)
+
+    faults = {"robots": [1], **manner}
+    study = Study(
+        scenario=SMALL["scenario"], policies=["homing"], seeds=2, faults=[faults], indicators=["R"]
+    )
+    monkeypatch.setattr(messages, "recorded_page", keep_session)
+    assert study.run().failed == 0
+    found = study.findings()
+    for _, _, arm in found.plan.cells:
+        outcome = found.outcomes[arm.case.key, 1]
+        words = [*shlex.split(str(watch_command(arm)))[1:], "--seed", "1"]
+        assert app.run(["run", *words[1:]]) == 0
+        assert f"P = {outcome.delivered} items" in capsys.readouterr().out
+        assert app.run([*words, "--save", "page.html"]) == 0
+        world = shown[-1].run.world
+        assert world.state.delivery_times == outcome.delivery_times.tolist()
+        assert world.struck_robots == outcome.failed_robots
+        assert round(world.state.anchoring_seconds, 9) == outcome.anchoring_seconds
+        play = Play(arm.case.scenario, arm.case.policy.load(), 1, arm.case.faults)  # type: ignore[arg-type]
+        while not play.is_over:
+            play.step()
+        assert (world.state.robot_position == play.world.state.robot_position).all()
+
+
 def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word() -> None:
     scenario = {"speed_mix": [1.0, 0.5], "restock": True}
     mid_run = {"modes": ["FM4"], "robots": [1], "onsets": [100.0], "duration": 50.0}
@@ -118,6 +171,9 @@ def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word()
         *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100+50")
     ]
     assert commands["FM1"] is None
+    arm = plan.cells[0][2]
+    model = replace(arm, case=replace(arm.case, policy=PolicySpec(name="model.zip")))
+    assert "--policy model.zip --trust-code" in str(watch_command(model))
     given = {"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}}
     own = Study(policies=[SwarmDT(), given], sizes=[{"values": [2, 3]}]).plan()
     assert {watch_command(arm) for _, _, arm in own.cells} == {None}

@@ -130,7 +130,7 @@ def test_other_behaviour_meets_the_same_worlds_and_nothing_is_remembered() -> No
 def test_workers_end_with_a_parent_that_is_killed() -> None:
     script = (
         "import os, signal\n"
-        "from swarm_logistics_env.studies.play import workers\n"
+        "from swarm_logistics_env.studies.worker_processes import workers\n"
         "if __name__ == '__main__':\n"
         "    with workers(2) as pool:\n"
         "        print(len({pool.submit(os.getpid).result() for _ in range(20)}), flush=True)\n"

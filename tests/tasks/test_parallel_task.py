@@ -18,7 +18,7 @@ from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks import Case, Outcome, ParallelTask, Run, SumOfInfos, SumOfRewards
-from tests.tasks.lane import FAILURES, LANE, OF_LANE, Lane
+from tests.tasks.lane import FAILURES, LANE, OF_LANE, Lane, Walker
 
 FAULT = {"modes": ["silent"], "robots": [1]}
 
@@ -263,3 +263,28 @@ def test_a_task_that_cannot_be_compared_plays_in_its_workers_and_counts_for_no_o
     task = made()
     assert task.code() == task.code() != made().code()
     assert only_run(task).play().error is None
+
+
+class Threaded(Walker):
+    """Walks where torch computes in one thread, and stays else."""
+
+    identity = "threaded"
+
+    def act(self, observations: Any) -> Any:
+        import torch
+
+        return super().act(observations) * (torch.get_num_threads() == 1)
+
+
+def test_torch_computes_in_one_thread() -> None:
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        whole, threaded = (
+            only_run(LANE, policies=[policy]).play().delivered for policy in ("walker", Threaded())
+        )
+        assert threaded == whole > 0
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)

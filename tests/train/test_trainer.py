@@ -195,3 +195,21 @@ def test_deviations_keep_above_their_floor(small: Any, tmp_path: Path) -> None:
     ended = load_file(train(small(ppo=ppo.replace(learning_rate=1e-9)), tmp_path))
     # The last update began three quarters on; the start of the next one would have lowered none.
     np.testing.assert_allclose(ended["deviations"], [0.5, 0.4, 0.4], rtol=1e-5)
+
+
+def test_torch_has_as_many_threads_after_a_training_as_before(small: Any, tmp_path: Path) -> None:
+    before = torch.get_num_threads()
+
+    def broken(*_: object) -> bool:
+        assert torch.get_num_threads() == 1
+        raise KeyboardInterrupt
+
+    torch.set_num_threads(2)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            train(small(), tmp_path, callbacks=[ConvertCallback(broken)])
+        assert torch.get_num_threads() == 2
+        train(small(agent_steps=1), tmp_path / "whole")
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)

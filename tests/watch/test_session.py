@@ -92,6 +92,30 @@ def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
     assert modes.count("FM1") == 2  # a fault that is yet to come comes
 
 
+def test_a_fault_by_role_chooses_at_its_onset_and_each_of_its_robots_is_repaired() -> None:
+    faults = ["FM4:2:searching@5", "FM1:1:carrier@3+4"]
+    session = Session(SMALL, against="homing", seed=1, faults=faults)
+    session.select(0)
+    session.choose_mode("FM2")
+    session.break_robot()  # before any has chosen
+    assert [event.mode for event in session.events] == ["FM2"]
+    while session.state.time < 6.0:
+        session.advance()
+    first, second = (event.robot for event in session.events if event.mode == "FM4")
+    assert {(event.time, event.mode) for event in session.events[1:]} == {(5, "FM4"), (3, "FM1")}
+    assert "FM4" in session.state.failure_modes[first]
+    chosen = [modes.count("FM4") for modes in session.beside.world.state.failure_modes]
+    session.select(first)
+    session.repair_robot()
+    assert session.state.failure_modes[first] == ()
+    assert "FM4" in session.state.failure_modes[second]
+    # Beside it the same role was another robot's.
+    left = [modes.count("FM4") for modes in session.beside.world.state.failure_modes]
+    assert left == [0 if robot == first else count for robot, count in enumerate(chosen)]
+    session.restart()
+    assert session.events == []
+
+
 def test_breaking_twice_in_a_mode_is_once() -> None:
     session = Session(SMALL)
     session.select(1)
