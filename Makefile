@@ -19,10 +19,17 @@ TASKS     := .venvs/tasks
 
 INSTALLED := .venvs/lowest .venvs/newest
 
+# The newest Python here, among commands or pyenv's, if it is newer than the gate's.
+NEWER := .venvs/newer
+NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; print(sys.version_info[1])"); \
+	for minor in 13 12; do for python in python3.$$minor $$(pyenv root)/versions/3.$$minor.*/bin/python; do \
+		test $$minor -gt $$gate && $$python -c "" && echo $$python && exit; \
+	done; done)
+
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help paper tables test quick check soak combined-faults mutants test-lowest test-newest benchmark interop interop-calls tasks docs docs-check dist absolute-links format clean
+.PHONY: help paper tables test quick check soak combined-faults mutants test-python on-newer-python test-lowest test-newest benchmark interop interop-calls tasks docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -33,6 +40,7 @@ help:
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
 	@echo "make combined-faults  2,000 small worlds whose faults meet, against a slow reference"
 	@echo "make mutants         faults made on purpose in all rooms, and the first test that catches each"
+	@echo "make test-python     in two minutes, a run, golden trajectories and a study with the newest Python here and the newest dependencies"
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
 	@echo "make interop         four learners of other people's code, three trainings each (1.4 core-hours): results/interop"
@@ -84,6 +92,15 @@ combined-faults: $(DEV)/installed
 
 mutants: $(DEV)/installed
 	$(DEV)/bin/python -m verification.mutants
+
+test-python:
+	@$(if $(NEWER_PYTHON),$(MAKE) on-newer-python PYTHON=$(NEWER_PYTHON),echo "There is no Python newer than that of the gate ($(PYTHON)), so nothing was tested with one.")
+
+on-newer-python: $(NEWER)/installed
+	$(NEWER)/bin/swarm-logistics run --seed 0 --set duration=20
+	$(NEWER)/bin/python -m pytest tests/verification/test_trajectories.py
+	rm -rf results/newer
+	$(NEWER)/bin/swarm-logistics study run quick --out results/newer
 
 # Tests from a copy of the tree without the package, so that the one that is installed is tested.
 test-lowest test-newest: test-%: .venvs/%/wheel
@@ -141,6 +158,8 @@ clean:
 
 $(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,onnx
 $(STUDY)/installed: EXTRAS := study
+$(NEWER)/installed: EXTRAS := study
+$(NEWER)/installed: OTHERS := hypothesis pytest
 $(DOCS)/installed: EXTRAS := docs,study
 $(TORCHRL)/installed: OTHERS := hypothesis pytest torch torchrl
 $(BENCHMARL)/installed: OTHERS := hypothesis pytest torch benchmarl

@@ -9,6 +9,7 @@ import contextlib
 import functools
 import hashlib
 import importlib
+import io
 import math
 import multiprocessing
 import os
@@ -23,7 +24,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import config, types
-from numba.core.caching import NullCache
+from numba.core.caching import IndexDataCacheFile, NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
@@ -35,6 +36,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 QUIET = "SWARM_LOGISTICS_QUIET"  # environment variable of workers: nobody reads what they say
+_CHECKSUM_SIZE = 16  # bytes
 _SILENCE = 1.0  # [s] of compiling that nobody is told of
 _HERE = Path(__file__).parent
 _all_kernels: list[Any] = []
@@ -167,21 +169,86 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
             compiled.enable_caching()
         except RuntimeError:
             # Neither the installation nor the user's own folder can be written.
-            _warn_of_no_cache()
+            _warn_of_no_cache("no folder can be written")
             yield
             return
-        if Path(compiled.py_func.__code__.co_filename).is_relative_to(_HERE):
-            # numba looks at the kernel's own file alone, not at what it takes from others.
-            compiled._cache._cache_file._source_stamp = _digest()
+        cache = compiled._cache
+        cache.save_overload = functools.partial(_save_overload, cache)
+        # numba looks at the kernel's own file alone, not at what it takes from others.
+        is_ours = Path(compiled.py_func.__code__.co_filename).is_relative_to(_HERE)
+        stamp = _digest() if is_ours else cache._impl.locator.get_source_stamp()
+        cache._cache_file = _CheckedFiles(  # type: ignore[no-untyped-call]  # numba's
+            cache.cache_path, f"{cache._impl.filename_base}.checked", stamp
+        )
     from filelock import FileLock
 
     kept = Path(compiled.stats.cache_path)
-    kept.mkdir(parents=True, exist_ok=True)
     with contextlib.ExitStack() as held:
         # A file system may know no locks: then two processes may compile the same.
         with contextlib.suppress(OSError, NotImplementedError):
+            kept.mkdir(parents=True, exist_ok=True)
             held.enter_context(FileLock(kept / "swarm_logistics_env.lock"))
         yield
+
+
+def _save_overload(cache: Any, signature: Any, result: Any) -> None:
+    try:
+        type(cache).save_overload(cache, signature, result)
+    except OSError as error:
+        _warn_of_no_cache(str(error.strerror or error))
+
+
+class _CheckedFiles(IndexDataCacheFile):
+    """numba's files of a kernel, with a digest at the end of each, which numba does not read.
+
+    Code that was damaged is compiled again. So is code of other sources or another signature:
+    where a full disk took the index, but not the code, an older file has its name.
+    """
+
+    is_told = False  # in this process
+
+    def save(self, key: Any, data: Any) -> None:
+        super().save(key, (self._source_stamp, key, data))  # type: ignore[no-untyped-call]
+
+    def load(self, key: Any) -> Any:
+        *belongs_to, data = super().load(key) or [None]  # type: ignore[no-untyped-call]
+        return data if belongs_to == [self._source_stamp, key] else None
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[io.BytesIO]:
+        content = io.BytesIO()
+        yield content
+        with super()._open_for_write(filepath) as file:
+            file.write(content.getvalue() + _checksum(content.getvalue()))
+
+    def _load_index(self) -> Any:
+        is_sound = self._is_sound(self._index_path)
+        return super()._load_index() if is_sound else {}  # type: ignore[no-untyped-call]
+
+    def _load_data(self, name: str) -> Any:
+        is_sound = self._is_sound(self._data_path(name))  # type: ignore[no-untyped-call]
+        return super()._load_data(name) if is_sound else None  # type: ignore[no-untyped-call]
+
+    def _is_sound(self, path: str) -> bool:
+        """Return whether a file is as it was written, or none; else remove it and tell once."""
+        try:
+            content = Path(path).read_bytes()
+        except FileNotFoundError:
+            return True
+        except OSError:
+            content = b""
+        if content[-_CHECKSUM_SIZE:] == _checksum(content[:-_CHECKSUM_SIZE]):
+            return True
+        with contextlib.suppress(OSError):
+            Path(path).unlink()
+        if not _CheckedFiles.is_told:
+            _CheckedFiles.is_told = True
+            warnings.warn(f"{path}: compiled code was damaged, so it is made again", stacklevel=8)
+        return False
+
+
+def _checksum(content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=_CHECKSUM_SIZE).digest()
 
 
 @functools.cache
@@ -234,10 +301,10 @@ class _Report:
 
 
 @functools.cache
-def _warn_of_no_cache() -> None:
+def _warn_of_no_cache(reason: str) -> None:
     warnings.warn(
-        "compiled code can be kept nowhere, so every process compiles for itself, which takes "
-        "up to 15 seconds: set NUMBA_CACHE_DIR to a folder that can be written",
+        f"compiled code cannot be kept ({reason}), so every process compiles for itself, which "
+        "takes up to 15 seconds: set NUMBA_CACHE_DIR to a folder that can be written",
         stacklevel=8,
     )
 

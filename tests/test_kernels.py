@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -55,6 +57,79 @@ def test_a_kernel_compiles_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(type(double), "enable_caching", refuse)
     kernels._warn_of_no_cache.cache_clear()
     with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as told:
+        assert (double(3.0), half(3.0)) == (6.0, 1.5)
+    assert len(told) == 1
+    kernels._warn_of_no_cache.cache_clear()
+
+
+def cut(content: bytes) -> bytes:
+    return content[: len(content) // 2]
+
+
+def flip(content: bytes) -> bytes:
+    place = len(content) // 2
+    return content[:place] + bytes([content[place] ^ 4]) + content[place + 1 :]
+
+
+def checked_files(folder: Path, stamp: str = "sources") -> kernels._CheckedFiles:
+    return kernels._CheckedFiles(str(folder), "kernel", stamp)  # type: ignore[no-untyped-call]
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [bytes, cut, flip])
+def test_a_damaged_file_of_code_is_told_of_once_and_written_anew(
+    ending: str, damage: Callable[[bytes], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kernels._CheckedFiles, "is_told", False)
+    files = checked_files(tmp_path)
+    for key in ("floats", "integers"):
+        files.save(key, f"code of {key}")
+    [file, *_] = sorted(tmp_path.glob(f"*.{ending}"))
+    file.write_bytes(b"" if damage is bytes else damage(file.read_bytes()))
+    with pytest.warns(UserWarning, match=f"{ending}: compiled code was damaged") as told:
+        assert files.load("floats") is None
+    files.save("floats", "code made again")
+    file.write_bytes(b"")
+    assert files.load("floats") is None
+    files.save("floats", "code made again")
+    assert files.load("floats") == "code made again"
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize("before", ["older sources", "sources"])
+def test_an_older_file_is_not_run_where_there_was_room_for_the_index_alone(
+    before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    older, files = checked_files(tmp_path, before), checked_files(tmp_path)
+    older.save("floats", "older code")
+    next(tmp_path.glob("*.nbi")).unlink()
+    monkeypatch.setattr(files, "_save_data", refuse)
+    with pytest.raises(OSError, match="No space left"):
+        files.save("integers", "code")
+    assert files.load("integers") is None
+
+
+def test_a_process_starts_with_damaged_code_and_keeps_what_it_compiles(tmp_path: Path) -> None:
+    first = finished(started(FIRST_CALLS, tmp_path))
+    file = min(tmp_path.rglob("*pair_key*.nbc"))
+    file.write_bytes(flip(file.read_bytes()))
+    result, _, told = finished(started(FIRST_CALLS, tmp_path))
+    assert (result, told.count("was damaged, so it is made again")) == (first[0], 1)
+    assert finished(started(FIRST_CALLS, tmp_path)) == [first[0], "2", ""]
+
+
+def test_a_kernel_compiles_where_the_disk_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    double = kernels.kernel(lambda number: 2.0 * number)
+    half = kernels.kernel(lambda number: number / 2.0)
+    monkeypatch.setattr(kernels._CheckedFiles, "save", refuse)
+    kernels._warn_of_no_cache.cache_clear()
+    with pytest.warns(UserWarning, match=r"\(No space left on device\).*NUMBA_CACHE_DIR") as told:
         assert (double(3.0), half(3.0)) == (6.0, 1.5)
     assert len(told) == 1
     kernels._warn_of_no_cache.cache_clear()

@@ -68,6 +68,13 @@ def test_workflows_call_targets_that_exist_and_all_that_is_promised() -> None:
     assert PROJECT["requires-python"] == f">={named[0]}"
 
 
+def test_the_gate_runs_the_newest_python_that_pyproject_names() -> None:
+    assert "\nmake test-python\n" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    [minors] = re.findall(r"for minor in ([\d ]+);", MAKEFILE)
+    named = re.findall(r"Python :: 3\.(\d+)", " ".join(PROJECT["classifiers"]))
+    assert minors.split() == named[:0:-1]
+
+
 def test_nothing_may_write_but_the_release_which_needs_no_password() -> None:
     for name, text in WORKFLOWS.items():
         workflow = yaml.safe_load(text)

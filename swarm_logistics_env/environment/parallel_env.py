@@ -15,6 +15,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.faults import FaultLike, checked_faults
+from swarm_logistics_env.warehouse.one_thread import Lock, in_one_thread, used_elsewhere
 
 from .requests import (
     OPTIONS,
@@ -110,6 +111,7 @@ class SwarmLogisticsEnv(DictView):
         """Return the space of a command (4,): forward, left, turn, gripper; the same for all."""
         return self._spaces.action
 
+    @in_one_thread
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
@@ -177,13 +179,25 @@ class SwarmLogisticsEnv(DictView):
         Raises:
             CommandError: the commands have the wrong shape, cannot be read or are not finite; the
                 world has not changed then.
-            SetupError: there was no reset, or the episode is over: nobody is left in `agents`.
+            SetupError: there was no reset; the episode is over: nobody is left in `agents`; or
+                another thread is using the environment.
         """
-        if not self.agents:
-            self.refuse_to_step()
-        if not isinstance(commands, np.ndarray):
-            commands = as_array(commands, "commands")
-        return self.outcome(self.warehouse.step(commands))
+        lock = self.warehouse.lock
+        if not lock.acquire(False):  # as `in_one_thread`, within a tenth of a microsecond
+            raise used_elsewhere()
+        try:
+            if not self.agents:
+                self.refuse_to_step()
+            if not isinstance(commands, np.ndarray):
+                commands = as_array(commands, "commands")
+            return self.outcome(self.warehouse.step(commands))
+        finally:
+            lock.release()
+
+    @property
+    def lock(self) -> Lock:
+        """Held by the thread that uses the environment, which refuses others."""
+        return self.warehouse.lock
 
     @property
     def is_watched(self) -> bool:
@@ -233,6 +247,7 @@ class SwarmLogisticsEnv(DictView):
         if scenario.n_robots > len(self.possible_agents):
             self.possible_agents = agent_names(range(scenario.n_robots))
 
+    @in_one_thread
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (H, W, 3) in mode "rgb_array"; show the window in mode "human".
 
@@ -251,6 +266,7 @@ class SwarmLogisticsEnv(DictView):
         self._renderer.show(world.state, world.scenario)
         return None
 
+    @in_one_thread
     def state(self) -> NDArray[np.float32]:
         """Return the whole warehouse as one vector, see `global_state`; for central critics."""
         return global_state(self.warehouse, len(self.possible_agents), self._spaces.most["n_items"])

@@ -129,7 +129,7 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
         (
             named[one][0],
             bracketed(spi.mean_interval(named[one][1]), 1),
-            f"{found[one]} [{best[one]}, {worst[one]}]",
+            f"{found[one]:.0f} [{best[one]}, {worst[one]}]",
             f"{same[one]:.0%}",
         )
         for one in np.argsort(found, kind="stable")

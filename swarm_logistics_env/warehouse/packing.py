@@ -134,9 +134,9 @@ def field_kinds(structure: type) -> dict[str, Any]:
     kinds: dict[str, Any] = {}
     for name, hint in get_type_hints(structure, include_extras=True).items():
         kinds[name] = getattr(hint, "__origin__", hint)
-        if get_origin(kinds[name]) is np.ndarray:
-            scalar = get_args(get_args(kinds[name])[1])[0]
-            kinds[name] = (np.dtype(scalar), hint.__metadata__)
+        if get_origin(kinds[name]) in (np.ndarray, NDArray):  # an alias of its own since NumPy 2.5
+            *_, scalar = get_args(kinds[name])  # or, before, np.dtype[scalar]
+            kinds[name] = (np.dtype(*get_args(scalar) or [scalar]), hint.__metadata__)
     return kinds
 
 

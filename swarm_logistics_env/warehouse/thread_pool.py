@@ -27,6 +27,7 @@ from swarm_logistics_env.kernels import inlined_kernel, kernel
 
 from . import stepping
 from .logistics import refused_command
+from .one_thread import holding
 from .packing import add, exchange, load, pointer_at, replace, unpacked_at
 from .structs import NOBODY, Numbers, Sensed, World
 from .warehouse import Warehouse, not_finite
@@ -104,8 +105,14 @@ class WorldThreadPool:
         Raises:
             CommandError: a robot's command is not finite; all worlds are as they were.
             ScenarioError: an item that came back to a storage found no room.
-            SetupError: a world was never reset.
+            SetupError: a world was never reset, or another thread is using it.
         """
+        with holding([world.lock for world in self._worlds]):
+            self._step(commands, rows, arrived)
+
+    def _step(
+        self, commands: NDArray[np.float64], rows: Sensed, arrived: Callable[[int, Sensed], None]
+    ) -> None:
         if self._process != os.getpid():
             self._start()
         self._jobs[:, WORLD] = [world.address for world in self._worlds]
