@@ -61,7 +61,10 @@ def fingerprint(value: object, files: Iterable[Path] = ()) -> dict[str, Any]:
     digests: dict[str, list[str]] = {}
     for path, source in source_files([*content.files, *files]).items():
         digests.setdefault(path.name, []).append(content.digest(source))
-    return {"value": digest, "files": {name: _hash(*sorted(d)) for name, d in digests.items()}}
+    return {
+        "value": digest,
+        "files": {name: _hash(*sorted(d)) for name, d in sorted(digests.items())},
+    }
 
 
 def changes(before: str, now: str) -> str:

@@ -287,10 +287,14 @@ def _policy_errors_explained() -> Iterator[None]:
     """Let whatever a policy raises be a SetupError that says what and where; log the traceback."""
     try:
         yield
-    except SwarmLogisticsError:
-        raise
-    except (Exception, SystemExit) as error:
-        logging.getLogger(__name__).warning("A policy has failed.", exc_info=True)
+    except (Exception, SystemExit) as raised:
+        error: BaseException = raised
+        if isinstance(raised, SwarmLogisticsError):
+            # Loading wraps what the policy raised.
+            if raised.__cause__ is None or isinstance(raised.__cause__, SwarmLogisticsError):
+                raise
+            error = raised.__cause__
+        logging.getLogger(__name__).warning("A policy has failed.", exc_info=error)
         what = plain(traceback.format_exception_only(error)[-1].strip())
         frames = traceback.extract_tb(error.__traceback__)
         foreign = [at for at in frames if not Path(at.filename).is_relative_to(_PACKAGE)]

@@ -31,7 +31,7 @@ def test_a_class_is_loaded_by_module_or_the_file_of_this_folder_and_name(own_mod
     [
         ("swarm-td", {}, r"no policy 'swarm-td' \(.* file\); did you mean 'swarm-dt'\?$"),
         ("no_such_module:Class", {}, "ModuleNotFoundError: No module named 'no_such_mod"),
-        ("own_policies:Stil", {}, "cannot be imported: .* no attribute 'Stil'"),
+        ("own_policies:Stil", {}, r"own_policies has no Stil; did you mean 'Still'\?"),
         ("own_policies:Leaving", {}, "cannot be made: SystemExit: 0"),
         ("leaving_module:Class", {}, "cannot be imported: SystemExit: 0"),
         ("own_policies:number", {}, "is a int: should be a class"),
