@@ -7,7 +7,6 @@ import csv
 import json
 import random
 import sqlite3
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -128,7 +127,6 @@ def test_a_study_file_runs_no_code_unless_it_is_allowed_to(
         assert listing(tmp_path) == {"canary.py", "mine.toml"}
     assert app.run(["study", "plan", "mine.toml", "--trust-code"]) == 2  # there is no policy B
     assert Path("it-was-run").exists()
-    sys.modules.pop("canary")
 
 
 @given(st.randoms(use_true_random=False), st.sampled_from([TABLE, WIDE, EVENTS]))

@@ -13,4 +13,4 @@ def test_ways_are_short(tmp_path: Path) -> None:
     assert len(episode.hops) <= 9
     assert len(episode.containers) <= 5
     assert {"spec.PolicySpec.of", "spec.PolicySpec.load"} <= policy.hops.keys()
-    assert len(policy.hops) <= 6
+    assert len(policy.hops) <= 11  # it is compared with what was planned, where it is played
