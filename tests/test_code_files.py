@@ -5,6 +5,7 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import cloudpickle
 import pytest
@@ -44,6 +45,23 @@ def test_files_of_one_name_have_their_own_neighbours_whenever_they_import(tmp_pa
         assert policies[number].act(None) == (number, number)  # type: ignore[arg-type]
     after = {name for name in sys.modules if "@" not in name}, [*sys.path], [*sys.meta_path]
     assert after == before
+
+
+def test_modules_are_kept_apart_and_executed_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stranger = ModuleType("gains")
+    monkeypatch.setitem(sys.modules, "gains", stranger)
+    (tmp_path / "gains.py").write_text("GAIN = [0]\n")
+    (tmp_path / "mine.py").write_text(
+        "import gains\nclass Mine:\n    def reset(self, n, seed): gains.GAIN[0] += 1\n"
+        "    def act(self, observations):\n        from gains import GAIN\n        return GAIN[0]\n"
+    )
+    policy = load(f"{tmp_path}/mine.py:Mine")
+    for _ in range(3):
+        policy.reset(1, 0)
+    assert policy.act(None) == 3  # type: ignore[comparison-overlap, arg-type]
+    assert sys.modules["gains"] is stranger
 
 
 @given(st.permutations(["v1", "v2", "v1/deep", "."]))
