@@ -182,7 +182,7 @@ def judge_command(
         columns=_pairs("--column", columns),
         ignore=ignore or (),
         duration=duration,
-        decimal=decimal or ".",
+        decimal=decimal,
     )
     origin = origin_of(trials, stated)
     usual = Path("results", "judged", Path(asked).stem)
