@@ -256,6 +256,8 @@ def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str
         if estimate is not None:
             value = bracketed(estimate, 3)
             says = f"above {estimate.threshold:g}: {said(answer.verdict)}"
+            if estimate.untestable:
+                says = f"no verdict: cannot be below {estimate.threshold:g}"
         rows.append((answer.name, value, says))
     show_table(title, ("", "value [95 %]", "verdict under Holm"), rows, *left_out)
 

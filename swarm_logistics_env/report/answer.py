@@ -84,6 +84,8 @@ class Line(NamedTuple):
         assert test.estimate is not None
         if test.conclusion == UNAFFECTED:
             return f"{words[0]}, exact"
+        if test.estimate.untestable:
+            return f"{words[0]}: it cannot be below {test.compared.threshold:g}"
         if "unbounded" in test.flags and test.conclusion in section.DECIDED:
             return f"{words[0]} by its test; P_o is too near 0 for an interval"
         if test.conclusion != "inconclusive":
@@ -258,6 +260,8 @@ def _last(results: StudyResults) -> str:
     if "assumes_normal" in flags:
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normality)")
+    if "cannot_fail" in flags:
+        parts.append("no verdict where it cannot lie below the threshold, as P cannot below 0")
     if "too_few_seeds" in flags:
         parts.append("two seeds give no verdict")
     if results.exploratory:

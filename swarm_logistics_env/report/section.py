@@ -32,6 +32,8 @@ FLAGS = {
     "single_seed": "One seed gives a value, but no interval and no verdict",
     "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
     "degenerate": "The seeds show no spread, so there is no interval and no verdict",
+    "cannot_fail": "As no P is below 0, it cannot lie below the threshold, so it is not tested and "
+    "has no verdict",
     "capped": "P is capped on the side that the verdict leans to, so the verdict is open",
     "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
     "so it is open",
@@ -241,10 +243,11 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
     level = f", {percent(estimate.confidence)} interval {found}" if found else " (no interval)"
     capped = SATURATED * test.saturated
     yield f"{indicator}{capped} = {fixed(estimate.value, 3)}{level} over {seeds}."
-    # One seed gives no p, and Holm's placeholder of 1 says nothing.
-    adjusted_p = None if estimate.p_value is None else test.p_holm
-    yield f"Unadjusted: {said(test.answer)}{_p(estimate.p_value)};"
-    yield f"Holm-adjusted: {said(test.answer_holm)}{_p(adjusted_p)}."
+    if not estimate.untestable:
+        # One seed gives no p, and Holm's placeholder of 1 says nothing.
+        adjusted_p = None if estimate.p_value is None else test.p_holm
+        yield f"Unadjusted: {said(test.answer)}{_p(estimate.p_value)};"
+        yield f"Holm-adjusted: {said(test.answer_holm)}{_p(adjusted_p)}."
     if test.claim:
         plain, adjusted = map(said, (test.claim_verdict, test.claim_verdict_holm))
         both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"

@@ -267,7 +267,7 @@ ROW = st.tuples(st.floats(0.0, 1e9), CELL)
     marked=st.booleans(),
 )
 def test_what_is_written_is_read_row_by_row(
-    rows: list[tuple[float, str]], delimiter: str, line_end: str, quoting: int, decimal: str,
+    rows: list[tuple[float, str]], delimiter: str, line_end: str, quoting: Any, decimal: str,
     start: str, ends: bool, marked: bool, tmp_path_factory: pytest.TempPathFactory,
 ) -> None:  # fmt: skip
     file = io.StringIO(newline="")
