@@ -78,7 +78,9 @@ supports {claims[1]} and {claims[2]}; {claims[3]}, {claims[4]} cannot fail. FM1 
 
 95 % intervals: {seeds[0]} seeds ({seeds[1]} for times, {seeds[2]} for slow lifting), of networks \
 over trainings too."""
-_CLAIMS = r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?);\s(\d+ are open);\s(\d+)"
+_CLAIMS = (
+    r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?);\s(\d+ are open);\s(\d+)"
+)
 
 
 def findings(page: str) -> str:

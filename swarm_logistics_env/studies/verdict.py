@@ -103,14 +103,18 @@ class Cell:
 
     @cached_property
     def mean(self) -> Interval:
-        """Mean P with its 95 % interval; NaN: no run."""
-        return self._possible(spi.mean_interval(self.by_seed)) if self.n_seeds else _UNKNOWN
+        """Mean P with its interval at `CONFIDENCE`; NaN: no run."""
+        return (
+            self._possible(spi.mean_interval(self.by_seed, CONFIDENCE))
+            if self.n_seeds
+            else _UNKNOWN
+        )
 
     @cached_property
     def one_run(self) -> Interval:
-        """Mean P with the 95 % interval of one further run."""
+        """Mean P with the interval of one further run at `CONFIDENCE`."""
         p = self.by_seed.ravel()
-        return self._possible(spi.prediction_interval(p)) if p.size else _UNKNOWN
+        return self._possible(spi.prediction_interval(p, CONFIDENCE)) if p.size else _UNKNOWN
 
     def _possible(self, interval: Interval) -> Interval:
         """Return an interval that ends at the number of items where none comes back."""
