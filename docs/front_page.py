@@ -74,11 +74,13 @@ in {times[ppo-indicator].text} s, the paper's Swarm D-T in {times[swarm-dt].text
 * **Four times the robots do not deliver four times as much**: from 25 to 100 S of \
 `swarm-dt-follow` is {s[swarm-dt-follow].text}, of `homing` {s[homing].text}.
 * **Of {claims[0]} claims of the paper's text** this re-implementation (constants partly fitted) \
-supports {claims[1]} and {claims[2]}; {claims[3]}. FM1 is not reproduced.
+supports {claims[1]} and {claims[2]}; {claims[3]}, {claims[4]} cannot fail. FM1 is not reproduced.
 
 95 % intervals: {seeds[0]} seeds ({seeds[1]} for times, {seeds[2]} for slow lifting), of networks \
 over trainings too."""
-_CLAIMS = r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?);\s(\d+ are open)\."
+_CLAIMS = (
+    r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?);\s(\d+ are open);\s(\d+)"
+)
 
 
 def findings(page: str) -> str:

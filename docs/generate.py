@@ -21,6 +21,7 @@ from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, S
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS, Columns
 from swarm_logistics_env.studies.specification import Specification
+from swarm_logistics_env.studies.verdict import Cell, Verdict
 from swarm_logistics_env.train.training import Training, load_training, preset_names
 
 FACTORS = ("sizes", "faults", "parameters", "ablations")
@@ -116,7 +117,7 @@ def about(study: Specification) -> str:
     return f"{study.seeds} seeds, {world}; tables: {tables}"
 
 
-def columns_of(known: Columns) -> str:
+def columns_of(known: Columns[Cell] | Columns[Verdict]) -> str:
     """Return the columns of a table of results with what they mean."""
     return table(("column", "meaning"), [(f"`{name}`", text) for name, (*_, text) in known.items()])
 

@@ -181,8 +181,8 @@ def _summary(parts: Sequence[StudyResults]) -> str:
     return f"""\
 Of {len(of_text)} claims of the paper's text this re-implementation supports
 {counted["supported"]} and contradicts {counted["contradicted"]}{about};
-{counted["open"]} are open. {names.count("warehouse_width")} of
-those supported, on the warehouse's width, cannot fail, as A cannot fall below 0 where a
+{counted["open"]} are open; {counted["no verdict"]}, on the
+warehouse's width, have no verdict, as they cannot fail: A cannot fall below 0 where a
 parameter at least doubles. {len(beside)} more, that P falls without taxis, are not in
 the text: {_counted(beside)}. Of FM3_send, the other reading of FM3: {_counted(other)}.
 {PAPER.whose}"""

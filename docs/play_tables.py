@@ -66,9 +66,9 @@ def robust_block(results: StudyResults) -> str:
         by_symbol = {test.compared.indicator: test for test in tests}
         row = [label, section.mean_p(cell)]
         for symbol in ("R", "FT"):
-            word = section.said(by_symbol[symbol].conclusion)
-            row.append(f"{section.ratio(by_symbol[symbol])}, {word}")
-            told.setdefault(word, []).append(f"{symbol} under {label}")
+            test = by_symbol[symbol]
+            row.append(f"{section.ratio(test)}, {section.concluded(test)}")
+            told.setdefault(section.said(test.answer_holm), []).append(f"{symbol} under {label}")
         rows.append(row)
     found = "; ".join(f"{words}: {section.listed(what)}" for words, what in told.items())
     head = "", "P", "R above 0?", "FT above 0?"

@@ -17,7 +17,7 @@ Counts = NDArray[np.float64]  # of every seed, or of every training and seed
 
 def with_verdict(test: Verdict) -> str:
     """Return an indicator with its interval and its verdict."""
-    return f"{section.ratio(test)} {section.said(test.conclusion)}"
+    return f"{section.ratio(test)} {section.concluded(test)}"
 
 
 def _over(found: StudyResults) -> str:

@@ -15,7 +15,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, PolicySpec
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import bracketed, slug
+from swarm_logistics_env.report.section import bracketed, fixed, percent, slug
 from swarm_logistics_env.report.write import write_report
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
@@ -169,7 +169,7 @@ def judge_command(
             say(f"{why}; the same command goes on:", str(context.obj))
         # Several trainings and untrusted code need options that this command does not repeat.
         elif not (tally.left or plays_benchmark or policy.trainings or trust_code) and any(
-            v.conclusion == "inconclusive" for v in results.verdicts
+            v.answer_holm == "inconclusive" for v in results.verdicts
         ):
             more = max(JUDGE_SEEDS, 2 * most)
             say(
@@ -186,7 +186,7 @@ def judge_command(
         columns=_pairs("--column", columns),
         ignore=ignore or (),
         duration=duration,
-        decimal=decimal or ".",
+        decimal=decimal,
     )
     origin = origin_of(trials, stated)
     usual = Path("results", "judged", Path(asked).stem)
@@ -305,11 +305,11 @@ def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> 
     )
     show_table(
         f"{policy}: worst faults found",
-        ("found by", "--fault", "R [95 %]", "runs"),
+        ("found by", "--fault", f"R [{percent(worst.robustness.confidence)}]", "runs"),
         rows,
         f"Worst fault of {robots} robots found: {text_of(worst.fault)}, R = "
-        f"{worst.robustness.value:.3f} on {fresh} seeds that the search has not met. `run` and "
-        "`watch` play it with --fault.",
+        f"{fixed(worst.robustness.value, 3, [0.0])} on {fresh} seeds that the search has not met. "
+        "`run` and `watch` play it with --fault.",
         f"{result.tried} of {result.searched} faults were tried. What is found bounds "
         "the worst from one side: it proves no other fault harmless.",
         *([capped] if result.is_capped else ()),

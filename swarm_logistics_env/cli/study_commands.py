@@ -13,8 +13,9 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
 from swarm_logistics_env.records import plain
-from swarm_logistics_env.report.section import NOTHING, bracketed, said, slug
+from swarm_logistics_env.report.section import NOTHING, bracketed, percent, said, slug
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.declaration import merge
 from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
 from swarm_logistics_env.studies.plan import Shard
@@ -257,16 +258,18 @@ def compare_command(
 
 
 def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str, ...]) -> None:
-    rows = []
+    rows, levels = [], {CONFIDENCE}
     for answer in found:
         estimate, value, says = answer.estimate, NOTHING, answer.problem or ""
         if answer.exact is not None:
             value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
         if estimate is not None:
-            value = bracketed(estimate, 3)
+            value, levels = bracketed(estimate, 3), {estimate.confidence}
             says = f"above {estimate.threshold:g}: {said(answer.verdict)}"
+            if estimate.untestable:
+                says = f"no verdict: cannot be below {estimate.threshold:g}"
         rows.append((answer.name, value, says))
-    show_table(title, ("", "value [95 %]", "verdict under Holm"), rows, *left_out)
+    show_table(title, ("", f"value [{percent(*levels)}]", "verdict under Holm"), rows, *left_out)
 
 
 @study.command("merge")

@@ -16,7 +16,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import NOTHING, Section, Texts, number
+from swarm_logistics_env.report.section import NOTHING, Section, Texts, levels, number
 from swarm_logistics_env.report.write import how_to_get_figures, section_markdown, write_report
 from swarm_logistics_env.studies.play import Tally
 from swarm_logistics_env.studies.results import StudyResults
@@ -95,7 +95,8 @@ def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
     )  # fmt: skip
     hint = f"For another effect: swarm-logistics study plan {quote(asked)} --effect 0.2"
     rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
-    show_table(f"Power, from {n_seeds} {runs}", columns, rows, hint)
+    level = levels(results.verdicts)
+    show_table(f"Power, from {n_seeds} {runs}, of verdicts at {level}", columns, rows, hint)
 
 
 def _power(test: Verdict, effect: float | None) -> Texts:

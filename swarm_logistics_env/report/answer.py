@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT
@@ -21,7 +22,6 @@ from .section import Section, said
 
 MOST_LINES = 30  # of the answer of `paper` at a terminal
 _EFFECT = 0.1  # of an indicator, for which seeds are counted
-_COLUMNS = ("question", "value", "95 % interval", "verdict")
 
 
 class Line(NamedTuple):
@@ -42,25 +42,37 @@ class Line(NamedTuple):
     numbers: tuple[int, ...]
 
     @property
+    def thresholds(self) -> list[float]:
+        """What the values are tested against."""
+        return [test.compared.threshold for test in self.tests]
+
+    @property
     def value(self) -> str:
         """The values, one after the other; from the lowest to the highest where they are many."""
         known = [test.value for test in self.tests if test.value is not None]
         if not known:
             return section.NOTHING
         if len(self.tests) > 3:
-            return f"{section.fixed(min(known), 2)} to {section.fixed(max(known), 2)}"
+            return " to ".join(self._fixed(value) for value in (min(known), max(known)))
         capped = any(test.saturated for test in self.tests)
-        return " ".join(section.fixed(value, 2) for value in known) + capped * section.SATURATED
+        return " ".join(map(self._fixed, known)) + capped * section.SATURATED
 
-    @property
-    def interval(self) -> str:
-        """The interval; of several values that which holds all of theirs."""
+    def _fixed(self, value: float) -> str:
+        return section.fixed(value, 2, self.thresholds)
+
+    def interval(self, level: float) -> str:
+        """Return the interval; of several values that which holds all of theirs.
+
+        Args:
+            level: that the heading names; another one stands behind the interval.
+        """
         known = [t.interval for t in self.tests if t.interval and t.conclusion != UNAFFECTED]
         low = [one.low for one in known if one.low is not None]
         high = [one.high for one in known if one.high is not None]
         if not (low and high):
             return ""
-        whole = f"[{section.fixed(min(low), 2)}, {section.fixed(max(high), 2)}]"
+        whole = f"[{self._fixed(min(low))}, {self._fixed(max(high))}]"
+        whole += section.other_levels(self.tests, level)
         if len(self.tests) == 1:
             return whole
         # A value that is capped or alone has none.
@@ -71,29 +83,30 @@ class Line(NamedTuple):
     @property
     def verdict(self) -> str:
         """The verdicts in words, and what an open one takes."""
-        words = [said(test.conclusion) for test in self.tests]
-        test = self.tests[0]
+        words, test = section.concluded(*self.tests), self.tests[0]
         if not any(one.estimate for one in self.tests):
             if all(str(one.problem).endswith(" missing") for one in self.tests):
                 return "not played yet"
-            return f"{words[0]}: {test.problem}"
+            return f"{words}: {test.problem}"
         if all(one.estimate and one.conclusion is None for one in self.tests):
             return f"no verdict: {self.indicator} lacks runs"
         if len(self.tests) > 1:
-            return words[0] if len(set(words)) == 1 else section.counted(words)
+            return words
         assert test.estimate is not None
         if test.conclusion == UNAFFECTED:
-            return f"{words[0]}, exact"
-        if "unbounded" in test.flags and test.conclusion in section.DECIDED:
-            return f"{words[0]} by its test; P_o is too near 0 for an interval"
+            return f"{words}, exact"
+        if test.estimate.untestable:
+            return f"{words}: it cannot be below {test.compared.threshold:g}"
+        if "unbounded" in test.flags and test.answer_holm in section.DECIDED:
+            return f"{words} by its test; P_o is too near 0 for an interval"
         if test.conclusion != "inconclusive":
-            return words[0]
+            return words
         # An effect on the side of the value, which 80 % power finds.
         estimate, threshold = test.estimate, test.estimate.threshold
         effect = threshold + math.copysign(_EFFECT, estimate.value - threshold)
         needed = spi.seeds_for_power(estimate, effect, POWER)
         if needed is None or needed <= estimate.n_seeds:
-            return words[0]
+            return words
         runs = "seeds" if estimate.paired else "trials"
         return f"open: {needed - estimate.n_seeds} more {runs} tell {effect:g}"
 
@@ -125,13 +138,20 @@ class Answer(NamedTuple):
         return [f"{one.policy}: {one.question}" if several else one.question for one in self.lines]
 
     @property
+    def level(self) -> float:
+        """The level of most intervals, which the heading names."""
+        return section.level_of(test for line in self.lines for test in line.tests)
+
+    @property
     def section(self) -> Section:
         """The lines as a table."""
+        level = self.level
+        columns = "question", "value", f"{section.percent(level)} interval", "verdict"
         rows = tuple(
-            (question, line.value, line.interval, line.verdict)
+            (question, line.value, line.interval(level), line.verdict)
             for question, line in zip(self.questions, self.lines)
         )
-        return Section("Answer", _COLUMNS, rows, (self.performance, self.last))
+        return Section("Answer", columns, rows, (self.performance, self.last))
 
 
 def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
@@ -230,7 +250,10 @@ def _performance(results: StudyResults) -> str:
     several = len(results.policies) > 1
     told = (f"{one.policy} " * several + _mean(one) for one in reversed(here.values()))
     is_usual = cell.arm.case.task.name == DEFAULT
-    measured = f"P, items in {scenario.duration:g} s," if is_usual else "P"
+    level = (
+        f" [{section.P_LEVEL}]" if any(one.mean.low is not None for one in here.values()) else ""
+    )
+    measured = f"P{level}, items in {scenario.duration:g} s," if is_usual else f"P{level}"
     return f"{measured} at {where}: {', '.join(told)}."
 
 
@@ -241,9 +264,10 @@ def _mean(cell: Cell) -> str:
         cleared = any(outcome.all_delivered for outcome in cell.outcomes)
         time = f", all items after {section.time_to_clear(cell)} s" if cleared else ""
         return section.mean_p(cell) + failed + time
-    most = -math.log(0.05) / cell.n_seeds
+    most = -math.log(1.0 - CONFIDENCE) / cell.n_seeds
     why = f"none of {cell.n_seeds} runs delivered anything"
-    return f"0 (at most {most:.2f}, as {why}{f'; {cell.problem}' if cell.problem else ''})"
+    problem = f"; {cell.problem}" if cell.problem else ""
+    return f"0 (at most {most:.2f} at {section.P_LEVEL}, as {why}{problem})"
 
 
 def _last(results: StudyResults) -> str:
@@ -253,11 +277,17 @@ def _last(results: StudyResults) -> str:
     asked = {test.compared.indicator for test in tests} - {"change"}
     named = [one.heading for symbol, one in DEFINITIONS.items() if symbol in asked]
     parts = [f"{', '.join(named)}: good above 0"] if named else []
+    level = section.level_of(tests)
+    differ = section.other_levels(tests, level) and ", or as said behind them"
+    if any(test.interval and test.interval.low is not None for test in tests):
+        parts.append(f"{section.percent(level)} intervals{differ}")
     parts.append("verdicts are Holm-adjusted")
     flags = {flag for test in tests for flag in test.flags}
     if "assumes_normal" in flags:
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normality)")
+    if "cannot_fail" in flags:
+        parts.append("no verdict where it cannot lie below the threshold, as P cannot below 0")
     if "too_few_seeds" in flags:
         parts.append("two seeds give no verdict")
     if results.exploratory:
@@ -296,14 +326,21 @@ def in_a_sentence(results: StudyResults) -> str:
     """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
     known = [one for one in results.verdicts if one.interval and one.interval.low is not None]
     known = [test for test in known if test.compared.indicator != "change"] or known
-    words = section.counted(said(test.conclusion) for test in results.verdicts)
     told = f"{_performance(results)[:-1]} over {section.seeds_text(results)}"
-    asked = section.plural(len(results.verdicts), "question")
-    told += f"; of {asked} {words} (Holm)"
-    if known:
-        worst = min(known, key=lambda test: test.value or 0.0)
-        line = _line([(0, worst)])
-        told += f"; the lowest is {line.question} = {line.value} {line.interval}".rstrip()
+    worst = min(known or results.verdicts, key=lambda test: test.value or 0.0)
+    line = _line([(0, worst)])
+    value, level = f"{line.question} = {line.value}", section.level_of([worst])
+    if interval := line.interval(level):
+        value += f", {section.percent(level)} interval {interval}"
+    if len(results.verdicts) == 1:
+        asked = f"{line.indicator} > {worst.compared.threshold:.3g}"
+        told += f"; {value}; {asked}: {section.concluded(worst)} (Holm)"
+    else:
+        words = section.concluded(*results.verdicts)
+        if words == said(worst.answer_holm):  # all alike
+            words = f"{len(results.verdicts)} {words}"
+        told += f"; of {len(results.verdicts)} questions {words} (Holm)"
+        told += f"; the lowest is {value}" if known else ""
     whose = results.policies
     if results.plan.origin and len(whose) == 1:  # nobody named it
         whose = (results.plan.specification.name,)
@@ -329,7 +366,8 @@ def digest(found: Answer, width: int, most: int | None = MOST_LINES) -> str:
 
 def _rows(found: Answer, width: int) -> list[str]:
     """Return the lines in columns, as few as questions and verdicts can be folded into."""
-    columns = zip(*((line.question, line.value, line.interval) for line in found.lines))
+    level = found.level
+    columns = zip(*((line.question, line.value, line.interval(level)) for line in found.lines))
     longest, *others = [max(map(len, column)) for column in columns]
     most = min(longest, max(8, width - sum(others) - 16))
     tried = range(min(20, most), most + 1)
@@ -342,7 +380,8 @@ def _in_columns(found: Answer, widths: Sequence[int], width: int) -> Iterator[st
             yield f"{policy}:"
         for line in lines:
             question, *more = wrap(line.question, widths[0], subsequent_indent="  ")
-            left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {line.interval:{widths[2]}}"
+            interval = line.interval(found.level)
+            left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {interval:{widths[2]}}"
             verdict = wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
             yield f"{left}  {verdict[0]}".rstrip()
             for first, second in zip_longest(more, verdict[1:], fillvalue=""):

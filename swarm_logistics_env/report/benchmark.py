@@ -9,11 +9,21 @@ import numpy as np
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.spi.inputs import Numbers
-from swarm_logistics_env.studies.comparison import Arm
+from swarm_logistics_env.studies.comparison import CONFIDENCE, Arm
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
 
-from .section import NOTHING, Section, Texts, bracketed, mean_p, ratio
+from .section import (
+    NOTHING,
+    P_LEVEL,
+    Section,
+    Texts,
+    bracketed,
+    level_of,
+    mean_p,
+    percent,
+    ratio,
+)
 
 STUDY = "benchmark"
 HELD_OUT = "Held out"  # how the titles of its tables begin that give the score
@@ -22,6 +32,7 @@ RESAMPLES = 2_000
 
 def table(results: StudyResults) -> Section:
     """Return P, S, R or A, and FT of every condition, those of a title together."""
+    level = level_of(results.verdicts)
     rows: list[Texts] = []
     shown: set[str] = set()  # the sound swarm is the original condition of most titles
     for title, tests in grouped(results.verdicts, lambda one: one.compared.table).items():
@@ -36,13 +47,18 @@ def table(results: StudyResults) -> Section:
         for changed, found in grouped(tests, lambda one: one.compared.changed).items():
             by_symbol = {test.compared.indicator: test for test in found}
             tolerance = by_symbol.pop("FT", None)
-            others = [f"{symbol} {ratio(test)}" for symbol, test in by_symbol.items()]
+            others = [f"{symbol} {ratio(test, level)}" for symbol, test in by_symbol.items()]
             p = mean_p(results.cells_of(found[0].compared)[changed])
-            ft = NOTHING if tolerance is None else ratio(tolerance)
+            ft = NOTHING if tolerance is None else ratio(tolerance, level)
             rows.append((f"  {changed.setting}", p, "; ".join(others), ft))
     return Section(
         f"{results.policies[0]}: benchmark of robustness",
-        ("condition", "P [95 %]", "S, R or A [95 %]", "FT [95 %]"),
+        (
+            "condition",
+            f"P [{P_LEVEL}]",
+            f"S, R or A [{percent(level)}]",
+            f"FT [{percent(level)}]",
+        ),
         tuple(rows),
         tuple(_notes(results)),
     )
@@ -56,8 +72,11 @@ def _notes(results: StudyResults) -> Iterator[str]:
         f"Worst cell: {test.compared.table}, {changed.words}: P {mean_p(changed)}, {share:.0%} of "
         f"{mean_p(original)}."
     )
-    held_out = spi.mean_interval(score(results))
-    yield f"Score: mean P of the {len(_held_out(results))} held-out cells {bracketed(held_out, 1)}."
+    held_out = bracketed(spi.mean_interval(score(results), CONFIDENCE), 1)
+    yield (
+        f"Score: mean P of the {len(_held_out(results))} held-out cells {held_out}, {P_LEVEL} "
+        "interval."
+    )
 
 
 def worst(results: StudyResults) -> tuple[Verdict, float]:
@@ -122,13 +141,15 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
     # 1 + how many entries score higher.
     found = rankdata([-one.mean() for one in scores], method="min")
     ranks = rankdata(-np.array(drawn), method="min", axis=1)
-    best, worst = np.percentile(ranks, (2.5, 97.5), axis=0, method="nearest").astype(int)
+    outside = 50.0 * (1.0 - CONFIDENCE)
+    ends = outside, 100.0 - outside
+    best, worst = np.percentile(ranks, ends, axis=0, method="nearest").astype(int)
     same = (ranks == found).mean(axis=0)
     named = list(entries.items())
     rows = tuple(
         (
             named[one][0],
-            bracketed(spi.mean_interval(named[one][1]), 1),
+            bracketed(spi.mean_interval(named[one][1], CONFIDENCE), 1),
             f"{found[one]:.0f} [{best[one]}, {worst[one]}]",
             f"{same[one]:.0%}",
         )
@@ -136,7 +157,7 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
     )
     return Section(
         "Benchmark of robustness: entries by score",
-        ("policy", "score [95 %]", "rank [95 %]", "same rank"),
+        ("policy", f"score [{P_LEVEL}]", f"rank [{P_LEVEL}]", "same rank"),
         rows,
         (
             "Score: mean P of the held-out cells, over trainings and seeds.",

@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
+from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.plan import Origin, Plan
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.verdict import grouped
 
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures
-from .section import Figure, Section, listed, seeds_text, sentence
+from .section import Figure, Section, listed, percent, seeds_text, sentence
 from .tables import fault_sections, tables, warnings
 
 
@@ -84,7 +85,8 @@ def document(results: StudyResults) -> Document:
         Chapter(
             "Results",
             f"P is {plan.specification.played.performance}. Square brackets hold intervals at the "
-            'level that the heading gives; "one run" is where a single further run falls.',
+            "level that the heading gives, or at that behind them; "
+            '"one run" is where a single further run falls.',
             result_tables,
         ),
         Chapter(
@@ -93,7 +95,7 @@ def document(results: StudyResults) -> Document:
             faults,
         ),
         Chapter("Set-up", "", setup_sheet(plan)),
-        Chapter("Methods", "", (Section("", lines=(methods(plan),)),)),
+        Chapter("Methods", "", (Section("", lines=(methods(plan, results.looks),)),)),
     ]
     shown = tuple(chapter for chapter in chapters if chapter.sections)
     whole = Document(f"Study {plan.specification.name!r}", tuple(text), found, shown)
@@ -172,28 +174,43 @@ def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:
     )
 
 
-def methods(plan: Plan) -> str:
-    """Return a paragraph for a paper: what was measured, how it was estimated and tested."""
+def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
+    """Return a paragraph for a paper: what was measured, how it was estimated and tested.
+
+    Args:
+        looks: numbers of seeds at which comparisons might stop; none: they are not looked at.
+    """
     asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
     names = [DEFINITIONS[symbol].heading for symbol in asked]
     n = len(plan.seeds)
     if plan.paired:
         what = "trials" if plan.origin else "simulated runs"
-        trials = f"{n} {what} of each of {len(plan.cases)} conditions, paired by seed"
+        least = "at least " * bool(looks)
+        trials = f"{least}{n} {what} of each of {len(plan.cases)} conditions, paired by seed"
         test = "the paired t-test (Fieller's interval)"
         if n >= MIN_SEEDS:
             test += " and its studentised bootstrap, whichever gives the larger p"
     else:
         trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
         test = "Welch's t-test for independent samples"
+    level, side = percent(CONFIDENCE), f"{50 * (1 - CONFIDENCE):.3g} %"
+    holds, stops = f"the {level} interval", ""
+    if looks:
+        holds, side = "the interval", f"its share of {side}"
+        stops = (
+            f" The study was looked at after {listed([*map(str, looks)])} seeds, and each "
+            "comparison stopped where it was clear. Its error was spent over these looks in "
+            "proportion to the seeds, so that an interval has the level of its look, which stands "
+            f"with it, and those of all looks together hold the true value with {level}."
+        )
     return (
         f"We measured performance P in {trials}. We report {listed(names)}, each a ratio of mean "
-        f"performances, with the 95 % interval that inverts {test}. An indicator is called above "
-        "its threshold (supported) or below it (refuted) where this test rejects at 2.5 % on that "
-        "side, equivalent where it does not but two one-sided tests find that P changes by less "
-        f"than {100 * plan.specification.margin:.3g} % of P_o, else inconclusive; p is adjusted by "
-        "Holm's method over all comparisons of one indicator for one policy. Computed with "
-        f"{_version()}."
+        f"performances, with {holds} that inverts {test}.{stops} An indicator is called above its "
+        f"threshold (supported) or below it (refuted) where this test rejects at {side} on that "
+        "side, else inconclusive (open); it has no verdict where it cannot lie below. Beside it "
+        "stands whether two one-sided tests find that P changes by less than "
+        f"{100 * plan.specification.margin:.3g} % of P_o; p is adjusted by Holm's method over all "
+        f"comparisons of one indicator for one policy. Computed with {_version()}."
     )
 
 

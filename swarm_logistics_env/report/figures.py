@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
-from swarm_logistics_env.studies.comparison import Comparison
+from swarm_logistics_env.studies.comparison import CONFIDENCE, Comparison
 from swarm_logistics_env.studies.measures import RateCurve, mid_run_faults, rate_curves, window_of
 from swarm_logistics_env.studies.results import VERDICT_COLUMNS, StudyResults, frame
 from swarm_logistics_env.studies.verdict import Verdict, grouped
@@ -14,16 +14,12 @@ from swarm_logistics_env.studies.verdict import Verdict, grouped
 from . import drawing
 from .answer import Answer
 from .drawing import Panel, Point
-from .section import DECIDED, Figure, listed, seeds_text, slug
+from .section import DECIDED, P_LEVEL, Figure, levels, listed, seeds_text, slug
 
 _COLUMNS = [
-    "policy", "table", "indicator", "comparison", "value", "low", "high", "verdict",
-    "verdict_holm", "published", "saturated",
+    "policy", "table", "indicator", "comparison", "value", "low", "high", "confidence",
+    "verdict", "verdict_holm", "published", "saturated",
 ]  # fmt: skip
-_MARKS = (
-    "Filled: the Holm-adjusted verdict is decided; hollow: open; bars: 95 % intervals, without an "
-    "end where they leave the axis; dashed: thresholds"
-)
 
 
 def forest_figure(results: StudyResults, found: Answer) -> Figure:
@@ -36,7 +32,7 @@ def forest_figure(results: StudyResults, found: Answer) -> Figure:
     tests = [test for line in found.lines for test in line.tests]
     return Figure(
         "answer",
-        f"{found.asked} Every question with its 95 % interval. {_MARKS}.{_capped(tests)}",
+        f"{found.asked} Every question with its interval. {_marks(tests)}.{_capped(tests)}",
         frame(tests, VERDICT_COLUMNS)[_COLUMNS],
         0.9 + 0.27 * len(rows),
         partial(drawing.forest, rows=rows),
@@ -51,7 +47,7 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
         crosses = "; crosses: published" if any(t.published is not None for t in tests) else ""
         caption = f"{listed(list(dict.fromkeys(t.compared.policy for t in tests)))}, "
         caption += f"{_where(table, onset, swarm)}: {_caption(definitions)} "
-        caption += f"{seeds_text(results).capitalize()}. {_MARKS}{crosses}."
+        caption += f"{seeds_text(results).capitalize()}. {_marks(tests)}{crosses}."
         panels = [_panel(results, tests, definition) for definition in definitions]
         yield Figure(
             slug(*(definition.symbol for definition in definitions), *names),
@@ -133,6 +129,13 @@ def _point(results: StudyResults, test: Verdict, category: str, published: float
     return Point(policy, style, category, value, low, high, published, decided, test.saturated)
 
 
+def _marks(tests: Sequence[Verdict]) -> str:
+    return (
+        "Filled: the Holm-adjusted verdict is decided; hollow: it is not; bars: "
+        f"{levels(tests)} intervals, without an end where they leave the axis; dashed: thresholds"
+    )
+
+
 def _capped(tests: Sequence[Verdict]) -> str:
     is_capped = any(test.saturated for test in tests)
     return " †: P is capped, every item was delivered in a run." * is_capped
@@ -165,7 +168,7 @@ def rate_figures(results: StudyResults) -> Iterator[Figure]:
         one, setting, window = compared[0], compared[0].changed.setting, window_of(compared[0])
         panels = {f"m = {c.changed.setting.value:g}": rate_curves(results, c) for c in compared}
         rows = [
-            (title, curve.runs, *point)
+            (title, curve.runs, *point, CONFIDENCE)
             for title, curves in panels.items()
             for curve in curves
             for point in zip(*curve[1:])
@@ -175,8 +178,8 @@ def rate_figures(results: StudyResults) -> Iterator[Figure]:
                 slug("deliveries", one.policy, one.table, setting.name, f"{setting.onset:g}s"),
                 f"{one.policy}, {one.table}, N = {one.n_robots}: deliveries in the trailing "
                 f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s (dotted "
-                f"line). Mean over {seeds_text(results)} with pointwise 95 % t-intervals.",
-                pd.DataFrame(rows, columns=["panel", "runs", *RateCurve._fields[1:]]),
+                f"line). Mean over {seeds_text(results)} with pointwise {P_LEVEL} t-intervals.",
+                pd.DataFrame(rows, columns=["panel", "runs", *RateCurve._fields[1:], "confidence"]),
                 0.6 + 2.3 * len(panels),
                 partial(
                     drawing.rates,

@@ -118,7 +118,7 @@ function drawComparison() {
   at("policies").innerHTML = shown.map((policy) => {
     const c = data.policies.indexOf(policy);
     return `<span><svg width="12" height="12" viewBox="-6 -6 12 12" style="display:inline"><path d="${MARKS[c % 6](0, 0)}" fill="${colour(c)}"/></svg> ${escaped(policy)}</span>`;
-  }).join("") + `<span>bar: 95 % interval</span>${view.thresholds.length ? "" : `<span>dot: one ${repeat}, click it</span>`}` + (crosses.length ? "<span>×: published</span>" : "");
+  }).join("") + `<span>bar: ${escaped(view.level)} interval</span>${view.thresholds.length ? "" : `<span>dot: one ${repeat}, click it</span>`}` + (crosses.length ? "<span>×: published</span>" : "");
 }
 
 // One question: paired slopes, delivery curves, and one run

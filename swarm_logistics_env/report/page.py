@@ -21,7 +21,7 @@ from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from .answer import Answer
 from .figures import X_LABELS, indicator_panels
-from .section import sentence
+from .section import P_LEVEL, levels, sentence
 
 Json: TypeAlias = dict[str, JsonValue]
 _MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
@@ -42,7 +42,8 @@ def page_data(results: StudyResults) -> Json:
     places = {key: place for place, key in enumerate(arms)}
     return {
         "policies": [*results.policies],
-        "seeds": [int(seed) for seed in results.plan.seeds],
+        # A script rounds larger numbers.
+        "seeds": [seed if seed < 2**53 else str(seed) for seed in results.plan.seeds],
         "paired": results.plan.paired,
         "conditions": list(_conditions(results, list(arms.values()))),
         "questions": [_question(results, test, places) for test in results.verdicts],
@@ -124,6 +125,7 @@ def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterato
         yield {
             "name": f"P: {table}",
             "y": f"performance P over {X_LABELS.get(setting.kind, setting.name)}",
+            "level": P_LEVEL,
             "thresholds": [],
             # "N = 10" stands there as "10", "FM1, m = 2" as "FM1 2".
             "categories": [re.sub(r"^\w+ = |, m =", "", one) for one in categories],
@@ -149,6 +151,7 @@ def _indicator_views(results: StudyResults) -> Iterator[Json]:
         yield {
             "name": f"{panel.tests[0].compared.indicator}: {where}",
             "y": f"{panel.y_label} over {panel.x_label}",
+            "level": levels(panel.tests),
             "thresholds": [float(threshold) for threshold in panel.thresholds],
             "categories": [*categories],
             "points": [

@@ -13,6 +13,7 @@ import numpy as np
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import SIGNS, Estimate
+from swarm_logistics_env.studies.comparison import CONFIDENCE
 from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.studies.specification import seeds_in_words
 from swarm_logistics_env.studies.verdict import Cell, Verdict
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from .drawing import Draw
 
 SATURATED = "†"
+_SAME = 1e-9  # a value so near a threshold differs from it by rounding alone
 NOTHING = "–"
 DECIDED = ("supported", "refuted", "equivalent")
 UNAFFECTED = SIGNS["unaffected"].word
@@ -32,6 +34,8 @@ FLAGS = {
     "single_seed": "One seed gives a value, but no interval and no verdict",
     "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
     "degenerate": "The seeds show no spread, so there is no interval and no verdict",
+    "cannot_fail": "As no P is below 0, it cannot lie below the threshold, so it is not tested and "
+    "has no verdict",
     "capped": "P is capped on the side that the verdict leans to, so the verdict is open",
     "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
     "so it is open",
@@ -67,11 +71,19 @@ class Figure:
 
 
 class Sentence(NamedTuple):
-    """One verdict in words; `verdict`: the conclusion, a name in `WORDS`."""
+    """One verdict in words.
+
+    Attributes:
+        head: what is asked.
+        text: all that is known.
+        verdict: the conclusion, a name in `WORDS`.
+        word: the answer to what is asked.
+    """
 
     head: str
     text: str
     verdict: str
+    word: str
 
 
 class Section(NamedTuple):
@@ -95,24 +107,48 @@ def digits_of(p: float) -> int:
     return 1 if not 0 < p < 1 else 2 - math.floor(math.log10(p))
 
 
-def fixed(value: float, digits: int) -> str:
-    """Return a number to so many digits; infinity as its sign."""
+def fixed(value: float, digits: int, thresholds: Iterable[float] = ()) -> str:
+    """Return a number to so many digits; infinity as its sign.
+
+    Args:
+        thresholds: numbers on whose side the value is shown, by more digits where it takes them.
+    """
+
+    def sides(x: float) -> list[bool]:
+        return [one for t in thresholds if abs(value - t) > _SAME for one in (x > t, x < t)]
+
+    thresholds = tuple(thresholds)
+    while sides(round(value, digits)) != sides(value):
+        digits += 1
     # "+ 0.0" after rounding: no minus sign before a zero.
     return f"{round(value, digits) + 0.0:.{digits}f}".replace("inf", "∞")
 
 
-def limits(interval: spi.Interval | Estimate, digits: int) -> str:
-    """Return the limits of an interval to so many digits, e.g. "[101.2, ∞]"; empty: none."""
+def limits(interval: spi.Interval | Estimate, digits: int, thresholds: Iterable[float] = ()) -> str:
+    """Return the limits of an interval to so many digits, e.g. "[101.2, ∞]"; empty: none.
+
+    Args:
+        thresholds: numbers on whose sides they are shown, besides that of an estimate.
+    """
     if interval.low is None or interval.high is None:
         return ""
-    return f"[{fixed(interval.low, digits)}, {fixed(interval.high, digits)}]"
+    told = _thresholds(interval, thresholds)
+    return f"[{fixed(interval.low, digits, told)}, {fixed(interval.high, digits, told)}]"
 
 
-def bracketed(interval: spi.Interval | Estimate | None, digits: int) -> str:
-    """Return a value with its limits to so many digits, e.g. "124.0 [101.2, ∞]"."""
+def bracketed(
+    interval: spi.Interval | Estimate | None, digits: int, thresholds: Iterable[float] = ()
+) -> str:
+    """Return a value with its limits, as `limits` does, e.g. "124.0 [101.2, ∞]"."""
     if interval is None:
         return NOTHING
-    return f"{fixed(interval.value, digits)} {limits(interval, digits)}".rstrip()
+    told = _thresholds(interval, thresholds)
+    return f"{fixed(interval.value, digits, told)} {limits(interval, digits, told)}".rstrip()
+
+
+def _thresholds(interval: spi.Interval | Estimate, others: Iterable[float]) -> tuple[float, ...]:
+    own = (interval.threshold,) if isinstance(interval, Estimate) else ()
+    return (*own, *others)
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -125,6 +161,32 @@ def percent(confidence: float) -> str:
     return "> 99.99 %" if confidence > 0.9999 else f"{100 * confidence:.4g} %"
 
 
+P_LEVEL = percent(CONFIDENCE)  # of intervals of P
+
+
+def _with_interval(tests: Iterable[Verdict]) -> list[Estimate]:
+    estimates = (test.estimate for test in tests)
+    return [one for one in estimates if one and one.low is not None and not one.identical]
+
+
+def level_of(tests: Iterable[Verdict]) -> float:
+    """Return the level of most intervals of these tests, for a heading over all of them."""
+    counts = Counter(one.confidence for one in _with_interval(tests))
+    return max(counts, key=counts.__getitem__, default=CONFIDENCE)
+
+
+def levels(tests: Iterable[Verdict]) -> str:
+    """Return the levels of the intervals of these tests, e.g. "95 %" or "97.8 % to 99.2 %"."""
+    found = {one.confidence for one in _with_interval(tests)} or {CONFIDENCE}
+    return " to ".join(dict.fromkeys(map(percent, (min(found), max(found)))))
+
+
+def other_levels(tests: Sequence[Verdict], level: float) -> str:
+    """Return the levels of these tests' intervals behind one blank, if any is not `level`."""
+    differ = any(one.confidence != level for one in _with_interval(tests))
+    return f" {levels(tests)}" if differ else ""
+
+
 def mean_p(cell: Cell) -> str:
     """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
@@ -132,9 +194,14 @@ def mean_p(cell: Cell) -> str:
     return bracketed(cell.mean, digits_of(cell.mean.value)) + SATURATED * cell.saturated
 
 
-def ratio(test: Verdict) -> str:
-    """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]"."""
-    return bracketed(test.interval, 3) + SATURATED * (test.saturated and test.interval is not None)
+def ratio(test: Verdict, level: float = CONFIDENCE) -> str:
+    """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]".
+
+    Args:
+        level: that the heading names; another one of the interval stands behind it.
+    """
+    capped = SATURATED * (test.saturated and test.estimate is not None)
+    return bracketed(test.estimate, 3) + capped + other_levels([test], level)
 
 
 def lies_above(test: Verdict) -> bool | None:
@@ -149,6 +216,26 @@ def lies_above(test: Verdict) -> bool | None:
 def said(verdict: str | None) -> str:
     """Return a verdict in words."""
     return WORDS[verdict or "blocked"]
+
+
+def concluded(*tests: Verdict) -> str:
+    """Return the answers under Holm, then what else is known: "open; P changes by less than 10 %".
+
+    Of several tests they are counted, unless all are the same.
+    """
+    words = [said(test.answer_holm) for test in tests]
+    told = [words[0] if len(set(words)) == 1 else counted(words)]
+    same = Counter(_unchanged(test) for test in tests if test.conclusion == "equivalent")
+    for known, count in same.items():
+        told.append(known if count == len(tests) else f"{known} in {count}")
+    return "; ".join(told)
+
+
+def _unchanged(test: Verdict) -> str:
+    margin = f"{100 * test.margin:.3g} %"
+    if test.compared.definition.needs_removed:
+        return f"P_F and P_S differ by less than {margin} of P_o"
+    return f"P changes by less than {margin}"
 
 
 def answered(test: Verdict) -> str:
@@ -195,8 +282,8 @@ def time_to_clear(cell: Cell) -> str:
     late = sum(map(math.isinf, times))
     several = len(cell.arm.case.trainings)
     if several > 1 and not (late or cell.problem):
-        return bracketed(spi.mean_interval(np.reshape(times, (several, -1))), 0)
-    found = bracketed(spi.median_interval(times), 0)
+        return bracketed(spi.mean_interval(np.reshape(times, (several, -1)), CONFIDENCE), 0)
+    found = bracketed(spi.median_interval(times, CONFIDENCE), 0)
     return f"{found} ({late} of {len(times)})" if late else found
 
 
@@ -218,7 +305,8 @@ def sentence(results: StudyResults, test: Verdict) -> Sentence:
         "" if compared.original.setting.kind in ("size", "policy") else f", N = {compared.n_robots}"
     )
     head = f"{compared.policy}, {test.asked}? {compared.label}{swarm}."
-    return Sentence(head, " ".join(_parts(results, test)), test.conclusion or "blocked")
+    text = " ".join(_parts(results, test))
+    return Sentence(head, text, test.conclusion or "blocked", said(test.answer_holm))
 
 
 def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
@@ -240,11 +328,13 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
     found = limits(estimate, 3)
     level = f", {percent(estimate.confidence)} interval {found}" if found else " (no interval)"
     capped = SATURATED * test.saturated
-    yield f"{indicator}{capped} = {fixed(estimate.value, 3)}{level} over {seeds}."
-    # One seed gives no p, and Holm's placeholder of 1 says nothing.
-    adjusted_p = None if estimate.p_value is None else test.p_holm
-    yield f"Unadjusted: {said(test.answer)}{_p(estimate.p_value)};"
-    yield f"Holm-adjusted: {said(test.answer_holm)}{_p(adjusted_p)}."
+    value = fixed(estimate.value, 3, [estimate.threshold])
+    yield f"{indicator}{capped} = {value}{level} over {seeds}."
+    if not estimate.untestable:
+        # One seed gives no p, and Holm's placeholder of 1 says nothing.
+        adjusted_p = None if estimate.p_value is None else test.p_holm
+        yield f"Unadjusted: {said(test.answer)}{_p(estimate.p_value)};"
+        yield f"Holm-adjusted: {said(test.answer_holm)}{_p(adjusted_p)}."
     if test.claim:
         plain, adjusted = map(said, (test.claim_verdict, test.claim_verdict_holm))
         both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
@@ -252,8 +342,11 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
     if test.equivalence is not None:
         same, holm = said(test.equivalence.verdict), said(test.equivalence_holm)
         adjusted = "" if same == holm else f" ({holm} under Holm)"
-        change = bracketed(test.equivalence.change, 3)
-        yield f"{test.unchanged}? Change {change}: {same}{adjusted}."
+        change = test.equivalence.change
+        told = bracketed(change, 3, [-test.margin, test.margin])
+        if change.low is not None and not change.identical:
+            told += f" ({percent(change.confidence)})"
+        yield f"{test.unchanged}? Change {told}: {same}{adjusted}."
     yield from (f"{FLAGS[flag]}." for flag in test.flags)
     if "hidden_stalls" in test.flags:
         yield f"It needs at least {spi.seeds_against_stalls(estimate)} seeds."

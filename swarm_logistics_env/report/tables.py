@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -38,8 +39,8 @@ def tables(results: StudyResults) -> Iterator[Section]:
         columns = [setting]
         if published:
             columns.append(("P paper", _published))
-        columns.append(("P ours [95 %]" if published else "P [95 %]", section.mean_p))
-        columns.append(("one run [95 %]", _one_run))
+        columns.append((f"P{' ours' * published} [{section.P_LEVEL}]", section.mean_p))
+        columns.append((f"one run [{section.P_LEVEL}]", _one_run))
         whole = title = ": ".join(place)
         asked_here = tests.get(place, ())
         for indicator, asked in grouped(asked_here, lambda test: test.compared.indicator).items():
@@ -77,9 +78,9 @@ def _answers(indicator: str, tests: Sequence[Verdict], *, published: bool) -> It
         by_arm = {test.compared.changed: test for test in asked}
         return heading, lambda cell: text(by_arm[cell.arm]) if cell.arm in by_arm else NOTHING
 
-    levels = {test.estimate.confidence for test in tests if test.estimate}
-    level = section.percent(levels.pop()) if len(levels) == 1 else section.percent(CONFIDENCE)
-    yield column(f"{indicator} [{level}]", tests, section.ratio)
+    level = section.level_of(tests)
+    shown = partial(section.ratio, level=level)
+    yield column(f"{indicator} [{section.percent(level)}]", tests, shown)
     if published:
         yield column(f"{indicator} paper", tests, lambda test: section.number(test.published))
     for name, asked in grouped(tests, lambda test: test.asked).items():
@@ -98,7 +99,7 @@ def _sentences(results: StudyResults) -> Iterator[Section]:
         return
     for policy, tests in grouped(results.verdicts, lambda test: test.compared.policy).items():
         if said := sentences(reference, tests):
-            columns = ("the text", "claim", "ours [95 %]", "verdict")
+            columns = ("the text", "claim", f"ours [{section.P_LEVEL}]", "verdict")
             yield Section(f"{policy}: what the text says", columns, tuple(said), (reference.whose,))
 
 
@@ -146,18 +147,19 @@ def _times_to_clear(results: StudyResults) -> Iterator[Section]:
         "∞: nor was the median."
     )
     if rows:
-        columns = "", "median [s], 95 %"
+        columns = "", f"median [s], {section.P_LEVEL}"
         yield Section("Time until all items are delivered", columns, rows, (line,))
 
 
 def _agreement(found: Agreement) -> Section:
     total = len(found.cells)
-    lines = ["Cells inside the 95 % prediction interval: one seed gives no interval."]
+    level = section.P_LEVEL
+    lines = [f"Cells inside the {level} prediction interval: one seed gives no interval."]
     if all(cell.n_seeds > 1 for cell in found.cells):
         lines = [
             (
-                f"Cells whose published P lies inside the 95 % prediction interval of one of our "
-                f"runs: {total - len(found.misses)} of {total}; inside that of our mean: "
+                f"Cells whose published P lies inside the {level} prediction interval of one of "
+                f"our runs: {total - len(found.misses)} of {total}; inside that of our mean: "
                 f"{len(found.met)} of {total}."
             ),
             f"Misses: {'; '.join(cell.words for cell in found.misses) or 'none'}.",
@@ -215,9 +217,11 @@ def fault_sections(results: StudyResults) -> Iterator[Section]:
     if not found:
         return
     who = [(one.compared.policy, str(one.compared.changed.setting)) for one in found]
+    indices = (x for one in found for x in (one.against_removed, one.against_whole) if x)
+    level = section.percent(next((index.confidence for index in indices), CONFIDENCE))
     columns = (
-        "policy", "fault", "over the removed robots' [95 %]", "above 1",
-        "over the whole swarm's [95 %]", "above 1 - m/N",
+        "policy", "fault", f"over the removed robots' [{level}]", "above 1",
+        f"over the whole swarm's [{level}]", "above 1 - m/N",
     )  # fmt: skip
     rows = tuple(
         (*whose, *_index(one.against_removed), *_index(one.against_whole))

@@ -22,7 +22,7 @@ from swarm_logistics_env.studies.runs import write_csv
 from .document import Document, document
 from .drawing import images
 from .page import axis, page_data
-from .section import Section
+from .section import Section, percent
 
 
 def write_report(
@@ -155,6 +155,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         document=document,
         paired=results.plan.paired,
         answer=document.answer,
+        level=percent(document.answer.level),
         axis=axis(document.answer),
         signs=SIGNS,
         drawings=drawings,

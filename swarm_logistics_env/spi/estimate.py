@@ -47,6 +47,7 @@ SIGNS = {
     "equivalent": Sign("equivalent", "#005b94", "#6cb8ee"),
     "inconclusive": Sign("open", "#5b6068", "#a9afb8"),
     "unaffected": Sign("same runs", "#5b6068", "#a9afb8"),
+    "untestable": Sign("no verdict", "#5b6068", "#a9afb8"),
     "blocked": Sign("undefined", "#a84300", "#f5915a"),
 }
 
@@ -56,7 +57,8 @@ class Estimate:
     """One indicator over n seeds: theta = mean(num) / mean(den) + offset, with its judgement.
 
     Everything but `value` and the description of the input is None at n = 1; where the runs
-    compared are the same runs, `low` and `high` are `value`, and there is no p.
+    compared are the same runs, `low` and `high` are `value`, and there is no p. Nor is there one
+    where the indicator cannot lie below the threshold.
 
     Attributes:
         indicator: Which indicator this is.
@@ -85,13 +87,14 @@ class Estimate:
         degrees_of_freedom: Degrees of freedom of the t-test: n - 1, or Welch's if unpaired.
         flags: Some of "single_seed", "too_few_seeds" (two: counts agree by chance, so p = 1),
             "degenerate" (se(D) = 0: no limits, p = 1), "identical" (the runs compared are the same
-            runs: the value is exact, and no evidence), "capped" (a capped P blocks the verdict on
-            the side that it leans to: p = 1), "hidden_stalls" (stalled runs that these seeds did
-            not show could turn the verdict: it needs `seeds_against_stalls`), "unbounded" (the mean
-            denominator is not distinguishable from 0), "assumes_normal" (below ten paired seeds, or
-            unpaired: the verdict rests on normal differences), "skewed" (D is so skewed that the
-            verdict errs more often than it promises at this n), "few_trainings" (fewer than five:
-            p = 1).
+            runs: the value is exact, and no evidence), "cannot_fail" (as no P is below 0, theta
+            cannot lie below the threshold: there is no p, and no verdict), "capped" (a capped P
+            blocks the verdict on the side that it leans to: p = 1), "hidden_stalls" (stalled runs
+            that these seeds did not show could turn the verdict: it needs `seeds_against_stalls`),
+            "unbounded" (the mean denominator is not distinguishable from 0), "assumes_normal"
+            (below ten paired seeds, or unpaired: the verdict rests on normal differences), "skewed"
+            (D is so skewed that the verdict errs more often than it promises at this n),
+            "few_trainings" (fewer than five: p = 1).
     """
 
     indicator: str
@@ -119,6 +122,11 @@ class Estimate:
         return "identical" in self.flags
 
     @property
+    def untestable(self) -> bool:
+        """Whether it cannot lie below the threshold, so that there is nothing to test."""
+        return "cannot_fail" in self.flags
+
+    @property
     def verdict(self) -> Verdict:
         """On theta > threshold, one-sided (1 - confidence)/2 on each side, unadjusted."""
         return self.verdict_for(self.p_value)
@@ -141,7 +149,9 @@ class Estimate:
 
     def __str__(self) -> str:
         """Return value, interval and verdict in one line."""
-        shown = SIGNS["unaffected" if self.identical else self.verdict]
+        shown = SIGNS["untestable" if self.untestable else self.verdict]
+        if self.identical:
+            shown = SIGNS["unaffected"]
         limits = ""
         if self.low is not None and self.high is not None and not self.identical:
             limits = f" [{self.low:.3f}, {self.high:.3f}]"
@@ -162,6 +172,8 @@ LEAST_SEEDS = 3
 # With three trainings an interval is 4.3 standard errors wide on each side, and one of three that
 # is lucky turns it: such few are shown, and decide nothing.
 LEAST_TRAININGS = 5
+# The flags that concern the interval; all others are about a test.
+_OF_INTERVAL = ("single_seed", "degenerate", "unbounded")
 
 
 class Options(TypedDict, total=False):
@@ -232,9 +244,16 @@ def judge(
     if identical:  # the same runs leave nothing to test
         value = untested.value
         return replace(untested, low=value, high=value, flags=("identical",))
+    found = untested
     if n_seeds == 1:
-        return replace(untested, flags=("single_seed",))
-    return _tested(untested, weighted, offset, saturated)
+        found = replace(untested, flags=("single_seed",))
+    else:
+        found = _tested(untested, weighted, offset, saturated)
+    # D is a sum of weighted P, and no P is below 0.
+    if min(term.weight(threshold - offset) for term in weighted.values()) >= 0.0:
+        of_interval = [flag for flag in found.flags if flag in _OF_INTERVAL]
+        return replace(found, p_value=None, probability=None, flags=("cannot_fail", *of_interval))
+    return found
 
 
 def _tested(

@@ -40,8 +40,8 @@ def adjust(estimates: Sequence[Estimate | Equivalence]) -> tuple[Verdict, ...]:
 
     In the order given. An estimate without a p (one seed) counts in the family and stays
     inconclusive. One of identical runs is no evidence and outside the family: it stays inconclusive
-    on a threshold, and is equivalent. The family-wise error is 1 - confidence, of equivalences
-    their alpha.
+    on a threshold, and is equivalent. One that cannot fail is outside the family, too, and
+    inconclusive. The family-wise error is 1 - confidence, of equivalences their alpha.
 
     Raises:
         IndicatorError: The estimates' confidences differ.
@@ -55,11 +55,14 @@ def adjust(estimates: Sequence[Estimate | Equivalence]) -> tuple[Verdict, ...]:
 
 
 def adjusted_p_values(estimates: Sequence[Estimate | Equivalence]) -> tuple[float | None, ...]:
-    """Holm-adjusted p of every estimate, in the order given; None for identical runs."""
-    adjusted = iter(
-        holm([1.0 if e.p_value is None else e.p_value for e in estimates if not e.identical])
-    )
-    return tuple(None if e.identical else float(next(adjusted)) for e in estimates)
+    """Holm-adjusted p of every estimate, in the order given; None where there is nothing to test.
+
+    That is so of identical runs, and of an indicator that cannot lie below its threshold.
+    """
+    tested = [not (e.identical or "cannot_fail" in e.flags) for e in estimates]
+    p_values = [1.0 if e.p_value is None else e.p_value for e in estimates]
+    adjusted = iter(holm([p for p, is_tested in zip(p_values, tested) if is_tested]))
+    return tuple(float(next(adjusted)) if is_tested else None for is_tested in tested)
 
 
 Spending = Literal["obrien-fleming", "linear"]

@@ -40,6 +40,8 @@ def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float |
     from scipy.optimize import brentq
 
     _check_power(estimate, power)
+    if estimate.untestable:
+        return None
     spread = _spread_limit(estimate, PLANNED_LIMIT) / estimate.mean_denominator
     if not spread:
         return None
@@ -147,6 +149,8 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
     finite("effect", effect)
     if estimate.identical:
         return "the runs compared are the same runs: the value is exact"
+    if estimate.untestable:
+        return f"it cannot lie below {estimate.threshold:g}: there is nothing to find"
     if estimate.n_trainings is not None:
         return "of several trainings no number of seeds is planned: more trainings tell more"
     if estimate.difference_sd is None:

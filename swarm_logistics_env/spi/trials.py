@@ -29,7 +29,7 @@ class Trial:
     """One run.
 
     Attributes:
-        line: of the file, for an event log that of its first row.
+        line: of the file that its row begins in, for an event log its first row.
         policy: what controlled the robots.
         table: of the file's tables, each of which has a P_o of its own; "" where none is named.
         n_robots: swarm size N; None: not given.
@@ -118,7 +118,7 @@ def read_trials(
     columns: Mapping[str, str] | None = None,
     ignore: Sequence[str] = (),
     duration: float | None = None,
-    decimal: str = ".",
+    decimal: str | None = None,
 ) -> Trials:
     """Read one run a row, or one delivery a row (an event log), from a CSV file.
 
@@ -133,7 +133,8 @@ def read_trials(
         columns: what a column is to its name in the file, e.g. {"performance": "boxes"}.
         ignore: columns to leave out.
         duration: of every trial [s], where no column says it; faults in mid-run need it.
-        decimal: the sign before decimals, "." or ",".
+        decimal: the sign before decimals, "." or ","; None: ".", and a file is refused in which it
+            may stand between thousands.
 
     Raises:
         IndicatorError: the file cannot be read, or a line of it cannot be; names line, column and

@@ -216,7 +216,10 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswe
             said.append(GateAnswer(name, gate.holds_for(value), exact=value))
         else:
             verdict = next(verdicts)
-            said.append(GateAnswer(name, gate.fails_on(verdict), value, verdict))
+            is_impossible = gate.below and value.untestable
+            said.append(
+                GateAnswer(name, gate.fails_on(verdict) and not is_impossible, value, verdict)
+            )
     return tuple(said)
 
 

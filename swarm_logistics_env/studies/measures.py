@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
 
-from .comparison import Arm, Comparison
+from .comparison import CONFIDENCE, Arm, Comparison
 from .results import StudyResults, Times
 from .verdict import Cell, grouped, same_runs
 
@@ -139,7 +139,7 @@ class RateCurve(NamedTuple):
         runs: "no fault", "removed" or "fault".
         seconds: ends of the trailing window [s], shape (k,).
         deliveries: in the window, mean over seeds [items], shape (k,).
-        low, high: limits of its pointwise 95 % t-interval, shape (k,); NaN at one seed.
+        low, high: limits of its pointwise t-interval at `CONFIDENCE`, shape (k,); NaN at one seed.
     """
 
     runs: str
@@ -161,7 +161,7 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
         if times:
             ends = [np.searchsorted(one, [seconds - window, seconds], "right") for one in times]
             counts = np.diff(ends, axis=1)[:, 0]
-            limits = np.array([spi.mean_interval(column) for column in counts.T], np.float64)
+            limits = np.array([spi.mean_interval(n, CONFIDENCE) for n in counts.T], np.float64)
             curves.append(RateCurve(runs, seconds, *limits.T))
     return tuple(curves)
 
@@ -175,9 +175,9 @@ class Agreement(NamedTuple):
     Attributes:
         policy: its label.
         cells: those of the reference's tables.
-        misses: those whose published value lies outside our 95 % prediction interval of one run: a
+        misses: those whose published value lies outside our prediction interval of one run: a
             weak test, which quite different policies pass as well. Empty at one seed.
-        met: those whose published value lies inside the 95 % interval of our mean. Empty as above.
+        met: those whose published value lies inside the interval of our mean. Empty as above.
         mean_log_error: mean of |ln(our mean P / published P)|; None where a mean is 0.
     """
 

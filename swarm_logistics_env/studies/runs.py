@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,6 +16,7 @@ from pydantic import TypeAdapter
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import becoming, canonical_json
+from swarm_logistics_env.spi.trials_table import inert
 from swarm_logistics_env.tasks.task import Outcome, Run
 
 if TYPE_CHECKING:
@@ -321,8 +323,15 @@ def export(runs: Runs, path: Path) -> tuple[int, str]:
 def write_csv(path: Path, table: pd.DataFrame) -> None:
     """Write a table as CSV with Unix line ends; floats in shortest exact form.
 
+    A text that a spreadsheet would compute as a formula has an apostrophe before it, and a line in
+    it ends in the Unix way, or it would end the row.
+
     Raises:
         StudyError: the file cannot be written.
     """
+    texts = table.select_dtypes(exclude="number")
+    harmless = texts.map(
+        lambda cell: inert("\n".join(re.split(r"\r\n?", cell))) if isinstance(cell, str) else cell
+    )
     with becoming(path, StudyError) as part:
-        table.to_csv(part, index=False, lineterminator="\n")
+        table.assign(**harmless).to_csv(part, index=False, lineterminator="\n")

@@ -47,7 +47,7 @@ class Study:
     """
 
     def __init__(self, *, out: str | Path | None = None, **fields: Any) -> None:
-        self.specification = Specification(**fields)
+        self._specification = Specification(**fields)
         self.out = None if out is None else Path(out)
         self._plan: Plan | None = None
         self._memory: Runs | None = None
@@ -107,6 +107,21 @@ class Study:
         else:
             study._plan = make_plan(specification, code=noted.code, identities=noted.identities)
         return study
+
+    @property
+    def specification(self) -> Specification:
+        """What is asked. Another one makes another plan.
+
+        Raises:
+            StudyError: another one is set, and the runs were recorded elsewhere.
+        """
+        return self._specification
+
+    @specification.setter
+    def specification(self, changed: Specification) -> None:
+        if self._plan is not None and self._plan.origin is not None:
+            raise StudyError("specification: a study that was imported asks what its trials vary")
+        self._specification, self._plan = changed, None
 
     def plan(self) -> Plan:
         """Return the conditions and comparisons, shared conditions once; nothing is run."""

@@ -126,7 +126,9 @@ class _Family:
         tested = list[tuple[float, Comparison, spi.Estimate]]()
         for comparison in list(self._open):
             estimate = self._found[comparison].estimate
-            if estimate and estimate.identical:  # nothing to test, at any number of seeds
+            if estimate and (
+                estimate.identical or estimate.untestable
+            ):  # nothing to test, at any number of seeds
                 self._stop(comparison, n_seeds)
             elif estimate and estimate.p_value is not None:
                 tested.append((estimate.p_value, comparison, estimate))

@@ -21,6 +21,7 @@ from .presets import Reference
 
 POWER = 0.8
 UNAFFECTED = "unaffected"
+UNTESTABLE = "untestable"
 _UNKNOWN = Interval(np.nan, None, None)
 Item = TypeVar("Item")
 Group = TypeVar("Group")
@@ -102,14 +103,18 @@ class Cell:
 
     @cached_property
     def mean(self) -> Interval:
-        """Mean P with its 95 % interval; NaN: no run."""
-        return self._possible(spi.mean_interval(self.by_seed)) if self.n_seeds else _UNKNOWN
+        """Mean P with its interval at `CONFIDENCE`; NaN: no run."""
+        return (
+            self._possible(spi.mean_interval(self.by_seed, CONFIDENCE))
+            if self.n_seeds
+            else _UNKNOWN
+        )
 
     @cached_property
     def one_run(self) -> Interval:
-        """Mean P with the 95 % interval of one further run."""
+        """Mean P with the interval of one further run at `CONFIDENCE`."""
         p = self.by_seed.ravel()
-        return self._possible(spi.prediction_interval(p)) if p.size else _UNKNOWN
+        return self._possible(spi.prediction_interval(p, CONFIDENCE)) if p.size else _UNKNOWN
 
     def _possible(self, interval: Interval) -> Interval:
         """Return an interval that ends at the number of items where none comes back."""
@@ -147,7 +152,8 @@ class Verdict:
         equivalence: whether P is unchanged; None: blocked, or not asked.
         saturated: whether it rests on a P that is capped.
         margin: the largest change that counts as none, as a share of P_o.
-        p_holm, verdict_holm: of the estimate under Holm; None: unaffected, blocked family, or no p.
+        p_holm, verdict_holm: of the estimate under Holm; None: nothing to test, or a blocked
+            family.
         equivalence_holm: verdict of the equivalence under Holm; None as `equivalence`.
         stopped_at: number of seeds at which it was clear, in a study that runs until then; None: it
             is not, or the study is another.
@@ -197,15 +203,20 @@ class Verdict:
 
     @property
     def plain(self) -> str | None:
-        """Whether it lies above the threshold; "unaffected": equal runs, no evidence."""
+        """Whether it lies above the threshold.
+
+        "unaffected": equal runs, no evidence; "untestable": it cannot lie below the threshold.
+        """
         if self.estimate is None:
             return None
-        return UNAFFECTED if self.estimate.identical else self.estimate.verdict
+        if self.estimate.identical:
+            return UNAFFECTED
+        return UNTESTABLE if self.estimate.untestable else self.estimate.verdict
 
     @property
     def holm(self) -> str | None:
         """The same after Holm."""
-        return UNAFFECTED if self.plain == UNAFFECTED else self.verdict_holm
+        return self.plain if self.plain in (UNAFFECTED, UNTESTABLE) else self.verdict_holm
 
     @property
     def claim_verdict(self) -> str | None:
@@ -335,7 +346,7 @@ def under_holm(found: Sequence[Verdict]) -> Iterator[Verdict]:
             adjusted[one.compared] = replace(
                 one,
                 p_holm=p,
-                # One of identical runs is no evidence, and has no verdict.
+                # What is no evidence, or cannot fail, has no verdict.
                 verdict_holm=None if p is None else verdict,
                 equivalence_holm=as_before,
             )

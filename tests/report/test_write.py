@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import pytest
 
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import Section, counted_as, sentence
+from swarm_logistics_env.report.section import Section, counted_as, limits, sentence
 from swarm_logistics_env.report.write import latex_tables, markdown, section_markdown, write_report
 from swarm_logistics_env.studies.results import StudyResults
 from tests.studies.made_up import paper
@@ -94,14 +94,15 @@ def test_every_figure_comes_as_drawing_and_data(few: StudyResults, directory: Pa
 def test_every_verdict_quotes_seeds_interval_and_what_it_rests_on(few: StudyResults) -> None:
     for test in few.verdicts:
         assert test.estimate is not None
-        low, high = test.estimate.low, test.estimate.high
         told = sentence(few, test).text
-        assert f"95 % interval [{low:.3f}, {high:.3f}] over 4 paired seeds (0 to 3)" in told
-        assert "Unadjusted: " in told
-        assert "Holm-adjusted: " in told
+        assert f"95 % interval {limits(test.estimate, 3)} over 4 paired seeds (0 to 3)" in told
+        assert ("Unadjusted: " in told) != test.estimate.untestable
+        assert ("Holm-adjusted: " in told) != test.estimate.untestable
         assert ("†" in told) == test.saturated
     text = markdown(document(paper(same=frozenset({"FM2"}))))
-    assert re.search(r"P_F within 10 % of P_o\? Change -0\.[67]\d\d \[.*\]: refuted\.", text)
+    assert re.search(
+        r"P_F within 10 % of P_o\? Change -0\.[67]\d\d \[.*\] \(90 %\): refuted\.", text
+    )
     assert "R = 0.080 exactly, over 10 paired seeds (0 to 9): same runs." in text
     assert re.search(r"too few to exclude stalled runs .* It needs at least \d+ seeds\.", text)
 
@@ -118,4 +119,4 @@ def test_without_the_extra_the_markdown_still_comes_and_one_seed_gives_values_al
     assert "![" not in text
     assert "S = 0.611 (no interval) over one seed (0). Unadjusted: open; Holm-adj" in text
     with (tmp_path / "claims.csv").open(newline="") as file:
-        assert {row["verdict"] for row in csv.DictReader(file)} == {"inconclusive"}
+        assert {row["verdict"] for row in csv.DictReader(file)} == {"inconclusive", "untestable"}

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi import IndicatorError
@@ -101,6 +103,55 @@ def test_arguments_that_cannot_be_are_named(
         indicator(P, P, **arguments)
 
 
+PERFORMANCES = st.lists(st.integers(0, 60), min_size=3, max_size=12)
+VALUES = st.floats(0.1, 40.0) | st.sampled_from([0.1, 0.2, 0.3, 0.6, 1.0, 2.0, 4.0])
+
+
+@given(
+    symbol=st.sampled_from([*DEFINITIONS]),
+    samples=st.tuples(PERFORMANCES, PERFORMANCES, PERFORMANCES),
+    n=st.integers(2, 60),
+    m=st.integers(1, 90),
+    values=st.tuples(VALUES, VALUES | st.just(0.0)),
+    threshold=st.sampled_from([0.0, 1.0, -1.0, -0.5, -2.0]),
+)
+def test_what_no_performance_can_refute_has_no_verdict_and_all_else_can_be_either(
+    symbol: str, samples: tuple[list[int], ...], n: int, m: int, values: tuple[float, float],
+    threshold: float,
+) -> None:  # fmt: skip
+    row, (x_o, x_new) = DEFINITIONS[symbol], values
+    change = Change(n, n + m, n) if row.compares == "size" else Change(x_o, x_new, n)
+    if row.compares == "fault":
+        change = Change(0, min(m, n - row.needs_removed), n)
+    elif x_o == x_new:
+        return
+
+    def judged(*performances: Any) -> spi.Estimate:
+        named = dict(zip(row.performances, performances))
+        return row.function(**named, **row.arguments(change), threshold=threshold, paired=False)
+
+    p_o, p_new, p_s = samples
+    found = judged([*p_o, 1], p_new, p_s)
+    nothing, much = [0] * 4, [10**6] * 4
+    least = judged([40] * 4, nothing, much).value  # the worst that can happen
+    assert found.untestable == ("cannot_fail" in found.flags) == (least >= threshold - 1e-12)
+    assert judged([40] * 4, much, nothing).value > threshold  # every indicator can succeed
+    if found.untestable:
+        assert found.value >= threshold - 1e-9
+        assert (found.verdict, found.p_value, found.probability) == ("inconclusive", None, None)
+        assert f"above {threshold:g}: no verdict" in str(found)
+        assert spi.adjusted_p_values([found, judged([5, 6, 7], [3, 4, 9], [1, 2, 2])])[0] is None
+        assert spi.minimum_detectable_effect(found) is spi.seeds_for_power(found, 9.0) is None
+
+
+def test_what_cannot_fail_leaves_holms_family_to_the_others() -> None:
+    clear = INDICATORS["A"]([40.0 + k % 3 for k in range(12)], [40.0 - k % 4 for k in range(12)])
+    doubled = INDICATORS["A"](P * 3, LESS * 3, x_new=20)
+    assert doubled.flags == ("cannot_fail",)
+    assert spi.adjusted_p_values([doubled, clear, clear])[1] == 2 * (clear.p_value or 1.0)
+    assert spi.adjust([doubled, clear]) == ("inconclusive", "supported")
+
+
 def waits(n: int) -> np.ndarray:
     """Return exponential differences, whose g is nearly 2, far beyond chance; 25 g^2 is 90."""
     return np.log((np.arange(n) + 0.5) / n)
@@ -141,8 +192,7 @@ GREATER = np.array([47.1, 46.9, 47.0, 47.2, 46.8])
         # The sign of FT does not depend on P_o.
         ("FT", (MANY, FEWER, GREATER), 0.0, ("p_o",), "refuted"),
         ("FT", (MANY, GREATER, FEWER), 0.1, ("p_o",), "inconclusive"),
-        # x trebles, so that A = (P_new/P_o - 1)/2 + 1 is above 0 whatever P_o is.
-        ("A", (MANY, FEWER), 0.0, ("p_o",), "supported"),
+        ("A", (MANY, FEWER), 0.6, ("p_new",), "supported"),
         ("A", (FEWER, MANY), 1.0, ("p_o",), "inconclusive"),
     ],
 )

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import codecs
+import csv
+import io
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.spi.trials_table import inert
 
 
 def read(tmp_path: Path, text: str, **asked: Any) -> spi.Trials:
@@ -99,6 +106,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
     ("text", "words"),
     [
         ("", "is empty: should have a row of column names"),
+        (" \n;;\n", "is empty: should have a row of column names"),
         (HEAD, "holds no trial"),
         ("\udcff", "is not UTF-8 text: save it as CSV UTF-8"),
         ("robots,p\n4,\x001\n", r"line 2: holds '\x00': should be plain text"),
@@ -108,6 +116,28 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         ("robots,fualt,p\n4,none,1\n", "has a column 'fualt'; did you mean 'fault'?"),
         (HEAD + GOOD + "2,8,none,,ten\n", "line 3, column 'delivered': 'ten': should be a number"),
         (HEAD + "1,8,none,,12,5\n", "line 2: has 6 values, more values than the 5 columns"),
+        # Either would swallow the rows below it.
+        (HEAD + GOOD + '"2,8,none,,7\n' + GOOD, "line 3: opens a quote that is never closed"),
+        (HEAD + '1,8,"no"ne,,7\n', "line 2: opens a quote that is closed within a cell"),
+        (HEAD + GOOD + '2,8,"none,,7\n3,8,"x",,1\n', "line 3: opens a quote that is closed within"),
+        (
+            HEAD + '1,8,none,,"7\n2,8,none,,8\n3,8,none,,"\n',
+            "line 2: opens a quote that holds whole",
+        ),
+        # 1200 or 1.2?
+        (
+            "robots;p\n4;980\n4;1.200\n",
+            "line 3, column 'p': '1.200': is 1200 or 1.2, beside 980 in",
+        ),
+        (
+            "robots;p;x\n4;1;980\n4;2;1.250\n",
+            "line 3, column 'x': '1.250': is 1250 or 1.25, beside",
+        ),
+        ("robots;p\n4;1.204.000\n", "'1.204.000': should be a number, 0 or more without a sign be"),
+        ("robots;p\n4;1 204\n", "'1 204': should be a number, 0 or more without a sign between"),
+        ("robots,seed,p\n4,1e3,1\n", "column 'seed': '1e3': should be a whole number with all its"),
+        ("robots,seed,p\n4,9007199254740993.0,1\n", "should be a whole number with all its digits"),
+        ("robots,seed,p\n4,7.5,1\n", "column 'seed': '7.5': should be a whole number, 0 or more"),
         ('robots,p\n4,"1,204"\n8,998\n', "line 2, column 'p': '1,204': should be a number, 0 or"),
         ("robots,p,note\n4,1,a\n8,2,b\n", "line 2, column 'note': 'a': should be a number, as"),
         (HEAD + GOOD + "2,8,jam,,7\n", "line 3, column 'faulty': nothing: should be how many"),
@@ -157,3 +187,110 @@ def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
         assert words in str(caught.value)
     with pytest.raises(spi.IndicatorError, match=r"cannot read .*nowhere\.csv: No such file"):
         spi.read_trials(tmp_path / "nowhere.csv")
+
+
+ROBOTS = "{},robots,fault,faulty,delivered{}\n" + "".join(
+    f"{{}}{robot},8,{fault},{5 + robot}{{}}\n"
+    for fault in ("none,0", "jam,1")
+    for robot in range(4)
+)
+
+
+@pytest.mark.parametrize(
+    "name", ["robot", "Robot ID", "robot_no", "agent_id", "Agent", "drone [-]"]
+)
+def test_a_row_a_robot_is_refused_with_and_without_its_column(tmp_path: Path, name: str) -> None:
+    text = ROBOTS.format(name, *[""] * 17)
+    for ignored in ([], [name]):
+        with pytest.raises(spi.IndicatorError) as caught:
+            read(tmp_path, text, ignore=ignored)
+        assert "the unit is the trial, never the robot; sum the deliveries of" in str(caught.value)
+        assert "--ignore" not in str(caught.value)
+    # It may as well be the swarm's size, or say which robot failed in each trial.
+    assert read(tmp_path, f"{name},p\n4,1\n8,2\n", columns={"robots": name}).rows[1].n_robots == 8
+    trials = "trial," + text.replace("\n", "\n{},").removesuffix("{},").format(*range(8))
+    assert len(read(tmp_path, trials, ignore=[name]).rows) == 8
+    with pytest.raises(spi.IndicatorError, match="never the robot"):  # one of them is the same
+        read(tmp_path, trials.replace("\n1,", "\n0,"), ignore=[name])
+
+
+def test_who_delivered_is_left_out_of_an_event_log(tmp_path: Path) -> None:
+    rows = read(tmp_path, "trial,robots,robot,time\n1,4,2,3.5\n1,4,0,7\n").rows
+    assert [(row.performance, row.parameters) for row in rows] == [(2.0, ())]
+
+
+def test_a_column_that_is_left_out_is_not_read(tmp_path: Path) -> None:
+    text = "robots,p,seed,fault\n4,1,3,jam\n4,2,3,jam\n"
+    rows = read(tmp_path, text, ignore=["seed", "fault"]).rows
+    assert [(row.seed, row.fault) for row in rows] == [(None, "none")] * 2
+
+
+def test_seeds_are_exact(tmp_path: Path) -> None:
+    seeds = [2**53, 2**53 + 1, 10**30 + 1]
+    for written, expected in (([*map(str, seeds)], seeds), (["7.0", "+8", "09"], [7, 8, 9])):
+        rows = [f"{n},{seed},{n}" for n in (4, 8) for seed in written]
+        trials = read(tmp_path, "\n".join(["robots,seed,p", *rows]))
+        assert [row.seed for row in trials.rows] == expected * 2
+    with pytest.raises(spi.IndicatorError, match="no run of seed 9007199254740993"):
+        read(tmp_path, f"robots,seed,p\n4,{2**53},1\n8,{2**53 + 1},2\n")
+
+
+def test_a_point_may_stand_before_three_decimals(tmp_path: Path) -> None:
+    for text, asked in (
+        ("robots;p\n4;980\n4;1.200\n", {"decimal": "."}),
+        ("robots;p\n4;980\n4;1.25\n4;1.200\n", {}),
+        ("robots;p\n4;2\n4;1.125\n", {}),
+        ("robots;p\n4;9\n4;0.125\n", {}),
+    ):
+        written = re.findall(r";([\d.]+)", text)
+        assert [row.performance for row in read(tmp_path, text, **asked).rows] == [
+            float(cell) for cell in written
+        ]
+    with pytest.raises(
+        spi.IndicatorError, match=r"'1\.200': .*--decimal \. where decimals have a p"
+    ):
+        read(tmp_path, "robots;p\n4;980,5\n4;1.200\n", decimal=",")
+
+
+CELL = st.text(st.sampled_from("ab'\"=+-@ é1\t") | st.sampled_from("\n\r\v\f\x85\u2028\u2029"))
+ROW = st.tuples(st.floats(0.0, 1e9), CELL)
+
+
+@given(
+    rows=st.lists(ROW, min_size=1, max_size=5),
+    delimiter=st.sampled_from(",;\t"),
+    line_end=st.sampled_from(["\n", "\r\n", "\r"]),
+    quoting=st.sampled_from([csv.QUOTE_ALL, csv.QUOTE_MINIMAL, csv.QUOTE_NONNUMERIC]),
+    decimal=st.sampled_from(".,"),
+    start=st.sampled_from(["", "sep=", "\n"]),
+    ends=st.booleans(),
+    marked=st.booleans(),
+)
+def test_what_is_written_is_read_row_by_row(
+    rows: list[tuple[float, str]], delimiter: str, line_end: str, quoting: Any, decimal: str,
+    start: str, ends: bool, marked: bool, tmp_path_factory: pytest.TempPathFactory,
+) -> None:  # fmt: skip
+    file = io.StringIO(newline="")
+    writer = csv.writer(file, delimiter=delimiter, lineterminator=line_end, quoting=quoting)
+    writer.writerow(["p", "policy", "robots"])
+    lines = []
+    head = (
+        start and f"sep={delimiter}{line_end}" if start == "sep=" else start.replace("\n", line_end)
+    )
+    # A cell that holds a whole row is refused, as a quote that is closed too late.
+    # Python's writer leaves ends of lines without quotes if they are not those of its own lines.
+    lost = delimiter + "\r\n" * (quoting == csv.QUOTE_MINIMAL)
+    rows = [(p, text.translate(dict.fromkeys(map(ord, lost)))) for p, text in rows]
+    for p, text in rows:
+        lines.append(1 + len(re.findall(r"\r\n|\r|\n", head + file.getvalue())))
+        writer.writerow([repr(p).replace(".", decimal), inert(text), "4"])
+    written = head + file.getvalue()
+    written = written if ends else written.removesuffix(line_end)
+    path = tmp_path_factory.mktemp("trials") / "t.csv"
+    path.write_bytes(codecs.BOM_UTF8 * marked + written.encode())
+    found = spi.read_trials(path, decimal=decimal).rows
+    assert [(row.performance, row.line) for row in found] == [*zip((p for p, _ in rows), lines)]
+    for row, (_, text) in zip(found, rows):
+        assert row.policy == (
+            re.sub("[\n\v\f\r\x85\u2028\u2029]+", " ", text.strip()) or "recorded"
+        )

@@ -186,3 +186,13 @@ def test_what_cannot_be_judged_fails_and_a_gate_on_nothing_is_refused() -> None:
     for text in ("A < 0", "R < 0 at FM4"):
         with pytest.raises(StudyError, match="tests nothing"):
             answers(Gate.parse(text), old, old)
+
+
+def test_a_gate_on_what_cannot_be_passes() -> None:
+    widths = {"name": "handling_time", "values": [1.0, 2.0]}
+    found = results({(10, 0): 40}, sizes=[], faults=[], parameters=[widths])
+    (answer,) = answers(Gate.parse("possibly A < 0"), found, found)
+    assert (answer.fails, answer.verdict) == (False, "inconclusive")
+    (answer,) = answers(Gate.parse("possibly A < 0.5"), found, found)
+    assert answer.estimate is not None
+    assert not answer.estimate.untestable

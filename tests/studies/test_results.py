@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,13 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import Setting
 from swarm_logistics_env.studies.declaration import Declaration
 from swarm_logistics_env.studies.measures import agreements
-from swarm_logistics_env.studies.results import CELL_COLUMNS, StudyResults, frame, judge
+from swarm_logistics_env.studies.results import (
+    CELL_COLUMNS,
+    VERDICT_COLUMNS,
+    StudyResults,
+    frame,
+    judge,
+)
 from swarm_logistics_env.studies.verdict import Verdict
 from swarm_logistics_env.tasks.task import Outcome
 from tests.studies.made_up import judged, paper, published
@@ -137,7 +144,9 @@ def test_two_seeds_and_a_cap_everywhere_give_no_verdict() -> None:
 
     for found in (paper(seeds=2), judged(Study.preset("paper", seeds=10), capped)):
         for test in found.verdicts:
-            assert (test.plain, test.holm) == ("inconclusive", "inconclusive")
+            assert test.estimate is not None
+            word = "untestable" if test.estimate.untestable else "inconclusive"
+            assert (test.plain, test.holm) == (word, word)
 
 
 def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
@@ -147,3 +156,14 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     assert means.isna().all()
     assert means.dtype == np.dtype(float)
     assert {(test.value, test.plain) for test in found.verdicts} == {(None, None)}
+
+
+def test_a_column_that_is_not_there_is_an_error_at_once(found: StudyResults) -> None:
+    known: Any = {"low": (float, lambda cell: cell.mean.lower, "a slip of the pen")}
+    with pytest.raises(AttributeError, match="lower"):
+        frame(found.cells, known)
+    # Every column has a value somewhere in a whole study, but for what only others have.
+    claimed = paper(same=frozenset({"FM2"}), seeds=40)
+    cells, verdicts = frame(claimed.cells, CELL_COLUMNS), frame(claimed.verdicts, VERDICT_COLUMNS)
+    assert {*cells.columns[cells.isna().all()]} == {"problem"}
+    assert {*verdicts.columns[verdicts.isna().all()]} == {"n_trainings", "stopped_at", "problem"}

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export
+from swarm_logistics_env.spi import read_trials
+from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export, write_csv
 from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 
@@ -67,6 +73,30 @@ def test_csv_says_what_the_store_holds_sorted_and_without_wall_times(
     for times, known in zip(text["delivery_times"].fillna(""), frame["delivery_times"]):
         assert list(map(float, times.split())) == known
     assert json.loads(text["scenario"][0])["warehouse_width"] == 3.0
+
+
+@given(text=st.text(st.sampled_from("=+-@'\"a1 ,;.\t\r\n"), max_size=5))
+def test_no_text_in_a_csv_is_a_formula_and_each_is_read_again(text: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "one.csv")
+        write_csv(path, pd.DataFrame({"policy": [text, "us"], "low": [-1.5, 2.0], "P": [4, 4]}))
+        found = read_trials(path, ignore=["low"])
+        with path.open(newline="") as file:
+            _, (cell, number, _), _ = csv.reader(file)
+    assert number == "-1.5"
+    assert not re.match(r"[=@\t\r\n]|[+-](?!\d*\.?\d*$)", cell)
+    said = re.sub(r"[\r\n]+", " ", text.strip())
+    assert [trial.policy for trial in found.rows] == [said or "recorded", "us"]
+
+
+def test_labels_and_errors_are_exported_without_formulas(tmp_path: Path) -> None:
+    evil = Case(PolicySpec(name="swarm-dt", label="=1+1"), "id", Scenario(), task=WAREHOUSE)
+    with Runs(None) as runs:
+        runs.add(Run(evil, "code", 0), Outcome(error="@SUM(1)\r=2"))
+        export(runs, tmp_path / "rows.csv")
+    with (tmp_path / "rows.csv").open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert (row["policy"], row["error"]) == ("'=1+1", "'@SUM(1)\n=2")
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,10 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
+from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import Declaration, note
+from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 from tests.conftest import SMALL
 from tests.studies.made_up import digest
@@ -224,3 +226,16 @@ def test_a_policy_that_cannot_travel_and_a_study_in_memory(sizes: dict[str, Any]
         study.report()
     with pytest.raises(StudyError, match="cannot write to"):
         Study(out=Path(__file__) / "in", **sizes).run()
+
+
+def test_another_specification_makes_another_plan(tmp_path: Path) -> None:
+    study = Study(**{**SMALL, "seeds": 2})
+    before = study.plan()
+    study.specification = study.specification.replace(seeds=3)
+    assert (len(before.seeds), len(study.plan().seeds)) == (2, 3)
+    (tmp_path / "t.csv").write_text("robots,p\n4,1\n8,2\n")
+    import_results(read_trials(tmp_path / "t.csv"), tmp_path / "out")
+    imported = Study.stored(tmp_path / "out")
+    with pytest.raises(StudyError, match="asks what its trials vary"):
+        imported.specification = study.specification
+    assert imported.plan().origin is not None

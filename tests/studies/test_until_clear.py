@@ -13,6 +13,8 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.report.answer import answer
+from swarm_logistics_env.report.section import sentence
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.specification import looks_up_to
@@ -52,6 +54,22 @@ class Engine:
 def until_clear(most: int, out: Path | None = None) -> Study:
     faults = [{"modes": [*MEANS], "robots": [1]}]
     return Study(out=out, seeds=most, until_clear=True, faults=faults, indicators=["R"])
+
+
+def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
+    drift = {"name": "heading_drift", "values": [0.02, 0.04, 0.03]}
+    study, engine = Study(seeds=60, until_clear=True, parameters=[drift]), Engine()
+    study.run(engine)
+    doubled, half = study.findings().verdicts
+    assert (doubled.plain, doubled.holm, doubled.conclusion) == ("untestable",) * 3
+    assert (doubled.p_holm, doubled.stopped_at) == (None, 20)
+    assert (half.conclusion, half.p_holm is None) == ("supported", False)
+    (line, _), last = answer(study.findings())[2:]
+    assert line.verdict == "no verdict: it cannot be below 0"
+    assert "no verdict where it cannot lie below the threshold" in last
+    told = sentence(study.findings(), doubled).text
+    assert "it cannot lie below the threshold, so it is not tested" in told
+    assert "djusted" not in told
 
 
 def verdicts_of(study: Study) -> dict[str, Verdict]:
