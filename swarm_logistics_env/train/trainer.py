@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -78,35 +79,49 @@ def train(
             f"callbacks = {callbacks!r}: should be a list of callbacks of stable-baselines3"
         )
     device, view = device_of(device), NetworkView(training)
-    enter(out, training, command)
-    # Small networks gain little from more threads and lose much if cores are shared; the sums would
-    # depend on the number of threads as well.
-    torch.set_num_threads(1)
-    state = read_checkpoint(out)
-    learner, log = make_learner(training, view, device), TrainingLog()
-    learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
-    if state is not None:
-        log = state["log"]
-        restore(learner, state)
-    if learner.num_timesteps < training.agent_steps:
-        log.versions = versions()
-        log.references = log.references or reference_means(training)
-        total, done = training.agent_steps, learner.num_timesteps
-        with ProgressBar(training.name, total, "agent-steps", done=done) as progress:
-            own = TrainingCallback(training, log, out, progress)
-            learner.learn(total - done, [own, *callbacks], reset_num_timesteps=False)
-    learner.env.close()
-    asked = training.evaluation
-    log.draw(out / PICTURE, f"{training.name}, N = {asked.n_robots}", asked.seeds)
-    tensors = tensors_of(learner.policy)
-    card = _card(training, learner.num_timesteps, log, command)
-    path = out / f"{training.name}.safetensors"
-    # The file is written before the scores are measured, which takes minutes.
-    write_policy(path, card, tensors)
-    scores = score(LearnedPolicy(card, tensors), training, out / "scores")
-    if scores:
-        write_policy(path, card.replace(scores=scores, scored_with=versions()), tensors)
-    return path
+    with _disk_errors_told(out):
+        enter(out, training, command)
+        # Small networks gain little from more threads and lose much if cores are shared; the sums
+        # would depend on the number of threads as well.
+        torch.set_num_threads(1)
+        state = read_checkpoint(out)
+        learner, log = make_learner(training, view, device), TrainingLog()
+        learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
+        if state is not None:
+            log = state["log"]
+            restore(learner, state)
+        if learner.num_timesteps < training.agent_steps:
+            log.versions = versions()
+            log.references = log.references or reference_means(training)
+            total, done = training.agent_steps, learner.num_timesteps
+            with ProgressBar(training.name, total, "agent-steps", done=done) as progress:
+                own = TrainingCallback(training, log, out, progress)
+                learner.learn(total - done, [own, *callbacks], reset_num_timesteps=False)
+        learner.env.close()
+        asked = training.evaluation
+        log.draw(out / PICTURE, f"{training.name}, N = {asked.n_robots}", asked.seeds)
+        tensors = tensors_of(learner.policy)
+        card = _card(training, learner.num_timesteps, log, command)
+        path = out / f"{training.name}.safetensors"
+        # The file is written before the scores are measured, which takes minutes.
+        write_policy(path, card, tensors)
+        scores = score(LearnedPolicy(card, tensors), training, out / "scores")
+        if scores:
+            write_policy(path, card.replace(scores=scores, scored_with=versions()), tensors)
+        return path
+
+
+@contextmanager
+def _disk_errors_told(out: Path) -> Iterator[None]:
+    """Raise a TrainingError that says how to go on where the disk is full or gone."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise TrainingError(
+            f"the training in {out} stopped ({reason}): the same command goes on from its last "
+            "checkpoint"
+        ) from error
 
 
 @dataclass
@@ -163,7 +178,8 @@ class TrainingLog:
             axes.set(title=title, xlabel="million agent-steps", ylabel=y_label, ylim=(0.0, None))
 
         _, png = images(curve, 0.62 * WIDTH)
-        picture.write_bytes(png)
+        with becoming(picture, TrainingError) as part:
+            part.write_bytes(png)
 
 
 class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check

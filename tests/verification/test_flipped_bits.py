@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.errors import PolicyError, TrainingError
 from swarm_logistics_env.policies.files import read_policy
 from swarm_logistics_env.policies.spec import WEIGHTS
 
@@ -54,3 +54,27 @@ def test_a_policy_file_with_a_flipped_bit_is_refused_or_the_same(part: str, tmp_
             assert len(said.splitlines()) == 1
             refused += 1
     assert refused > 0.9 * FLIPS
+
+
+def test_a_checkpoint_with_a_flipped_bit_is_refused_before_it_is_unpickled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("torch")
+    pytest.importorskip("stable_baselines3")
+    from swarm_logistics_env.train import Training, learner
+
+    training = Training(
+        worlds=[{"n_robots": 2}], network={"hidden": (4,)}, scenario={"n_items": 2}, threads=1
+    )
+    trained = learner.make_learner(training, learner.NetworkView(training), "cpu")
+    trained.env.reset()
+    learner.save_checkpoint(tmp_path, trained, log={})
+    path = tmp_path / learner.CHECKPOINT
+    whole, unpickled = path.read_bytes(), []
+    assert learner.read_checkpoint(tmp_path) is not None
+    monkeypatch.setattr(learner.torch, "load", lambda *_, **__: unpickled.append(1))
+    for content in (*flipped(whole), *flipped(whole[:100]), whole[:-1], b"", whole + b"x"):
+        path.write_bytes(content)
+        with pytest.raises(TrainingError, match=r"checkpoint.pt is damaged .*begin anew"):
+            learner.read_checkpoint(tmp_path)
+    assert not unpickled
