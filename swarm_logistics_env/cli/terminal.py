@@ -95,7 +95,8 @@ def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
     )  # fmt: skip
     hint = f"For another effect: swarm-logistics study plan {quote(asked)} --effect 0.2"
     rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
-    show_table(f"Power, from {n_seeds} {runs}", columns, rows, hint)
+    lines = (hint,) if results.damage is None else (f"{results.damage}.", hint)
+    show_table(f"Power, from {n_seeds} {runs}", columns, rows, *lines)
 
 
 def _power(test: Verdict, effect: float | None) -> Texts:

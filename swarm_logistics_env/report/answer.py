@@ -260,6 +260,8 @@ def _last(results: StudyResults) -> str:
         parts.append(f"provisional ({few} they assume normality)")
     if "too_few_seeds" in flags:
         parts.append("two seeds give no verdict")
+    if results.damage:
+        parts.append(results.damage)
     if results.exploratory:
         parts.append("exploratory: other seeds than were declared, whose report this replaces")
     if results.late_margin:

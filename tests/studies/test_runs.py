@@ -75,7 +75,7 @@ def test_csv_says_what_the_store_holds_sorted_and_without_wall_times(
         ("", "malformed"),
         ("PRAGMA user_version = 99", "store schema 99"),
         ("PRAGMA application_id = 0", "not the store of a study"),
-        ("UPDATE runs SET outcome = '{\"delivery_times\": [-1.0]}'", "a run in it does not read"),
+        ("PRAGMA user_version = 4", r"is damaged \(schema 4 with other columns\)"),
     ],
 )
 def test_what_is_no_store_is_refused_with_the_reason(
