@@ -168,7 +168,7 @@ class Runs:
 
     def damage(self) -> str | None:
         """Return which rows are damaged, in a sentence, as a terminal may show it; None: none."""
-        keys = [plain(str(row.key))[:12] for row in self._rows(sound=False)]
+        keys = sorted(plain(str(row.key))[:12] for row in self._rows(sound=False))
         if not keys:
             return None
         runs = "1 run of {} is" if len(keys) == 1 else f"{len(keys)} runs of {{}} are"
