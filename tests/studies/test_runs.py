@@ -125,7 +125,7 @@ def test_a_policy_that_fails_with_any_text_leaves_a_study_that_is_finished_and_r
     sizes: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str
 ) -> None:
     class Complaining(SwarmDT):
-        identity = "complaining"
+        identity = f"complaining of {text[:5]}"
 
         def act(self, observations: Any) -> Any:
             raise ValueError(text)
