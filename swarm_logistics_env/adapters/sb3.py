@@ -158,9 +158,9 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         Raises:
             ScenarioError, FaultError, SetupError: options that a world refuses; none has begun one.
         """
-        for world, rows in zip(self.worlds, self._worlds.rows):
+        for env, rows in zip(self.worlds, self._worlds.rows):
             seed, options = self._seeds[rows.start], self._options[rows.start]
-            world.conditions_of(world.next_seed if seed is None else seed, options)
+            env.conditions_of(env.next_seed if seed is None else seed, options)
         observations = self._worlds.blank()
         self._returns[:], self._begun[:] = 0.0, self._n_steps
         for world, rows in enumerate(self._worlds.rows):

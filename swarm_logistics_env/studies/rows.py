@@ -47,7 +47,7 @@ class Row(NamedTuple):
             return bool(self.digest == digest_of(*self.content))
         try:
             case_of(self.run)
-            return (outcome_of(self.outcome).error is not None) == self.failed
+            return bool((outcome_of(self.outcome).error is not None) == self.failed)
         except ValueError:  # of JSON and of pydantic
             return False
 

@@ -40,7 +40,7 @@ requests = st.one_of(
 def later(env: Any, steps: int) -> list[Any]:
     """Return all that an environment tells in some steps and in the episode after them."""
     told: list[Any] = [env.state().tobytes(), list(getattr(env, "agents", ()))]
-    world = getattr(env, "env", env) if isinstance(env, CentralEnv) else env
+    world: Any = env.env if isinstance(env, CentralEnv) else env
     for step in range(steps):
         if isinstance(env, CentralEnv):
             seen, *_ = env.step(np.full(env.action_space.shape, 0.1 * step, np.float32))

@@ -57,6 +57,6 @@ def test_times_and_events_are_read_the_same_way() -> None:
     with pytest.raises(spi.IndicatorError, match=r"times is of times"):
         spi.median_interval(np.array([1, 2, 3], dtype="m8[s]"))
     with pytest.raises(spi.IndicatorError, match=r"happened\[0\] is masked"):
-        spi.kaplan_meier([1.0, 2.0], np.ma.array([1, 0], mask=[1, 0]))
+        spi.kaplan_meier([1.0, 2.0], np.ma.array([1, 0], mask=[True, False]))
     with pytest.raises(spi.IndicatorError, match=r"happened = .*should be an array of numbers"):
         spi.kaplan_meier([1.0, 2.0], ["True", "False"])

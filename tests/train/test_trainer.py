@@ -31,6 +31,7 @@ from swarm_logistics_env.train.learner import (
     KNOWN,
     NetworkView,
     make_learner,
+    save_checkpoint,
     tensors_of,
 )
 from swarm_logistics_env.train.settings import Scores
@@ -181,7 +182,8 @@ def test_what_cannot_be_gone_on_with_is_refused(small: Any, done: Path, tmp_path
     with pytest.raises(TrainingError, match=r"checkpoint.pt is damaged .*: train into a new dir"):
         train(small(), tmp_path)
     record = json.loads((done.parent / "training.json").read_text())
-    for changed in ({"sessions": {}}, {"training": []}):
+    damaged: list[dict[str, Any]] = [{"sessions": {}}, {"training": []}]
+    for changed in damaged:
         (tmp_path / "training.json").write_text(json.dumps({**record, **changed}))
         with pytest.raises(TrainingError, match=r"training.json is damaged"):
             train(small(), tmp_path)
@@ -210,7 +212,7 @@ def test_a_training_on_a_full_disk_ends_in_a_sentence_and_goes_on_when_there_is_
     name: str,
 ) -> None:
     monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
-    save, saved = trainer.save_checkpoint, []
+    save, saved = save_checkpoint, list[bytes]()
     with monkeypatch.context() as changed:
 
         def save_and_fill(*given: Any) -> None:

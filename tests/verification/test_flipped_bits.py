@@ -70,16 +70,20 @@ def test_a_checkpoint_with_a_flipped_bit_is_refused_before_it_is_unpickled(
     pytest.importorskip("stable_baselines3")
     from swarm_logistics_env.train import Training, learner
 
-    training = Training(
-        worlds=[{"n_robots": 2}], network={"hidden": (4,)}, scenario={"n_items": 2}, threads=1
-    )
+    fields: dict[str, Any] = {
+        "worlds": [{"n_robots": 2}],
+        "network": {"hidden": (4,)},
+        "scenario": {"n_items": 2},
+        "threads": 1,
+    }
+    training = Training(**fields)
     trained = learner.make_learner(training, learner.NetworkView(training), "cpu")
     trained.env.reset()
     learner.save_checkpoint(tmp_path, trained, log={})
     path = tmp_path / learner.CHECKPOINT
     whole, unpickled = path.read_bytes(), []
     assert learner.read_checkpoint(tmp_path) is not None
-    monkeypatch.setattr(learner.torch, "load", lambda *_, **__: unpickled.append(1))
+    monkeypatch.setattr("torch.load", lambda *_, **__: unpickled.append(1))
     for content in (*flipped(whole), *flipped(whole[:100]), whole[:-1], b"", whole + b"x"):
         path.write_bytes(content)
         with pytest.raises(TrainingError, match=r"checkpoint.pt is damaged .*begin anew"):
@@ -87,7 +91,7 @@ def test_a_checkpoint_with_a_flipped_bit_is_refused_before_it_is_unpickled(
     assert not unpickled
 
 
-Content = dict[str, dict[str, object]]
+Content = dict[str, Any]
 
 
 def content_of(store: Runs) -> Content:
@@ -178,10 +182,10 @@ def test_an_unknown_or_missing_field_of_an_old_store_is_damage_and_never_no_deli
         for key, (column, before, after) in zip(keys, changes, strict=False):
             change = f"UPDATE runs SET {column} = replace({column}, ?, ?) WHERE key = ?"
             database.execute(change, (before, after, key))
-    before = path.read_bytes()
+    unread = path.read_bytes()
     for reading in (True, False):  # and with digests, after it was opened to write
         with Runs(path, read_only=reading) as store:
             rest = {key: sound[key] for key in keys[len(changes) :]}
             assert content_of(store) == rest
             assert f"{len(changes)} runs of" in (store.damage() or "")
-        assert (path.read_bytes() == before) == reading
+        assert (path.read_bytes() == unread) == reading
