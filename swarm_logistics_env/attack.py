@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
@@ -223,6 +224,8 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
     policy = PolicySpec.of(asked.policy)
     base = Case(policy, policy.identity(), asked.scenario, task=WAREHOUSE)
     with Runs(out / STORE) as store:
+        if damage := store.discard_damaged():
+            warnings.warn(f"{damage}: what is asked is played again", stacklevel=2)
 
         def delivered(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:
             outcomes = _outcomes(base, engine, store, pairs)

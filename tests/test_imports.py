@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import graphlib
+import importlib
+import inspect
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,6 +13,8 @@ from importlib.util import resolve_name
 from pathlib import Path
 
 import pytest
+
+from swarm_logistics_env.spi import REMOVED
 
 PACKAGE = "swarm_logistics_env"
 ROOT = Path(__file__).parents[1]
@@ -111,3 +115,21 @@ def test_importing_loads_nothing_heavy(module: str) -> None:
     command = [sys.executable, "-c", f"import sys, {module}; print(*sys.modules)"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert set(done.stdout.split()) & HEAVY == set()
+
+
+def test_a_missing_attribute_of_any_module_is_an_attribute_error_with_its_hint() -> None:
+    lazy = [name for name, path in MODULES.items() if "def __getattr__(name" in path.read_text()]
+    assert {PACKAGE, f"{PACKAGE}.spi", f"{PACKAGE}.policies", f"{PACKAGE}.adapters"} <= {*lazy}
+    gone = [name.partition(".") for name in REMOVED]
+    asked = [(f"{PACKAGE}.{module}", name) for module, _, name in gone]
+    for module, name in [*asked, *((module, "no_such_name") for module in lazy)]:
+        found = importlib.import_module(module)
+        assert not hasattr(found, name)
+        assert getattr(found, name, None) is None
+        with pytest.raises(AttributeError, match=name) as error:
+            getattr(found, name)
+        if name != "no_such_name":
+            assert "was removed in 0.3.0: " in str(error.value)
+        # What looks for any name, as doctest, copy and mocks do.
+        assert not inspect.isabstract(found)
+        assert not hasattr(found, "__deepcopy__")

@@ -10,7 +10,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import numbers_of
+from swarm_logistics_env.environment.requests import checked_count, numbers_of
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies.policy import mask_unreachable_commands
 from swarm_logistics_env.wrappers import FixedAgents, Wrapper
@@ -86,10 +86,15 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin an episode; see `SwarmLogisticsEnv.reset_arrays`."""
-        seed = self.env.next_seed if seed is None else seed
+        """Begin an episode; see `SwarmLogisticsEnv.reset_arrays`. What is refused changes nothing.
+
+        Raises:
+            SetupError: the seed is below 0, which Gymnasium has no generator for.
+        """
+        # Both that seed the world and Gymnasium's generator: checked before either.
+        seed = checked_count("seed", self.env.next_seed if seed is None else seed, least=0)
         observations = self._rows.reset_arrays(seed, options)
-        super().reset(seed=int(seed))
+        super().reset(seed=seed)
         return self._shaped(observations), self._info()
 
     def step(

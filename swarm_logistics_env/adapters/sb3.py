@@ -153,12 +153,19 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._options = [checked_options(options)] * self.num_envs
 
     def reset(self) -> NDArray[np.float32]:
-        """Begin an episode in every world; returns the observations (num_envs, D)."""
+        """Begin an episode in every world; returns the observations (num_envs, D).
+
+        Raises:
+            ScenarioError, FaultError, SetupError: options that a world refuses; none has begun one.
+        """
+        for env, rows in zip(self.worlds, self._worlds.rows):
+            seed, options = self._seeds[rows.start], self._options[rows.start]
+            env.conditions_of(env.next_seed if seed is None else seed, options)
         observations = self._worlds.blank()
         self._returns[:], self._begun[:] = 0.0, self._n_steps
         for world, rows in enumerate(self._worlds.rows):
             seed = self._seeds[rows.start]
-            self._worlds.begin(world, observations, seed, self._options[world])
+            self._worlds.begin(world, observations, seed, self._options[rows.start])
             self._note(world)
         self.reset_infos = list(map(dict.copy, self._abouts))
         self._reset_seeds()

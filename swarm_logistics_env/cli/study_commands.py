@@ -279,6 +279,10 @@ def merge_command(
 ) -> None:
     """Make one store of those that shards or machines have filled."""
     echo(f"{merge(directories, out)} runs in {out}")
+    for directory in directories:
+        with Runs.existing(directory) as runs:
+            if damage := runs.damage():
+                echo(plain(damage), err=True)
     echo(f"Its report: swarm-logistics study report {shlex.quote(str(out))}")
 
 
@@ -286,10 +290,17 @@ def merge_command(
 def export_command(
     directory: DirectoryArgument, to: Annotated[Path, Option(help="File to write, .csv.")]
 ) -> None:
-    """Write every stored run as one row, sorted by key. Wall times are left out."""
+    """Write every stored run as one row, sorted by key. Wall times are left out.
+
+    Ends with 1 if a run is damaged: it is left out, and told.
+    """
     with Runs.existing(directory) as runs:
         count, digest = export(runs, to)
+        damage = runs.damage()
     echo(f"{count} runs in {to}, SHA-256 {digest}")
+    if damage:
+        echo(plain(damage), err=True)
+        raise Exit(1)
 
 
 def study_of(

@@ -96,7 +96,8 @@ def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
     hint = f"For another effect: swarm-logistics study plan {quote(asked)} --effect 0.2"
     rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
     level = levels(results.verdicts)
-    show_table(f"Power, from {n_seeds} {runs}, of verdicts at {level}", columns, rows, hint)
+    lines = (hint,) if results.damage is None else (f"{results.damage}.", hint)
+    show_table(f"Power, from {n_seeds} {runs}, of verdicts at {level}", columns, rows, *lines)
 
 
 def _power(test: Verdict, effect: float | None) -> Texts:

@@ -14,7 +14,7 @@ from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import FaultLike, checked_faults
+from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults
 from swarm_logistics_env.warehouse.one_thread import Lock, in_one_thread, used_elsewhere
 
 from .requests import (
@@ -139,10 +139,7 @@ class SwarmLogisticsEnv(DictView):
                 stacklevel=3,
             )
         seed = self.next_seed if seed is None else seed
-        scenario = self.scenario_of(seed, options)
-        self._spaces.check(scenario, len(self.possible_agents))
-        faults = faults_among(options, self.faults)
-        check_somebody_is_there(faults, seed, scenario.n_robots)
+        scenario, faults = self.conditions_of(seed, options)
         observations = self.warehouse.reset(seed, faults, scenario)
         self.next_seed = key(seed, "the episode that follows") >> 1
         self._rewards.begin(self.warehouse)
@@ -159,6 +156,23 @@ class SwarmLogisticsEnv(DictView):
             ScenarioError, SetupError: as `reset_arrays`.
         """
         return self.scenario.replace(**scenario_fields(options))
+
+    def conditions_of(
+        self, seed: int, options: Mapping[str, Any]
+    ) -> tuple[Scenario, tuple[Fault, ...]]:
+        """Return scenario and faults of the episode that such a reset would begin.
+
+        It begins nothing. What it takes `reset_arrays` takes, but for items or robots that find no
+        room.
+
+        Raises:
+            ScenarioError, FaultError, SetupError: as `reset_arrays`.
+        """
+        scenario = self.scenario_of(seed, options)
+        self._spaces.check(scenario, len(self.possible_agents))
+        faults = faults_among(options, self.faults)
+        check_somebody_is_there(faults, seed, scenario.n_robots)
+        return scenario, faults
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:

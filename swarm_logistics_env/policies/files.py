@@ -7,6 +7,8 @@ without Python. Models that stable-baselines3 saved execute the code in them whe
 from __future__ import annotations
 
 import hashlib
+import json
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,20 +22,25 @@ from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.policies.current_folder import everything_here
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import becoming, canonical_json
 from swarm_logistics_env.scenario import Scenario
 
 SUFFIX = ".safetensors"
 CARD = "swarm_logistics_policy"  # the header's entry that holds the card
+DIGEST = "swarm_logistics_digest"  # and that of card and tensors, see `content_digest`
 LARGEST_FILE = 64 * 2**20  # bytes; a policy of ours has less than 1 MB
 
 
 def read_policy(path: Path) -> LearnedPolicy:
     """Return the trained policy in a file; reading one executes nothing that is in it.
 
+    Warns:
+        UserWarning: the file has no digest, as those of version 0.3.0, so that
+            damage to it would not be seen.
+
     Raises:
-        PolicyError: the file cannot be read, is cut short, carries something else, or its numbers
-            are not those of the network on its card.
+        PolicyError: the file cannot be read, is cut short or damaged, carries something else, or
+            its numbers are not those of the network on its card.
     """
     from safetensors import SafetensorError, safe_open
 
@@ -50,16 +57,48 @@ def read_policy(path: Path) -> LearnedPolicy:
                     f"{path} is safetensors without a card: a policy file should be one that "
                     "`swarm-logistics train` wrote"
                 )
+            if unknown := sorted(header.keys() - {CARD, DIGEST}):
+                raise PolicyError(
+                    f"{path} is damaged or of a later version: its header has {unknown[0]!r}, and "
+                    f"should have {CARD!r} and {DIGEST!r} alone"
+                )
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - no dict
     except OSError as error:
         reason = error.strerror or error
         raise PolicyError(f"cannot read the policy file {path}: {reason}") from error
     except (SafetensorError, TypeError) as error:
         raise PolicyError(f"{path} is cut short or no safetensors file: {error}") from None
+    if DIGEST in header and header[DIGEST] != content_digest(header[CARD], tensors):
+        raise PolicyError(
+            f"{path} is damaged: its card and numbers are not those that were written, by their "
+            "digest; copy it again from where it came"
+        )
     try:
-        return LearnedPolicy(PolicyCard.from_json(header[CARD]), tensors)
+        policy = LearnedPolicy(PolicyCard.from_json(header[CARD]), tensors)
     except PolicyError as error:
         raise PolicyError(f"the policy file {path} cannot be used: {error}") from None
+    if DIGEST not in header:
+        warnings.warn(
+            f"{path} has no digest, as files of version 0.3.0: damage to it would not be seen. To "
+            "write it with one: policies.files.write_policy(path, policy.card, policy.tensors) of "
+            "policy = policies.load(str(path)), where path is a pathlib.Path",
+            stacklevel=2,
+        )
+    return policy
+
+
+def content_digest(card: str, tensors: Mapping[str, NDArray[Any]]) -> str:
+    """Return the digest of a card's text and all tensors: 64 hexadecimal digits.
+
+    It covers the names, types and shapes of the tensors as well, and no other part of a file.
+    """
+    total = hashlib.sha256()
+    for name in sorted(tensors):
+        tensor = tensors[name]
+        about = canonical_json([name, str(tensor.dtype), tensor.shape])
+        total.update(about.encode() + b"\0" + np.ascontiguousarray(tensor).tobytes())
+    total.update(card.encode())
+    return total.hexdigest()
 
 
 def read_card(path: Path) -> PolicyCard:
@@ -77,14 +116,23 @@ def write_policy(path: Path, card: PolicyCard, tensors: Mapping[str, NDArray[np.
     Raises:
         PolicyError: the tensors are not those of the network on the card, or it cannot be written.
     """
-    from safetensors.numpy import save
-
     check_tensors(card.network, tensors)
-    content = save(
-        {name: np.ascontiguousarray(t) for name, t in tensors.items()}, {CARD: card.to_json()}
-    )
+    content = file_content(card.to_json(), tensors)
     with becoming(path, PolicyError) as part:
         part.write_bytes(content)
+
+
+def file_content(card: str, tensors: Mapping[str, NDArray[Any]]) -> bytes:
+    """Return the bytes of a policy file with this text as its card; equal content, equal bytes."""
+    from safetensors.numpy import save
+
+    about = {CARD: card, DIGEST: content_digest(card, tensors)}
+    content = save({name: np.ascontiguousarray(t) for name, t in tensors.items()}, about)
+    # Safetensors writes the header's entries in any order.
+    end = 8 + int.from_bytes(content[:8], "little")
+    header = json.dumps({**json.loads(content[8:end]), "__metadata__": about}).encode()
+    header += b" " * (-len(header) % 8)
+    return len(header).to_bytes(8, "little") + header + content[end:]
 
 
 # Both are old enough for the runtimes of 2022.

@@ -285,7 +285,10 @@ class PolicySpec(Record):
             parts["made by"] = self.name.rpartition(":")[2]
         if self.parameters:
             parts["given"] = self.parameters
-        return str(parts["identity"]) if parts.keys() == {"identity"} else canonical_json(parts)
+        if parts.keys() != {"identity"}:
+            return canonical_json(parts)
+        # A lone half of a sign cannot be written into a file.
+        return str(parts["identity"]).encode(errors="backslashreplace").decode()
 
 
 # By text, parameters and identity: policies that are what was planned, whatever changes later.

@@ -290,6 +290,8 @@ def _last(results: StudyResults) -> str:
         parts.append("no verdict where it cannot lie below the threshold, as P cannot below 0")
     if "too_few_seeds" in flags:
         parts.append("two seeds give no verdict")
+    if results.damage:
+        parts.append(results.damage)
     if results.exploratory:
         parts.append("exploratory: other seeds than were declared, whose report this replaces")
     if results.late_margin:

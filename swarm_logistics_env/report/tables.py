@@ -171,6 +171,8 @@ def _agreement(found: Agreement) -> Section:
 
 def warnings(results: StudyResults) -> Iterator[str]:
     """Yield what a reader has to know before any verdict, one sentence each."""
+    if results.damage:
+        yield f"{results.damage}."
     if any(cell.saturated for cell in results.cells):
         yield (
             f"{section.SATURATED} marks a P that is capped, because every item was delivered in at "

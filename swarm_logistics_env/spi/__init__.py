@@ -102,10 +102,13 @@ REMOVED = {
 
 
 def refuse(module: str, name: str) -> NoReturn:
-    """Raise ImportError with what to use instead of a removed name, else AttributeError."""
+    """Raise AttributeError, with what to use instead where the name was removed.
+
+    No other error: `hasattr` and `getattr(module, name, None)` ask about any name.
+    """
     place = f"{module.partition('.')[2]}.{name}"
     if place in REMOVED:
-        raise ImportError(f"{place} was removed in 0.3.0: {REMOVED[place]}")
+        raise AttributeError(f"{place} was removed in 0.3.0: {REMOVED[place]}")
     raise AttributeError(f"module {module!r} has no attribute {name!r}")
 
 

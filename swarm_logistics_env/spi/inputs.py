@@ -13,8 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 Numbers: TypeAlias = NDArray[np.float64]
 
 
+# Beyond these the squares of squares, which intervals are made of, are no numbers any more.
+SMALLEST, LARGEST = 1e-60, 1e60
+
+
 def performance(name: str, values: ArrayLike, *, or_trainings: bool = False) -> Numbers:
-    """Performances as a float array (n,): not empty, finite, not negative.
+    """Performances as a float array (n,): not empty, finite, not negative, of a usual size.
 
     Args:
         or_trainings: whether (K trainings, n) will do as well, with two trainings or more.
@@ -32,14 +36,42 @@ def performance(name: str, values: ArrayLike, *, or_trainings: bool = False) -> 
         if not 0.0 <= value < math.inf:
             where = ", ".join(map(str, place))
             raise IndicatorError(f"{name}[{where}] = {value:g}: should be finite, not negative")
+    most = float(array.max())
+    if most > LARGEST or 0.0 < most < SMALLEST:
+        raise IndicatorError(
+            f"{name} goes up to {most:g}: should go up to a number from {SMALLEST:g} to "
+            f"{LARGEST:g}, or be 0; use another unit"
+        )
     return array
 
 
 def numbers(name: str, values: ArrayLike) -> Numbers:
-    """A float array of any shape."""
+    """A float array of any shape, of whole and real numbers, none of them masked."""
     try:
-        return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        rows = enumerate(values) if isinstance(values, list | tuple) else [(None, values)]
+        for row, entries in rows:
+            if np.ma.isMA(entries) and np.ma.getmaskarray(entries).any():
+                first = np.argwhere(np.ma.getmaskarray(entries))[0].tolist()
+                where = ", ".join(map(str, first if row is None else [row, *first]))
+                raise IndicatorError(
+                    f"{name}[{where}] is masked: should be left out, or be a number"
+                )
+        given = np.asarray(values)
+        times = (np.timedelta64, np.datetime64)  # numpy would turn them into counts of some unit
+        if given.dtype.kind in "cmM" or (
+            given.dtype.kind == "O" and any(isinstance(one, times) for one in given.flat)
+        ):
+            what = "complex" if given.dtype.kind == "c" else "times of numpy or pandas"
+            raise IndicatorError(
+                f"{name} is of {what} ({given.dtype}): should be an array of real numbers, as "
+                "seconds for times"
+            )
+        return np.asarray(given, dtype=np.float64)
+    except OverflowError:
+        raise IndicatorError(f"{name} has a number that is too large: up to {LARGEST:g}") from None
+    except (TypeError, ValueError) as error:
+        if isinstance(error, IndicatorError):
+            raise
         raise IndicatorError(f"{name} = {values!r}: should be an array of numbers") from None
 
 

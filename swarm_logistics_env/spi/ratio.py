@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .inputs import Numbers
 from .summaries import mean_over_trainings, p_with_hidden
@@ -160,10 +161,9 @@ def resampled_pivots(residual: Numbers) -> Numbers:
         Shape (RESAMPLES, ...); -inf or inf where a resample shows no spread but a mean.
     """
     n = residual.shape[-1]
-    drawn = _times_drawn(n)
     flattened = residual.reshape(-1, n).T
-    mean = drawn @ flattened / n
-    variance = (drawn @ flattened**2 - n * mean**2) / (n - 1)
+    mean = _resampled_sums(flattened) / n
+    variance = (_resampled_sums(flattened**2) - n * mean**2) / (n - 1)
     largest = np.abs(flattened).max(axis=0)
     flat = variance <= _FLAT * largest**2
     # A resample without spread is as far out as its sign says: leaving it out would narrow.
@@ -191,12 +191,29 @@ def critical_value(pivots: Numbers, alpha: float) -> Numbers:
     return np.asarray(pivots[RESAMPLES - 1 - most])
 
 
-@functools.lru_cache(maxsize=8)
-def _times_drawn(n: int) -> Numbers:
+# So many resamples are multiplied at once where all of them would fill the memory: a multiple of
+# 64, for which the sums of one study have the same bits as those of all resamples at once.
+_AT_ONCE = 512
+_MOST_SEEDS_AT_ONCE = 1_000
+
+
+def _resampled_sums(values: Numbers) -> Numbers:
+    """Return the sums of values (n, k) over the seeds of each resample, shape (RESAMPLES, k)."""
+    drawn = _times_drawn(len(values))
+    rows = RESAMPLES if len(values) <= _MOST_SEEDS_AT_ONCE else _AT_ONCE
+    parts = (drawn[start : start + rows] for start in range(0, RESAMPLES, rows))
+    return np.concatenate([part.astype(np.float64) @ values for part in parts])
+
+
+@functools.lru_cache(maxsize=4)
+def _times_drawn(n: int) -> NDArray[np.uint8]:
     """Return how often each resample holds each of n seeds, shape (RESAMPLES, n)."""
-    generator = np.random.Generator(np.random.Philox(key=n))
-    drawn = generator.multinomial(n, np.full(n, 1 / n), size=RESAMPLES)
-    return np.asarray(drawn, dtype=np.float64)
+    generator, even = np.random.Generator(np.random.Philox(key=n)), np.full(n, 1 / n)
+    drawn = np.empty((RESAMPLES, n), np.uint8)  # more than 255 times is never drawn of ten or more
+    for start in range(0, RESAMPLES, _AT_ONCE):
+        part = drawn[start : start + _AT_ONCE]
+        part[:] = generator.multinomial(n, even, size=len(part))
+    return drawn
 
 
 class Term(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .estimate import Estimate, Options, judge
-from .inputs import IndicatorError, Numbers, delivery_times, finite, performance
+from .inputs import IndicatorError, Numbers, delivery_times, finite, numbers, performance
 
 
 def resilience_index(
@@ -125,7 +125,7 @@ def kaplan_meier(seconds: ArrayLike, happened: ArrayLike) -> SurvivalCurve:
     """
     from scipy.stats import CensoredData, ecdf
 
-    time, event = performance("seconds", seconds), np.asarray(happened, dtype=bool)
+    time, event = performance("seconds", seconds), numbers("happened", happened) != 0.0
     if time.shape != event.shape:
         raise IndicatorError(
             f"seconds has shape {time.shape}, happened {event.shape}: should be equal, one per run"

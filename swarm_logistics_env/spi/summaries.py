@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .inputs import IndicatorError, Numbers, between_0_and_1, performance, same_seeds
+from .inputs import IndicatorError, Numbers, between_0_and_1, numbers, performance, same_seeds
 
 
 class Interval(NamedTuple):
@@ -89,7 +89,7 @@ def median_interval(times: ArrayLike, confidence: float = 0.95) -> Interval:
     from scipy.special import bdtr
 
     between_0_and_1("confidence", confidence)
-    known = np.asarray(times, dtype=np.float64)
+    known = numbers("times", times)
     if known.ndim != 1 or not known.size or not (known >= 0.0).all():
         raise IndicatorError(f"times: should be a sequence of times from 0 on, got {times!r}")
     ascending, n = np.sort(known), known.size

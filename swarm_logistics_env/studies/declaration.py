@@ -14,7 +14,7 @@ from swarm_logistics_env.fingerprint import UNSTABLE, changes
 from swarm_logistics_env.spi.equivalence import MARGIN
 
 from .plan import Origin, Plan
-from .runs import FILE_NAME, Runs
+from .runs import Runs
 from .specification import Specification
 
 NOTE = "study"
@@ -144,7 +144,7 @@ def note(runs: Runs, plan: Plan, declared: Declaration) -> None:
 def merge(directories: Sequence[Path], out: Path) -> int:
     """Write the runs of one study's shards into a new store; return how many runs it holds.
 
-    A run that failed in one store and succeeded in another succeeded.
+    A run that failed in one store and succeeded in another succeeded. Damaged ones are left out.
 
     Args:
         directories: of the stores.
@@ -163,6 +163,7 @@ def merge(directories: Sequence[Path], out: Path) -> int:
             raise StudyError(f"{first} and {directory} differ: should be shards of one study")
     with Runs.new(out, "merge") as runs:
         for directory in directories:
-            runs.absorb(directory / FILE_NAME)
+            with Runs.existing(directory) as shard:
+                runs.absorb(shard)
         runs.note(NOTE, one.model_dump_json())
         return len(runs)

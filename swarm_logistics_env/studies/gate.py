@@ -89,6 +89,8 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     if old.plan.paired and new.plan.paired:
         seeds = tuple(sorted({*old.plan.seeds} & {*new.plan.seeds}))
     for study, results in (("old", old), ("new", new)):
+        if results.damage:
+            notes.append(f"{results.damage}.")
         if seeds and (extra := sorted({*results.plan.seeds} - {*seeds})):
             notes.append(
                 f"Only in the {study} study, and left out: seeds {seeds_in_words(extra)}. "

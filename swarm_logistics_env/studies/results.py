@@ -42,6 +42,7 @@ class StudyResults:
             clear.
         late_margin: whether another margin of equivalence was declared before the first run, so
             that the verdicts on it are exploratory.
+        damage: which stored runs are damaged and left out, in a sentence; None: none.
     """
 
     plan: Plan
@@ -52,6 +53,7 @@ class StudyResults:
     outcomes: Outcomes = field(repr=False)
     looks: tuple[int, ...] = ()
     late_margin: bool = False
+    damage: str | None = None
 
     @cached_property
     def by_place(self) -> dict[Place, Cell]:

@@ -7,46 +7,48 @@ import json
 import re
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
-
-from pydantic import TypeAdapter
+from typing import TYPE_CHECKING, Any, Self
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import becoming, canonical_json
+from swarm_logistics_env.records import becoming, canonical_json, plain
 from swarm_logistics_env.spi.trials_table import inert
 from swarm_logistics_env.tasks.task import Outcome, Run
+
+from .rows import Row, case_of, content_of, digest_of, outcome_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
 FILE_NAME = "study.sqlite"
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
+_WITHOUT_DIGESTS = 4  # as version 0.3.0 wrote it; read, and given digests where runs are added
 TIMEOUT = 60.0  # s, for other processes that write
 APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
 
 _SCHEMA = (
-    "CREATE TABLE notes (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
+    """CREATE TABLE notes (name TEXT PRIMARY KEY, value TEXT NOT NULL, digest TEXT NOT NULL)
+        WITHOUT ROWID""",
     """CREATE TABLE runs (
         key TEXT PRIMARY KEY,    -- digest of all that decides the outcome
         run TEXT NOT NULL,       -- JSON: policy, conditions, code and seed
         failed INTEGER NOT NULL,
         outcome TEXT NOT NULL,   -- JSON: all of it but the wall time
-        wall_seconds REAL NOT NULL
+        wall_seconds REAL NOT NULL,
+        digest TEXT NOT NULL     -- of all of these but the last, see `rows`
     )""",
 )
 # One statement, as another process may be making the tables.
 _HEADER = """SELECT application_id, user_version, (SELECT count(*) FROM sqlite_master)
     FROM pragma_application_id, pragma_user_version"""
 # A run that failed before is replaced, one that succeeded stays.
-_REPLACE = """ON CONFLICT (key) DO UPDATE SET failed = excluded.failed, outcome = excluded.outcome,
-    wall_seconds = excluded.wall_seconds WHERE runs.failed"""
-_CLASH = """SELECT key, json_extract(runs.run, '$.seed') FROM main.runs JOIN other.runs AS theirs
-    USING (key) WHERE NOT (runs.failed OR theirs.failed) AND runs.outcome != theirs.outcome"""
-
-_OUTCOME = TypeAdapter(Outcome)
+_ADD = """INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO UPDATE SET
+    failed = excluded.failed, outcome = excluded.outcome, wall_seconds = excluded.wall_seconds,
+    digest = excluded.digest WHERE runs.failed"""
+# What SQLite finds wrong with an index, or with a value: no row but the damaged ones is concerned.
+_OF_ROWS = re.compile(r"(row \d+ missing from index|non-unique entry in index|NULL value in) ")
 
 Outcomes = Mapping[tuple[str, int], Outcome]  # by the key of the case, and the seed
 
@@ -54,7 +56,8 @@ Outcomes = Mapping[tuple[str, int], Outcome]  # by the key of the case, and the 
 class Runs:
     """The finished runs of a study. A run is kept from the moment that `add` returns.
 
-    Every error of SQLite becomes a StudyError that names the file.
+    Every error of SQLite becomes a StudyError that names the file. A row that is not as it was
+    written, by its digest, counts as not played: `damage` tells of it.
 
     Args:
         path: the file, made with its folder where it is missing; None: kept in memory only.
@@ -62,8 +65,8 @@ class Runs:
             writes.
 
     Raises:
-        StudyError: the file is not a store, its schema is not this version's, or its folder cannot
-            be made.
+        StudyError: the file is not a store, its schema is not this version's, more of it than rows
+            is damaged, or its folder cannot be made.
     """
 
     def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
@@ -79,8 +82,10 @@ class Runs:
             self._connection = sqlite3.connect(
                 place, timeout=TIMEOUT, isolation_level=None, uri=read_only
             )
+            # What is not UTF-8 is damaged, and told by its digest.
+            self._connection.text_factory = lambda text: text.decode("utf-8", "backslashreplace")
             try:
-                self._prepare()
+                self._prepare(read_only=read_only)
             except BaseException:
                 self._connection.close()
                 raise
@@ -133,48 +138,62 @@ class Runs:
         self._connection.close()
 
     def __len__(self) -> int:
-        return len(self._execute("SELECT key FROM runs"))
+        ((count,),) = self._execute("SELECT count(*) FROM runs NOT INDEXED")
+        return int(count)
 
     def add(self, run: Run, outcome: Outcome) -> None:
         """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
-        result = _OUTCOME.dump_json(outcome, exclude={"wall_seconds"}).decode()
-        failed = outcome.error is not None
-        row = (run.key, canonical_json(_described(run)), failed, result, outcome.wall_seconds)
+        content = content_of(run, outcome)
         with self._transaction():
-            self._execute(f"INSERT INTO runs VALUES (?, ?, ?, ?, ?) {_REPLACE}", row)
+            self._execute(_ADD, (*content, outcome.wall_seconds, digest_of(*content)))
 
-    def absorb(self, path: Path) -> None:
-        """Add the runs of another store, to which `add`'s rule applies.
+    def absorb(self, other: Runs) -> None:
+        """Add the runs of another store, to which `add`'s rule applies; not those damaged there.
 
         Raises:
-            StudyError: the file is not a store, or has another result of a run that is here.
+            StudyError: the other store has another result of a run that is here.
         """
-        Runs(path).close()
-        self._execute("ATTACH ? AS other", (str(path),))
-        try:
-            with self._transaction():
-                for key, seed in self._execute(_CLASH):
+        with self._transaction():
+            for row in other._rows():
+                before = self._execute(
+                    "SELECT outcome FROM runs WHERE key = ? AND NOT failed", (row.key,)
+                )
+                if before and not row.failed and before[0][0] != row.outcome:
                     raise StudyError(
-                        f"{path} has another result than the stores before it for the run {key} "
-                        f"(seed {seed}), of the same scenario, policy and code"
+                        f"{other.path} has another result than the stores before it for the run "
+                        f"{row.key} (seed {case_of(row.run)['seed']}), of the same scenario, "
+                        "policy and code"
                     )
-                self._execute(f"INSERT INTO runs SELECT * FROM other.runs WHERE true {_REPLACE}")
-        finally:
-            self._execute("DETACH other")
+                digest = digest_of(*row.content)
+                self._execute(_ADD, (*row.content, row.wall_seconds, digest))
+
+    def damage(self) -> str | None:
+        """Return which rows are damaged, in a sentence, as a terminal may show it; None: none."""
+        keys = sorted(plain(str(row.key))[:12] for row in self._rows(sound=False))
+        if not keys:
+            return None
+        runs = "1 run of {} is" if len(keys) == 1 else f"{len(keys)} runs of {{}} are"
+        more = ", .." if len(keys) > 3 else ""
+        named = f"{', '.join(keys[:3])}{more}"
+        return f"{runs.format(self.path)} damaged and left out ({named})"
+
+    def discard_damaged(self) -> str | None:
+        """Take damaged rows out, so that they can be played again; return what `damage` did."""
+        told = self.damage()
+        if told is not None:
+            with self._transaction():
+                for row in list(self._rows(sound=False)):
+                    self._execute("DELETE FROM runs WHERE rowid = ?", (row.rowid,))
+        return told
 
     def succeeded(self) -> set[str]:
         """Return the keys of the runs that need not run again."""
-        return {key for (key,) in self._execute("SELECT key FROM runs WHERE NOT failed")}
+        return {row.key for row in self._rows() if not row.failed}
 
     def outcomes(self, runs: Iterable[Run]) -> dict[tuple[str, int], Outcome]:
         """Return the outcomes of those of `runs` that finished, by the case's key and the seed."""
         wanted = {run.key: (run.case.key, run.seed) for run in runs}
-        with self._sound():
-            return {
-                wanted[key]: _OUTCOME.validate_json(outcome)
-                for key, outcome in self._execute("SELECT key, outcome FROM runs")
-                if key in wanted
-            }
+        return {wanted[row.key]: outcome_of(row.outcome) for row in self._rows(wanted)}
 
     def frame(self, keys: Iterable[str] | None = None) -> pd.DataFrame:
         """Return one row a run, sorted by key, without wall times.
@@ -190,30 +209,55 @@ class Runs:
         """
         import pandas as pd
 
-        wanted = None if keys is None else set(keys)
         found = []
-        with self._sound():
-            for key, run, text in self._execute("SELECT key, run, outcome FROM runs ORDER BY key"):
-                if wanted is None or key in wanted:
-                    outcome = _OUTCOME.validate_json(text)
-                    result = json.loads(text) | {"delivered": outcome.delivered}
-                    if outcome.error is not None:
-                        result = dict.fromkeys(result) | {"error": outcome.error}
-                    case = json.loads(run)
-                    case |= {name: canonical_json(case[name]) for name in ("scenario", "faults")}
-                    found.append({"run": key} | case | result)
+        for row in sorted(self._rows(None if keys is None else set(keys)), key=lambda row: row.key):
+            outcome = outcome_of(row.outcome)
+            result = json.loads(row.outcome) | {"delivered": outcome.delivered}
+            if outcome.error is not None:
+                result = dict.fromkeys(result) | {"error": outcome.error}
+            case = case_of(row.run)
+            case |= {name: canonical_json(case[name]) for name in ("scenario", "faults")}
+            found.append({"run": row.key} | case | result)
         return pd.DataFrame(found, dtype=object)
 
     def note(self, name: str, value: str) -> None:
         """Note a fact about the study; an earlier one of this name is replaced."""
         with self._transaction():
-            self._execute("INSERT OR REPLACE INTO notes VALUES (?, ?)", (name, value))
+            row = (name, value, digest_of(name, value))
+            self._execute("INSERT OR REPLACE INTO notes VALUES (?, ?, ?)", row)
 
     def notes(self) -> dict[str, str]:
-        """Return what was noted about the study, by name."""
-        return {row[0]: row[1] for row in self._execute("SELECT name, value FROM notes")}
+        """Return what was noted about the study, by name.
 
-    def _execute(self, statement: str, values: tuple[object, ...] = ()) -> list[tuple[str, ...]]:
+        Raises:
+            StudyError: a note is damaged.
+        """
+        found = self._execute(f"SELECT name, value, {self._digest_column} FROM notes")
+        for name, value, digest in found:
+            if digest not in (None, digest_of(name, value)):
+                raise StudyError(
+                    f"the store {self.path} is damaged: a note in it is not as it was written; its "
+                    "runs can be exported (swarm-logistics study export)"
+                )
+        return {name: value for name, value, _ in found}
+
+    def _rows(self, keys: Collection[str] | None = None, *, sound: bool = True) -> Iterator[Row]:
+        """Yield the rows that are sound, or else those that are not.
+
+        Args:
+            keys: of the rows wanted; None: all.
+        """
+        # Without the index, which may be damaged by itself.
+        statement = (
+            "SELECT rowid, key, run, failed, outcome, wall_seconds, "
+            f"{self._digest_column} FROM runs NOT INDEXED"
+        )
+        with self._explained():
+            for row in map(Row._make, self._connection.execute(statement)):
+                if (keys is None or row.key in keys) and row.is_sound == sound:
+                    yield row
+
+    def _execute(self, statement: str, values: tuple[object, ...] = ()) -> list[tuple[Any, ...]]:
         with self._explained():
             return self._connection.execute(statement, values).fetchall()
 
@@ -225,44 +269,72 @@ class Runs:
             yield
 
     @contextmanager
-    def _sound(self) -> Iterator[None]:
-        try:
-            yield
-        except (TypeError, ValueError) as error:  # of JSON and of pydantic
-            reason = str(error).splitlines()[-1].strip()
-            raise StudyError(
-                f"the store {self.path} is damaged: a run in it does not read ({reason})"
-            ) from error
-
-    @contextmanager
     def _explained(self) -> Iterator[None]:
         try:
             yield
         except sqlite3.Error as error:
             raise StudyError(f"cannot use the store {self.path}: {error}") from error
 
-    def _prepare(self) -> None:
+    def _prepare(self, *, read_only: bool) -> None:
         ((application, version, tables),) = self._execute(_HEADER)
         is_ours = int(application) == APPLICATION_ID
         if not is_ours and int(tables):
             raise StudyError(f"{self.path} is a database, but not the store of a study")
-        if is_ours and int(version) != SCHEMA_VERSION:
+        if is_ours and version not in (_WITHOUT_DIGESTS, SCHEMA_VERSION):
             raise StudyError(
                 f"{self.path} has store schema {version}, this version of the package reads "
                 f"schema {SCHEMA_VERSION}: export it with the version that wrote it"
             )
+        if is_ours:
+            self._check(version)
+        # What stands for the digest where there is none.
+        self._digest_column = "digest"
+        if is_ours and version == _WITHOUT_DIGESTS and read_only:
+            self._digest_column = "NULL"
         # A process that is killed loses nothing; a power cut at most the latest runs.
         self._change_to_wal()
         self._execute("PRAGMA synchronous = NORMAL")
-        if is_ours:
+        if is_ours and (read_only or version == SCHEMA_VERSION):
             return
         with self._transaction():
             # Another process may have made the tables since: two shards start at once.
-            if not self._execute("SELECT 1 FROM sqlite_master"):
+            ((_, version, tables),) = self._execute(_HEADER)
+            if not tables:
                 for statement in _SCHEMA:
                     self._execute(statement)
                 self._execute(f"PRAGMA application_id = {APPLICATION_ID}")
-                self._execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+            elif version == _WITHOUT_DIGESTS:
+                self._add_digests()
+            self._execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+    def _check(self, version: int) -> None:
+        """Raise StudyError if SQLite finds damage that no digest would: rows that are lost."""
+        columns = {name for (name,) in self._execute("SELECT name FROM pragma_table_info('runs')")}
+        found = [text for (text,) in self._execute("PRAGMA integrity_check") if text != "ok"]
+        worst = [text for text in found if not _OF_ROWS.match(text)]
+        if ("digest" in columns) != (version == SCHEMA_VERSION):
+            worst.append(f"schema {version} with other columns")
+        if worst:
+            raise StudyError(
+                f"the store {self.path} is damaged ({worst[0].splitlines()[-1]}): should be "
+                "replaced by a copy, or the study run into a new directory"
+            )
+        if found:
+            with suppress(StudyError):  # it may be read-only
+                self._execute("REINDEX")
+
+    def _add_digests(self) -> None:
+        """Give every row that reads its digest; one that does not will count as damaged."""
+        for table in ("runs", "notes"):
+            self._execute(f"ALTER TABLE {table} ADD COLUMN digest TEXT NOT NULL DEFAULT ''")
+        self._digest_column = "NULL"
+        for row in list(self._rows()):
+            told = (digest_of(*row.content), row.rowid)
+            self._execute("UPDATE runs SET digest = ? WHERE rowid = ?", told)
+        self._digest_column = "digest"
+        for name, value in self._execute("SELECT name, value FROM notes"):
+            told = (digest_of(name, value), name)
+            self._execute("UPDATE notes SET digest = ? WHERE name = ?", told)
 
     def _change_to_wal(self) -> None:
         give_up = time.monotonic() + TIMEOUT
@@ -275,21 +347,6 @@ class Runs:
                 if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or time.monotonic() > give_up:
                     raise
                 time.sleep(0.01)
-
-
-def _described(run: Run) -> dict[str, object]:
-    """Return what a store says of a run besides its outcome, as JSON holds it."""
-    case = run.case
-    return {
-        "policy": case.policy.title,
-        "policy_identity": case.identity,
-        "task": case.task.name,
-        "scenario": case.scenario.model_dump(mode="json"),
-        "faults": [fault.model_dump(mode="json") for fault in case.faults],
-        "behaviour": case.behaviour,
-        "code": run.code,
-        "seed": run.seed,
-    }
 
 
 def _make_folder(folder: Path) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import shlex
 import time
+import warnings
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
@@ -176,7 +178,9 @@ class Study:
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
             noted = StoredStudy.of(store)
+            damage = store.discard_damaged()
             changed = tuple(noted.changes(plan)) if noted and len(store) else ()
+            changed += (damage,) if damage else ()
             note(store, plan, self._declared(store))
             kept = len({run.key for run in whole} & store.succeeded())
             tried: set[str] = set()
@@ -253,11 +257,18 @@ class Study:
         plan = self.plan()
         with self._store(existing=True) as store:
             declared = self._declared(store)
-            return judge(plan, store.outcomes(plan.runs), declared)
+            found = judge(plan, store.outcomes(plan.runs), declared)
+            return replace(found, damage=store.damage())
 
     def results(self) -> pd.DataFrame:
-        """Return one row per finished run: condition, seed, P, delivery times [s], error."""
+        """Return one row per finished run: condition, seed, P, delivery times [s], error.
+
+        Warns:
+            UserWarning: stored runs are damaged, and left out.
+        """
         with self._store(existing=True) as store:
+            if damage := store.damage():
+                warnings.warn(damage, stacklevel=2)
             return store.frame(run.key for run in self.plan().runs)
 
     def performance(self) -> pd.DataFrame:

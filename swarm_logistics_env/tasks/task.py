@@ -43,7 +43,22 @@ Times = Annotated[
 ]
 
 
-@validated(frozen=True, config=ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False))
+_LONGEST_ERROR = 20_000  # characters
+
+
+def _storable(error: object) -> object:
+    """Return a text as files and databases hold it: no half signs, and not without end."""
+    if not isinstance(error, str):
+        return error
+    text = error.encode(errors="backslashreplace").decode().replace("\0", "\\x00")
+    half = _LONGEST_ERROR // 2
+    return text if len(text) <= _LONGEST_ERROR else f"{text[:half]} [..] {text[-half:]}"
+
+
+@validated(
+    frozen=True,
+    config=ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False, extra="forbid"),
+)
 class Outcome:
     """What one run gave: an episode's result, or the traceback of the error that ended it.
 
@@ -55,7 +70,7 @@ class Outcome:
         anchoring_seconds: robot-seconds that working robots spent in contact range of failed ones;
             None: the task does not tell.
         digest: of the trajectory and the deliveries (`Episode.digest`); None: not known.
-        error: traceback; None: the run succeeded.
+        error: traceback, its middle left out where it is very long; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
         untimed: P, 0 or more, where it is not the number of times; None: it is.
     """
@@ -66,7 +81,7 @@ class Outcome:
     failed_robots: tuple[int, ...] = ()
     anchoring_seconds: NonNegativeFloat | None = 0.0
     digest: str | None = None
-    error: str | None = None
+    error: Annotated[str | None, BeforeValidator(_storable)] = None
     wall_seconds: float = 0.0  # a clock may be set back
     untimed: NonNegativeFloat | None = None
 

@@ -64,6 +64,8 @@ def enter(directory: Path, training: Training, command: str) -> None:
     if path.exists():
         record = read_table(path, "record of a training", TrainingError)
         there, sessions = record.get("training", {}), record.get("sessions", [])
+        if not isinstance(there, dict) or not isinstance(sessions, list):
+            raise TrainingError(f"{path} is damaged: should be as it was written, or --out another")
         differing = sorted(n for n in asked if n not in MAY_CHANGE and there.get(n) != asked[n])
         if differing:
             raise TrainingError(

@@ -7,7 +7,9 @@ that decides never sees this.
 
 from __future__ import annotations
 
+import hashlib
 import inspect
+import io
 import math
 import os
 from pathlib import Path
@@ -248,30 +250,48 @@ def save_checkpoint(directory: Path, learner: PPO, log: Any) -> None:
         "numpy": np.random.get_state(),  # noqa: NPY002 - see above
         "log": log,
     }
+    content = io.BytesIO()
+    torch.save(state, content)
     with becoming(directory / CHECKPOINT, TrainingError) as part, part.open("wb") as file:
-        torch.save(state, file)
+        file.write(_head(content.getbuffer()))
+        file.write(content.getbuffer())
         file.flush()
         os.fsync(file.fileno())
+
+
+def _head(content: bytes | memoryview) -> bytes:
+    """Return the line that stands before what torch wrote, with its digest."""
+    return b"swarm-logistics checkpoint, sha256 %s\n" % hashlib.sha256(content).hexdigest().encode()
 
 
 def read_checkpoint(directory: Path) -> dict[str, Any] | None:
     """Return the checkpoint in a training's directory; None: there is none.
 
-    It is a pickle: resume trainings of your own only.
+    It is a pickle: resume trainings of your own only. One that is not as it was written is not
+    unpickled.
 
     Raises:
-        TrainingError: it cannot be read.
+        TrainingError: it cannot be read, is damaged, or is of another version.
     """
     path = directory / CHECKPOINT
     if not path.exists():
         return None
+    way_on = "train into a new directory, or delete that file to begin anew in this one"
     try:
-        state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=False)
-    except Exception as error:  # whatever reading a pickle that is none raises
+        head, end, content = path.read_bytes().partition(b"\n")
+        if head + end != _head(content):
+            raise TrainingError(
+                f"the checkpoint {path} is damaged or of another version, as its digest tells: "
+                f"{way_on}"
+            )
+        state: dict[str, Any] = torch.load(
+            io.BytesIO(content), map_location="cpu", weights_only=False
+        )
+    except TrainingError:
+        raise
+    except Exception as error:  # whatever unpickling what another version wrote raises
         reason = str(error).partition("\n")[0]
-        raise TrainingError(
-            f"the checkpoint {path} cannot be read ({reason}): train into a new directory"
-        ) from error
+        raise TrainingError(f"the checkpoint {path} cannot be read ({reason}): {way_on}") from error
     return state
 
 

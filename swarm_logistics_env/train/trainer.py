@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -79,8 +80,8 @@ def train(
             f"callbacks = {callbacks!r}: should be a list of callbacks of stable-baselines3"
         )
     device, view = device_of(device), NetworkView(training)
-    enter(out, training, command)
-    with one_thread():
+    with _disk_errors_told(out), one_thread():
+        enter(out, training, command)
         return _trained(training, out, command, device, view, callbacks)
 
 
@@ -118,6 +119,19 @@ def _trained(
     if scores:
         write_policy(path, card.replace(scores=scores, scored_with=versions()), tensors)
     return path
+
+
+@contextmanager
+def _disk_errors_told(out: Path) -> Iterator[None]:
+    """Raise a TrainingError that says how to go on where the disk is full or gone."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise TrainingError(
+            f"the training in {out} stopped ({reason}): the same command goes on from its last "
+            "checkpoint"
+        ) from error
 
 
 @dataclass
@@ -174,7 +188,8 @@ class TrainingLog:
             axes.set(title=title, xlabel="million agent-steps", ylabel=y_label, ylim=(0.0, None))
 
         _, png = images(curve, 0.62 * WIDTH)
-        picture.write_bytes(png)
+        with becoming(picture, TrainingError) as part:
+            part.write_bytes(png)
 
 
 class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check

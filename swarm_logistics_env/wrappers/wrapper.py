@@ -18,7 +18,7 @@ from swarm_logistics_env.environment.spaces import ArrayStep, DictView
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.warehouse.faults import Fault, failed_robots
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,12 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
     def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
         """Return the scenario of the episode that such a reset would begin; it begins nothing."""
         return self.env.scenario_of(seed, self.plan(seed, dict(options)))
+
+    def conditions_of(
+        self, seed: int, options: Mapping[str, Any]
+    ) -> tuple[Scenario, tuple[Fault, ...]]:
+        """Return scenario and faults of the episode that such a reset would begin."""
+        return self.env.conditions_of(seed, self.plan(seed, checked_options(options)))
 
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault
-from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.wrappers import (
     FaultInjection,
@@ -147,6 +147,24 @@ def test_options_are_for_the_next_reset_only() -> None:
     given: Any = [faulty, faulty]
     with pytest.raises(SetupError, match="should be None or a dict"):
         env.set_options(given)
+
+
+def test_a_reset_or_seed_that_is_refused_changes_no_world() -> None:
+    env = SwarmVecEnv(make_env=lambda world: brief(n_robots=(5, 3)[world]), n_worlds=2, seed=1)
+    env.reset()
+    untouched = copy.deepcopy(env)
+    with pytest.raises(SetupError, match="seed = 'x'"):
+        env.seed("x")  # type: ignore[arg-type]
+    # The first world has room for as many, the second one has not.
+    env.set_options({"scenario": {"n_robots": 4}})
+    with pytest.raises(SwarmLogisticsError, match="4"):
+        env.reset()
+    env.set_options()
+    actions = np.full((env.num_envs, 4), 0.5)
+    for _ in range(3):
+        for one, other in zip(env.step(actions)[:3], untouched.step(actions)[:3]):
+            assert one.tobytes() == other.tobytes()
+    assert env.reset().tobytes() == untouched.reset().tobytes()
 
 
 def test_pictures_are_tiles_of_the_worlds() -> None:

@@ -13,7 +13,7 @@ from safetensors.numpy import save_file
 from swarm_logistics_env import policies
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import PolicyCard, files, identity, read_card
-from swarm_logistics_env.policies.files import CARD, write_policy
+from swarm_logistics_env.policies.files import CARD, DIGEST, content_digest, write_policy
 
 Tensors = dict[str, NDArray[np.float32]]
 
@@ -31,6 +31,32 @@ def test_what_is_written_is_read_back(card: PolicyCard, tensors: Tensors, file: 
     assert all((policy.tensors[name] == tensors[name]).all() for name in tensors)
     assert identity(policy) == identity(policies.load(str(file)))
     assert [path.name for path in file.parent.iterdir()] == [file.name]
+
+
+def test_a_file_has_equal_bytes_each_time_and_says_when_it_is_not_what_was_written(
+    card: PolicyCard, tensors: Tensors, file: Path
+) -> None:
+    whole, identity_before = file.read_bytes(), identity(policies.load(str(file)))
+    for _ in range(8):
+        write_policy(file, card, tensors)
+        assert file.read_bytes() == whole
+    other = {**tensors, "layers.0.bias": tensors["layers.0.bias"] + 1}
+    for held, text in (
+        (other, card.to_json()),
+        (tensors, card.to_json().replace('"seed":3', '"seed":4')),
+        (tensors, card.to_json().replace('"seed":3', '"seed": 3')),
+    ):
+        save_file(held, file, {CARD: text, DIGEST: content_digest(card.to_json(), tensors)})
+        refused(file, "is damaged: its card and numbers are not those that were written")
+    save_file(tensors, file, {CARD: card.to_json(), "swarm_logistics_digesu": "0"})
+    refused(file, "its header has 'swarm_logistics_digesu'")
+    # As version 0.3.0 wrote them.
+    save_file(tensors, file, {CARD: card.to_json()})
+    with pytest.warns(UserWarning, match=r"small.safetensors has no digest.*write_policy"):
+        policy: Any = policies.load(str(file))
+    assert identity(policy) == identity_before
+    policies.files.write_policy(file, policy.card, policy.tensors)
+    assert file.read_bytes() == whole
 
 
 @pytest.mark.parametrize("wrap", ["pickle", "zip"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.stats import ttest_1samp, ttest_ind, ttest_rel
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.spi import ratio
 from swarm_logistics_env.spi.ratio import critical_value, paired_ratio, resampled_pivots
 from verification.verdict_errors import wrong_verdicts
 
@@ -144,3 +146,30 @@ def test_wrong_verdicts_are_bounded_on_either_side(model: str, n: int, most: flo
     wrong = wrong_verdicts(model, [n], 1_500, only_seen=True)
     assert max(wrong.above, wrong.below) <= most
     assert wrong.share > 0.02
+
+
+@pytest.mark.parametrize("n", [10, 1001])
+def test_resamples_in_parts_have_the_bits_of_all_at_once(
+    n: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = np.random.default_rng(n).normal(size=n)
+    at_once = np.random.Generator(np.random.Philox(key=n)).multinomial(
+        n, np.full(n, 1 / n), size=ratio.RESAMPLES
+    )
+    for most in (0, n):
+        monkeypatch.setattr(ratio, "_MOST_SEEDS_AT_ONCE", most)
+        found = ratio._resampled_sums(values[:, None])
+        assert found.tobytes() == (at_once.astype(np.float64) @ values[:, None]).tobytes()
+
+
+def test_thousands_of_trials_fit_into_the_memory() -> None:
+    n = 1100
+    source = np.random.default_rng(0)
+    before, after = source.poisson(30, n).astype(float), source.poisson(20, n).astype(float)
+    tracemalloc.start()
+    try:
+        paired_ratio(after, before)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 4 * ratio.RESAMPLES * n  # bytes: all resamples as floats would take eight each

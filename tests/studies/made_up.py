@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.comparison import NO_FAULT, Setting
 from swarm_logistics_env.studies.presets import PAPER
 from swarm_logistics_env.studies.results import StudyResults, judge
+from swarm_logistics_env.studies.rows import digest_of
 from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -20,6 +23,23 @@ def digest(directory: Path, to: Path) -> str:
     """The digest of a study's exported rows."""
     with Runs.existing(directory) as runs:
         return export(runs, to / "rows.csv")[1]
+
+
+def alter(store: Path, change: str, *values: Any) -> None:
+    """Change a store by a statement of SQL, as if that had been written with its digests."""
+    with closing(sqlite3.connect(store)) as database, database:
+        database.execute(change, values)
+        database.create_function("digest_of", -1, digest_of)
+        database.execute("UPDATE runs SET digest = digest_of(key, run, failed, outcome)")
+        database.execute("UPDATE notes SET digest = digest_of(name, value)")
+
+
+def made_old(store: Path) -> None:
+    """Make a store one of version 0.3.0, which has no digests."""
+    with closing(sqlite3.connect(store)) as database, database:
+        for table in ("runs", "notes"):
+            database.execute(f"ALTER TABLE {table} DROP COLUMN digest")
+        database.execute("PRAGMA user_version = 4")
 
 
 def delivered(count: float, **fields: Any) -> Outcome:

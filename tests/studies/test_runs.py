@@ -18,9 +18,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Scenario
+from swarm_logistics_env.cli import app
+from swarm_logistics_env.cli.terminal import say_what_was_played
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.spi import read_trials
+from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export, write_csv
 from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
@@ -105,7 +109,7 @@ def test_labels_and_errors_are_exported_without_formulas(tmp_path: Path) -> None
         ("", "malformed"),
         ("PRAGMA user_version = 99", "store schema 99"),
         ("PRAGMA application_id = 0", "not the store of a study"),
-        ("UPDATE runs SET outcome = '{\"delivery_times\": [-1.0]}'", "a run in it does not read"),
+        ("PRAGMA user_version = 4", r"is damaged \(schema 4 with other columns\)"),
     ],
 )
 def test_what_is_no_store_is_refused_with_the_reason(
@@ -142,6 +146,36 @@ def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: P
     assert path.read_bytes() == before
     assert (place, kept.delivery_times.tolist()) == ((CASE.key, 0), times)
     assert (kept.ended_at, kept.failed_robots, kept.anchoring_seconds) == (500.0, (3,), 1.5)
+
+
+@pytest.mark.parametrize(
+    "text", ["\udc80", "a\0b", "x" * 5_000_000, "\x1b[2J\u2028", "line\n" * 30_000, "\n", ""]
+)
+def test_a_policy_that_fails_with_any_text_leaves_a_study_that_is_finished_and_reported(
+    sizes: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str
+) -> None:
+    class Complaining(SwarmDT):
+        identity = f"complaining of {text[:5]}"
+
+        def act(self, observations: Any) -> Any:
+            raise ValueError(text)
+
+    fields = {**sizes, "sizes": [{"values": [2, 4]}], "seeds": 1, "policies": [Complaining()]}
+    study = Study(out=tmp_path, **fields)
+    tally = study.run()
+    assert (tally.played, tally.failed) == (2, 2)
+    assert tally.error
+    say_what_was_played(tally)
+    for words in (["report"], ["export", "--to", str(tmp_path / "rows.csv")]):
+        assert app.run(["study", words[0], str(tmp_path), *words[1:]]) == 0
+    assert "\x1b" not in (said := capsys.readouterr().out)
+    assert len(said) < 20_000
+    errors = study.results()["error"]
+    assert errors.str.contains("ValueError").all()
+    assert max(map(len, errors)) < 21_000
+    with Runs.existing(tmp_path) as runs:
+        assert runs.damage() is None
+        assert len(runs) == 2
 
 
 MAKER = """

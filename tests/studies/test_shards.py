@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,8 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import StoredStudy, merge
 from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.runs import FILE_NAME, Runs
+
+from .made_up import alter
 
 
 def test_every_run_is_in_one_shard() -> None:
@@ -40,8 +40,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def altered(whole: Path, directory: Path, change: str) -> Path:
     shutil.copytree(whole, directory)
-    with closing(sqlite3.connect(directory / FILE_NAME)) as database, database:
-        database.execute(change)
+    alter(directory / FILE_NAME, change)
     return directory
 
 
@@ -55,7 +54,7 @@ def rows(directory: Path) -> list[dict[Any, Any]]:
 
 
 def test_merged_parts_are_the_declared_study_and_success_wins(whole: Path, tmp_path: Path) -> None:
-    fail = """UPDATE runs SET failed = 1, outcome = '{"error": "Traceback"}'"""
+    fail = "UPDATE runs SET failed = 1, outcome = json_set(outcome, '$.error', 'Traceback')"
     failed = altered(whole, tmp_path / "failed", fail)
     for number, order in enumerate([(whole, failed), (failed, whole)]):
         out = tmp_path / str(number)

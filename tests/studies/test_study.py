@@ -6,11 +6,9 @@ import json
 import os
 import random
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +26,7 @@ from swarm_logistics_env.studies.declaration import Declaration, note
 from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 from tests.conftest import SMALL
-from tests.studies.made_up import digest
+from tests.studies.made_up import alter, digest
 
 DYING = """
 import os, pathlib, signal
@@ -161,8 +159,7 @@ def test_stored_study_is_judged_without_its_policies(
     # The page alone names commands, which need the policy.
     first, second = study.report()[1:], again.report(tmp_path / "elsewhere")[1:]
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
-    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as database, database:
-        database.execute("UPDATE notes SET value = json_set(value, '$.code', 'older')")
+    alter(tmp_path / FILE_NAME, "UPDATE notes SET value = json_set(value, '$.code', 'older')")
     with pytest.raises(StudyError, match="was played under code version older"):
         Study.stored(tmp_path).run()
 

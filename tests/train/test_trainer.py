@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import errno
 import json
 import pickle
+import pkgutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,8 +24,16 @@ from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.motion.frame import INPUTS, MotionView
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
+from swarm_logistics_env.train import trainer
 from swarm_logistics_env.train.evaluation import versions
-from swarm_logistics_env.train.learner import KNOWN, NetworkView, make_learner, tensors_of
+from swarm_logistics_env.train.learner import (
+    CHECKPOINT,
+    KNOWN,
+    NetworkView,
+    make_learner,
+    save_checkpoint,
+    tensors_of,
+)
 from swarm_logistics_env.train.settings import Scores
 from swarm_logistics_env.train.trainer import train
 
@@ -169,8 +179,53 @@ def test_what_cannot_be_gone_on_with_is_refused(small: Any, done: Path, tmp_path
             train(small(), tmp_path)
     for name, end in (("training.json", None), ("checkpoint.pt", 1000)):
         (tmp_path / name).write_bytes((done.parent / name).read_bytes()[:end])
-    with pytest.raises(TrainingError, match=r"cannot be read .*: train into a new directory"):
+    with pytest.raises(TrainingError, match=r"checkpoint.pt is damaged .*: train into a new dir"):
         train(small(), tmp_path)
+    record = json.loads((done.parent / "training.json").read_text())
+    damaged: list[dict[str, Any]] = [{"sessions": {}}, {"training": []}]
+    for changed in damaged:
+        (tmp_path / "training.json").write_text(json.dumps({**record, **changed}))
+        with pytest.raises(TrainingError, match=r"training.json is damaged"):
+            train(small(), tmp_path)
+
+
+def full(*_: object, **__: object) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("writer", "name"),
+    [
+        ("torch.utils.tensorboard.SummaryWriter", "add_scalar"),
+        ("torch.utils.tensorboard.SummaryWriter", "flush"),
+        ("pathlib.Path", "replace"),
+        ("pathlib.Path", "write_bytes"),
+        ("os", "fsync"),
+    ],
+)
+def test_a_training_on_a_full_disk_ends_in_a_sentence_and_goes_on_when_there_is_room(
+    small: Any,
+    done: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    writer: str,
+    name: str,
+) -> None:
+    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    save, saved = save_checkpoint, list[bytes]()
+    with monkeypatch.context() as changed:
+
+        def save_and_fill(*given: Any) -> None:
+            save(*given)
+            saved.append((tmp_path / CHECKPOINT).read_bytes())
+            changed.setattr(pkgutil.resolve_name(writer), name, full)
+
+        changed.setattr(trainer, "save_checkpoint", save_and_fill)
+        with pytest.raises(TrainingError, match="No space left on device"):
+            train(small(), tmp_path)
+    assert saved[-1] == (tmp_path / CHECKPOINT).read_bytes()
+    assert not list(tmp_path.glob(".*"))
+    assert weights(train(small(), tmp_path)) == weights(done)
 
 
 @pytest.mark.parametrize("package", ["torch", "tensorboard"])

@@ -27,6 +27,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.declaration import NOTE, merge
 from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export
+from tests.studies.made_up import alter, made_old
 
 STUDY = """\
 policies = ["swarm-dt", "random-walk"]
@@ -189,16 +190,23 @@ VALUES = [None, "x", "{", "[1, 2", -1, 1e300, b"\x01", b"\xff" * 16, "[]", "null
 NOTES = ["", "x", "null", "{}", "[]", "-1", '{"a": 1}', "[[1]]", "1e9", b"\xff", None]
 
 
-@given(column=st.sampled_from(COLUMNS), value=st.sampled_from(VALUES), place=st.integers(0, 7))
+@given(
+    column=st.sampled_from(COLUMNS),
+    value=st.sampled_from(VALUES),
+    place=st.integers(0, 7),
+    source=st.randoms(use_true_random=False),
+)
 @store_examples
 def test_a_store_of_wrong_contents_is_read_or_refused(
-    played: Path, column: str, value: Any, place: int
+    played: Path, column: str, value: Any, place: int, source: random.Random
 ) -> None:
     def spoil(store: Path) -> None:
         with contextlib.closing(sqlite3.connect(store)) as database, database:
             keys = [key for (key,) in database.execute("SELECT key FROM runs ORDER BY key")]
             change = f"UPDATE OR IGNORE runs SET {column} = ? WHERE key = ?"
             database.execute(change, (value, keys[place]))
+        if source.random() < 0.5:  # in a store that has no digests
+            made_old(store)
 
     check_spoilt(played, spoil)
 
@@ -206,10 +214,11 @@ def test_a_store_of_wrong_contents_is_read_or_refused(
 @given(
     name=st.sampled_from(["", "specification", "code", "identities", "declared", "imported"]),
     value=st.sampled_from(NOTES),
+    source=st.randoms(use_true_random=False),
 )
 @store_examples
 def test_a_store_of_wrong_notes_is_read_or_refused(
-    played: Path, name: str, value: str | bytes | None
+    played: Path, name: str, value: str | bytes | None, source: random.Random
 ) -> None:
     def spoil(store: Path) -> None:
         with contextlib.closing(sqlite3.connect(store)) as database, database:
@@ -220,7 +229,9 @@ def test_a_store_of_wrong_notes_is_read_or_refused(
                 text = value.decode("latin-1") if isinstance(value, bytes) else value
                 told = json.dumps({**json.loads(note), name: text})
             if told is not None:
-                database.execute("INSERT INTO notes VALUES (?, ?)", (NOTE, told))
+                database.execute("INSERT INTO notes VALUES (?, ?, '')", (NOTE, told))
+        if source.random() < 0.5:  # as if that had been written
+            alter(store, "DELETE FROM notes WHERE value IS NULL")
 
     check_spoilt(played, spoil)
 

@@ -1,0 +1,104 @@
+"""Rows of a store: what is written of a run, and the digest by which damage is seen."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import fields
+from typing import Any, NamedTuple, TypeAlias
+
+from pydantic import TypeAdapter
+
+from swarm_logistics_env.records import canonical_json
+from swarm_logistics_env.tasks.task import Outcome, Run
+
+_OUTCOME = TypeAdapter(Outcome)
+_FIELDS = {one.name for one in fields(Outcome)} - {"wall_seconds"}
+_DESCRIBED = {
+    "policy", "policy_identity", "task", "scenario", "faults", "behaviour", "code", "seed"
+}  # fmt: skip
+
+Content: TypeAlias = tuple[str, str, int, str]  # key, run, whether it failed, outcome
+
+
+class Row(NamedTuple):
+    """A row as it is in the file, where anything may be damaged."""
+
+    rowid: int
+    key: Any
+    run: Any
+    failed: Any
+    outcome: Any
+    wall_seconds: Any
+    digest: Any
+
+    @property
+    def content(self) -> Content:
+        """What its digest is of; the wall time is no part of the result."""
+        return self.key, self.run, self.failed, self.outcome
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether it is as it was written; if it has no digest (None), whether it reads."""
+        texts = (self.key, self.run, self.outcome)
+        if not all(isinstance(text, str) for text in texts) or self.failed not in (0, 1):
+            return False
+        if self.digest is not None:
+            return bool(self.digest == digest_of(*self.content))
+        try:
+            case_of(self.run)
+            return bool((outcome_of(self.outcome).error is not None) == self.failed)
+        except ValueError:  # of JSON and of pydantic
+            return False
+
+
+def digest_of(*values: object) -> str:
+    """Return the digest of a row's values, 64 hexadecimal digits."""
+    texts = [str(value) for value in values]
+    lengths = " ".join(str(len(text)) for text in texts)
+    return hashlib.sha256(f"{lengths}\n{''.join(texts)}".encode()).hexdigest()
+
+
+def content_of(run: Run, outcome: Outcome) -> Content:
+    """Return what a store keeps of a run and its outcome besides the wall time."""
+    result = _OUTCOME.dump_json(outcome, exclude={"wall_seconds"}).decode()
+    return run.key, canonical_json(_described(run)), int(outcome.error is not None), result
+
+
+def _described(run: Run) -> dict[str, object]:
+    """Return what a store says of a run besides its outcome, as JSON holds it."""
+    case = run.case
+    return {
+        "policy": case.policy.title,
+        "policy_identity": case.identity,
+        "task": case.task.name,
+        "scenario": case.scenario.model_dump(mode="json"),
+        "faults": [fault.model_dump(mode="json") for fault in case.faults],
+        "behaviour": case.behaviour,
+        "code": run.code,
+        "seed": run.seed,
+    }
+
+
+def outcome_of(text: str) -> Outcome:
+    """Return the outcome that was stored.
+
+    Raises:
+        ValueError: it does not read, or a field is unknown or missing: P is never guessed.
+    """
+    found = _OUTCOME.validate_json(text, strict=True)
+    if json.loads(text).keys() != _FIELDS:
+        raise ValueError(f"an outcome should have the fields {sorted(_FIELDS)}")
+    return found
+
+
+def case_of(text: str) -> dict[str, Any]:
+    """Return what is stored of a run besides its outcome.
+
+    Raises:
+        ValueError: it does not read, or a field is unknown or missing.
+    """
+    case = json.loads(text)
+    if not isinstance(case, dict) or case.keys() != _DESCRIBED:
+        raise ValueError(f"a run should have the fields {sorted(_DESCRIBED)}")
+    return case
