@@ -7,6 +7,8 @@ left of its body. The frame is turned by whole beams, so that scans need no inte
 from __future__ import annotations
 
 import math
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
-from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.memory import in_frame, length_of
 from swarm_logistics_env.scenario import Scenario
 
@@ -44,7 +46,9 @@ INPUTS: tuple[str, ...] = (
     "cannot_deliver", "cannot_lift", "delivering_in_vain", "items_in_view",
     "top_speed", "handling_time", "turns_to_drive",
 )  # fmt: skip
-LEAD = slice(INPUTS.index("lead_present"), INPUTS.index("lead_timer") + 1)
+_Columns = namedtuple("_Columns", INPUTS)  # type: ignore[misc]  # by their names, as above
+INPUT: Any = _Columns(*range(len(INPUTS)))  # the column of each input
+LEAD = slice(INPUT.lead_present, INPUT.lead_timer + 1)
 
 
 class MotionView:
@@ -65,7 +69,7 @@ class MotionView:
 
     def __init__(self, scenario: Scenario, listens: bool = True) -> None:
         self._period = scenario.control_period
-        self._body = known.body_of(scenario)
+        self._body = column.body_of(scenario)
         self._listens = listens
         self.begin(np.empty(0, np.uint64))
 
@@ -77,7 +81,7 @@ class MotionView:
         """
         n = len(keys)
         self.keys, self.counts = np.empty(n, np.uint64), np.empty(n, np.int64)
-        self.memory, self.turned = np.empty((n, known.N_COLUMNS)), np.zeros(n)
+        self.memory, self.turned = np.empty((n, column.N_COLUMNS)), np.zeros(n)
         self.begin_rows(np.arange(n), keys, bodies)
 
     def begin_rows(
@@ -88,9 +92,9 @@ class MotionView:
     ) -> None:
         """Begin an episode in these rows alone."""
         self.keys[rows], self.counts[rows] = keys, 0
-        fresh = np.zeros((len(rows), known.N_COLUMNS))
-        fresh[:, known.BODY :] = self._body if bodies is None else bodies
-        known.face_anywhere(keys, fresh)
+        fresh = np.zeros((len(rows), column.N_COLUMNS))
+        fresh[:, column.BODY] = self._body if bodies is None else bodies
+        column.face_anywhere(keys, fresh)
         self.memory[rows] = fresh
 
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -121,7 +125,7 @@ class MotionView:
         rows: slice | NDArray[np.int64],
         turned: NDArray[np.float64],
     ) -> NDArray[np.float32]:
-        known.remember(observations, self._period, memory)
+        column.remember(observations, self._period, memory)
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
         headings = self.random_headings()[rows]
         read_rows(observations, memory, self.keys[rows], headings, inputs, turned)
@@ -140,8 +144,9 @@ class MotionView:
         A differential robot turns its body to where it wants to drive.
         """
         commands = np.zeros((len(outputs), 4))
-        given = outputs.astype(np.float64)
-        command_rows(given, self.turned, self.rows, self._period, self.memory, commands)
+        command_rows(
+            outputs.astype(np.float64), self.turned, self.rows, self._period, self.memory, commands
+        )
         return commands
 
     def outputs_for(self, commands: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -154,7 +159,7 @@ class MotionView:
 @kernel
 def read_rows(
     rows: NDArray[np.float32],
-    memory: NDArray[np.float64],
+    memories: NDArray[np.float64],
     keys: NDArray[np.uint64],
     random_headings: NDArray[np.int64],
     inputs: NDArray[np.float32],
@@ -162,119 +167,152 @@ def read_rows(
 ) -> None:
     """Fill inputs (N, len(INPUTS)) and how far each frame is turned from the body's (N,) [rad]."""
     for robot in range(rows.shape[0]):
-        sensed, own, read = rows[robot], memory[robot], inputs[robot]
-        heading = math.atan2(own[known.HEADING_Y], own[known.HEADING_X])
+        sensed, memory, read = rows[robot], memories[robot], inputs[robot]
+        heading = math.atan2(memory[column.HEADING_Y], memory[column.HEADING_X])
         beams = round(heading / (2.0 * math.pi / row.N_BEAMS)) % row.N_BEAMS
         turned[robot] = 2.0 * math.pi * beams / row.N_BEAMS
         frame = math.cos(turned[robot]), math.sin(turned[robot])
         for beam in range(row.N_BEAMS):
-            away = sensed[row.RANGE_WALLS + (beam + beams) % row.N_BEAMS]
-            read[beam] = max(0.0, 1.0 - away / WALL_REACH)
-        at = read_neighbours(sensed, frame, read, row.N_BEAMS)
-        at = read_items(sensed, frame, read, at)
+            distance = sensed[row.RANGE_WALLS + (beam + beams) % row.N_BEAMS]
+            read[INPUT.wall_0 + beam] = max(0.0, 1.0 - distance / WALL_REACH)
+        read_neighbours(sensed, frame, read)
+        read_items(sensed, frame, read)
         # The robot that tells the lowest timer may lie: it counts less the more this robot knows.
-        sure = length_of(own[known.HOME_X], own[known.HOME_Y])
-        at = read_lead(sensed, frame, 1.0 - math.tanh(sure), read, at)
-        read[at] = sensed[row.CARRYING]
-        read[at + 1] = sensed[row.CARRYING_REQUESTED]
-        read[at + 2] = sensed[row.IN_DELIVERY_AREA]
-        read[at + 3], read[at + 4] = sensed[row.TIMER_RUNS], sensed[row.TIMER] / 10.0
-        read[at + 5] = sensed[row.CONTACT]
-        at = put(read, at + 6, 0.5, frame, sensed[row.VELOCITY], sensed[row.VELOCITY + 1])
-        at = put(read, at, 1.0, frame, own[known.HEADING_X], own[known.HEADING_Y])
-        # The heading is at most half a beam aside, so it is doubled to be as large as other inputs.
-        read[at - 1] *= 2.0
-        unit = math.tanh(sure) / sure if sure > 0.0 else 0.0
-        at = put(read, at, unit, frame, own[known.HOME_X], own[known.HOME_Y])
-        read[at] = math.tanh(sure / 3.0)
-        read[at + 1], read[at + 2] = own[known.FAILED], own[known.STUCK]
+        certainty = length_of(memory[column.HOME_X], memory[column.HOME_Y])
+        read_lead(sensed, frame, 1.0 - math.tanh(certainty), read)
+        read_robot(sensed, memory, frame, read)
         angle = random_heading(keys[robot], random_headings[robot]) - turned[robot]
-        read[at + 3], read[at + 4] = math.cos(angle), math.sin(angle)
-        x, y, sure = known.kept_home(own)
-        sure = math.tanh(sure)
-        at = put(read, at + 5, sure, frame, x, y)
-        read[at] = sure * min(max(own[known.AWAY], -FARTHEST), FARTHEST) / FARTHEST
-        read[at + 1], read[at + 2] = own[known.CANNOT_DELIVER], own[known.CANNOT_LIFT]
-        surely = own[known.HANDLING_TIME] + known.SURELY_IN_VAIN
-        read[at + 3] = min(1.0, own[known.DELIVERING] / surely)
-        in_view = 0.0
-        for place in range(row.N_ITEMS_IN_VIEW):
-            in_view += sensed[row.ITEMS + row.ITEM_WIDTH * place]
-        read[at + 4] = in_view / row.N_ITEMS_IN_VIEW
-        read[at + 5] = own[known.TOP_SPEED] / 2.0
-        read[at + 6] = own[known.HANDLING_TIME] / 2.0
-        read[at + 7] = 1.0 if own[known.WIDEST_TURN] > 0.0 else 0.0
+        read[INPUT.whim_along], read[INPUT.whim_aside] = math.cos(angle), math.sin(angle)
+        read_memory(memory, certainty, frame, read)
 
 
 @inlined_kernel
 def put(
-    read: NDArray[np.float32], at: int, scale: float, frame: tuple[float, float], x: float, y: float
-) -> int:
-    """Fill two inputs with a vector in the frame, times `scale`; return the column after them."""
-    along, aside = in_frame(frame, x, y)
-    read[at], read[at + 1] = scale * along, scale * aside
-    return at + 2
+    read: NDArray[np.float32],
+    along: int,
+    scale: float,
+    frame: tuple[float, float],
+    x: float,
+    y: float,
+) -> None:
+    """Fill two inputs, from column `along` on, with a vector in the frame, times `scale`."""
+    vector = in_frame(frame, x, y)
+    read[along], read[along + 1] = scale * vector[0], scale * vector[1]
 
 
 @kernel
 def read_neighbours(
-    sensed: NDArray[np.float32], frame: tuple[float, float], read: NDArray[np.float32], at: int
-) -> int:
-    """Fill the inputs of neighbours, from column `at` on; return the column after them."""
-    for place in range(N_FAR + N_NEAR):
-        is_far = place < N_FAR
+    sensed: NDArray[np.float32], frame: tuple[float, float], read: NDArray[np.float32]
+) -> None:
+    """Fill the inputs of neighbours: near they are larger."""
+    for index in range(N_FAR + N_NEAR):
+        is_far = index < N_FAR
         reach = FAR if is_far else NEAR
-        there = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (place if is_far else place - N_FAR)
-        x, y = float(sensed[there + 1]), float(sensed[there + 2])
-        away = length_of(x, y)
-        near = max(0.0, 1.0 - away / reach) / away if away > 0.0 else 0.0
-        at = put(read, at, near, frame, x, y)
-    return at
+        first = INPUT.neighbour_0_along if is_far else INPUT.near_neighbour_0_along
+        rank = index if is_far else index - N_FAR
+        neighbour = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * rank
+        x, y = float(sensed[neighbour + 1]), float(sensed[neighbour + 2])
+        distance = length_of(x, y)
+        nearness = max(0.0, 1.0 - distance / reach) / distance if distance > 0.0 else 0.0
+        put(read, first + 2 * rank, nearness, frame, x, y)
 
 
 @kernel
 def read_items(
-    sensed: NDArray[np.float32], frame: tuple[float, float], read: NDArray[np.float32], at: int
-) -> int:
-    """Fill the inputs of obstacles and the requested item; return the column after them."""
+    sensed: NDArray[np.float32], frame: tuple[float, float], read: NDArray[np.float32]
+) -> None:
+    """Fill the inputs of obstacles, the requested item, and how full the view is of items."""
     carries = sensed[row.CARRYING] > 0.5
-    for place in range(N_OBSTACLES):
-        there = row.ITEMS + row.ITEM_WIDTH * place
-        read[at] = 1.0 if carries and sensed[there] > 0.5 else 0.0
-        at = put(read, at + 1, read[at], frame, sensed[there + 1], sensed[there + 2])
-    read[at : at + 6] = 0.0
-    for place in range(row.N_ITEMS_IN_VIEW):
-        there = row.ITEMS + row.ITEM_WIDTH * place
-        if sensed[there] > 0.5 and sensed[there + 3] > 0.5:
-            x, y = float(sensed[there + 1]), float(sensed[there + 2])
-            away = max(length_of(x, y), 1e-9)
+    for index in range(N_OBSTACLES):
+        item = row.ITEMS + row.ITEM_WIDTH * index
+        present = INPUT.obstacle_0_present + 3 * index
+        read[present] = 1.0 if carries and sensed[item] > 0.5 else 0.0
+        put(read, present + 1, read[present], frame, sensed[item + 1], sensed[item + 2])
+    read[INPUT.requested_present : INPUT.requested_recently_held + 1] = 0.0
+    for index in range(row.N_ITEMS_IN_VIEW):
+        item = row.ITEMS + row.ITEM_WIDTH * index
+        if sensed[item] > 0.5 and sensed[item + 3] > 0.5:
+            x, y = float(sensed[item + 1]), float(sensed[item + 2])
+            distance = max(length_of(x, y), 1e-9)
             along, aside = in_frame(frame, x, y)
-            read[at], read[at + 1], read[at + 2] = 1.0, along / away, aside / away
-            read[at + 3] = away
-            read[at + 4] = max(0.0, 1.0 - away / NEAR)
-            read[at + 5] = sensed[there + 4]
+            read[INPUT.requested_present] = 1.0
+            read[INPUT.requested_along] = along / distance
+            read[INPUT.requested_aside] = aside / distance
+            read[INPUT.requested_distance] = distance
+            read[INPUT.requested_nearness] = max(0.0, 1.0 - distance / NEAR)
+            read[INPUT.requested_recently_held] = sensed[item + 4]
             break  # the nearest one comes first
-    return at + 6
+    n_in_view = 0.0
+    for index in range(row.N_ITEMS_IN_VIEW):
+        n_in_view += sensed[row.ITEMS + row.ITEM_WIDTH * index]
+    read[INPUT.items_in_view] = n_in_view / row.N_ITEMS_IN_VIEW
 
 
 @kernel
 def read_lead(
-    sensed: NDArray[np.float32],
-    frame: tuple[float, float],
-    trust: float,
-    read: NDArray[np.float32],
-    at: int,
-) -> int:
-    """Fill the inputs of the lowest timer heard, times `trust`; return the column after them."""
+    sensed: NDArray[np.float32], frame: tuple[float, float], trust: float, read: NDArray[np.float32]
+) -> None:
+    """Fill the inputs of the lowest timer heard, times `trust`."""
     heard = sensed[row.LOWEST_TIMER] * trust
     x, y = float(sensed[row.LOWEST_TIMER + 1]), float(sensed[row.LOWEST_TIMER + 2])
-    away = length_of(x, y)
-    unit = heard / away if away > 0.0 else 0.0
-    read[at] = heard
-    at = put(read, at + 1, unit, frame, x, y)
-    read[at] = heard * away / 4.0
-    read[at + 1] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
-    return at + 2
+    distance = length_of(x, y)
+    unit = heard / distance if distance > 0.0 else 0.0
+    read[INPUT.lead_present] = heard
+    put(read, INPUT.lead_along, unit, frame, x, y)
+    read[INPUT.lead_distance] = heard * distance / 4.0
+    read[INPUT.lead_timer] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
+
+
+@kernel
+def read_robot(
+    sensed: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    frame: tuple[float, float],
+    read: NDArray[np.float32],
+) -> None:
+    """Fill the inputs of what a robot feels of itself, and of its body."""
+    read[INPUT.carrying] = sensed[row.CARRYING]
+    read[INPUT.carrying_requested] = sensed[row.CARRYING_REQUESTED]
+    read[INPUT.in_delivery_area] = sensed[row.IN_DELIVERY_AREA]
+    read[INPUT.timer_runs] = sensed[row.TIMER_RUNS]
+    read[INPUT.timer] = sensed[row.TIMER] / 10.0
+    read[INPUT.contact] = sensed[row.CONTACT]
+    velocity_x, velocity_y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
+    put(read, INPUT.velocity_along, 0.5, frame, velocity_x, velocity_y)
+    heading_x, heading_y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    put(read, INPUT.heading_along, 1.0, frame, heading_x, heading_y)
+    # The heading is at most half a beam aside, so it is doubled to be as large as other inputs.
+    read[INPUT.heading_aside] *= 2.0
+    read[INPUT.top_speed] = memory[column.TOP_SPEED] / 2.0
+    read[INPUT.handling_time] = memory[column.HANDLING_TIME] / 2.0
+    read[INPUT.turns_to_drive] = 1.0 if memory[column.WIDEST_TURN] > 0.0 else 0.0
+
+
+@kernel
+def read_memory(
+    memory: NDArray[np.float64],
+    certainty: float,
+    frame: tuple[float, float],
+    read: NDArray[np.float32],
+) -> None:
+    """Fill the inputs of what a robot remembers: the way home, and failures of its own.
+
+    Args:
+        certainty: length of the sum of its directions home.
+    """
+    unit = math.tanh(certainty) / certainty if certainty > 0.0 else 0.0
+    put(read, INPUT.home_along, unit, frame, memory[column.HOME_X], memory[column.HOME_Y])
+    read[INPUT.home_certainty] = math.tanh(certainty / 3.0)
+    read[INPUT.failed], read[INPUT.stuck] = memory[column.FAILED], memory[column.STUCK]
+    home_x, home_y, kept_certainty = column.kept_home(memory)
+    kept_certainty = math.tanh(kept_certainty)
+    put(read, INPUT.kept_home_along, kept_certainty, frame, home_x, home_y)
+    distance = min(max(memory[column.AWAY], -FARTHEST), FARTHEST)
+    read[INPUT.kept_home_distance] = kept_certainty * distance / FARTHEST
+    read[INPUT.cannot_deliver] = memory[column.CANNOT_DELIVER]
+    read[INPUT.cannot_lift] = memory[column.CANNOT_LIFT]
+    longest = memory[column.HANDLING_TIME] + column.SURELY_IN_VAIN
+    read[INPUT.delivering_in_vain] = min(1.0, memory[column.DELIVERING] / longest)
 
 
 @kernel
@@ -289,17 +327,17 @@ def command_rows(
     turned: NDArray[np.float64],
     rows: NDArray[np.float32],
     period: float,
-    memory: NDArray[np.float64],
+    memories: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4) of outputs (N, 3) upon rows; memories take note of them."""
     for robot in range(outputs.shape[0]):
-        sensed, own, command = rows[robot], memory[robot], commands[robot]
+        sensed, memory, command = rows[robot], memories[robot], commands[robot]
         turn_outputs(outputs[robot], turned[robot], command)
-        known.clear_the_way(sensed, own, command)
-        known.stand_to_handle(sensed, period, own, command)
-        known.note_command(sensed, command, own)
-        known.steer(own, command)
+        column.clear_the_way(sensed, memory, command)
+        column.stand_to_handle(sensed, period, memory, command)
+        column.note_command(sensed, command, memory)
+        column.steer(memory, command)
 
 
 @kernel

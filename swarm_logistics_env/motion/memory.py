@@ -51,30 +51,32 @@ def wall_angle(sensed: NDArray[np.float32]) -> float:
     return math.atan2(y, x) % QUARTER
 
 
-# Columns of a memory array (N, N_COLUMNS).
-HEADING_X, HEADING_Y = 0, 1  # of its last motion, length 1
-HOME_X, HOME_Y = 2, 3  # fading sum of its directions into the delivery area, less those out
-WAS_INSIDE = 4  # the delivery area
-FAILED = 5  # 1: it just met its own failure; fades over FAILURE_TIME
-STUCK = 6  # 1: it just stood still with the requested item; falls to 0 in STUCK_TIME
-HELD = 7  # the last gripper command: 0 open, 1 hold, 2 hold the requested item it carries
-STANDING = 8  # [s] that it stood still with the requested item, less those that it moved
-CLEARING = 9  # [s] that are left to clear its way out of a cage of items; see `clearing`
-WALL = 10  # direction of a wall in its frame [rad], always the same one of the four
-SIGHTINGS, WATCHED = 11, 12  # number of times it saw how a wall stands, and for how long [s]
-TURNED, DRIFT = 13, 14  # of that direction since the first sighting [rad], and per second [rad/s]
-KEPT_X, KEPT_Y = 15, 16  # as HOME, from WALL on and fading in KEPT_TIME
-AWAY = 17  # from the border of the delivery area as far as it reckons, negative inside [m]
-CANNOT_DELIVER = 18  # 1: it takes its delivery for broken; falls to 0 in RETRY_TIME
-CANNOT_LIFT = 19  # 1: it takes its gripper for broken; falls to 0 in RETRY_TIME
-IN_VAIN = 20  # [s] that it held on to items in vain; fades in FADING_TIME, a lift clears it
-DELIVERING = 21  # [s] that it held the requested item inside the area; fades as IN_VAIN
-CARRIED = 22  # whether it carried anything
-HANDLES = 23  # [s] for which it goes on to stand, to lift, put down or deliver
-# What its maker knows of its body, see `body_of`; they stay for the whole episode.
-BODY = 24
-TOP_SPEED, HANDLING_TIME, WIDEST_TURN = BODY, BODY + 1, BODY + 2
-N_COLUMNS = 27
+# Columns of the memories (N, N_COLUMNS) of N robots.
+(
+    HEADING_X, HEADING_Y,  # of its last motion, length 1
+    HOME_X, HOME_Y,  # fading sum of its directions into the delivery area, less those out
+    WAS_INSIDE,  # the delivery area
+    FAILED,  # 1: it just met its own failure; fades over FAILURE_TIME
+    STUCK,  # 1: it just stood still with the requested item; falls to 0 in STUCK_TIME
+    HELD,  # the last gripper command: 0 open, 1 hold, 2 hold the requested item it carries
+    STANDING,  # [s] that it stood still with the requested item, less those that it moved
+    CLEARING,  # [s] that are left to clear its way out of a cage of items; see `clear_the_way`
+    WALL,  # direction of a wall in its frame [rad], always the same one of the four
+    SIGHTINGS, WATCHED,  # number of times it saw how a wall stands, and for how long [s]
+    TURNED, DRIFT,  # of that direction since the first sighting [rad], and per second [rad/s]
+    KEPT_X, KEPT_Y,  # as HOME, from WALL on and fading in KEPT_TIME
+    AWAY,  # from the border of the delivery area as far as it reckons, negative inside [m]
+    CANNOT_DELIVER,  # 1: it takes its delivery for broken; falls to 0 in RETRY_TIME
+    CANNOT_LIFT,  # 1: it takes its gripper for broken; falls to 0 in RETRY_TIME
+    IN_VAIN,  # [s] that it held on to items in vain; fades in FADING_TIME, a lift clears it
+    DELIVERING,  # [s] that it held the requested item inside the area; fades as IN_VAIN
+    CARRIED,  # whether it carried anything
+    HANDLES,  # [s] for which it goes on to stand, to lift, put down or deliver
+    # What its maker knows of its body, see `body_of`; they stay for the whole episode.
+    TOP_SPEED, HANDLING_TIME, WIDEST_TURN,
+    N_COLUMNS,
+) = range(28)  # fmt: skip
+BODY = slice(TOP_SPEED, N_COLUMNS)
 
 FAILURE_TIME = 60.0  # [s]
 RETRY_TIME = 120.0  # [s], after which it tries again: it may have been repaired
@@ -101,50 +103,50 @@ def body_of(scenario: Scenario) -> NDArray[np.float64]:
 
 
 @kernel
-def face_anywhere(keys: NDArray[np.uint64], memory: NDArray[np.float64]) -> None:
+def face_anywhere(keys: NDArray[np.uint64], memories: NDArray[np.float64]) -> None:
     """Fill the headings in memories (N, N_COLUMNS) with random ones."""
-    for robot in range(memory.shape[0]):
+    for robot in range(memories.shape[0]):
         angle = 2.0 * math.pi * uniform(keys[robot], 0)
-        memory[robot, HEADING_X], memory[robot, HEADING_Y] = math.cos(angle), math.sin(angle)
+        memories[robot, HEADING_X], memories[robot, HEADING_Y] = math.cos(angle), math.sin(angle)
 
 
 @kernel
-def remember(rows: NDArray[np.float32], period: float, memory: NDArray[np.float64]) -> None:
+def remember(rows: NDArray[np.float32], period: float, memories: NDArray[np.float64]) -> None:
     """Take what the rows (N, D) tell into the memories, once a control period [s]."""
     for robot in range(rows.shape[0]):
-        sensed, known = rows[robot], memory[robot]
+        sensed, memory = rows[robot], memories[robot]
         x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
         speed = length_of(x, y)
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
         delivers = sensed[row.CARRYING_REQUESTED] > 0.5
 
-        diagnose(sensed, period, known)
+        diagnose(sensed, period, memory)
 
-        known[STUCK] = max(0.0, known[STUCK] - period / STUCK_TIME)
-        stands = delivers and known[HELD] > 1.5 and speed < STANDS
+        memory[STUCK] = max(0.0, memory[STUCK] - period / STUCK_TIME)
+        stands = delivers and memory[HELD] > 1.5 and speed < STANDS
         if stands:
-            known[STUCK] = 1.0
-        known[STANDING] = max(0.0, known[STANDING] + (period if stands else -period))
-        known[CLEARING] = max(0.0, known[CLEARING] - period)
-        if known[STANDING] > CAGED_TIME and not is_inside:
-            known[STANDING], known[CLEARING] = 0.0, CLEARING_TIME
+            memory[STUCK] = 1.0
+        memory[STANDING] = max(0.0, memory[STANDING] + (period if stands else -period))
+        memory[CLEARING] = max(0.0, memory[CLEARING] - period)
+        if memory[STANDING] > CAGED_TIME and not is_inside:
+            memory[STANDING], memory[CLEARING] = 0.0, CLEARING_TIME
 
-        watch_walls(sensed, period, known)
+        watch_walls(sensed, period, memory)
         for column, time in ((HOME_X, HOME_TIME), (KEPT_X, KEPT_TIME)):
-            known[column] *= math.exp(-period / time)
-            known[column + 1] *= math.exp(-period / time)
-        if is_inside != (known[WAS_INSIDE] > 0.5) and speed > MOVES:
-            way = 1.0 if is_inside else -1.0
-            known[HOME_X] += way * x / speed
-            known[HOME_Y] += way * y / speed
-            along, aside = in_frame((math.cos(known[WALL]), math.sin(known[WALL])), x, y)
-            known[KEPT_X] += way / speed * along
-            known[KEPT_Y] += way / speed * aside
-            known[AWAY] = 0.0
-        home_x, home_y, sure = kept_home(known)
+            memory[column] *= math.exp(-period / time)
+            memory[column + 1] *= math.exp(-period / time)
+        if is_inside != (memory[WAS_INSIDE] > 0.5) and speed > MOVES:
+            inwards = 1.0 if is_inside else -1.0
+            memory[HOME_X] += inwards * x / speed
+            memory[HOME_Y] += inwards * y / speed
+            along, aside = in_frame((math.cos(memory[WALL]), math.sin(memory[WALL])), x, y)
+            memory[KEPT_X] += inwards / speed * along
+            memory[KEPT_Y] += inwards / speed * aside
+            memory[AWAY] = 0.0
+        home_x, home_y, sure = kept_home(memory)
         if sure > 0.0:
-            known[AWAY] -= period * (home_x * x + home_y * y)
-        known[WAS_INSIDE] = 1.0 if is_inside else 0.0
+            memory[AWAY] -= period * (home_x * x + home_y * y)
+        memory[WAS_INSIDE] = 1.0 if is_inside else 0.0
 
 
 @inlined_kernel
@@ -161,7 +163,7 @@ def in_frame(frame: tuple[float, float], x: float, y: float) -> tuple[float, flo
 
 
 @kernel
-def diagnose(sensed: NDArray[np.float32], period: float, known: NDArray[np.float64]) -> None:
+def diagnose(sensed: NDArray[np.float32], period: float, memory: NDArray[np.float64]) -> None:
     """Take one robot's row into what its memory tells of failures of its own.
 
     It takes its gripper or its delivery for broken only after having held on in vain for longer
@@ -169,28 +171,28 @@ def diagnose(sensed: NDArray[np.float32], period: float, known: NDArray[np.float
     """
     is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
     carries, delivers = sensed[row.CARRYING] > 0.5, sensed[row.CARRYING_REQUESTED] > 0.5
-    known[FAILED] *= 1.0 - period / FAILURE_TIME
+    memory[FAILED] *= 1.0 - period / FAILURE_TIME
     for column in (CANNOT_LIFT, CANNOT_DELIVER):
-        known[column] = max(0.0, known[column] - period / RETRY_TIME)
+        memory[column] = max(0.0, memory[column] - period / RETRY_TIME)
     for column in (IN_VAIN, DELIVERING):
-        known[column] *= 1.0 - period / FADING_TIME
+        memory[column] *= 1.0 - period / FADING_TIME
     # What it brought inside and did not let go of was delivered.
-    if is_inside and not carries and known[HELD] > 1.5:
-        known[DELIVERING], known[CANNOT_DELIVER], known[FAILED] = 0.0, 0.0, 0.0
-    if carries != (known[CARRIED] > 0.5):
-        known[HANDLES] = 0.0
-    known[CARRIED] = 1.0 if carries else 0.0
-    surely = known[HANDLING_TIME] + SURELY_IN_VAIN - 0.5 * period
+    if is_inside and not carries and memory[HELD] > 1.5:
+        memory[DELIVERING], memory[CANNOT_DELIVER], memory[FAILED] = 0.0, 0.0, 0.0
+    if carries != (memory[CARRIED] > 0.5):
+        memory[HANDLES] = 0.0
+    memory[CARRIED] = 1.0 if carries else 0.0
+    surely = memory[HANDLING_TIME] + SURELY_IN_VAIN - 0.5 * period
     if carries:
-        known[IN_VAIN], known[CANNOT_LIFT] = 0.0, 0.0
-    elif known[HELD] > 0.5 and known[HELD] < 1.5 and item_in_reach(sensed):
-        known[IN_VAIN] += period
-        if known[IN_VAIN] > surely:
-            known[IN_VAIN], known[CANNOT_LIFT], known[FAILED] = 0.0, 1.0, 1.0
+        memory[IN_VAIN], memory[CANNOT_LIFT] = 0.0, 0.0
+    elif memory[HELD] > 0.5 and memory[HELD] < 1.5 and item_in_reach(sensed):
+        memory[IN_VAIN] += period
+        if memory[IN_VAIN] > surely:
+            memory[IN_VAIN], memory[CANNOT_LIFT], memory[FAILED] = 0.0, 1.0, 1.0
     if is_inside and delivers:
-        known[DELIVERING] += period
-        if known[DELIVERING] > surely:
-            known[CANNOT_DELIVER], known[FAILED] = 1.0, 1.0
+        memory[DELIVERING] += period
+        if memory[DELIVERING] > surely:
+            memory[CANNOT_DELIVER], memory[FAILED] = 1.0, 1.0
 
 
 @kernel
@@ -199,122 +201,124 @@ def item_in_reach(sensed: NDArray[np.float32]) -> bool:
 
     It lifts no item again that it just put down, unless that is requested.
     """
-    found = False
-    for place in range(row.N_ITEMS_IN_VIEW):
-        item = row.ITEMS + row.ITEM_WIDTH * place
+    is_in_reach = False
+    for index in range(row.N_ITEMS_IN_VIEW):
+        item = row.ITEMS + row.ITEM_WIDTH * index
         away = length_of(sensed[item + 1], sensed[item + 2])
         may_lift = sensed[item + 3] > 0.5 or sensed[item + 4] < 0.5
-        found |= sensed[item] > 0.5 and away < SURELY_IN_REACH and may_lift
-    return found
+        is_in_reach |= sensed[item] > 0.5 and away < SURELY_IN_REACH and may_lift
+    return is_in_reach
 
 
 @kernel
-def watch_walls(sensed: NDArray[np.float32], period: float, known: NDArray[np.float64]) -> None:
+def watch_walls(sensed: NDArray[np.float32], period: float, memory: NDArray[np.float64]) -> None:
     """Take one robot's row into what its memory tells of a wall's direction."""
-    if known[SIGHTINGS] > 0.0:
-        known[WATCHED] += period
-        known[TURNED] += known[DRIFT] * period
-        known[WALL] += known[DRIFT] * period
+    if memory[SIGHTINGS] > 0.0:
+        memory[WATCHED] += period
+        memory[TURNED] += memory[DRIFT] * period
+        memory[WALL] += memory[DRIFT] * period
     seen = wall_angle(sensed)
     if seen >= 0.0:
-        off = seen - known[WALL]
+        off = seen - memory[WALL]
         off -= QUARTER * round(off / QUARTER)
-        if known[SIGHTINGS] > 0.0:
-            off *= max(1.0 / known[SIGHTINGS], LEAST_GAIN)
-            known[TURNED] += off
-        known[SIGHTINGS] += 1.0
-        known[WALL] += off
-        known[DRIFT] = known[TURNED] / (known[WATCHED] + SETTLING_TIME)
-    known[WALL] -= 2.0 * math.pi * round(known[WALL] / (2.0 * math.pi))
+        if memory[SIGHTINGS] > 0.0:
+            off *= max(1.0 / memory[SIGHTINGS], LEAST_GAIN)
+            memory[TURNED] += off
+        memory[SIGHTINGS] += 1.0
+        memory[WALL] += off
+        memory[DRIFT] = memory[TURNED] / (memory[WATCHED] + SETTLING_TIME)
+    memory[WALL] -= 2.0 * math.pi * round(memory[WALL] / (2.0 * math.pi))
 
 
 @kernel
-def kept_home(known: NDArray[np.float64]) -> tuple[float, float, float]:
+def kept_home(memory: NDArray[np.float64]) -> tuple[float, float, float]:
     """Return the direction home, of length 1, and how often it was taken lately; 0: never.
 
     The area has a straight border along a wall, so a robot that saw one goes at a right angle.
     """
-    sure = length_of(known[KEPT_X], known[KEPT_Y])
+    sure = length_of(memory[KEPT_X], memory[KEPT_Y])
     if sure == 0.0:
         return 0.0, 0.0, 0.0
-    angle = math.atan2(known[KEPT_Y], known[KEPT_X])
-    if known[SIGHTINGS] > 0.0:
+    angle = math.atan2(memory[KEPT_Y], memory[KEPT_X])
+    if memory[SIGHTINGS] > 0.0:
         angle = QUARTER * round(angle / QUARTER)
-    angle += known[WALL]
+    angle += memory[WALL]
     return math.cos(angle), math.sin(angle), sure
 
 
 @kernel
 def note_command(
-    sensed: NDArray[np.float32], command: NDArray[np.float64], own: NDArray[np.float64]
+    sensed: NDArray[np.float32], command: NDArray[np.float64], memory: NDArray[np.float64]
 ) -> None:
     """Remember the command (4,) that was given upon a row."""
     x, y, grips = command[0], command[1], command[3]
     speed = length_of(x, y)
     if speed > 0.05:
-        own[HEADING_X], own[HEADING_Y] = x / speed, y / speed
-    own[HELD] = 1.0 if grips > 0.5 else 0.0
+        memory[HEADING_X], memory[HEADING_Y] = x / speed, y / speed
+    memory[HELD] = 1.0 if grips > 0.5 else 0.0
     if sensed[row.CARRYING_REQUESTED] > 0.5 and grips > -0.5:
-        own[HELD] = 2.0
+        memory[HELD] = 2.0
 
 
 @kernel
 def stand_to_handle(
     sensed: NDArray[np.float32],
     period: float,
-    own: NDArray[np.float64],
+    memory: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> None:
     """Let a robot stand in its command (4,) while it lifts, puts down or delivers.
 
     The world makes it stand anyway; so its memory knows that its body does not turn.
     """
-    if own[HANDLING_TIME] <= 0.0:
+    if memory[HANDLING_TIME] <= 0.0:
         return
-    own[HANDLES] = max(0.0, own[HANDLES] - period)
+    memory[HANDLES] = max(0.0, memory[HANDLES] - period)
     carries, grips = sensed[row.CARRYING] > 0.5, command[3]
     begins = carries and grips < -0.5
-    begins |= not carries and grips > 0.5 and own[CANNOT_LIFT] <= 0.0 and item_in_reach(sensed)
+    begins |= not carries and grips > 0.5 and memory[CANNOT_LIFT] <= 0.0 and item_in_reach(sensed)
     is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
-    delivers = sensed[row.CARRYING_REQUESTED] > 0.5 and own[CANNOT_DELIVER] <= 0.0
+    delivers = sensed[row.CARRYING_REQUESTED] > 0.5 and memory[CANNOT_DELIVER] <= 0.0
     begins |= is_inside and delivers
-    if begins and own[HANDLES] <= 0.0:
-        own[HANDLES] = own[HANDLING_TIME] + period
-    if own[HANDLES] > 0.0:
+    if begins and memory[HANDLES] <= 0.0:
+        memory[HANDLES] = memory[HANDLING_TIME] + period
+    if memory[HANDLES] > 0.0:
         command[:3] = 0.0
 
 
 @kernel
-def steer(own: NDArray[np.float64], command: NDArray[np.float64]) -> None:
+def steer(memory: NDArray[np.float64], command: NDArray[np.float64]) -> None:
     """Turn a command (4,) to drive in a direction into a turn and motion ahead or back.
 
     Of a robot that drives in every direction it stays as it is.
 
     Args:
-        own: the robot's memory; its directions are turned back by the robot's own turn.
+        memory: the robot's memory; its directions are turned back by the robot's own turn.
         command: forward and left as if the drive were holonomic; left becomes 0.
     """
-    widest, speed = own[WIDEST_TURN], length_of(command[0], command[1])
+    widest, speed = memory[WIDEST_TURN], length_of(command[0], command[1])
     if widest <= 0.0 or speed < 1e-6:
         return
-    angle, way = math.atan2(command[1], command[0]), 1.0
+    angle = math.atan2(command[1], command[0])
+    forwards = 1.0
     if abs(angle) > 0.5 * math.pi:
         # It drives as well backwards, so that it never turns by more than a quarter.
-        angle, way = angle - math.copysign(math.pi, angle), -1.0
+        angle -= math.copysign(math.pi, angle)
+        forwards = -1.0
     turn = min(max(angle, -widest), widest)
     # It drives along its mean direction in the period, and slower the more that is off.
-    command[0] = way * speed * max(0.0, math.cos(angle - 0.5 * turn))
+    command[0] = forwards * speed * max(0.0, math.cos(angle - 0.5 * turn))
     command[1], command[2] = 0.0, turn / widest
-    turn_back(turn, own)
+    turn_back(turn, memory)
 
 
 @kernel
-def turn_back(turn: float, own: NDArray[np.float64]) -> None:
+def turn_back(turn: float, memory: NDArray[np.float64]) -> None:
     """Turn the directions in one memory by -turn [rad], as the body turns by `turn`."""
     frame = math.cos(turn), math.sin(turn)
     for column in (HEADING_X, HOME_X):
-        own[column], own[column + 1] = in_frame(frame, own[column], own[column + 1])
-    own[WALL] -= turn
+        memory[column], memory[column + 1] = in_frame(frame, memory[column], memory[column + 1])
+    memory[WALL] -= turn
 
 
 # Ranges in m, beside the pick-up range of 0.25: hold lifts the requested item first if in reach.
@@ -324,19 +328,19 @@ _PUT_DOWN_TIME = 0.5  # [s] before the end, at which the item that was in the wa
 
 @kernel
 def clear_the_way(
-    sensed: NDArray[np.float32], own: NDArray[np.float64], command: NDArray[np.float64]
+    sensed: NDArray[np.float32], memory: NDArray[np.float64], command: NDArray[np.float64]
 ) -> None:
     """Replace the command (4,) of a caged robot, which its memory tells."""
-    if own[CLEARING] <= 0.0:
+    if memory[CLEARING] <= 0.0:
         return
     requested, other = nearest_items(sensed)
     x, y, speed, gripper = 0.0, 0.0, 0.0, -1.0
     if sensed[row.CARRYING_REQUESTED] < 0.5 and sensed[row.CARRYING] > 0.5:
-        x, y = own[HEADING_X], own[HEADING_Y]
+        x, y = memory[HEADING_X], memory[HEADING_Y]
         if requested >= 0:
             x, y = -sensed[requested + 1], -sensed[requested + 2]
         speed = 1.0
-        gripper = 1.0 if own[CLEARING] > _PUT_DOWN_TIME else -1.0
+        gripper = 1.0 if memory[CLEARING] > _PUT_DOWN_TIME else -1.0
     elif sensed[row.CARRYING] < 0.5 and other >= 0:
         x, y = sensed[other + 1], sensed[other + 2]
         away = length_of(x, y)
@@ -360,14 +364,14 @@ def drive(x: float, y: float, speed: float, gripper: float, command: NDArray[np.
 def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
     """Return the columns of the requested item in view and of the nearest other; -1: none."""
     requested, other, nearest = -1, -1, math.inf
-    for place in range(row.N_ITEMS_IN_VIEW):
-        there = row.ITEMS + row.ITEM_WIDTH * place
-        if sensed[there] < 0.5:
+    for index in range(row.N_ITEMS_IN_VIEW):
+        item = row.ITEMS + row.ITEM_WIDTH * index
+        if sensed[item] < 0.5:
             continue
-        if sensed[there + 3] > 0.5:
-            requested = there
+        if sensed[item + 3] > 0.5:
+            requested = item
         else:
-            away = sensed[there + 1] ** 2 + sensed[there + 2] ** 2
+            away = sensed[item + 1] ** 2 + sensed[item + 2] ** 2
             if away < nearest:
-                other, nearest = there, away
+                other, nearest = item, away
     return requested, other

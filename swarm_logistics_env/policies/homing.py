@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import MotionView, random_heading
 from swarm_logistics_env.motion.memory import drive, length_of
 from swarm_logistics_env.scenario import Scenario
@@ -54,15 +54,15 @@ def decide_homing(
     for robot in range(rows.shape[0]):
         sensed, own = rows[robot], memory[robot]
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
-        x, y = own[known.HEADING_X], own[known.HEADING_Y]
+        x, y = own[column.HEADING_X], own[column.HEADING_Y]
         push_x, push_y = away_from_neighbours(sensed, AVOID_RANGE, AVOID_GAIN)
         speed, gripper = 1.0, -1.0
         if sensed[row.CARRYING_REQUESTED] > 0.5:
             # Inside it stands, and lets go only once it takes its delivery for broken.
-            if not is_inside or own[known.FAILED] < 0.5:
+            if not is_inside or own[column.FAILED] < 0.5:
                 gripper = 1.0
             speed = 0.0 if is_inside and gripper > 0.0 else 1.0
-            if own[known.STUCK] > 0.0:
+            if own[column.STUCK] > 0.0:
                 angle = random_heading(keys[robot], random_headings[robot])
                 x, y = math.cos(angle), math.sin(angle)
             elif not is_inside:
@@ -101,7 +101,7 @@ def requested_item(sensed: NDArray[np.float32], own: NDArray[np.float64], is_ins
 
     Not one that a robot inside held itself a moment ago.
     """
-    if own[known.FAILED] > 0.5:
+    if own[column.FAILED] > 0.5:
         return -1
     for place in range(row.N_ITEMS_IN_VIEW):
         there = row.ITEMS + row.ITEM_WIDTH * place
@@ -142,10 +142,10 @@ def search_direction(
     spread_x, spread_y = away_from_neighbours(sensed, SPREAD_RANGE, SPREAD_GAIN)
     x += wall_x + spread_x
     y += wall_y + spread_y
-    home = length_of(own[known.HOME_X], own[known.HOME_Y])
+    home = length_of(own[column.HOME_X], own[column.HOME_Y])
     if is_inside and home > 0.5:
-        x -= own[known.HOME_X] / home
-        y -= own[known.HOME_Y] / home
+        x -= own[column.HOME_X] / home
+        y -= own[column.HOME_Y] / home
     return x, y
 
 
@@ -154,11 +154,11 @@ def home_direction(
     sensed: NDArray[np.float32], own: NDArray[np.float64], x: float, y: float
 ) -> tuple[float, float]:
     """Return the direction in which a laden robot goes that drives in direction (x, y)."""
-    home = length_of(own[known.HOME_X], own[known.HOME_Y])
+    home = length_of(own[column.HOME_X], own[column.HOME_Y])
     trust = 1.0
     if home > 0.5:
-        x = HOME_SHARE * own[known.HOME_X] / home + (1.0 - HOME_SHARE) * x
-        y = HOME_SHARE * own[known.HOME_Y] / home + (1.0 - HOME_SHARE) * y
+        x = HOME_SHARE * own[column.HOME_X] / home + (1.0 - HOME_SHARE) * x
+        y = HOME_SHARE * own[column.HOME_Y] / home + (1.0 - HOME_SHARE) * y
         trust = 1.0 / home if home < SURE else 0.0
     if sensed[row.LOWEST_TIMER] > 0.5:
         lead_x, lead_y = sensed[row.LOWEST_TIMER + 1], sensed[row.LOWEST_TIMER + 2]
@@ -181,7 +181,7 @@ def freest_direction(
         angle = 2.0 * math.pi * number / N_DIRECTIONS
         go_x, go_y = math.cos(angle), math.sin(angle)
         worth = go_x * x + go_y * y
-        worth += 0.3 * (go_x * own[known.HEADING_X] + go_y * own[known.HEADING_Y])
+        worth += 0.3 * (go_x * own[column.HEADING_X] + go_y * own[column.HEADING_Y])
         for place in range(row.N_ITEMS_IN_VIEW):
             there = row.ITEMS + row.ITEM_WIDTH * place
             if sensed[there] < 0.5:

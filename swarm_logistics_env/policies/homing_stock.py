@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
-from swarm_logistics_env.motion import memory as known
+from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, random_heading
 from swarm_logistics_env.motion.memory import drive, length_of
 from swarm_logistics_env.policies.homing import (
@@ -71,21 +71,21 @@ def decide_homing_stock(
         turns = random_headings[robot] * RANDOM_HEADING_TIME / ROLE_TIME
         turn = int(turns + uniform(keys[robot], FIRST_ROLE))
         role = uniform(keys[robot], FIRST_ROLE + 1 + turn)
-        holds = role < HOLDERS and own[known.CANNOT_DELIVER] < 0.5
+        holds = role < HOLDERS and own[column.CANNOT_DELIVER] < 0.5
         forget_if_lost(own, is_inside)
-        home_x, home_y, sure = known.kept_home(own)
-        x, y = own[known.HEADING_X], own[known.HEADING_Y]
+        home_x, home_y, sure = column.kept_home(own)
+        x, y = own[column.HEADING_X], own[column.HEADING_Y]
         push_x, push_y = away_from_neighbours(sensed, AVOID_RANGE, AVOID_GAIN)
         item = requested_item(sensed, own, False)
         speed, gripper = 1.0, -1.0
         stands = is_inside and sensed[row.CARRYING_REQUESTED] > 0.5  # to deliver
-        if sensed[row.CARRYING] > 0.5 and own[known.STUCK] > STUCK and not stands:
+        if sensed[row.CARRYING] > 0.5 and own[column.STUCK] > STUCK and not stands:
             gripper = 0.0
             angle = random_heading(keys[robot], random_headings[robot])
             x, y = math.cos(angle) + PULL * home_x, math.sin(angle) + PULL * home_y
             x, y = freest_direction(sensed, own, x + push_x, y + push_y)
         elif sensed[row.CARRYING_REQUESTED] > 0.5:
-            gripper = 1.0 if not is_inside or own[known.FAILED] < 0.5 else -1.0
+            gripper = 1.0 if not is_inside or own[column.FAILED] < 0.5 else -1.0
             speed = 0.0 if stands and gripper > 0.0 else 1.0
             if not is_inside and sure > 0.0:
                 x, y = home_x, home_y
@@ -100,7 +100,7 @@ def decide_homing_stock(
             elif not holds and is_gap(sensed, own, is_inside):
                 pass  # it lets go here
             elif not holds and (is_inside or x * home_x + y * home_y < -0.3):
-                gripper = -1.0 if own[known.AWAY] > CARRIED_OFF else 0.0
+                gripper = -1.0 if own[column.AWAY] > CARRIED_OFF else 0.0
                 x, y = freest_direction(sensed, own, push_x - home_x, push_y - home_y)
             else:
                 gripper = 0.0
@@ -113,7 +113,7 @@ def decide_homing_stock(
             if item >= 0 and is_inside and sensed[item + 4] > 0.5:
                 item = -1  # it could not deliver it
             stocks = holds or role > HOLDERS
-            if item < 0 and stocks and sure > 0.0 and own[known.CANNOT_LIFT] <= 0.0:
+            if item < 0 and stocks and sure > 0.0 and own[column.CANNOT_LIFT] <= 0.0:
                 item = item_to_stock(sensed, own, home_x, home_y, 0.0 if holds else FAR)
             if item >= 0:
                 x, y, speed, gripper = fetch(sensed, item, push_x, push_y, period)
@@ -129,8 +129,8 @@ def decide_homing_stock(
 @kernel
 def forget_if_lost(own: NDArray[np.float64], is_inside: bool) -> None:
     """Forget the kept direction home if the distance reckoned with it cannot be."""
-    if (own[known.AWAY] > LOST) if is_inside else (own[known.AWAY] < -LOST):
-        own[known.KEPT_X], own[known.KEPT_Y], own[known.AWAY] = 0.0, 0.0, 0.0
+    if (own[column.AWAY] > LOST) if is_inside else (own[column.AWAY] < -LOST):
+        own[column.KEPT_X], own[column.KEPT_Y], own[column.AWAY] = 0.0, 0.0, 0.0
 
 
 @kernel
@@ -139,7 +139,7 @@ def is_gap(sensed: NDArray[np.float32], own: NDArray[np.float64], is_inside: boo
 
     The nearest item comes first in a row.
     """
-    if is_inside or own[known.AWAY] >= NEAR:
+    if is_inside or own[column.AWAY] >= NEAR:
         return False
     x, y = sensed[row.ITEMS + 1], sensed[row.ITEMS + 2]
     return bool(sensed[row.ITEMS] < 0.5 or length_of(x, y) > GAP)
@@ -156,7 +156,7 @@ def hold_direction(
 ) -> tuple[float, float]:
     """Return the velocity, in top speeds, to where a robot holds its item inside the area."""
     least = -1.0 if is_inside else 0.5
-    deeper = max(least, min(1.0, (own[known.AWAY] + DEPTH) / (2.0 * period)))
+    deeper = max(least, min(1.0, (own[column.AWAY] + DEPTH) / (2.0 * period)))
     far_x, far_y = away_from_neighbours(sensed, SPREAD_RANGE, 1.0)
     aside = max(-0.7, min(0.7, SPREAD_GAIN * (home_x * far_y - home_y * far_x)))
     return deeper * home_x - aside * home_y, deeper * home_y + aside * home_x
@@ -175,7 +175,7 @@ def item_to_stock(
         there = row.ITEMS + row.ITEM_WIDTH * place
         if sensed[there] < 0.5:
             break
-        away = own[known.AWAY] - sensed[there + 1] * home_x - sensed[there + 2] * home_y
+        away = own[column.AWAY] - sensed[there + 1] * home_x - sensed[there + 2] * home_y
         if sensed[there + 4] < 0.5 and away > least:
             return there
     return -1
