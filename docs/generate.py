@@ -21,7 +21,6 @@ from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, S
 from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS, Columns
 from swarm_logistics_env.studies.specification import Specification
-from swarm_logistics_env.studies.verdict import Cell, Verdict
 from swarm_logistics_env.train.training import Training, load_training, preset_names
 
 FACTORS = ("sizes", "faults", "parameters", "ablations")
@@ -117,9 +116,11 @@ def about(study: Specification) -> str:
     return f"{study.seeds} seeds, {world}; tables: {tables}"
 
 
-def columns_of(known: Columns[Cell] | Columns[Verdict]) -> str:
+def columns_of(columns: Columns) -> str:
     """Return the columns of a table of results with what they mean."""
-    return table(("column", "meaning"), [(f"`{name}`", text) for name, (*_, text) in known.items()])
+    return table(
+        ("column", "meaning"), [(f"`{name}`", text) for name, (*_, text) in columns.items()]
+    )
 
 
 def sections(record: type[Record], names: Iterable[str]) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self, TypeVar
+from typing import ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,7 @@ class Cell:
         problem: why runs are missing; None: they are complete.
         published: P of the reference; None: it has none.
         counted: whether it is one of the cells of the reference's tables.
+        confidence: level of its intervals.
     """
 
     policy: str
@@ -56,6 +57,7 @@ class Cell:
     problem: str | None
     published: float | None = None
     counted: bool = False
+    confidence: ClassVar[float] = CONFIDENCE
 
     @classmethod
     def of(

@@ -159,7 +159,7 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
 
 
 def test_a_column_that_is_not_there_is_an_error_at_once(found: StudyResults) -> None:
-    known: Any = {"low": (float, lambda cell: cell.mean.lower, "a slip of the pen")}
+    known: Any = {"low": (float, "mean.lower", "a slip of the pen")}
     with pytest.raises(AttributeError, match="lower"):
         frame(found.cells, known)
     # Every column has a value somewhere in a whole study, but for what only others have.
