@@ -118,7 +118,8 @@ def about(study: Specification) -> str:
 
 def columns_of(columns: Columns) -> str:
     """Return the columns of a table of results with what they mean."""
-    return table(
+    rows = [(f"`{name}`", text) for name, (*_, text) in columns.items()]
+    return table(("column", "meaning"), rows)
         ("column", "meaning"), [(f"`{name}`", text) for name, (*_, text) in columns.items()]
     )
 
