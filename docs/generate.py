@@ -120,8 +120,6 @@ def columns_of(columns: Columns) -> str:
     """Return the columns of a table of results with what they mean."""
     rows = [(f"`{name}`", text) for name, (*_, text) in columns.items()]
     return table(("column", "meaning"), rows)
-        ("column", "meaning"), [(f"`{name}`", text) for name, (*_, text) in columns.items()]
-    )
 
 
 def sections(record: type[Record], names: Iterable[str]) -> str:
