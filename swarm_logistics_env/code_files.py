@@ -132,7 +132,9 @@ def is_users_own(file: str | None) -> bool:
     if file is None:
         return True  # typed into an interpreter or a notebook
     path = Path(file).absolute()
-    return not any(path.is_relative_to(folder) for folder in _installed())
+    # Another environment's packages may be on the path, too.
+    is_package = not {"site-packages", "dist-packages"}.isdisjoint(path.parts)
+    return not is_package and not any(path.is_relative_to(folder) for folder in _installed())
 
 
 @functools.cache

@@ -8,11 +8,12 @@ from pathlib import Path
 from types import ModuleType
 
 import cloudpickle
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_logistics_env.code_files import import_file
+from swarm_logistics_env.code_files import import_file, is_users_own
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies import load
 
@@ -62,6 +63,15 @@ def test_modules_are_kept_apart_and_executed_once(
         policy.reset(1, 0)
     assert policy.act(None) == 3  # type: ignore[arg-type]
     assert sys.modules["gains"] is stranger
+
+
+def test_packages_of_another_environment_are_no_code_of_the_users(tmp_path: Path) -> None:
+    assert is_users_own(str(tmp_path / "mine.py"))
+    assert is_users_own(None)
+    for folder in ("lib/python3/dist-packages", "other/site-packages"):
+        assert not is_users_own(str(tmp_path / folder / "numpy" / "core.py"))
+    assert not is_users_own(np.__file__)
+    assert not is_users_own(os.__file__)
 
 
 @given(st.permutations(["v1", "v2", "v1/deep", "."]))
