@@ -358,14 +358,17 @@ def drive(x: float, y: float, speed: float, gripper: float, command: NDArray[np.
 
 @kernel
 def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
-    """Return the columns of the requested item in view and of the nearest other; -1: none."""
+    """Return the columns of the nearest requested item in view and of the nearest other; -1: none.
+
+    The nearest thing comes first in a row.
+    """
     requested, other, nearest = -1, -1, math.inf
     for place in range(row.N_ITEMS_IN_VIEW):
         there = row.ITEMS + row.ITEM_WIDTH * place
         if sensed[there] < 0.5:
             continue
         if sensed[there + 3] > 0.5:
-            requested = there
+            requested = there if requested < 0 else requested
         else:
             away = sensed[there + 1] ** 2 + sensed[there + 2] ** 2
             if away < nearest:
