@@ -71,7 +71,8 @@ class Before:
     def keeps(self, state: WarehouseState, robots: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which of these robots carried what they carry already, and it was requested."""
         items = state.robot_item[robots]
-        return self.requested[items] & (self.carriers[items] == robots)
+        keeps: NDArray[np.bool_] = self.requested[items] & (self.carriers[items] == robots)
+        return keeps
 
 
 Earned = NDArray[np.float64] | float | None  # per robot, the same for all, or nothing

@@ -121,7 +121,8 @@ class WarehouseState:
     @property
     def carries_requested(self) -> Flags:
         """Which robots carry an item that is asked for (N,)."""
-        return (self.robot_item != NOBODY) & self.item_requested[self.robot_item]
+        carries: Flags = (self.robot_item != NOBODY) & self.item_requested[self.robot_item]
+        return carries
 
     @property
     def anchoring_seconds(self) -> float:

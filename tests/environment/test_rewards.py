@@ -144,8 +144,7 @@ def test_stocking_pays_the_way_of_every_item_so_that_no_circle_earns() -> None:
     assert total.sum() == pytest.approx(nearer.sum())
 
 
-# With requests for the items 2 and 4 and none cannot deliver but robot 3: the weights, what was
-# before, and what each change pays.
+# With requests for the items 2 and 4: the weights, what was before, and what each change pays.
 ALL_REQUESTS: dict[str, tuple[dict[str, float], list[Act], list[tuple[list[Act], list[float]]]]] = {
     "each lift and each end of it": ({"lift_requested": 1.0}, [(give, 0, 2)], [
         ([(give, 1, 4)], [0.0, 1.0, 0.0, 0.0]),
@@ -160,6 +159,10 @@ ALL_REQUESTS: dict[str, tuple[dict[str, float], list[Act], list[tuple[list[Act],
         {"approach": 1.0}, [(give, 0, 2), (give, 1, 4), (to, 0, 3.0, 1.0), (to, 1, 4.0, 1.0)], [
         ([(to, 0, 3.5, 1.0), (to, 1, 3.0, 1.0)], [0.5, -1.0, 0.0, 0.0]),
         ([(deliver, 0, 5), (to, 1, 3.2, 1.0)], [0.0, 0.2, 0.0, 0.0])]),
+    "no way that was driven before the item was asked for": (
+        {"approach": 1.0}, [(give, 0, 2), (give, 1, 5), (to, 1, 4.0, 1.0)], [
+        ([(deliver, 0, 5), (to, 1, 4.5, 1.0)], NOTHING),
+        ([(to, 1, 5.0, 1.0)], [0.0, 0.5, 0.0, 0.0])]),
     "for every request that is blocked": ({"blocked_request": -1.0}, [(disable, 3), (disable, 1)], [
         ([(give, 3, 4), (give, 1, 2)], [0.0, -0.1, 0.0, -0.1])]),
 }  # fmt: skip

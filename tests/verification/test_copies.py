@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import math
 import pickle
 from collections.abc import Callable, Sequence
@@ -23,6 +24,7 @@ from verification.trajectories import GROUPS
 EXAMPLES = 2000 if settings().max_examples >= 2000 else 5
 STEPS = 1000  # beyond the rebuilding of bodies, which comes after 500 steps
 Change = tuple[int, Callable[[Warehouse], None]]
+Copy = Callable[[Warehouse], Warehouse]
 
 
 @st.composite
@@ -79,10 +81,10 @@ def changes(draw: st.DrawFn, n_robots: int, last: int) -> list[Change]:
         if draw(st.booleans()):
             name = draw(st.sampled_from(sorted(fields)))
             changed = {name: draw(fields[name])}
-            found.append((at, lambda world, changed=changed: world.change(**changed)))
+            found.append((at, functools.partial(Warehouse.change, **changed)))
         else:
             faults = draw(fault_lists(n_robots))
-            found.append((at, lambda world, faults=faults: world.set_faults(faults)))
+            found.append((at, functools.partial(Warehouse.set_faults, faults=faults)))
     return found
 
 
@@ -108,7 +110,7 @@ def assert_goes_on(
     world: Warehouse,
     rng: np.random.Generator,
     copied_at: int,
-    copied: Callable[[Warehouse], Warehouse],
+    copied: Copy,
     events: Sequence[Change] = (),
 ) -> None:
     """Assert that a copy and its copy are the same bits as `world` in each of the next steps."""
@@ -147,7 +149,8 @@ def test_a_copy_of_any_world_at_any_moment_goes_on_to_the_same_bits(
         return
     copied_at = data.draw(st.sampled_from([0, 1]) | st.integers(0, 700))
     events = data.draw(changes(scenario.n_robots, copied_at + 300))
-    copied = data.draw(st.sampled_from([through_pickle, copy.deepcopy]))
+    ways: list[Copy] = [through_pickle, copy.deepcopy]
+    copied = data.draw(st.sampled_from(ways))
     assert_goes_on(world, np.random.default_rng(seed), copied_at, copied, events)
 
 
