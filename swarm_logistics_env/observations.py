@@ -75,7 +75,7 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
         Column("item_present", "flag", items["present"], 0, 1, "a free item is in view"),
         Column("item_x", "m", items["x"], -view, view, "its centre, forward"),
         Column("item_y", "m", items["y"], -view, view, "its centre, left"),
-        Column("item_requested", "flag", items["requested"], 0, 1, "it is the requested one"),
+        Column("item_requested", "flag", items["requested"], 0, 1, "it is a requested one"),
         Column(
             "item_recently_held", "flag", items["recently_held"], 0, 1, "it was put down lately"
         ),
@@ -91,9 +91,7 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
         Column("lowest_timer_y", "m", lowest["y"], -far, far, "its sender, left"),
         Column("lowest_timer", "s", lowest["timer"], 0, limit, "the lowest timer heard"),
         Column("carrying", "flag", _run(CARRYING, 1), 0, 1, "it carries an item"),
-        Column(
-            "carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "the requested one"
-        ),
+        Column("carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "a requested one"),
         Column("in_delivery_area", "flag", _run(IN_DELIVERY_AREA, 1), 0, 1, "its centre is there"),
         Column("timer_runs", "flag", _run(TIMER_RUNS, 1), 0, 1, "its own timer is not silent"),
         Column("timer", "s", _run(TIMER, 1), 0, limit, "its own timer; the limit when silent"),

@@ -115,8 +115,9 @@ interpret_kernels()
 
 CHECK_POLICIES_AND_STUDIES = """
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
+from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.wrappers import HalfSpeed
+from swarm_logistics_env.wrappers import HalfSpeed, IndicatorReward
 
 small = Scenario(n_robots=3, n_items=4, duration=5.0)
 assert len(run_episode(small, policies.load("circles"), 0, ["weak:2@1"]).failed_robots) == 2
@@ -135,6 +136,12 @@ study = Study(seeds=2, scenario=small.model_dump(), faults=[fault], indicators=[
 study.run(engine="local")
 study.report(Path())
 assert "performance kept K; above " in Path("report.md").read_text()
+try:
+    IndicatorReward(swarm_logistics_v0.parallel_env(), "K", references=33.0)
+except SetupError as error:
+    assert str(error) == "no indicator 'K' is paid; known: A, FT, P, R, S", error
+else:
+    raise AssertionError("an indicator without payments pays nothing in silence")
 
 walking = Study(task="lane", policies=["walker"], seeds=2, sizes=[{"values": [2, 4]}])
 assert walking.run(engine="local").failed == 0

@@ -131,17 +131,18 @@ class Faults:
 
     def _in_role(self, one: Planned, now: State, views: list[float]) -> list[int]:
         """Return the robots that a fault by role strikes: those in it, then those nearest."""
-        asked, carrier = now.requested, now.carrier
+        asked = _asked(now)
+        carriers = [now.item_carrier[item] for item in asked if now.item_carrier[item] != NOBODY]
 
         def away(robot: int) -> float:
-            if asked == NOBODY:
-                return 0.0
-            return math.dist(now.robot_position[robot], now.item_position[asked])
+            here = now.robot_position[robot]
+            return min((math.dist(here, now.item_position[item]) for item in asked), default=0.0)
 
         def role(robot: int) -> str:
-            if robot == carrier:
+            if robot in carriers:
                 return "carrier"
-            if carrier != NOBODY and away(robot) <= views[carrier]:
+            here = now.robot_position[robot]
+            if any(math.dist(here, now.robot_position[c]) <= views[c] for c in carriers):
                 return "neighbour"
             if now.robot_in_delivery[robot]:
                 return "in_area"
@@ -207,10 +208,16 @@ def rewards(
     """Return what a step pays each robot that was there as it began."""
     period, edge, total = scenario.control_period, scenario.storage_width, []
     new = now.delivered_by[len(before.delivered_by) :]
-    was, is_ = before.carrier, now.carrier
+    asked = _asked(before) & _asked(now)  # what a step takes up, brings nearer or lets go of
     for robot in range(now.n_robots):
         x, x_before = (moment.robot_position[robot, 0] for moment in (now, before))
-        carries_on = is_ == was == robot and now.requested == before.requested
+        was, is_ = (moment.robot_item[robot] for moment in (before, now))
+        carries_on = is_ in asked and is_ == was
+        lifts = is_ in asked and is_ != was
+        lies = was in asked and now.item_carrier[was] == NOBODY and new
+        # What was delivered and is asked for again lies elsewhere than its carrier stands.
+        is_back = lies and list(now.item_position[was]) != list(now.robot_position[robot])
+        drops = was in asked and is_ != was and not is_back
         way = 0.0
         for item, after in enumerate(now.item_carrier):
             who = before.item_carrier[item] if after == NOBODY else after
@@ -220,19 +227,24 @@ def rewards(
                 way -= min(before.item_position[item, 0], edge)
         delivers = now.delivers[robot]
         deeper = 2.0 * (max(x, edge) - max(x_before, edge)) if carries_on else 0.0
-        nearer = min(x, edge) - min(x_before, edge) if carries_on and not new else 0.0
+        nearer = min(x, edge) - min(x_before, edge) if carries_on else 0.0
         terms = {
             "delivery": len(new),
             "own_delivery": new.count(robot),
-            "lift_requested": 0 if new else ((is_ == robot) - (was == robot)) * delivers,
+            "lift_requested": (int(lifts) - int(drops)) * delivers,
             "approach": nearer,
             "stocking": way,
             "contact": period * now.robot_contact[robot],
-            "blocked_request": (period + deeper) * (is_ == robot and not delivers),
+            "blocked_request": (period + deeper) * (is_ in _asked(now) and not delivers),
         }
         paid = sum(weights.get(name, 0.0) * value for name, value in terms.items())
         total.append(paid if before.robot_present[robot] else 0.0)
     return total
+
+
+def _asked(moment: State) -> set[int]:
+    """Return the items that requests are open for."""
+    return set(moment.open_requests.tolist()) - {NOBODY}
 
 
 def ends(before: State, now: State, last_step: int) -> tuple[list[bool], list[bool]]:

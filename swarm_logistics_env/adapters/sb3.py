@@ -321,7 +321,8 @@ class SwarmVecNormalize(VecNormalize):  # type: ignore[misc]  # not in the envir
 
     `VecNormalize` itself counts rows of padding, which are zeros: with sizes drawn from 3 and 25
     that is 44 % of all rows, so that its means and deviations are not those of what robots sense.
-    Here rows that are no robot's count neither among observations nor among returns.
+    Here rows that are no robot's count neither among observations nor among returns, and they stay
+    zeros.
 
     Args:
         venv: a `SwarmVecEnv`, or wrappers of stable-baselines3 around one.
@@ -349,6 +350,19 @@ class SwarmVecNormalize(VecNormalize):  # type: ignore[misc]  # not in the envir
         """Take the commands of the step that `step_wait` makes."""
         self._acting = self.venv.present
         super().step_async(actions)
+
+    def _normalize_obs(
+        self, obs: NDArray[np.float32], obs_rms: RunningMeanStd
+    ) -> NDArray[np.float32]:
+        # Robots always sense something, so zeros are padding; of rows, or of one, as at an end.
+        is_robot = obs.any(axis=-1, keepdims=True)
+        return np.where(is_robot, super()._normalize_obs(obs, obs_rms), 0.0)
+
+    def _unnormalize_obs(
+        self, obs: NDArray[np.float32], obs_rms: RunningMeanStd
+    ) -> NDArray[np.float32]:
+        is_robot = obs.any(axis=-1, keepdims=True)
+        return np.where(is_robot, super()._unnormalize_obs(obs, obs_rms), 0.0)
 
     def _update_reward(self, reward: NDArray[np.float32]) -> None:
         self.returns = self.returns * self.gamma + reward

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.state import NOBODY
+from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 
 DEFAULT_WEIGHTS: Mapping[str, float] = {"delivery": 1.0}
 
@@ -64,10 +64,15 @@ class Before:
 
     def __init__(self, world: Warehouse) -> None:
         state = world.state
-        self.delivered, self.requested = len(state.delivery_times), state.requested
-        self.carrier = carrier = state.carrier
-        self.carrier_x = 0.0 if carrier == NOBODY else float(state.robot_position[carrier, 0])
+        self.delivered, self.requested = len(state.delivery_times), state.item_requested
         self.carriers, self.item_x = state.item_carrier.copy(), state.item_position[:, 0].copy()
+        self.robot_x = state.robot_position[:, 0].copy()
+
+    def keeps(self, state: WarehouseState, robots: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which of these robots carried what they carry already, and it was requested."""
+        items = state.robot_item[robots]
+        keeps: NDArray[np.bool_] = self.requested[items] & (self.carriers[items] == robots)
+        return keeps
 
 
 Earned = NDArray[np.float64] | float | None  # per robot, the same for all, or nothing
@@ -87,36 +92,41 @@ def own_delivery(world: Warehouse, before: Before) -> Earned:
 
 
 def lift_requested(world: Warehouse, before: Before) -> Earned:
-    """1 to the robot that took up the requested item, -1 to the one that let go of it.
+    """1 to the robot that took up a requested item, -1 to the one that let go of it.
 
     Nothing to one that cannot deliver (privileged: as `approach`).
     """
-    carrier = world.state.carrier
-    # Deliveries tell that the request changed; the item's number does not, as the same item may be
-    # asked for again with `restock`.
-    if world.state.delivered != before.delivered or carrier == before.carrier:
+    state, carriers = world.state, world.state.item_carrier
+    items = np.flatnonzero(before.requested & state.item_requested & (carriers != before.carriers))
+    if not items.size:
         return None
-    paid = np.zeros(world.state.n_robots)
-    delivers = world.state.delivers
-    if carrier != NOBODY and delivers[carrier]:
-        paid[carrier] += 1.0
-    if before.carrier != NOBODY and delivers[before.carrier]:
-        paid[before.carrier] -= 1.0
+    paid, delivers = np.zeros(state.n_robots), state.delivers
+    for item in items.tolist():
+        now, was = int(carriers[item]), int(before.carriers[item])
+        # One that was delivered and is asked for again does not lie where its carrier stands.
+        is_back = state.delivered != before.delivered and now == NOBODY
+        if is_back and (state.item_position[item] != state.robot_position[was]).any():
+            continue
+        if now != NOBODY and delivers[now]:
+            paid[now] += 1.0
+        if was != NOBODY and delivers[was]:
+            paid[was] -= 1.0
     return paid
 
 
 def approach(world: Warehouse, before: Before) -> Earned:
-    """Metres that the requested item's carrier came nearer to the delivery area.
+    """Metres that the carrier of a requested item came nearer to the delivery area.
 
     Privileged: no robot can sense it, so it may shape a reward but not an observation.
     """
-    carrier = world.state.carrier
-    if carrier == NOBODY or carrier != before.carrier or before.requested != world.state.requested:
+    state, edge = world.state, world.scenario.storage_width
+    robots = np.flatnonzero(state.carries_requested)
+    robots = robots[before.keeps(state, robots)]
+    if not robots.size:
         return None
-    paid = np.zeros(world.state.n_robots)
-    edge = world.scenario.storage_width
-    x = world.state.robot_position[carrier, 0]
-    paid[carrier] = min(x, edge) - min(before.carrier_x, edge)
+    paid = np.zeros(state.n_robots)
+    paid[robots] = np.minimum(state.robot_position[robots, 0], edge)
+    paid[robots] -= np.minimum(before.robot_x[robots], edge)
     return paid
 
 
@@ -146,20 +156,20 @@ def contact(world: Warehouse, before: Before) -> Earned:
 
 
 def blocked_request(world: Warehouse, before: Before) -> Earned:
-    """Seconds that a robot that cannot deliver held the requested item; weigh it negatively.
+    """Seconds that a robot that cannot deliver held a requested item; weigh it negatively.
 
     A metre into the delivery area counts `SECONDS_A_METRE`, and the way out gives them back: an
     item that is let go there is found by nobody. Privileged: as `approach`.
     """
-    carrier = world.state.carrier
-    if carrier == NOBODY or world.state.delivers[carrier]:
+    state, edge = world.state, world.scenario.storage_width
+    robots = np.flatnonzero(state.carries_requested & ~state.delivers)
+    if not robots.size:
         return None
-    paid = np.zeros(world.state.n_robots)
-    paid[carrier] = world.scenario.control_period
-    if carrier == before.carrier and before.requested == world.state.requested:
-        edge = world.scenario.storage_width
-        x = float(world.state.robot_position[carrier, 0])
-        paid[carrier] += SECONDS_A_METRE * (max(x, edge) - max(before.carrier_x, edge))
+    paid = np.zeros(state.n_robots)
+    paid[robots] = world.scenario.control_period
+    robots = robots[before.keeps(state, robots)]
+    deeper = np.maximum(state.robot_position[robots, 0], edge)
+    paid[robots] += SECONDS_A_METRE * (deeper - np.maximum(before.robot_x[robots], edge))
     return paid
 
 

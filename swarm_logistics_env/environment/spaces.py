@@ -44,7 +44,7 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
     limit = world.scenario.max_speed
     here[:, 5:7] = np.clip(state.robot_velocity, -limit, limit)
     here[:, 7] = state.robot_item != NOBODY
-    here[:, 8] = here[:, 7] * (state.robot_item == state.requested)
+    here[:, 8] = here[:, 7] * state.carries_requested
     here[:, 9] = np.nan_to_num(state.robot_timer, nan=world.scenario.timer_limit)
     here[~state.robot_present] = 0.0
     items = np.zeros((n_items, len(ITEM_FEATURES)), np.float32)
@@ -52,8 +52,7 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
     there[:, 0] = state.item_status == STORED
     there[:, 1] = state.item_status == CARRIED
     there[:, 2:4] = state.item_position * (there[:, :1] + there[:, 1:2])
-    if state.requested != NOBODY:
-        there[state.requested, 4] = 1.0
+    there[:, 4] = state.item_requested
     width, height = world.scenario.warehouse_width, world.scenario.warehouse_height
     for places in (here[:, 1:3], there[:, 2:4]):
         np.clip(places, 0.0, (width, height), out=places)

@@ -362,14 +362,17 @@ def drive(x: float, y: float, speed: float, gripper: float, command: NDArray[np.
 
 @kernel
 def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
-    """Return the columns of the requested item in view and of the nearest other; -1: none."""
+    """Return the columns of the nearest requested item in view and of the nearest other; -1: none.
+
+    The nearest thing comes first in a row.
+    """
     requested, other, nearest = -1, -1, math.inf
     for index in range(row.N_ITEMS_IN_VIEW):
         item = row.ITEMS + row.ITEM_WIDTH * index
         if sensed[item] < 0.5:
             continue
         if sensed[item + 3] > 0.5:
-            requested = item
+            requested = item if requested < 0 else requested
         else:
             away = sensed[item + 1] ** 2 + sensed[item + 2] ** 2
             if away < nearest:

@@ -1,8 +1,8 @@
 """A central controller that sees the whole warehouse, for comparison with swarms.
 
-One robot at a time works on the request: the best one fetches the item and takes it home, on the
-cheapest way around free items and other robots. All others wait right under free items, spread
-out, so that somebody is always near, and nobody is where a laden robot could drive. It does
+One robot at a time works on the oldest request: the best one fetches the item and takes it home,
+on the cheapest way around free items and other robots. All others wait right under free items,
+spread out, so that somebody is always near, and nobody is where a laden robot could drive. It does
 not know which robots fail. If a robot makes no progress, another one is sent, and the first is not
 chosen again for a while.
 """

@@ -79,10 +79,9 @@ def mark(modes: tuple[str, ...]) -> str:
 
 def activity(state: WarehouseState, robot: int) -> str:
     """Return what a robot does, a key of `ACTIVITIES`."""
-    item = int(state.robot_item[robot])
-    if item == NOBODY:
+    if state.robot_item[robot] == NOBODY:
         return "searching"
-    return "delivering" if item == state.requested else "shuffling"
+    return "delivering" if state.carries_requested[robot] else "shuffling"
 
 
 def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:

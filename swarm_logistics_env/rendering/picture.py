@@ -52,15 +52,15 @@ class Picture:
         self._draw_halos(state, robots)
         for number in np.flatnonzero(state.item_status == STORED).tolist():
             self._stamp(sprites.item(self._item_half, False), items[number])
-        carrier = state.carrier
-        if carrier != NOBODY and (leader := palette.followed(state, scenario, carrier)) != NOBODY:
-            self._draw_arrow(robots[carrier], robots[leader])
+        for carrier in np.flatnonzero(state.carries_requested).tolist():
+            if (leader := palette.followed(state, scenario, carrier)) != NOBODY:
+                self._draw_arrow(robots[carrier], robots[leader])
         self._canvas.set_clip(None)
         self._draw_robots(state, robots)
-        if state.requested != NOBODY:
-            if carrier == NOBODY:
-                self._stamp(sprites.item(1.4 * self._item_half, True), items[state.requested])
-            self._stamp(sprites.target(1.9 * self._robot_radius + 1.0), items[state.requested])
+        for number in np.flatnonzero(state.item_requested).tolist():
+            if state.item_carrier[number] == NOBODY:
+                self._stamp(sprites.item(1.4 * self._item_half, True), items[number])
+            self._stamp(sprites.target(1.9 * self._robot_radius + 1.0), items[number])
         self._draw_badges(state, robots)
         self._write_caption(state)
         return self._canvas

@@ -153,6 +153,7 @@ def _spaces(env: Env) -> dict[str, tuple[Space[Value], Space[Value]]]:
     return {a: (env.observation_space(a), env.action_space(a)) for a in env.possible_agents}
 
 
+GRACE = 5e-7  # [s]; times are products of steps and periods, which need not be round numbers
 REMOVED = "removed"
 FAILURE_MODES = {
     "silent": "its actions are replaced by the task's no-op",
@@ -182,7 +183,7 @@ class RobotFault(Record):
 
     def active(self, time: float) -> bool:
         """Return whether the robots fail at a time [s]."""
-        return self.onset <= time < self.onset + (self.duration or np.inf)
+        return self.onset - GRACE <= time < self.onset + (self.duration or np.inf) - GRACE
 
 
 def failing_rows(seed: int, n_robots: int, n_failing: int) -> tuple[int, ...]:

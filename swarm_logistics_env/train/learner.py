@@ -55,11 +55,11 @@ def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.floa
     world = unpacked_at(World, address)
     robots, able, items = world.robots, world.able, world.items
     edge, height = world.parameters.storage_width, world.parameters.warehouse_height
-    requested = world.progress.requested[0]
-    carrier = NOBODY if requested == NOBODY else items.carrier[requested]
     for robot in range(len(robots.position)):
         row = known[robot]
         x, y = robots.position[robot, 0], robots.position[robot, 1]
+        requested = nearest_request(world, x, y)
+        carrier = NOBODY if requested == NOBODY else items.carrier[requested]
         frame = robots.heading[robot] + turned[robot]
         cos, sin = math.cos(frame), math.sin(frame)
         row[0], row[1] = (edge - x) / 10.0, (y - 0.5 * height) / 10.0
@@ -80,6 +80,18 @@ def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.floa
             row[12] = 1.0
             row[13] = (edge - robots.position[carrier, 0]) / 10.0
             row[14] = 1.0 if able.delivers[carrier] else 0.0
+
+
+@kernel
+def nearest_request(world: World, x: float, y: float) -> int:
+    """Return the item that is asked for and lies nearest to a place [m], or NOBODY."""
+    nearest, least = NOBODY, math.inf
+    for item in world.progress.requested:
+        if item != NOBODY:
+            away = length_of(world.items.position[item, 0] - x, world.items.position[item, 1] - y)
+            if away < least:
+                nearest, least = item, away
+    return nearest
 
 
 class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environment of the type check

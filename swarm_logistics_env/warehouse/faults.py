@@ -35,8 +35,8 @@ from .state import WarehouseState, robots_in_role
 from .structs import Capabilities
 
 Role = Literal[
-    "carrier",  # carries the requested item
-    "neighbour",  # the carrier sees it with its cameras
+    "carrier",  # carries a requested item
+    "neighbour",  # a carrier sees it with its cameras
     "in_area",  # in the delivery area
     "shuffling",  # carries an item that is not requested
     "searching",  # empty, anywhere else

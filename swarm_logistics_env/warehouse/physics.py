@@ -170,7 +170,7 @@ def build_robots(world: World) -> None:
     # A batch reads and writes bodies in the order in which they were added.
     for robot in range(len(robots.item)):
         body = made_at(call.cpBodyNew, (parameters.robot_mass, math.inf))
-        place = (robots.position[robot, 0], robots.position[robot, 1])
+        place = (engine.robot_places[robot, 0], engine.robot_places[robot, 1])
         call_at(call.cpBodySetPosition, (body, place))
         velocity = (robots.velocity[robot, 0], robots.velocity[robot, 1])
         call_at(call.cpBodySetVelocity, (body, velocity))
@@ -216,13 +216,18 @@ class Physics:
 
     Unladen robots drive under free items, laden ones collide with them. A robot that is taken out
     stays as a ghost that touches nothing, so that rows keep their robots. Nothing is made until
-    `begin`; what the engine remembers of contacts is not part of a world's state.
+    `begin`; what the engine remembers of contacts is not part of a world's state. Where a ghost
+    stands is, as it decides in which order the engine finds the contacts of others.
+
+    Args:
+        scenario: the conditions of the episode.
+        robot_places: (N, 2) [m] where the robots' bodies are made, also those of ghosts.
 
     Attributes:
         engine: what compiled code knows of it.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, robot_places: Numbers) -> None:
         n = scenario.n_robots
         # A batch call reads and writes every body: of N robots, and the static one.
         self._kept = [
@@ -234,6 +239,7 @@ class Physics:
         self.engine = Engine(
             functions=_FUNCTION_ADDRESSES,
             space=np.zeros(1, np.int64),
+            robot_places=robot_places,
             robot_bodies=np.zeros(n, np.int64),
             robot_shapes=np.zeros(n, np.int64),
             item_shapes=np.zeros(scenario.n_items, np.int64),

@@ -112,6 +112,19 @@ class WarehouseState:
         return int(self.progress.requested[0])
 
     @property
+    def item_requested(self) -> Flags:
+        """Which items are asked for (I,): a request for them is open."""
+        asked = np.zeros(len(self.item_status), np.bool_)
+        asked[self.open_requests[self.open_requests != NOBODY]] = True
+        return asked
+
+    @property
+    def carries_requested(self) -> Flags:
+        """Which robots carry an item that is asked for (N,)."""
+        carries: Flags = (self.robot_item != NOBODY) & self.item_requested[self.robot_item]
+        return carries
+
+    @property
     def anchoring_seconds(self) -> float:
         """Seconds for which working robots touched failed ones, summed over robots."""
         return float(self.progress.anchoring_seconds[0])
@@ -140,12 +153,12 @@ def roles_of(state: WarehouseState) -> NDArray[np.str_]:
     roles = np.full(state.n_robots, "searching", dtype="<U9")
     roles[state.robot_item != NOBODY] = "shuffling"
     roles[state.robot_in_delivery] = "in_area"
-    carrier = state.carrier
-    if carrier != NOBODY:
+    carries = state.carries_requested
+    for carrier in np.flatnonzero(carries).tolist():
         to_carrier = state.robot_position - state.robot_position[carrier]
         is_near = np.hypot(*to_carrier.T) <= state.view_range[carrier]
         roles[is_near] = "neighbour"
-        roles[carrier] = "carrier"
+    roles[carries] = "carrier"
     roles[~state.robot_present] = ""
     return roles
 
@@ -153,13 +166,13 @@ def roles_of(state: WarehouseState) -> NDArray[np.str_]:
 def robots_in_role(state: WarehouseState, role: str, count: int) -> NDArray[np.int64]:
     """Return the numbers of `count` robots, ascending: those in the role first.
 
-    Among robots alike, those nearest to the requested item come first; so the sets of 1, 2, 3
+    Among robots alike, those nearest to a requested item come first; so the sets of 1, 2, 3
     robots are nested.
     """
     distance = np.zeros(state.n_robots)
     if state.requested != NOBODY:
-        away = state.robot_position - state.item_position[state.requested]
-        distance = np.hypot(*away.T)
+        away = state.robot_position[:, None] - state.item_position[state.item_requested]
+        distance = np.hypot(*away.T).min(axis=0)
     is_other = roles_of(state) != role
     order = np.lexsort((distance, is_other, ~state.robot_present))
     return np.sort(order[:count]).astype(np.int64)

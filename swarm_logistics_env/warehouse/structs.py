@@ -212,6 +212,7 @@ class Engine(NamedTuple):
 
     functions: Functions
     space: Annotated[Integers, 1]
+    robot_places: Annotated[Numbers, "N", 2]  # [m] where the bodies are made, of ghosts as well
     robot_bodies: Annotated[Integers, "N"]
     robot_shapes: Annotated[Integers, "N"]
     item_shapes: Annotated[Integers, "I"]

@@ -83,6 +83,7 @@ class Warehouse:
         self.scenario, self.state, self._seed = scenario, state, seed
         self._occurrences = occurrences
         self._make_room_to_work()
+        self._robot_places = state.robot_position.copy()
         self._build()
         stepping.begin(self._address)
         self._apply_faults()
@@ -143,9 +144,10 @@ class Warehouse:
         if outcome.is_paused[0]:
             self._apply_faults()
             stepping.perceive(self._address, rows)
-        if len(self._logged()) == self._longest_log:
+        is_room = outcome.is_room.item()
+        if len(self._logged()) == self._longest_log or not is_room:  # a replay would raise, too
             self._remember()
-        if not outcome.is_room[0]:
+        if not is_room:
             raise ScenarioError(
                 f"no room for items that come back (delivery {state.delivered}): should be fewer "
                 "items or robots, or a larger warehouse"
@@ -300,6 +302,7 @@ class Warehouse:
         What the engine remembers of contacts cannot be saved, so a pickle holds the world at the
         last such moment and the commands since, which unpickling replays.
         """
+        self._robot_places = self.state.robot_position.copy()
         self._build()
         self._save()
 
@@ -350,7 +353,7 @@ class Warehouse:
         n, n_columns = self._command_shape
         state.progress.last_step[0] = scenario.n_steps
         lengths = lengths_of(scenario)
-        self._physics = Physics(scenario)
+        self._physics = Physics(scenario, self._robot_places)
         self._world = World(
             parameters=Parameters(*(getattr(scenario, name) for name in Parameters._fields)),
             commands=Commands(

@@ -21,7 +21,7 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import columns, unflatten
 from swarm_logistics_env.rendering import palette
 from swarm_logistics_env.warehouse import FAILURE_MODES
-from swarm_logistics_env.warehouse.state import NOBODY, STORED
+from swarm_logistics_env.warehouse.state import STORED
 
 from .session import SPEEDS, Session
 
@@ -58,7 +58,7 @@ def frame(session: Session) -> Message:
     For each of the two runs, with its number 0 or 1 behind the name: `poses` (3 N numbers: x, y,
     heading of each robot, or None where it is absent), `robots` ([activity, age of its timer in 1/8
     of the limit or None, mark, robot it follows] of each), `items` (x, y of each that is stored),
-    `requested` ([x, y, carrier] of the item asked for, or None) and `deliveries` (their times).
+    `requested` ([x, y, carrier] of each that is asked for) and `deliveries` (their times).
     """
     frame: Message = {
         **{name: getattr(session, name) for name in _TOLD},
@@ -158,16 +158,13 @@ def _arena(play: Play) -> Message:
         robots.append(
             [palette.activity(state, robot), age, mark, palette.followed(state, scenario, robot)]
         )
-    requested, stored = None, state.item_status == STORED
-    if state.requested != NOBODY:
-        (place,) = _millimetres(state.item_position[[state.requested]])
-        requested = [*place, state.carrier]
-        stored[state.requested] = False
+    asked, stored = state.item_requested, state.item_status == STORED
+    places, carriers = _millimetres(state.item_position[asked]), state.item_carrier[asked].tolist()
     return {
         "poses": poses,
         "robots": robots,
-        "items": _millimetres(state.item_position[stored]),
-        "requested": requested,
+        "items": _millimetres(state.item_position[stored & ~asked]),
+        "requested": [[*place, carrier] for place, carrier in zip(places, carriers)],
         "deliveries": [round(time, 1) for time in state.delivery_times],
     }
 

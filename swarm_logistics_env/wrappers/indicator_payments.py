@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from swarm_logistics_env.environment.requests import checked_count
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 
@@ -128,9 +128,9 @@ class RunningMeans:
         return max(self.performance(condition), self.least)
 
 
-# The performances that each indicator is relative to.
-PERFORMANCES = {d.symbol: d.references for d in DEFINITIONS.values() if d.compares != "policy"}
-INDICATORS = tuple(PERFORMANCES)
+# The indicators that `comparison` has a case of, and the performances that each is relative to.
+INDICATORS = ("S", "FT", "R", "A")
+PERFORMANCES = {name: DEFINITIONS[name].references for name in INDICATORS}
 
 
 @dataclass(frozen=True)
@@ -168,8 +168,10 @@ def comparison(name: str, tested: Condition, own: Scenario) -> Ratio | None:
         own: the scenario that changes are relative to, with the N of S.
 
     Raises:
-        SetupError: the indicator is about such an episode, but undefined.
+        SetupError: the indicator is about such an episode, but undefined; or it is none of those.
     """
+    if name not in (*INDICATORS, "P"):
+        raise SetupError(f"no indicator {name!r} is paid{suggest(name, (*INDICATORS, 'P'))}")
     n, m = tested.n_robots, tested.n_failed
     unbroken = dataclasses.replace(tested, modes=(), n_failed=0)
     if name == "R" and m:
@@ -205,11 +207,9 @@ def indicator_of(
     Raises:
         SetupError: a reference performance is missing or 0, or the indicator is undefined.
     """
-    if name == "P":
-        return Payment(1.0)
     compared = comparison(name, condition, own)
     if compared is None:
-        return None
+        return Payment(1.0) if name == "P" else None
     p_o = p_against = references.divisor(compared.reference)
     if compared.against != compared.reference:
         p_against = references.performance(compared.against)

@@ -44,8 +44,8 @@ class IndicatorReward(Wrapper):
 
     The `Condition` of an episode is read from the warehouse. So it may come from the options of a
     reset or from wrappers inside or outside of this one. Removed robots do not count as faulty.
-    When a parameter changes in mid-run, the next reward corrects what was paid before, so that
-    the return is still A.
+    When a parameter changes in mid-run, or a fault by role chooses its robots, the next reward
+    corrects what was paid before, so that the return is still the indicator.
 
     *References as numbers.* Give P_o of the environment's own scenario, which then stands for
     episodes with other parameters as well, or a performance for each condition, for instance the
@@ -191,7 +191,7 @@ class IndicatorReward(Wrapper):
         """Count the episode before if it came to its end; store what this one is and pays."""
         if self._is_over:
             self.measured.add(self.condition, self._delivered)
-        self._seed, self._is_over = seed, False
+        self._is_over = False
         self._paid, self._delivered = Payment(), 0
         self._take_condition()
 
@@ -202,7 +202,7 @@ class IndicatorReward(Wrapper):
         state = world.state
         rewards = self.own_reward * own if self.own_reward else np.zeros(state.n_robots)
         deliverers = state.delivered_by[self._delivered :]
-        if world.scenario is not self._scenario or world.faults is not self._faults:
+        if world.is_eventful and condition_of(world, self._own) != self.condition:
             self._take_condition()
         if self._paid is not self._due or deliverers:
             self._pay(rewards, deliverers, state.robot_present | terminations)
@@ -225,9 +225,7 @@ class IndicatorReward(Wrapper):
             rewards[robot] += self._due.share
 
     def _take_condition(self) -> None:
-        world = self.unwrapped.warehouse
-        self._scenario, self._faults = world.scenario, world.faults
-        self.condition = condition_of(world, self._seed, self._own)
+        self.condition = condition_of(self.unwrapped.warehouse, self._own)
         self.payments = self.payments_of(self.condition)
         self._indicators = {
             name: indicator
@@ -247,6 +245,6 @@ def _checked_weights(weights: str | Mapping[str, float]) -> dict[str, float]:
     known = (*INDICATORS, "P")
     for name, weight in checked.items():
         if name not in known:
-            raise SetupError(f"no indicator {name!r}{suggest(str(name), known)}")
+            raise SetupError(f"no indicator {name!r} is paid{suggest(str(name), known)}")
         finite_number(f"weights[{name!r}]", weight)
     return checked

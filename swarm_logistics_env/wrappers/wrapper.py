@@ -18,7 +18,7 @@ from swarm_logistics_env.environment.spaces import ArrayStep, DictView
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import Fault, failed_robots
+from swarm_logistics_env.warehouse.faults import Fault
 
 
 @dataclass(frozen=True)
@@ -62,17 +62,24 @@ class Condition:
             )
 
 
-def condition_of(world: Warehouse, seed: int, own: Scenario) -> Condition:
-    """Return the condition of the episode of `seed` in `world`, relative to the scenario `own`."""
+def condition_of(world: Warehouse, own: Scenario) -> Condition:
+    """Return the condition of the episode in `world`, relative to the scenario `own`.
+
+    A fault by role that has not chosen its robots yet counts as one of robots that fail by no other
+    fault.
+    """
     n_robots = world.scenario.n_robots
     modes, failed, removed = set[str](), set[int](), set[int]()
-    for fault in world.faults:
-        robots = failed_robots(fault, seed, n_robots).tolist()
-        if fault.mode == "removed":
-            removed.update(robots)
-        else:
+    faults = world.numbered_faults
+    for fault in sorted(faults, key=lambda fault: isinstance(fault.robots, int)):
+        affected = removed if fault.mode == "removed" else failed
+        if fault.mode != "removed":
             modes.add(fault.mode)
-            failed.update(robots)
+        if isinstance(fault.robots, int):
+            others = [robot for robot in range(n_robots) if robot not in affected]
+            affected.update(others[: fault.robots])
+        else:
+            affected.update(fault.robots)
     changes = changes_of(world.scenario, own)
     return Condition(n_robots, tuple(sorted(modes)), len(failed), len(removed), changes)
 

@@ -132,6 +132,25 @@ def test_statistics_are_those_of_rows_that_are_robots(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.obs_rms.mean, env.obs_rms.mean)
 
 
+def test_padding_stays_zeros_when_it_is_normalized() -> None:
+    env = SwarmVecNormalize(in_padding())
+    rng = np.random.default_rng(0)
+    rows, n_padding, n_ended = env.reset(), 0, 0
+    for _ in range(50):
+        present = env.venv.present
+        assert not rows[~present].any()
+        assert rows[present].any(axis=1).all()
+        raw = env.get_original_obs()
+        np.testing.assert_allclose(env.unnormalize_obs(rows)[~present], raw[~present])
+        n_padding += int((~present).sum())
+        rows, _, dones, infos = env.step(rng.uniform(-1, 1, (24, 4)))
+        for row in np.flatnonzero(dones).tolist():
+            if infos[row]["padding"]:
+                assert not infos[row]["terminal_observation"].any()
+                n_ended += 1
+    assert min(n_padding, n_ended) > 10
+
+
 def test_without_padding_it_is_theirs() -> None:
     ours, theirs = (kind(worlds(2, rewards=STEADY)) for kind in (SwarmVecNormalize, VecNormalize))
     ours.reset(), theirs.reset()

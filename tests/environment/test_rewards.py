@@ -52,6 +52,10 @@ def lay(world: Warehouse, item: int, x: float, y: float) -> None:
     world.state.item_position[item] = [x, y]
 
 
+def at_robot(world: Warehouse, item: int, robot: int) -> None:
+    world.state.item_position[item] = world.state.robot_position[robot]
+
+
 def disable(world: Warehouse, robot: int) -> None:
     world.state.delivers[robot] = world.state.lifts[robot] = False
 
@@ -138,3 +142,43 @@ def test_stocking_pays_the_way_of_every_item_so_that_no_circle_earns() -> None:
     assert (total != 0.0).all()
     nearer = np.minimum(state.item_position[:, 0], edge) - np.minimum(begun, edge)
     assert total.sum() == pytest.approx(nearer.sum())
+
+
+# With requests for the items 2 and 4: the weights, what was before, and what each change pays.
+ALL_REQUESTS: dict[str, tuple[dict[str, float], list[Act], list[tuple[list[Act], list[float]]]]] = {
+    "each lift and each end of it": ({"lift_requested": 1.0}, [(give, 0, 2)], [
+        ([(give, 1, 4)], [0.0, 1.0, 0.0, 0.0]),
+        ([(put_down, 0), (give, 2, 2), (put_down, 1)], [-1.0, -1.0, 1.0, 0.0])]),
+    "a lift beside a delivery, which costs nothing": ({"lift_requested": 1.0}, [(give, 0, 2)], [
+        ([(deliver, 0, 5), (give, 1, 4)], [0.0, 1.0, 0.0, 0.0])]),
+    "the end of a lift beside a delivery": ({"lift_requested": 1.0}, [(give, 0, 2), (give, 1, 4)], [
+        ([(deliver, 0, 5), (put_down, 1), (at_robot, 4, 1)], [0.0, -1.0, 0.0, 0.0])]),
+    "nothing for what is delivered and asked for again": (
+        {"lift_requested": 1.0}, [(give, 0, 2), (give, 1, 4)], [([(deliver, 0, 2)], NOTHING)]),
+    "the way of every carrier": (
+        {"approach": 1.0}, [(give, 0, 2), (give, 1, 4), (to, 0, 3.0, 1.0), (to, 1, 4.0, 1.0)], [
+        ([(to, 0, 3.5, 1.0), (to, 1, 3.0, 1.0)], [0.5, -1.0, 0.0, 0.0]),
+        ([(deliver, 0, 5), (to, 1, 3.2, 1.0)], [0.0, 0.2, 0.0, 0.0])]),
+    "no way that was driven before the item was asked for": (
+        {"approach": 1.0}, [(give, 0, 2), (give, 1, 5), (to, 1, 4.0, 1.0)], [
+        ([(deliver, 0, 5), (to, 1, 4.5, 1.0)], NOTHING),
+        ([(to, 1, 5.0, 1.0)], [0.0, 0.5, 0.0, 0.0])]),
+    "for every request that is blocked": ({"blocked_request": -1.0}, [(disable, 3), (disable, 1)], [
+        ([(give, 3, 4), (give, 1, 2)], [0.0, -0.1, 0.0, -0.1])]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", ALL_REQUESTS)
+def test_with_several_requests_it_pays(case: str) -> None:
+    world = Warehouse(Scenario(n_robots=4, n_items=6, n_requests=2))
+    world.reset(0)
+    world.state.open_requests[:] = 2, 4
+    weights, before, changes = ALL_REQUESTS[case]
+    for act, *arguments in before:
+        act(world, *arguments)
+    terms = RewardTerms(weights)
+    terms.begin(world)
+    for acts, paid in changes:
+        for act, *arguments in acts:
+            act(world, *arguments)
+        assert terms.pay(world).tolist() == pytest.approx(paid)

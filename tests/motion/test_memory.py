@@ -187,3 +187,12 @@ def test_the_way_home_is_kept_though_the_body_turns_unnoticed() -> None:
     assert np.median(np.abs(memory[has, column.AWAY] - away)) < 0.6
     drifts = memory[has, column.DRIFT] + state.robot_heading_drift[has]
     assert np.median(np.abs(drifts)) < 0.01
+
+
+def test_of_several_requested_items_in_view_the_nearest_counts() -> None:
+    rows, ahead = sensed(), [0.3, 0.5, 0.6, 0.8]
+    for place, (away, asked) in enumerate(zip(ahead, [0, 1, 1, 0])):
+        there = row.ITEMS + row.ITEM_WIDTH * place
+        rows[0, there : there + row.ITEM_WIDTH] = [1, away, 0, asked, 0]
+    requested, other = known.nearest_items(rows[0])
+    assert (requested, other) == (row.ITEMS + row.ITEM_WIDTH, row.ITEMS)

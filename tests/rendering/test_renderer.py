@@ -133,6 +133,29 @@ def test_requested_item_is_plain_to_see() -> None:
     assert count(arena(state, scenario, 800), palette.REQUESTED) == 0
 
 
+def test_every_request_and_every_robot_that_carries_one_is_plain_to_see() -> None:
+    places = [[2, 2], [8, 2], [5, 8], [2, 8], [8, 8], [6, 5]]
+    robots = [[4, 5], [1, 5]]
+    state, _ = situation(robots, places)
+    scenario = Scenario(n_robots=2, n_items=6, n_requests=5)
+    state = WarehouseState(scenario)
+    state.robot_position, state.item_position = np.array(robots), np.array(places)
+    state.open_requests[:] = range(5)
+    give(state, 0, 3)  # not the oldest request
+    give(state, 1, 5)  # nothing that is asked for
+    floor = arena(state, scenario, 800)
+
+    def orange(x: float, y: float) -> int:
+        around = floor[int(760 - 76 * y) - 20 :, int(76 * x) - 20 :][:40, :40]
+        return count(around, palette.REQUESTED)
+
+    assert all(orange(*places[item]) > 200 for item in (0, 1, 2, 4))
+    assert orange(*robots[0]) > 100
+    assert orange(*robots[1]) == 0
+    assert [palette.activity(state, robot) for robot in (0, 1)] == ["delivering", "shuffling"]
+    assert min(count(floor, palette.DELIVERING), count(floor, palette.SHUFFLING)) > 50
+
+
 def test_what_a_robot_does_its_timer_and_its_heading_show() -> None:
     state, scenario = situation([[2, 2]], [[5, 5], [7, 7]])
 

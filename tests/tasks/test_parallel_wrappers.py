@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from gymnasium.spaces import Box, Dict, Discrete, Tuple
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarm_logistics_env.errors import FaultError, SetupError
 from swarm_logistics_env.tasks import (
@@ -198,3 +200,26 @@ def test_examples_run() -> None:
         warnings.simplefilter("ignore")  # theirs
         pytest.importorskip("pettingzoo.sisl.pursuit_v5")
         assert doctest.testmod(parallel_wrappers).failed == 0
+
+
+@given(
+    period=st.sampled_from([1.0, 0.1, 0.02, 1 / 30, 0.3]) | st.floats(0.005, 2.0),
+    first=st.integers(0, 2000),
+    steps=st.integers(1, 2000),
+    is_rounded=st.booleans(),
+)
+def test_a_fault_holds_in_the_steps_that_its_times_are_of(
+    period: float, first: int, steps: int, is_rounded: bool
+) -> None:
+    onset, duration = first * period, steps * period
+    if is_rounded:  # as people type them
+        onset, duration = round(onset, 9), round(duration, 9)
+    fault = RobotFault(mode="silent", robots=1, onset=onset, duration=duration)
+    around = {max(first - 1, 0), first, first + steps - 1, first + steps}
+    assert {step for step in around if fault.active(step * period)} == {
+        step for step in around if first <= step < first + steps
+    }
+    last = RobotFault(mode="silent", robots=1, onset=onset)
+    assert [last.active(step * period) for step in sorted(around)] == [
+        step >= first for step in sorted(around)
+    ]

@@ -43,6 +43,20 @@ def test_the_critic_knows_where_the_requested_item_is() -> None:
     assert told["carrier_to_delivery"] == pytest.approx(0.1)
 
 
+def test_of_several_requests_the_critic_knows_the_nearest() -> None:
+    env = SwarmLogisticsEnv(n_robots=2, n_items=5, n_requests=3)
+    env.reset_arrays(seed=0)
+    state = env.warehouse.state
+    state.robot_position[:], state.robot_heading[:] = [(4.0, 5.0), (1.0, 1.0)], 0.0
+    state.item_position[state.open_requests] = [(7.0, 9.0), (4.0, 6.0), (1.0, 3.0)]
+    known = np.zeros((2, len(KNOWN)), np.float32)
+    read_known(env.warehouse.address, np.zeros(2), known)
+    assert known[:, KNOWN.index("requested_distance")] == pytest.approx([0.1, 0.2])
+    state.item_carrier[state.open_requests[1]] = 0
+    read_known(env.warehouse.address, np.zeros(2), known)
+    assert known[:, KNOWN.index("is_carried")].tolist() == [1.0, 0.0]
+
+
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:
     view = NetworkView(small())
     view.seed(0)

@@ -31,6 +31,7 @@ from swarm_logistics_env.train.learner import (
     KNOWN,
     NetworkView,
     make_learner,
+    read_checkpoint,
     save_checkpoint,
     tensors_of,
 )
@@ -132,6 +133,25 @@ def test_the_view_trains_what_the_policy_plays_and_goes_on_from_a_checkpoint(sma
     for _ in range(70):  # beyond the ends of episodes
         outputs = rng.uniform(-1, 1, (3, 3)).astype(np.float32)
         for one, two in zip(view.step(outputs)[:2], other.step(outputs)[:2]):
+            assert one.tobytes() == two.tobytes()
+
+
+def test_a_checkpoint_of_worlds_with_removed_robots_goes_on_to_the_same_bits(
+    small: Any, tmp_path: Path
+) -> None:
+    training = small(
+        worlds=[{"n_robots": 16, "conditions": [{"modes": ["removed"], "robots": [8]}]}] * 3,
+        scenario=small().scenario.replace(duration=60.0),
+    )
+    learner = make_learner(training, NetworkView(training), "cpu")
+    learner._last_obs = learner.env.reset()  # as a rollout does
+    save_checkpoint(tmp_path, learner, None)
+    saved = read_checkpoint(tmp_path)
+    assert saved is not None
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        outputs = rng.uniform((0.5, -0.5, -1), (1, 0.5, 1), (48, 3)).astype(np.float32)
+        for one, two in zip(learner.env.step(outputs)[:2], saved["view"].step(outputs)[:2]):
             assert one.tobytes() == two.tobytes()
 
 

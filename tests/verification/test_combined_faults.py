@@ -58,9 +58,10 @@ def planned_faults(draw: st.DrawFn, n_robots: int, least: int) -> Planned:
 
 @st.composite
 def cases(draw: st.DrawFn) -> Case:
-    n = draw(st.integers(2, 6))
+    n, n_items = draw(st.integers(2, 6)), draw(st.integers(1, 4))
     scenario = Scenario(
-        n_robots=n, n_items=draw(st.integers(1, 4)), warehouse_width=2.5, warehouse_height=1.6,
+        n_robots=n, n_items=n_items, n_requests=draw(st.integers(1, n_items)),
+        warehouse_width=2.5, warehouse_height=1.6,
         delivery_width=draw(st.sampled_from([0.6, 1.2])), duration=STEPS * 0.1,
         restock=draw(st.booleans()), pickup_range=0.6, view_range=0.8, radio_range=1.2,
         timer_limit=1.5, relay=draw(st.sampled_from(["none", "gossip"])), message_size=1,

@@ -180,3 +180,22 @@ def test_robots_have_roles_and_those_of_a_role_come_first_then_those_near_the_it
     state.robot_present[0] = False
     assert 0 not in robots_in_role(state, "carrier", 5)
     assert roles_of(state)[0] == ""
+
+
+def test_roles_are_those_about_every_item_that_is_asked_for() -> None:
+    world = Warehouse(Scenario(n_robots=6, n_items=4, n_requests=3))
+    world.reset(0)
+    state = world.state
+    state.robot_position = np.array(
+        [[5.0, 5.0], [5.0, 5.8], [1.0, 1.0], [1.0, 1.5], [3.0, 9.0], [3.0, 7.0]]
+    )
+    oldest, second, third = state.open_requests.tolist()
+    state.robot_item[[0, 2]], state.item_carrier[[third, second]] = (third, second), (0, 2)
+    state.item_position[[oldest, second, third]] = [(3.0, 9.5), (1.0, 1.0), (5.0, 5.0)]
+    roles = ["carrier", "neighbour", "carrier", "neighbour", "searching", "searching"]
+    assert roles_of(state).tolist() == roles
+    assert robots_in_role(state, "carrier", 2).tolist() == [0, 2]
+    assert robots_in_role(state, "searching", 1).tolist() == [4]
+    assert robots_in_role(state, "in_area", 3).tolist() == [0, 2, 3]  # the distances 0, 0, 0.5 m
+    assert state.item_requested.sum() == 3
+    assert np.flatnonzero(state.carries_requested).tolist() == [0, 2]

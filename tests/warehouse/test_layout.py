@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -109,3 +110,6 @@ def test_where_nothing_fits_any_more_it_says_what_would_help(build: Build) -> No
         world.step([(0.0, 0.0, 0.0, 1.0)])
     assert (world.state.delivered, world.state.step) == (1, 1)
     assert world.all_delivered
+    copied = pickle.loads(pickle.dumps(world))
+    stay = [(0.0, 0.0, 0.0, 0.0)]
+    assert copied.step(stay).tobytes() == world.step(stay).tobytes()

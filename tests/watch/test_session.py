@@ -12,6 +12,7 @@ import pytest
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, policies, run_episode
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.warehouse.state import NOBODY, STORED
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.messages import Recording, frame
 
@@ -317,3 +318,22 @@ def test_a_policy_that_cannot_begin_leaves_the_session_as_it_is(
     assert (session.run, session.beside) == (run, beside)
     session.play(1.0)
     assert session.failure == ""
+
+
+def test_every_request_is_told_with_its_carrier() -> None:
+    session = Session(SMALL.replace(n_requests=3, restock=True), policy="homing", seed=1)
+    n_carriers = 0
+    while not session.is_over:
+        session.advance()
+        state, shown = session.state, frame(session)
+        asked = sorted(set(state.open_requests.tolist()))  # one may be asked for twice
+        places = np.rint(1000 * state.item_position[asked]).astype(int).tolist()
+        carriers = state.item_carrier[asked].tolist()
+        assert shown["requested0"] == [[*at, robot] for at, robot in zip(places, carriers)]
+        stored = set(np.flatnonzero(state.item_status == STORED).tolist()) - set(asked)
+        assert len(shown["items0"]) == len(stored)
+        activities = [told[0] for told in shown["robots0"]]
+        delivering = [robot for robot, does in enumerate(activities) if does == "delivering"]
+        assert delivering == sorted({*carriers} - {NOBODY})
+        n_carriers = max(n_carriers, len(delivering))
+    assert n_carriers > 1

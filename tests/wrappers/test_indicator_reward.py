@@ -21,6 +21,7 @@ from swarm_logistics_env.wrappers import (
     RunningMeans,
     SwarmSize,
 )
+from swarm_logistics_env.wrappers.indicator_payments import comparison
 from tests.wrappers.conftest import eastward
 
 N = 4
@@ -159,6 +160,102 @@ def test_a_change_in_mid_run_makes_the_return_the_adaptability() -> None:
     assert not rewards[:59].any()
 
 
+@pytest.mark.parametrize(("onset", "role"), [(0.0, "searching"), (4.0, "shuffling")])
+@pytest.mark.parametrize(("mode", "lost"), [("motor_slow", "n_failed"), ("removed", "n_removed")])
+def test_faults_by_role_count_as_the_robots_that_they_strike(
+    onset: float, role: str, mode: str, lost: str
+) -> None:
+    """Whom a role strikes may be among those that the seed chooses, or not."""
+    counted = set()
+    for seed in range(6):
+        # In an episode that is over before it begins, a role strikes whom nothing else does.
+        faults = [Fault(mode, 1), Fault(mode, 1, onset=onset, role=role)]
+        env = rewarded({"P": 1.0}, 33.0)
+        play(env, seed, {"faults": faults})
+        world = env.unwrapped.warehouse
+        counted.add(m := len(world.struck_robots))
+        removed, failed = Condition(N, n_removed=m), Condition(N, ("motor_slow",), n_failed=m)
+        assert env.condition == (removed if mode == "removed" else failed)
+        env.reset(seed=seed, options={"faults": [faults[0], Fault(mode, 1, 99.0, role="carrier")]})
+        assert getattr(env.condition, lost) == 2
+    assert 2 in counted
+
+
+def test_a_fault_by_role_that_strikes_in_mid_run_makes_the_return_the_robustness() -> None:
+    faults = [Fault("motor_slow", 1), Fault("motor_slow", 2, onset=4.0, role="searching")]
+    counted = set()
+    for seed in range(6):
+        env = rewarded("R", 33.0)
+        rewards, _ = play(env, seed, {"faults": faults})
+        m = len(env.unwrapped.warehouse.struck_robots)
+        value = spi.robustness([33], [delivered(env)], n=N, m=m).value
+        assert rewards.sum(axis=0) == pytest.approx(value, **CLOSE)
+        counted.add(m)
+    assert counted == {2, 3}
+
+
+def test_means_at_the_start_hold_for_the_whole_episode() -> None:
+    means = filled({OWN: 33, FAULTY: 20})
+    env = rewarded("R", means)
+    env.reset_arrays(0, OPTIONS[FAULTY])
+    payments = env.payments
+    for _ in range(40):
+        env.step_arrays(eastward(env))
+        means.add(OWN, 5)  # as another environment does that shares them
+        assert env.payments == payments
+
+
+# Of a swarm in which a robot is missing anyway: what is tested, and the indicator of it.
+WITHOUT_ONE: dict[str, tuple[Condition, Any, Callable[[int], float]]] = {
+    "R": (
+        Condition(N, ("dead",), n_failed=2, n_removed=1),
+        {"faults": [Fault("removed", (3,)), Fault("dead", (0, 1))]},
+        lambda p: p / 30 - 1 + 2 / N,
+    ),
+    "FT": (
+        Condition(N, ("dead",), n_failed=2, n_removed=1),
+        {"faults": [Fault("removed", (3,)), Fault("dead", (0, 1))]},
+        lambda p: (p - 12) / 30,
+    ),
+    "S": (
+        Condition(N + 2, n_removed=1),
+        {"faults": [Fault("removed", (3,))], "scenario": {"n_robots": N + 2}},
+        lambda p: (p / 30 - 1) / (2 / N),
+    ),
+    "A": (
+        Condition(N, n_removed=1, changes=(("delivery_width", 1.5),)),
+        {"faults": [Fault("removed", (3,))], "scenario": {"delivery_width": 1.5}},
+        lambda p: (p / 30 - 1) / 0.25 + 1,
+    ),
+}
+
+
+@pytest.mark.parametrize("credit", ["team", "deliverer"])
+@each_indicator
+def test_the_same_robots_are_removed_in_the_references(name: str, credit: Any) -> None:
+    tested, options, value = WITHOUT_ONE[name]
+    references = {Condition(N, n_removed=1): 30, Condition(N, n_removed=3): 12}
+    env = rewarded(name, references, busy(max_robots=N + 2), credit=credit)
+    rewards, infos = play(env, 0, options)
+    assert env.condition == tested
+    info = next(iter(infos.values()))
+    assert (info["n_failed"], info["n_removed"]) == (tested.n_failed, 1)
+    assert info["FT_P_S" if name == "FT" else "S_P_N" if name == "S" else f"{name}_P_o"] == (
+        12 if name == "FT" else 30
+    )
+    expected = value(delivered(env))
+    assert info[name] == pytest.approx(expected, **CLOSE)
+    assert not rewards[:, 3].any()  # who is not there is paid nothing
+    if credit == "team":
+        paid = np.delete(rewards.sum(axis=0), 3)
+        assert paid == pytest.approx([expected] * len(paid), **CLOSE)
+    else:
+        assert rewards.sum() == pytest.approx(expected, **CLOSE)
+    for reference in references:
+        env.condition = reference
+        assert env.payments_of(reference)[name].share == 0.0
+
+
 def test_running_means_are_those_of_the_episodes_that_ended() -> None:
     means = RunningMeans(window=2)
     env = rewarded({"R": 1.0, "FT": 1.0}, means)
@@ -254,7 +351,7 @@ CHANGED = ParameterChange(busy(), "max_speed", 1.0)
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"weights": "Q"}, "no indicator 'Q'"),
+        ({"weights": "Q"}, "no indicator 'Q' is paid; known: A, FT, P, R, S"),
         ({"weights": {}}, "at least one indicator"),
         ({"weights": {"R": np.nan}}, r"weights\['R'\] = nan"),
         ({"credit": "robot"}, "credit = 'robot'"),
@@ -279,6 +376,8 @@ def test_what_cannot_be_judged_is_refused_at_the_reset() -> None:
         env.reset_arrays(0, OPTIONS[FAULTY])
     with pytest.raises(SetupError, match="4 of 4 robots faulty"):
         env.payments_of(Condition(4, ("FM1",), n_failed=4))
+    with pytest.raises(SetupError, match="no indicator 'K' is paid; known: A, FT, P, R, S"):
+        comparison("K", FAULTY, env.unwrapped.scenario)
     with pytest.raises(SetupError, match="n_removed = -1"):
         Condition(4, n_removed=-1)
     with pytest.raises(SetupError, match="window = 0"):

@@ -214,7 +214,7 @@ function drawArena(canvas, number, now, next, share, options) {
   });
   poses.forEach((pose, robot) => {
     const leader = pose && robots[robot] && robots[robot][3] !== NOBODY ? poses[robots[robot][3]] : null;
-    const isCarrier = requested && requested[2] === robot;
+    const isCarrier = requested.some(([, , carrier]) => carrier === robot);
     if (leader && (isCarrier || options.links)) arrow(pen, at(pose), at(leader), radius, isCarrier ? Math.max(2, radius / 3.5) : 1, colours.LINK);
   });
   const watched = options.selected && poses[options.selected.robot];
@@ -234,9 +234,9 @@ function drawArena(canvas, number, now, next, share, options) {
     pen.translate(-x, -y);
   });
   if (watched) ring(pen, ...at(watched), 1.6 * radius + 2, 2.5, colours.INK);
-  if (requested) {
-    const isCarried = requested[2] !== NOBODY && poses[requested[2]];
-    const [x, y] = at(isCarried ? poses[requested[2]] : requested);
+  for (const place of requested) {
+    const isCarried = place[2] !== NOBODY && poses[place[2]];
+    const [x, y] = at(isCarried ? poses[place[2]] : place);
     target(pen, x, y, 1.9 * radius + 1);
     item(pen, x, y, isCarried ? 0.5 * radius : 1.4 * half, true);
   }
