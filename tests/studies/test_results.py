@@ -147,3 +147,12 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     assert means.isna().all()
     assert means.dtype == np.dtype(float)
     assert {(test.value, test.plain) for test in found.verdicts} == {(None, None)}
+
+
+def test_ft_of_a_fault_that_changes_no_run_is_what_the_removed_robots_cost() -> None:
+    found = by_question(paper(same=frozenset({"FM1"})))
+    assert found["R", "FM1, m = 1", 0.0].plain == "unaffected"
+    ft = found["FT", "FM1, m = 1", 0.0]
+    assert ft.problem is None
+    assert ft.estimate is not None
+    assert not ft.estimate.identical
