@@ -92,7 +92,7 @@ def test_a_policy_that_returns_no_commands_is_named(commands: Any, complaint: st
 
 
 def test_runs_that_go_other_ways_have_other_digests_though_neither_delivers() -> None:
-    scenario = Scenario(duration=6.0)
+    scenario = Scenario(duration=4.0)
 
     def digest(policy: str, **fields: int) -> str:
         episode = run_episode(scenario, policies.load(policy), 3, **fields)
