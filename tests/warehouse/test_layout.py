@@ -109,3 +109,17 @@ def test_where_nothing_fits_any_more_it_says_what_would_help(build: Build) -> No
         world.step([(0.0, 0.0, 0.0, 1.0)])
     assert (world.state.delivered, world.state.step) == (1, 1)
     assert world.all_delivered
+
+
+def test_no_item_comes_back_into_an_obstacle() -> None:
+    size: Any = {"warehouse_width": 4, "warehouse_height": 2, "n_obstacles": 5}
+    world = Warehouse(Scenario(n_robots=1, n_items=2, restock=True, **size))
+    world.reset(0)
+    state, places = world.state, []
+    state.item_status[0] = DELIVERED
+    for count in range(1, 60):
+        state.progress.n_delivered[0] = count
+        assert layout.place_restocked(world._world, 0)
+        places.append(state.item_position[0].copy())
+    clear = world.scenario.obstacle_radius + world.scenario.item_radius
+    assert narrowest(np.array(places), state.obstacle_position) >= clear
