@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice, product
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,9 @@ from swarm_logistics_env.attack import STORE, Attack, attack, search
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.studies.play import serial
 from swarm_logistics_env.studies.runs import Runs
+from swarm_logistics_env.tasks.task import Outcome, Run
+from swarm_logistics_env.warehouse.faults import ROLES
+from tests.studies.made_up import delivered
 
 SCENARIO = Scenario(
     n_robots=6, warehouse_width=5.0, warehouse_height=5.0, delivery_width=1.5, n_items=8,
@@ -95,3 +98,37 @@ def test_a_fault_that_changes_no_run_is_no_evidence_and_seeds_of_estimates_are_f
         rows = runs.frame().to_dict("records")
     # Five for the choice among the named modes, and three that had no part in any choice.
     assert sorted(row["seed"] for row in rows if row["faults"] == "[]") == list(range(8))
+
+
+def test_every_role_is_searched_at_every_time_at_which_robots_may_have_it() -> None:
+    faults = Attack("swarm-dt", SCENARIO, modes=("FM4",)).faults()
+    times = [(onset, lasts) for onset in (0.0, 6.0, 12.0, 18.0) for lasts in (None, 6.0, 12.0)]
+    assert {(fault.role, fault.onset, fault.duration) for fault in faults} == {
+        (role, *time)
+        for role, time in product((None, *ROLES), times)
+        if time[0] or role in (None, "searching")
+    }
+    assert len(faults) == 60
+
+
+def test_what_was_never_tried_is_not_named() -> None:
+    faults = Attack("swarm-dt", SCENARIO).faults()
+
+    def play(pairs: Sequence[tuple[int, int]]) -> list[float]:
+        return [10.0 + place % 7 for place, _ in pairs]
+
+    for seed in range(10):
+        worst, tried = search(faults, play, 6, seed)
+        assert worst in tried
+
+
+def test_each_run_is_measured_against_that_of_its_seed_without_a_fault(tmp_path: Path) -> None:
+    costs = {"FM1": 4, "FM2": 10, "FM3": 6, "FM4": 8}
+
+    def engine(runs: Iterable[Run]) -> Iterator[tuple[Run, Outcome]]:
+        for run in runs:  # seeds differ far more than faults
+            cost = sum(costs[fault.mode] for fault in run.case.faults)
+            yield run, delivered(20 + 200 * (run.seed % 3 == 1) - cost, digest=run.key)
+
+    result = attack(Attack("swarm-dt", SCENARIO, modes=tuple(costs), budget=40), engine, tmp_path)
+    assert [found.fault.mode for found in result.found] == ["FM2", "FM2"]

@@ -89,3 +89,16 @@ def test_a_policy_that_returns_no_commands_is_named(commands: Any, complaint: st
     name: Any = "swarm-dt"
     with pytest.raises(PolicyError, match=r"'swarm-dt': should have .* policies\.load\(name\)"):
         run_episode(Scenario(), name, seed=0)
+
+
+def test_runs_that_go_other_ways_have_other_digests_though_neither_delivers() -> None:
+    scenario = Scenario(duration=4.0)
+
+    def digest(policy: str, **fields: int) -> str:
+        episode = run_episode(scenario, policies.load(policy), 3, **fields)
+        assert episode.delivered == 0
+        return episode.digest
+
+    walk = digest("random-walk")
+    assert digest("random-walk") == digest("random-walk", policy_seed=3) == walk
+    assert len({walk, digest("swarm-dt"), digest("random-walk", policy_seed=0)}) == 3

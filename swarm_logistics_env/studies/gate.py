@@ -273,10 +273,7 @@ def _change(
                 "seeds"
             )
         # Over shared seeds the runs of these alone tell whether P is capped.
-        one, other = (
-            Cell.of(of.policy, of.table, of.arm, [results.outcome(of.arm, seed) for seed in seeds])
-            for results, of in (before, after)
-        )
+        one, other = (_over(seeds, results, of) for results, of in (before, after))
         if same_runs(one.outcomes, other.outcomes):
             return 0.0
     try:
@@ -289,3 +286,10 @@ def _change(
         )
     except spi.IndicatorError as error:
         return str(error)
+
+
+def _over(seeds: Sequence[int], results: StudyResults, cell: Cell) -> Cell:
+    """Return a cell over some of its seeds, of each training if there are several."""
+    cases = cell.arm.case.trainings
+    found = [results.outcomes.get((case.key, seed)) for case in cases for seed in seeds]
+    return Cell.of(cell.policy, cell.table, cell.arm, found)

@@ -190,3 +190,20 @@ def test_gymnasium_writes_a_film(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     [written] = (tmp_path / "films").iterdir()
     assert written.suffix == ".mp4"
     assert written.stat().st_size > 1000
+
+
+def test_a_delivery_pays_one_in_the_step_of_a_removal_as_well() -> None:
+    def total(**fields: Any) -> tuple[float, CentralEnv]:
+        env = CentralEnv(n_robots=3, n_items=2, pickup_range=14.0, duration=60.0, **fields)
+        env.reset(seed=0)
+        paid, is_over = 0.0, False
+        while not is_over:
+            _, reward, *ends, _ = env.step(eastward(env.env))
+            paid, is_over = paid + reward, any(ends)
+        return paid, env
+
+    _, env = total()
+    state = env.env.warehouse.state
+    last = next(robot for robot in range(3) if robot not in state.delivered_by)
+    paid, env = total(faults=[Fault("removed", (last,), onset=state.delivery_times[0])])
+    assert paid == env.env.warehouse.state.delivered == 2

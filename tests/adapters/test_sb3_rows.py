@@ -275,7 +275,7 @@ def test_wrappers_change_commands_and_outcomes_however_worlds_are_stepped() -> N
     def trace(first: Any, last: Any, threads: int) -> list[Any]:
         wrappers = [first, lambda env: env, last]
         env = made(lambda world: wrappers[world](brief(n_robots=2 + world)), 3, threads)
-        seen = played(env, 60)
+        seen = played(env, 65)  # within an episode
         return [*seen, *(world.unwrapped.warehouse.observe() for world in env.worlds)]
 
     shared_out = trace(Halved, Halved, threads=2)
@@ -298,3 +298,16 @@ def test_worlds_share_running_means_whatever_the_threads() -> None:
     alone = trace(1)
     assert alone[1] == [12, 12]
     np.testing.assert_equal(trace(3), alone)
+
+
+def test_worlds_that_end_together_begin_anew_in_their_order_whatever_their_sizes() -> None:
+    begun: list[int] = []
+
+    class Noted(Wrapper):
+        def begun(self, seed: int) -> None:
+            begun.append(self.warehouse.state.n_robots)
+
+    sizes = [2, 5, 1, 4]
+    env = made(lambda world: Noted(brief(n_robots=sizes[world])), 4, 2)
+    played(env, 41)
+    assert begun == sizes * 3

@@ -289,3 +289,23 @@ def test_the_state_of_a_robot_that_is_shoved_lies_in_its_space() -> None:
     env.reset(seed=0)
     env.warehouse.state.robot_velocity[:] = [[9.0, -9.0], [0.0, 9.0]]
     assert env.state_space.contains(env.state())
+
+
+def test_the_state_tells_nothing_of_robots_that_are_gone_nor_of_items_that_were_delivered() -> None:
+    gone = [Fault("removed", (0,)), Fault("removed", (2,), onset=0.2)]
+    env = parallel_env(REACHABLE, n_robots=3, n_items=2, faults=gone)
+    env.reset(seed=0)
+
+    def told() -> tuple[NDArray[Any], NDArray[Any]]:
+        state = env.state()
+        return state[:30].reshape(3, 10), state[30:40].reshape(2, 5)
+
+    assert told()[0][:, 0].tolist() == [0.0, 1.0, 1.0]
+    delivered = env.warehouse.state.requested
+    while not env.warehouse.state.delivered:
+        env.step(east(env))
+    robots, items = told()
+    assert robots[:, 0].tolist() == [0.0, 1.0, 0.0]
+    assert not robots[[0, 2]].any()
+    assert not items[delivered].any()
+    assert items[1 - delivered, 2:4].all()

@@ -194,5 +194,5 @@ def test_of_several_requested_items_in_view_the_nearest_counts() -> None:
     for place, (away, asked) in enumerate(zip(ahead, [0, 1, 1, 0])):
         there = row.ITEMS + row.ITEM_WIDTH * place
         rows[0, there : there + row.ITEM_WIDTH] = [1, away, 0, asked, 0]
-    requested, other = known.nearest_items(rows[0])
+    requested, other = column.nearest_items(rows[0])
     assert (requested, other) == (row.ITEMS + row.ITEM_WIDTH, row.ITEMS)

@@ -12,6 +12,7 @@ from swarm_logistics_env.policies.learned import (
     explore,
     hyperbolic_tangent,
 )
+from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.streams import row_keys
 
 Tensors = dict[str, NDArray[np.float32]]
@@ -65,3 +66,16 @@ def test_the_hyperbolic_tangent_is_one() -> None:
     values = np.linspace(-12.0, 12.0, 20_001, dtype=np.float32)
     ours = [hyperbolic_tangent(value) for value in values]
     np.testing.assert_allclose(ours, np.tanh(values.astype(np.float64)), rtol=0, atol=5e-7)
+
+
+def test_it_steers_the_body_that_the_robots_of_a_scenario_have(
+    card: PolicyCard, tensors: Tensors
+) -> None:
+    policy, rows = LearnedPolicy(card, tensors), np.zeros((4, N_COLUMNS), np.float32)
+
+    def turns(scenario: Scenario) -> bool:
+        start(policy, scenario, 0)
+        return bool(policy.act(rows)[:, 2].any())
+
+    assert turns(Scenario(n_robots=4, drive="differential"))
+    assert not turns(Scenario(n_robots=4, drive="holonomic"))

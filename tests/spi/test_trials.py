@@ -294,3 +294,18 @@ def test_what_is_written_is_read_row_by_row(
         assert row.policy == (
             re.sub("[\n\v\f\r\x85\u2028\u2029]+", " ", text.strip()) or "recorded"
         )
+
+
+def test_a_seed_alone_tells_two_runs_of_an_event_log_apart(tmp_path: Path) -> None:
+    rows = read(tmp_path, "seed,robots,time\n0,4,3\n1,4,9\n1,4,5\n2,4,\n").rows
+    assert [(row.seed, row.times) for row in rows] == [(0, (3.0,)), (1, (5.0, 9.0)), (2, ())]
+
+
+def test_a_label_may_stand_in_several_conditions_once_each(tmp_path: Path) -> None:
+    rows = "robots,fault,faulty,trial,p\n8,none,0,1,10\n8,none,0,2,9\n8,jam,1,1,7\n"
+    found = read(tmp_path, rows).rows
+    assert [(row.fault, row.performance) for row in found] == [
+        ("none", 10.0), ("none", 9.0), ("jam", 7.0),
+    ]  # fmt: skip
+    with pytest.raises(spi.IndicatorError, match=r"line 5, .*'1': is in line 4 too"):
+        read(tmp_path, f"{rows}8,jam,1,1,6\n")

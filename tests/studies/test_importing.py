@@ -11,6 +11,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.comparison import OTHER_BEHAVIOUR
 from swarm_logistics_env.studies.importing import import_results
 from swarm_logistics_env.studies.measures import resiliences
 from swarm_logistics_env.studies.runs import Runs
@@ -144,3 +145,15 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
             study.run()
     with Runs.existing(tmp_path / "out") as runs:
         assert len(runs) == 5
+
+
+def test_p_o_is_of_trials_without_a_fault_and_repeated_ones_are_their_null(tmp_path: Path) -> None:
+    measured = {"none again,0": (9, 8, 7), "none,0": (20, 22, 21), "jam,1": (19, 20, 18)}
+    rows = [f"8,{fault},{p}" for fault, found in measured.items() for p in found]
+    study = imported(tmp_path, "\n".join(["robots,fault,faulty,p", *rows]))
+    (test,) = study.findings().verdicts
+    assert (test.compared.indicator, test.compared.label) == ("R", "jam, m = 1")
+    assert test.value == pytest.approx((19 - 21) / 21 + 1 / 8)
+    assert [arm.setting for arm in study.plan().nulls.values()] == [OTHER_BEHAVIOUR]
+    behaviours = dict(study.results()[["delivered", "behaviour"]].to_numpy().tolist())
+    assert [behaviours[p] for p in (9.0, 22.0, 18.0)] == [1, 0, 0]

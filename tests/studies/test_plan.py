@@ -170,3 +170,11 @@ def test_robots_may_fail_and_be_repaired_at_random_or_keep_a_factor() -> None:
         Fault("removed", 1),
         Fault("removed", 2),
     }
+
+
+def test_for_p_s_of_faults_by_role_those_of_the_role_are_removed() -> None:
+    by_role = {"modes": ["FM4"], "robots": [1, 2], "onsets": [50], "role": "carrier"}
+    plan = Study(seeds=2, faults=[by_role]).plan()
+    assert {fault for case in plan.cases for fault in case.faults} == {
+        Fault(mode, m, onset=50.0, role="carrier") for mode in ("FM4", "removed") for m in (1, 2)
+    }

@@ -167,3 +167,12 @@ def test_a_column_that_is_not_there_is_an_error_at_once(found: StudyResults) -> 
     cells, verdicts = frame(claimed.cells, CELL_COLUMNS), frame(claimed.verdicts, VERDICT_COLUMNS)
     assert {*cells.columns[cells.isna().all()]} == {"problem"}
     assert {*verdicts.columns[verdicts.isna().all()]} == {"n_trainings", "stopped_at", "problem"}
+
+
+def test_ft_of_a_fault_that_changes_no_run_is_what_the_removed_robots_cost() -> None:
+    found = by_question(paper(same=frozenset({"FM1"})))
+    assert found["R", "FM1, m = 1", 0.0].plain == "unaffected"
+    ft = found["FT", "FM1, m = 1", 0.0]
+    assert ft.problem is None
+    assert ft.estimate is not None
+    assert not ft.estimate.identical

@@ -11,6 +11,9 @@ from swarm_logistics_env import Scenario, policies, run_episode, spi
 from swarm_logistics_env.errors import PolicyError, StudyError
 from swarm_logistics_env.policies.spec import WEIGHTS, trainings_of
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.studies.gate import Gate, answers
+from swarm_logistics_env.studies.results import StudyResults, judge
+from tests.studies.made_up import delivered
 
 SHIPPED = [*trainings_of("ppo-robust@all")[:2], "ppo-delivery"]
 SMALL = Scenario(n_robots=4, n_items=6, restock=True, duration=60.0)
@@ -58,3 +61,25 @@ def test_trainings_count_in_order_and_are_no_policy_to_play(recipe: str) -> None
     for name in ("ppo-nobody@all", "nowhere/mine@all.safetensors"):
         with pytest.raises(PolicyError, match=r"two trainings or more.* found 0"):
             policies.load(name)
+
+
+def test_a_gate_on_changes_judges_the_runs_of_all_trainings(recipe: str) -> None:
+    faults = [{"modes": ["FM4"], "robots": [2]}]
+    plan = Study(policies=[recipe], seeds=6, scenario=SMALL, faults=faults, indicators=["R"]).plan()
+
+    def results(mean: int, spread: int) -> StudyResults:
+        """Trainings and seeds differ from each other, and twice as much as the former."""
+        places = {case.key: place for place, case in enumerate(plan.cases)}
+        counts = {
+            (run.case.key, run.seed): mean + spread * (places[run.case.key] % 5) + run.seed % 3
+            for run in plan.runs
+        }
+        return judge(plan, {k: delivered(n, digest=f"{k} {n}") for k, n in counts.items()})
+
+    gate, old = Gate.parse("change < -0.1"), results(40, 1)
+    found = answers(gate, old, results(20, 2))
+    assert [one.fails for one in found] == [True, True]
+    assert {one.estimate and (one.estimate.n_trainings, one.estimate.n_seeds) for one in found} == {
+        (5, 6)
+    }
+    assert [(one.fails, one.exact) for one in answers(gate, old, old)] == [(False, 0.0)] * 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -15,6 +16,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.section import sentence
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.studies.plan import Shard
 from swarm_logistics_env.studies.specification import looks_up_to
@@ -213,3 +215,98 @@ def test_wrong_verdicts_over_all_looks_are_bounded(model: str) -> None:
     assert wrong_verdicts(model, looks_up_to(100), studies=1_000).share < most
     seen = wrong_verdicts(model, looks_up_to(100), studies=1_000, only_seen=True).share
     assert 0.02 < seen < most
+
+
+def noise(seed: int) -> Numbers:
+    """Return errors of 60 seeds, of variance 1, which cancel out at every look."""
+    drawn = np.random.default_rng(seed).uniform(-math.sqrt(3.0), math.sqrt(3.0), 60)
+    return np.concatenate([part - part.mean() for part in np.split(drawn, [20, 30, 40, 50])])
+
+
+P_O = 100.0 + noise(0)
+Sampled = Callable[[float], Numbers]  # P_F over seeds, by how much it scatters
+
+
+def with_p(p_value: Callable[[Numbers], float | None], sampled: Sampled, wanted: float) -> Numbers:
+    """Return the sample whose p, which rises with its scatter, is the one wanted."""
+    low, high = 1.0, 57.0
+    for _ in range(10):
+        middle = (low + high) / 2
+        low, high = (middle, high) if (p_value(sampled(middle)) or 0.0) < wanted else (low, middle)
+    assert p_value(sampled(low)) == pytest.approx(wanted, rel=0.05)
+    return sampled(low)
+
+
+def family(most: int, p_f: dict[str, Numbers]) -> tuple[dict[str, Verdict], Engine]:
+    """Judge R of a robot of 100 for each mode until it is clear, with P_F at each seed."""
+
+    def given(run: Run, _: Outcome) -> Outcome:
+        p = float(p_f.get(mode_of(run), P_O)[run.seed])
+        # Runs of one P at one seed are the same runs.
+        return Outcome(untimed=p, digest=f"{run.seed} {p}")
+
+    asked: dict[str, Any] = {"scenario": {"n_robots": 100}, "indicators": ["R"]}
+    asked["faults"], engine = [{"modes": [*p_f], "robots": [1]}], Engine(given)
+    study = Study(seeds=most, until_clear=True, **asked)
+    study.run(engine)
+    return verdicts_of(study), engine
+
+
+def test_every_step_of_holm_at_a_look_has_a_level_of_its_own() -> None:
+    def p_of_r(p_f: Numbers) -> float | None:
+        return spi.robustness(P_O[:20], p_f, n=100, m=1).p_value
+
+    def sampled(seed: int) -> Sampled:
+        return lambda scatter: P_O[:20] + 25.0 + scatter * noise(seed)[:20]
+
+    # Below 0.05, 0.05 / 2 and 0.05 / 3; in the plan the largest comes first.
+    wanted = {"FM2": 0.042, "FM3": 0.021, "FM4": 0.012}
+    found, _ = family(
+        20, {mode: with_p(p_of_r, sampled(n), p) for n, (mode, p) in enumerate(wanted.items(), 1)}
+    )
+    assert {mode: (test.holm, test.stopped_at) for mode, test in found.items()} == dict.fromkeys(
+        wanted, ("supported", 20)
+    )
+
+
+@pytest.mark.parametrize(
+    ("shares", "equivalent"),
+    [((0.85, 0.85, 0.85), {"FM2", "FM3", "FM4"}), ((0.85, 1.2, 0.85), {"FM4"})],
+)
+def test_equivalences_step_down_too_each_at_the_level_of_its_own_look(
+    shares: tuple[float, ...], equivalent: set[str]
+) -> None:
+    levels = [
+        spi.look_alphas(looks_up_to(60), 0.1 / n_open, spending=SPENDING)[-1] / 2
+        for n_open in (1, 2, 3)
+    ]
+
+    def p_of_equivalence(p_f: Numbers) -> float | None:
+        return spi.equivalence(P_O, p_f).p_value
+
+    def sampled(seed: int) -> Sampled:
+        return lambda scatter: 0.99 * P_O + scatter * noise(seed)  # R = 0, so it stays open
+
+    modes = ("FM2", "FM3", "FM4")  # the one with the largest p comes first
+    p_f = {
+        mode: with_p(p_of_equivalence, sampled(n), share * level)
+        for n, (mode, share, level) in enumerate(zip(modes, shares, levels), 1)
+    }
+    found, _ = family(60, p_f)
+    assert {test.stopped_at for test in found.values()} == {None}
+    alphas = [test.equivalence.alpha for test in found.values() if test.equivalence]
+    assert alphas == pytest.approx([levels[0]] * 3)
+    assert {m for m, test in found.items() if test.equivalence_holm == "equivalent"} == equivalent
+
+
+def test_a_comparison_of_the_same_runs_stops_at_the_first_look() -> None:
+    found, engine = family(60, {"FM2": P_O})
+    assert (found["FM2"].holm, found["FM2"].stopped_at) == ("unaffected", 20)
+    assert len(engine.played) == 40
+
+
+def test_all_seeds_after_looks_were_declared_are_exploratory(tmp_path: Path) -> None:
+    until_clear(30, tmp_path).run(Engine())
+    assert not until_clear(30, tmp_path).findings().exploratory
+    asked: dict[str, Any] = {"faults": [{"modes": [*MEANS], "robots": [1]}], "indicators": ["R"]}
+    assert Study(out=tmp_path, seeds=30, **asked).is_exploratory()

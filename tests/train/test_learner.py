@@ -13,7 +13,7 @@ import torch
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.motion.frame import INPUTS
-from swarm_logistics_env.motion.memory import HELD
+from swarm_logistics_env.motion.memory import BODY, HELD, body_of
 from swarm_logistics_env.train.learner import KNOWN, NetworkView, make_learner, read_known
 from swarm_logistics_env.warehouse.state import CARRIED
 
@@ -82,3 +82,25 @@ def test_the_actor_sees_nothing_of_it(small: Any) -> None:
         one, other = (policy.get_distribution(given).mode() for given in (columns, changed))
         assert (one == other).all()
         assert (policy.predict_values(columns) != policy.predict_values(changed)).all()
+
+
+def test_every_episode_has_the_bodies_of_its_robots_and_random_numbers_of_its_own(
+    small: Any,
+) -> None:
+    mixed = [{"scenario": {"drive": ["holonomic", "differential"]}}]
+    view = NetworkView(small(conditions=mixed))
+    view.seed(0)
+    view.reset()
+    drives, keys = set(), set(view.frame.keys.tolist())
+    for _ in range(6):
+        for world, rows in zip(view.venv.worlds, view.venv.rows_of_worlds):
+            scenario = world.warehouse.scenario
+            drives.add((rows.start, scenario.drive))
+            assert (view.frame.memory[rows, BODY:] == body_of(scenario)).all()
+        dones = np.zeros(view.num_envs, np.bool_)
+        while not dones.any():
+            view.step_async(np.zeros((view.num_envs, 3), np.float32))
+            _, _, dones, _ = view.step_wait()
+        keys |= set(view.frame.keys.tolist())
+    assert drives == {(row, drive) for row in (0, 3) for drive in ("holonomic", "differential")}
+    assert len(keys) == 7 * view.num_envs

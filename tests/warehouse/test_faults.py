@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,9 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.errors import FaultError
 from swarm_logistics_env.observations import N_BEAMS
-from swarm_logistics_env.warehouse.faults import ROLES, failed_robots, fault_of, text_of
+from swarm_logistics_env.warehouse.faults import ROLES, Occurrence, failed_robots, fault_of, text_of
 from swarm_logistics_env.warehouse.state import robots_in_role, roles_of
-from tests.warehouse.conftest import FAR, INSIDE, SMALL, STAY, WEST, Build, steps
+from tests.warehouse.conftest import FAR, HOLD, INSIDE, SMALL, STAY, WEST, Build, steps
 
 
 @given(seed=st.integers(0, 2**40), n_robots=st.integers(1, 60), data=st.data())
@@ -199,3 +200,22 @@ def test_roles_are_those_about_every_item_that_is_asked_for() -> None:
     assert robots_in_role(state, "in_area", 3).tolist() == [0, 2, 3]  # the distances 0, 0, 0.5 m
     assert state.item_requested.sum() == 3
     assert np.flatnonzero(state.carries_requested).tolist() == [0, 2]
+
+
+def test_an_intermittent_fault_never_has_the_same_breaks_again() -> None:
+    occurrence = Occurrence(Fault("FM2", (0,), intermittent=(5.0, 5.0)), 0, 1)
+    times = [0.0]
+    while len(times) < 130:
+        times.append(occurrence.next_change(times[-1], math.inf))
+    lasting = np.diff(times).round(9).tolist()
+    assert len(set(lasting)) == len(lasting)
+
+
+def test_who_carries_the_requested_item_is_the_carrier_inside_of_the_delivery_area_too(
+    build: Build,
+) -> None:
+    robots = [(INSIDE, 5.0), (INSIDE, 5.4), (INSIDE, 9.0), (2.0, 2.0)]
+    world = build(robots, [(INSIDE, 5.1), FAR], [Fault("FM4", (0,))])
+    steps(world, HOLD, STAY, STAY, STAY)
+    told = roles_of(world.state).tolist()
+    assert told == ["carrier", "neighbour", "in_area", "searching"]

@@ -113,3 +113,17 @@ def test_where_nothing_fits_any_more_it_says_what_would_help(build: Build) -> No
     copied = pickle.loads(pickle.dumps(world))
     stay = [(0.0, 0.0, 0.0, 0.0)]
     assert copied.step(stay).tobytes() == world.step(stay).tobytes()
+
+
+def test_no_item_comes_back_into_an_obstacle() -> None:
+    size: Any = {"warehouse_width": 4, "warehouse_height": 2, "n_obstacles": 5}
+    world = Warehouse(Scenario(n_robots=1, n_items=2, restock=True, **size))
+    world.reset(0)
+    state, places = world.state, []
+    state.item_status[0] = DELIVERED
+    for count in range(1, 60):
+        state.progress.n_delivered[0] = count
+        assert layout.place_restocked(world._world, 0)
+        places.append(state.item_position[0].copy())
+    clear = world.scenario.obstacle_radius + world.scenario.item_radius
+    assert narrowest(np.array(places), state.obstacle_position) >= clear

@@ -192,3 +192,39 @@ def test_a_program_ends_while_its_pool_is_at_work() -> None:
     command = [sys.executable, "-c", PROGRAM]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
+
+
+def test_a_refused_command_counts_no_delivery_of_the_step_before_again() -> None:
+    made = worlds()
+    pool = WorldThreadPool(made, FIRSTS, 1)
+    number = 0
+    while not any(world.state.delivered for world in made):
+        step(pool, made, commands(number))
+        number += 1
+    wrong, counted = commands(number), [world.state.delivered for world in made]
+    wrong[:, 1] = np.nan
+    for _ in range(2):
+        with pytest.raises(CommandError):
+            step(pool, made, wrong)
+    assert [world.state.delivered for world in made] == counted
+    pool.close()
+
+
+@pytest.mark.parametrize("n_helpers", [0, 2])
+def test_every_world_takes_its_step_though_the_caller_fails_in_the_midst(n_helpers: int) -> None:
+    made, alone = worlds(), worlds()
+    pool = WorldThreadPool(made, FIRSTS, n_helpers)
+    pool.is_watched[:] = 1
+
+    def fails(*_: object) -> None:
+        raise ValueError("broken")
+
+    rows, given = np.zeros((sum(SIZES), N_COLUMNS), np.float32), commands(0)
+    with pytest.raises(ValueError, match="broken"):
+        pool.step(given, rows, fails)
+    for world, other, first in zip(made, alone, FIRSTS):
+        own = slice(first, first + world.state.n_robots)
+        np.testing.assert_array_equal(other.step(given[own]), rows[own])
+        assert world.state.step == 1
+    step_beside(pool, made, alone, range(1, 5))
+    pool.close()

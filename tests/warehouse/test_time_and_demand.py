@@ -184,3 +184,45 @@ def test_random_worlds_keep_their_items_their_order_and_their_bits(
         left = iter(asked)
         assert all(item in left for item in state.open_requests)  # in the order of the draws
     assert capacity is None or (np.diff(state.delivery_times) >= 1.0 / capacity - 1e-6).all()
+
+
+@pytest.mark.parametrize("demand", ["closed", "independent", "zipf"])
+def test_first_requests_are_those_of_the_demand(demand: Any) -> None:
+    scenario = Scenario(n_robots=1, n_items=4, n_requests=4, restock=True, demand=demand)
+    twice = set()
+    for seed in range(20):
+        world = Warehouse(scenario)
+        world.reset(seed)
+        asked = world.state.open_requests.tolist()
+        assert asked == requests_of(demand, seed, 4, 4)
+        twice.add(len(set(asked)) < 4)
+    assert (True in twice) == (demand != "closed")
+
+
+def test_the_item_of_any_open_request_is_told_and_can_be_let_go_of_inside(build: Build) -> None:
+    robots, items = [(INSIDE, 5.0), (INSIDE, 5.6)], [FAR, (INSIDE, 5.1), (INSIDE, 5.5)]
+    world = build(robots, items, [Fault("FM4", (0, 1))], n_requests=2, pickup_range=0.3)
+    rows = steps(world, STAY, STAY)
+    assert world.state.open_requests.tolist() == [0, 1]
+    at = [row.ITEMS + row.ITEM_WIDTH * place + 3 for place in range(2)]
+    assert rows[0, at].tolist() == [1.0, 0.0]  # items 1 and 2, the nearer first
+    steps(world, HOLD, HOLD)
+    assert world.state.robot_item.tolist() == [1, 2]
+    steps(world, OPEN, OPEN)
+    assert world.state.robot_item.tolist() == [NOBODY, 2]
+
+
+def test_nothing_is_lifted_that_is_out_of_reach_when_the_time_is_over(build: Build) -> None:
+    world = build([(2.0, 2.0)], [FAR, (2.1, 2.0)], pickup_range=0.35, **TIMED)
+    steps(world, HOLD)
+    world.state.item_position[1] = (3.0, 2.0)
+    steps(world, STAY, times=5)
+    assert (world.state.robot_item[0], world.state.item_status[1]) == (NOBODY, STORED)
+
+
+def test_what_a_robot_was_lifting_as_it_was_removed_can_be_lifted_at_once(build: Build) -> None:
+    robots, gone = [(2.0, 2.0), (2.3, 2.0)], [Fault("removed", (0,), onset=0.2)]
+    world = build(robots, [FAR, (2.1, 2.0)], gone, pickup_range=0.35, handling_time=1.0)
+    steps(world, HOLD, STAY, times=2)
+    steps(world, STAY, HOLD, times=11)
+    assert world.state.robot_item.tolist() == [NOBODY, 1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.errors import CommandError, FaultError, ScenarioError, SetupError
 from swarm_logistics_env.observations import unflatten
-from tests.warehouse.conftest import EAST, SMALL, STAY, steps
+from tests.warehouse.conftest import EAST, FAR, SMALL, STAY, Build, steps
 
 TWO = Scenario(n_robots=2, n_items=3)
 
@@ -100,3 +102,31 @@ def test_what_is_assigned_to_the_state_is_what_the_next_step_works_on() -> None:
     columns = unflatten(steps(world, STAY), world.scenario)
     np.testing.assert_allclose(columns["item_present"][0, :2], 1.0)
     assert not columns["item_present"][0, 2:].any()
+
+
+def test_a_change_of_the_top_speed_holds_from_the_next_step_on(build: Build) -> None:
+    world = build([(2.0, 2.0)], [FAR])
+    steps(world, EAST, times=5)
+    world.change(max_speed=0.5)
+    steps(world, EAST, times=5)
+    assert world.state.max_speed[0] == 0.5
+    assert world.state.robot_velocity[0, 0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda world: pickle.loads(pickle.dumps(world))])
+@pytest.mark.parametrize(("moment", "is_changed"), [(20, True), (520, False), (520, True)])
+def test_a_copy_goes_on_alike_after_many_steps_and_after_a_change(
+    copied: Callable[[Warehouse], Warehouse], moment: int, is_changed: bool
+) -> None:
+    world = Warehouse(SMALL.replace(restock=True, n_requests=3))
+    world.reset(0, [Fault("motor_wear", 2, intermittent=(3.0, 2.0))])
+    rng = np.random.default_rng(0)
+    for _ in range(moment):
+        world.step(rng.uniform(-1.0, 1.0, (8, 4)))
+    if is_changed:
+        world.change(max_speed=1.0, view_range=0.6)
+    other = copied(world)
+    for _ in range(60):
+        given = rng.uniform(-1.0, 1.0, (8, 4))
+        np.testing.assert_array_equal(other.step(given), world.step(given))
+    assert other.scenario == world.scenario

@@ -12,7 +12,7 @@ from swarm_logistics_env import Fault, Scenario, motion
 from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.streams import row_keys
-from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, SwarmSize
+from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, ParameterChange, SwarmSize
 from swarm_logistics_env.wrappers.action_forms import ACTIONS
 from tests.wrappers.conftest import small
 
@@ -104,3 +104,13 @@ def test_stable_baselines3_takes_either_for_every_row(form: Any) -> None:
         rows, *_ = env.step(np.array([env.action_space.sample() for _ in range(8)]))
     assert rows.shape == (8, *env.observation_space.shape)
     assert np.isfinite(rows).all()
+
+
+def test_the_motion_frame_steers_the_bodies_that_robots_have_in_the_episode() -> None:
+    given = MotionFrame(ParameterChange(small(), "drive", "differential"))
+    always = MotionFrame(small(drive="differential"))
+    rng = np.random.default_rng(0)
+    np.testing.assert_array_equal(given.reset_arrays(0), always.reset_arrays(0))
+    for _ in range(10):
+        outputs = rng.uniform(-1.0, 1.0, (6, 3))
+        np.testing.assert_equal(given.step_arrays(outputs), always.step_arrays(outputs))

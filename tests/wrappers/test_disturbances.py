@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from typing import Any
 
@@ -177,3 +178,27 @@ def test_options_come_first_for_episodes_and_never_get_lost() -> None:
     scenario = env.warehouse.scenario
     assert (scenario.n_items, scenario.delivery_width, scenario.n_robots) == (7, 1.0, 6)
     assert env.env.value == 7
+
+
+def test_the_size_of_an_episode_decides_who_of_it_fails() -> None:
+    env = SwarmSize(FaultInjection(small(), "FM1", robots=2), [3, 9])
+    sizes = set()
+    for seed in range(12):
+        env.reset_arrays(seed)
+        state = env.warehouse.state
+        sizes.add(state.n_robots)
+        expected = failed_robots(Fault("FM1", 2), seed, state.n_robots).tolist()
+        assert np.flatnonzero(state.failed).tolist() == expected
+        assert env.env.failed_robots == tuple(expected)
+    assert sizes == {3, 9}
+
+
+def test_a_change_to_the_value_that_holds_already_changes_no_run() -> None:
+    plain = small(n_robots=14, warehouse_width=2.5, warehouse_height=1.5, delivery_width=0.5)
+    same = ParameterChange(copy.deepcopy(plain), "max_speed", plain.scenario.max_speed, at=2.0)
+    rng = np.random.default_rng(0)
+    plain.reset_arrays(3)
+    same.reset_arrays(3)
+    while plain.agents:  # they push each other, which bodies remember
+        commands = rng.uniform(-1.0, 1.0, (14, 4))
+        np.testing.assert_equal(same.step_arrays(commands), plain.step_arrays(commands))

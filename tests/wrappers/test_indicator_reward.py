@@ -382,3 +382,44 @@ def test_what_cannot_be_judged_is_refused_at_the_reset() -> None:
         Condition(4, n_removed=-1)
     with pytest.raises(SetupError, match="window = 0"):
         RunningMeans(window=0)
+
+
+ONE_GONE = Condition(N, n_removed=1)
+SICK = Condition(N, ("FM1",), n_failed=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "tested", "references", "share", "constant"),
+    [
+        ("R", Condition(N, ("FM1",), 1, n_removed=1), {ONE_GONE: 30}, 1 / 30, 1 / N - 1),
+        (
+            "FT", Condition(N, ("FM1",), 1, n_removed=1), {ONE_GONE: 30, REMOVED: 21},
+            1 / 30, -21 / 30,
+        ),
+        ("S", Condition(N + 2, n_removed=1), {ONE_GONE: 30}, N / 2 / 30, -N / 2),
+        ("A", Condition(N, ("FM1",), 1, changes=NARROW.changes), {SICK: 20}, 4 / 20, 1 - 4),
+    ],
+)  # fmt: skip
+def test_an_indicator_is_relative_to_what_it_does_not_vary(
+    name: str, tested: Condition, references: Any, share: float, constant: float
+) -> None:
+    env = rewarded(name, {OWN: 99.0, REMOVED: 99.0, **references})
+    paid = env.payments_of(tested)[name]
+    assert (paid.share, paid.constant) == pytest.approx((share, constant))
+
+
+def test_where_robots_are_gone_the_rest_shares_the_constant() -> None:
+    env = rewarded("R", {OWN: 40.0, ONE_GONE: 33.0}, credit="deliverer")
+    rewards, _ = play(env, 0, {"faults": [Fault("motor_slow", (0,)), Fault("removed", (1,))]})
+    value = spi.robustness([33], [delivered(env)], n=N, m=1).value
+    assert rewards.sum() == pytest.approx(value, **CLOSE)
+    assert not rewards[:, 1].any()
+
+
+def test_an_episode_that_is_cut_short_counts_for_nothing_whatever_it_delivered() -> None:
+    env = rewarded({"R": 1.0}, 33.0)
+    env.reset(seed=0)
+    while not delivered(env):
+        env.step_arrays(eastward(env))
+    env.reset(seed=0)
+    assert env.measured.conditions == ()
