@@ -94,8 +94,8 @@ def test_a_policy_that_returns_no_commands_is_named(commands: Any, complaint: st
 def test_runs_that_go_other_ways_have_other_digests_though_neither_delivers() -> None:
     scenario = Scenario(duration=4.0)
 
-    def digest(policy: str, **fields: int) -> str:
-        episode = run_episode(scenario, policies.load(policy), 3, **fields)
+    def digest(policy: str, policy_seed: int | None = None) -> str:
+        episode = run_episode(scenario, policies.load(policy), 3, policy_seed=policy_seed)
         assert episode.delivered == 0
         return episode.digest
 
