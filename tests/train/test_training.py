@@ -10,7 +10,7 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
 from swarm_logistics_env.train.settings import Conditions
-from swarm_logistics_env.train.training import EpisodeMix
+from swarm_logistics_env.train.training import EpisodeMix, make_worlds
 from swarm_logistics_env.warehouse import Fault
 
 
@@ -101,3 +101,16 @@ def test_scenarios_are_drawn_and_options_come_first() -> None:
     env.reset_arrays(0, {"scenario": {"delivery_width": 2.5}, "faults": [Fault("FM2", 1)]})
     assert env.warehouse.scenario.delivery_width == 2.5
     assert [fault.mode for fault in env.warehouse.faults] == ["FM2"]
+
+
+def test_kinds_of_worlds_play_their_own_conditions_or_else_those_of_the_training(
+    small: Any,
+) -> None:
+    pytest.importorskip("stable_baselines3")
+    own = [{"modes": ["FM2"], "robots": [1]}]
+    kinds = [{"n_robots": 3, "conditions": own}, {"n_robots": 5}]
+    env = make_worlds(small(worlds=kinds, conditions=[{"modes": ["FM4"], "robots": [2]}]))
+    env.seed(0)
+    env.reset()
+    faults = [[(f.mode, f.robots) for f in world.warehouse.faults] for world in env.worlds]
+    assert faults == [[("FM2", 1)], [("FM4", 2)]]
