@@ -309,3 +309,13 @@ def test_the_state_tells_nothing_of_robots_that_are_gone_nor_of_items_that_were_
     assert not robots[[0, 2]].any()
     assert not items[delivered].any()
     assert items[1 - delivered, 2:4].all()
+
+
+def test_a_robot_that_is_removed_between_two_steps_terminates_in_the_next() -> None:
+    env = parallel_env(n_robots=3)
+    env.reset(seed=0)
+    env.step(still(env))
+    env.warehouse.set_faults([Fault("removed", (1,))])
+    _, _, terminated, _, _ = env.step(still(env))
+    assert terminated == {"robot_0": False, "robot_1": True, "robot_2": False}
+    assert env.agents == ["robot_0", "robot_2"]

@@ -219,3 +219,14 @@ def test_who_carries_the_requested_item_is_the_carrier_inside_of_the_delivery_ar
     steps(world, HOLD, STAY, STAY, STAY)
     told = roles_of(world.state).tolist()
     assert told == ["carrier", "neighbour", "in_area", "searching"]
+
+
+def test_robots_keep_their_speeds_and_senses_when_another_is_removed(build: Build) -> None:
+    faults = [Fault("removed", (0,), onset=0.2), Fault("FM2", (1,), onset=0.4)]
+    mixes: dict[str, Any] = {"speed_mix": (1.0, 0.5), "sensing_mix": (0.5, 1.0)}
+    world = build([(2.0, 2.0), (3.0, 2.0), (4.0, 2.0)], [FAR], faults, **mixes)
+    state = world.state
+    before = [array[1:].tolist() for array in (state.max_speed, state.view_range)]
+    steps(world, STAY, STAY, STAY, times=5)
+    assert state.failure_modes == (("removed",), ("FM2",), ())
+    assert [array[1:].tolist() for array in (state.max_speed, state.view_range)] == before

@@ -226,3 +226,12 @@ def test_what_a_robot_was_lifting_as_it_was_removed_can_be_lifted_at_once(build:
     steps(world, HOLD, STAY, times=2)
     steps(world, STAY, HOLD, times=11)
     assert world.state.robot_item.tolist() == [NOBODY, 1]
+
+
+def test_a_delivery_closes_one_request_for_an_item_that_comes_back(build: Build) -> None:
+    items = [(INSIDE, 5.1), FAR, (1.0, 1.0)]
+    world = build([(INSIDE, 5.0)], items, n_requests=2, restock=True, pickup_range=0.3)
+    world.state.open_requests[:] = 0
+    steps(world, HOLD)
+    assert world.state.delivered == 1
+    assert world.state.open_requests.tolist() == [0, 2]
