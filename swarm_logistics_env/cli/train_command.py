@@ -12,6 +12,7 @@ from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import TrainingError, how_to_install
 from swarm_logistics_env.policies import read_card
+from swarm_logistics_env.report.section import P_LEVEL
 from swarm_logistics_env.train.training import load_training, preset_names
 
 from .terminal import show_table
@@ -74,7 +75,7 @@ def _show_training(path: Path) -> None:
             f"{card.name}: scores on seeds it was not trained on",
             ("measure", "condition", "value", "low", "high", "seeds"),
             rows,
-            "low, high: limits of the 95 % interval",
+            f"low, high: limits of the {P_LEVEL} interval",
         )
     echo(f"Curve: {path.parent / PICTURE}")
     echo(f"Best on the evaluation's seeds: {path.parent / BEST}")

@@ -57,7 +57,7 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     assert printed.startswith("6 runs in lab.csv\n")
     assert "| wheel, m = 1 | 10.6 [8.4, 12.8] | [6.2, 14.9] | -0.013 [" in printed
     assert "No FT: it needs trials without the robots, fault = removed" in printed
-    assert "For a paper: lab: P at N = 8, no fault: 12.3 [" in printed
+    assert "For a paper: lab: P [95 %] at N = 8, no fault: 12.3 [" in printed
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
     assert f"Figure: {out / 'figures' / 'answer.svg'}\nTables: {out / 'tables.tex'}\n" in printed
@@ -129,7 +129,7 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     study = Study.stored("results/judged/homing")
     cells = study.performance()
     p = cells[cells["factor"] == "none"]["mean"].iloc[0]
-    assert f"For a paper: homing: P, items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
+    assert f"For a paper: homing: P [95 %], items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
     assert "from the start: swarm-logistics judge homing --seeds" in printed
     last = printed.splitlines()[-1]
     assert last.startswith(f"{5 * len(study.plan().cases) - 1} runs played in ")
