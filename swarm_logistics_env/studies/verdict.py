@@ -356,6 +356,10 @@ def under_holm(found: Sequence[Verdict]) -> Iterator[Verdict]:
 
 
 def same_runs(before: Sequence[Outcome], after: Sequence[Outcome]) -> bool:
-    """Return whether two conditions gave the same run at every seed, by the digests of the runs."""
+    """Return whether two conditions gave the same run at every seed, by the digests of the runs.
+
+    Conditions without a run did not.
+    """
     digests = [outcome.digest for outcome in before]
-    return digests == [outcome.digest for outcome in after] and None not in digests
+    is_equal = digests == [outcome.digest for outcome in after]
+    return is_equal and bool(digests) and None not in digests

@@ -196,3 +196,9 @@ def test_a_gate_on_what_cannot_be_passes() -> None:
     (answer,) = answers(Gate.parse("possibly A < 0.5"), found, found)
     assert answer.estimate is not None
     assert not answer.estimate.untestable
+
+
+def test_conditions_without_a_run_are_not_the_same_runs() -> None:
+    outcome = Outcome(digest="1")
+    assert same_runs([outcome], [outcome])
+    assert not same_runs([], [])
