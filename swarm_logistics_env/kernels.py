@@ -176,7 +176,7 @@ def _kept_on_disk(compiled: Any) -> Iterator[None]:
         cache.save_overload = functools.partial(_save_overload, cache)
         # numba looks at the kernel's own file alone, not at what it takes from others.
         is_ours = Path(compiled.py_func.__code__.co_filename).is_relative_to(_HERE)
-        stamp = _digest() if is_ours else cache._impl.locator.get_source_stamp()
+        stamp = (_digest(), None if is_ours else cache._impl.locator.get_source_stamp())
         cache._cache_file = _CheckedFiles(  # type: ignore[no-untyped-call]  # numba's
             cache.cache_path, f"{cache._impl.filename_base}.checked", stamp
         )

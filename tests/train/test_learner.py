@@ -96,7 +96,7 @@ def test_every_episode_has_the_bodies_of_its_robots_and_random_numbers_of_its_ow
         for world, rows in zip(view.venv.worlds, view.venv.rows_of_worlds):
             scenario = world.warehouse.scenario
             drives.add((rows.start, scenario.drive))
-            assert (view.frame.memory[rows, BODY:] == body_of(scenario)).all()
+            assert (view.frame.memory[rows, BODY] == body_of(scenario)).all()
         dones = np.zeros(view.num_envs, np.bool_)
         while not dones.any():
             view.step_async(np.zeros((view.num_envs, 3), np.float32))
