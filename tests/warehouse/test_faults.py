@@ -230,3 +230,23 @@ def test_robots_keep_their_speeds_and_senses_when_another_is_removed(build: Buil
     steps(world, STAY, STAY, STAY, times=5)
     assert state.failure_modes == (("removed",), ("FM2",), ())
     assert [array[1:].tolist() for array in (state.max_speed, state.view_range)] == before
+
+
+def test_an_intermittent_fault_ends_with_its_duration_whatever_holds_then() -> None:
+    fault = Fault("FM2", (0,), onset=1.0, duration=2.0, intermittent=(1000.0, 1000.0))
+    occurrence = Occurrence(fault, 0, 1)
+    assert occurrence.next_change(0.0, math.inf) == 1.0
+    assert occurrence.holds_for(1.0).tolist() == [0]
+    assert occurrence.next_change(1.0, math.inf) == 3.0
+    assert occurrence.holds_for(3.0).tolist() == []
+    assert occurrence.next_change(3.0, math.inf) == math.inf
+
+
+def test_a_neighbour_is_whom_the_carrier_sees_not_who_sees_it() -> None:
+    world = Warehouse(Scenario(n_robots=4, n_items=2))
+    world.reset(0)
+    state = world.state
+    state.robot_position = np.array([[5.0, 5.0], [5.8, 5.0], [5.0, 6.5], [3.0, 3.0]])
+    state.robot_item[0], state.item_carrier[state.requested] = state.requested, 0
+    state.view_range[:] = [1.0, 0.1, 2.0, 2.0]
+    assert roles_of(state).tolist() == ["carrier", "neighbour", "searching", "searching"]
