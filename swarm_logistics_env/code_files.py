@@ -164,8 +164,8 @@ class _Loader(SourceFileLoader):
 
     def exec_module(self, module: ModuleType) -> None:
         """Execute the module."""
-        own = {"__import__": functools.partial(self._folder.import_for, vars(module))}
-        vars(module)["__builtins__"] = {**vars(builtins), **own}
+        import_for = functools.partial(self._folder.import_for, vars(module))
+        vars(module)["__builtins__"] = {**vars(builtins), "__import__": import_for}
         super().exec_module(module)
 
 
@@ -245,7 +245,7 @@ class _Folder:
             outer, self._wanted = self._wanted, wanted
             self._depth += 1
             if self._depth == 1:
-                others = self._exchange(self._modules)
+                displaced = self._exchange(self._modules)
                 sys.meta_path.insert(0, self)
             try:
                 yield
@@ -254,7 +254,7 @@ class _Folder:
                 self._depth -= 1
                 if self._depth == 0:
                     sys.meta_path.remove(self)
-                    self._modules = self._exchange(others)
+                    self._modules = self._exchange(displaced)
 
     def _exchange(self, modules: Mapping[str, ModuleType]) -> dict[str, ModuleType]:
         """Put modules of this folder's names into Python's table; return those that were there."""
