@@ -71,7 +71,7 @@ quick: $(DEV)/installed
 	$(DEV)/bin/mypy & types=$$!; \
 	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -q -p verification.interpreted $(QUICK) && wait $$types
 
-QUICK := tests/warehouse/test_kinematics.py tests/studies/test_plan.py tests/verification/test_mutants.py \
+QUICK := tests/warehouse/test_kinematics.py tests/questions/test_plan.py tests/verification/test_mutants.py \
 	$(addprefix tests/spi/test_,indicators.py multiplicity.py) \
 	$(addprefix tests/test_,imports.py records.py scenario.py streams.py sizes.py)
 

@@ -16,12 +16,12 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
 from swarm_logistics_env.environment.spaces import ITEM_FEATURES, ROBOT_FEATURES
 from swarm_logistics_env.observations import columns, n_columns
+from swarm_logistics_env.questions.presets import PRESETS
+from swarm_logistics_env.questions.specification import Specification
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
-from swarm_logistics_env.studies.presets import PRESETS
-from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS, Columns
-from swarm_logistics_env.studies.specification import Specification
 from swarm_logistics_env.train.training import Training, load_training, preset_names
+from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, Columns
 
 FACTORS = ("sizes", "faults", "parameters", "ablations")
 PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")

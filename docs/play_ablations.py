@@ -20,9 +20,9 @@ from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.report import section
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.train.trainer import train
 from swarm_logistics_env.train.training import load_training
+from swarm_logistics_env.verdicts.results import StudyResults
 
 OUT = ROOT / "results" / "ablations"
 AGENT_STEPS, TRAININGS = 16_000_000, 3

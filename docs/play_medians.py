@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.policies import read_card
+from swarm_logistics_env.questions.presets import load_preset
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.presets import load_preset
-from swarm_logistics_env.studies.verdict import grouped
 
 
 def means(files: list[str]) -> dict[str, float]:

@@ -10,17 +10,19 @@ from pathlib import Path
 
 from tables import table
 
+from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import Setting
 from swarm_logistics_env.report import section
 from swarm_logistics_env.report.drawing import images
 from swarm_logistics_env.report.figures import indicator_figures
 from swarm_logistics_env.report.tables import claims, sentences
 from swarm_logistics_env.spi import relative_change
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import Setting
-from swarm_logistics_env.studies.measures import Agreement, agreement
-from swarm_logistics_env.studies.presets import PAPER
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
+from swarm_logistics_env.verdicts.agreement import Agreement, agreement
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.reference import PAPER
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 SEEDS, SEEDS_WHERE_SKEWED = 20, 100
 NO_DRIFT = {"heading_drift": 0.0}

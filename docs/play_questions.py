@@ -14,13 +14,13 @@ import question_tables as tables
 from play_tables import OUT, play
 from tables import ROOT, example, rewrite
 
+from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.drawing import Draw, Panel, Point
 from swarm_logistics_env.report.section import DECIDED
-from swarm_logistics_env.studies.measures import RateCurve, rate_curves
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import grouped
+from swarm_logistics_env.verdicts.mid_run_faults import RateCurve, rate_curves
+from swarm_logistics_env.verdicts.results import StudyResults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

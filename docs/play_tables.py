@@ -16,12 +16,13 @@ from tables import ROOT, by_policy, example, rewrite, seeds_from, table
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.judging import ENTRIES
+from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.report import benchmark, drawing, section
+from swarm_logistics_env.runs.engines import usable_cores
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.play import usable_cores
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Cell, grouped
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.results import StudyResults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 from tables import by_policy, seeds_from, table
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.report import section
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Verdict, grouped
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 Counts = NDArray[np.float64]  # of every seed, or of every training and seed
 

@@ -6,8 +6,9 @@ from typing import Any
 
 from swarm_logistics_env.report import section
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Cell, Verdict
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 ROOT = Path(__file__).parents[1]
 BLOCK = "<!-- tables: {name} -->"

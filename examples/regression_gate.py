@@ -10,7 +10,7 @@ import sys
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.gate import Gate, answers
+from swarm_logistics_env.verdicts.gate import Gate, answers
 
 GATES = ("change < 0", "R < -0.5 at FM1")
 

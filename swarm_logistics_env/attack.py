@@ -15,15 +15,15 @@ from scipy.linalg import cho_factor, cho_solve
 
 from swarm_logistics_env.errors import SetupError, StudyError, suggest
 from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.questions.comparison import NO_FAULT, Arm
+from swarm_logistics_env.runs.engines import Engine
+from swarm_logistics_env.runs.store import Runs
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi import Estimate, robustness
 from swarm_logistics_env.streams import generator
-from swarm_logistics_env.studies.comparison import NO_FAULT, Arm
-from swarm_logistics_env.studies.play import Engine
-from swarm_logistics_env.studies.runs import Runs
-from swarm_logistics_env.studies.verdict import Cell, same_runs
 from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.verdicts.cell import Cell, same_runs
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import ROLES
 

@@ -14,7 +14,7 @@ import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import (
     BaseModel,
@@ -26,6 +26,9 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import SwarmLogisticsError, suggest
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @contextmanager
@@ -58,6 +61,25 @@ def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path
 
 
 _LONGEST_NAME = 80  # of a file [characters]; with an ending it fits every file system
+
+
+def write_csv(path: Path, table: pd.DataFrame, error_type: type[SwarmLogisticsError]) -> None:
+    """Write a table as CSV with Unix line ends; floats in shortest exact form.
+
+    A text that a spreadsheet would compute as a formula has an apostrophe before it, and a line in
+    it ends in the Unix way, or it would end the row.
+
+    Raises:
+        The `error_type`: the file cannot be written.
+    """
+    from swarm_logistics_env.spi.trials_table import inert
+
+    texts = table.select_dtypes(exclude="number")
+    harmless = texts.map(
+        lambda cell: inert("\n".join(re.split(r"\r\n?", cell))) if isinstance(cell, str) else cell
+    )
+    with becoming(path, error_type) as part:
+        table.assign(**harmless).to_csv(part, index=False, lineterminator="\n")
 
 
 class Record(BaseModel):

@@ -13,11 +13,11 @@ import pytest
 from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.attack import STORE, Attack, attack, search
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.studies.play import serial
-from swarm_logistics_env.studies.runs import Runs
+from swarm_logistics_env.runs.engines import serial
+from swarm_logistics_env.runs.store import Runs
 from swarm_logistics_env.tasks.task import Outcome, Run
 from swarm_logistics_env.warehouse.faults import ROLES
-from tests.studies.made_up import delivered
+from tests.made_up import delivered
 
 SCENARIO = Scenario(
     n_robots=6, warehouse_width=5.0, warehouse_height=5.0, delivery_width=1.5, n_items=8,

@@ -14,7 +14,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, run_episode
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.studies.specification import read_study_file
+from swarm_logistics_env.questions.specification import read_study_file
 from swarm_logistics_env.train.training import load_training
 
 ROOT = Path(__file__).parents[1]

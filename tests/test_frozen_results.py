@@ -16,8 +16,9 @@ import pytest
 
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.results import VERDICT_COLUMNS, StudyResults, frame, judge
 from swarm_logistics_env.tasks import Outcome
+from swarm_logistics_env.verdicts.columns import VERDICT_COLUMNS, frame
+from swarm_logistics_env.verdicts.results import StudyResults, judge
 
 FROZEN = Path(__file__).parent / "frozen"
 SHIPPED = Path(__file__).parents[1] / "examples" / "shipped_policies.toml"

@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "streams": {"errors"},
     "progress_bar": set(),
     "kernels": {"errors"},
-    "records": {"errors"},
+    "records": {"errors", "spi"},
     "scenario": {"errors", "records", "streams"},
     "code_files": set(),
     "fingerprint": {"code_files"},
@@ -48,15 +48,28 @@ MAY_IMPORT: dict[str, set[str]] = {
     "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS | {"code_files", "fingerprint"},
-    "studies": RUNS | {"fingerprint", "progress_bar", "spi", "tasks"},
-    "report": {"errors", "records", "warehouse", "spi", "tasks", "studies"},
-    "attack": RUNS | {"spi", "tasks", "studies"},
+    "grouping": set(),
+    "questions": {"errors", "grouping", "policies", "records", "spi", "tasks"},
+    # Neither knows the other: what was played, and what it says.
+    "runs": RUNS
+    | {"code_files", "fingerprint", "grouping", "progress_bar", "questions", "spi", "tasks"},
+    "verdicts": {"errors", "grouping", "questions", "records", "spi", "tasks"},
+    "report": {
+        "errors",
+        "grouping",
+        "questions",
+        "records",
+        "spi",
+        "tasks",
+        "verdicts",
+        "warehouse",
+    },
+    "studies": {"errors", "questions", "report", "runs", "tasks", "verdicts"},
+    "attack": RUNS | {"questions", "runs", "spi", "tasks", "verdicts"},
     "testing": RUNS | ENVIRONMENT | {"spi"},
 }
-# A Study offers its report, so it stands above both; the other modules of studies stand below.
-MAY_IMPORT["Study"] = MAY_IMPORT["report"] | {"report"}
-MAY_IMPORT["train"] = MAY_IMPORT["studies"] | ENVIRONMENT | MAY_IMPORT["Study"]
-MAY_IMPORT["train"] |= {"wrappers", "adapters", "Study"}
+MAY_IMPORT["train"] = RUNS | ENVIRONMENT | MAY_IMPORT["studies"] | MAY_IMPORT["report"]
+MAY_IMPORT["train"] |= {"adapters", "fingerprint", "progress_bar", "studies", "wrappers"}
 # The front doors import whatever they offer.
 MAY_IMPORT["cli"] = set(MAY_IMPORT)
 MAY_IMPORT["__init__"] = set(MAY_IMPORT)
@@ -87,8 +100,6 @@ IMPORTS = list(all_imports())
 
 def part(module: str) -> str:
     """The part of the package a module belongs to: `warehouse` for `….warehouse.physics`."""
-    if module in {f"{PACKAGE}.studies", f"{PACKAGE}.studies.study"}:
-        return "Study"
     return module.split(".")[1] if "." in module else "__init__"
 
 

@@ -21,8 +21,8 @@ from swarm_logistics_env.report.section import Section
 from swarm_logistics_env.report.tables import tables
 from swarm_logistics_env.report.write import section_markdown
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.verdict import Cell
 from swarm_logistics_env.tasks.task import Outcome, Run
+from swarm_logistics_env.verdicts.cell import Cell
 
 PACKAGE = str(Path(swarm_logistics_env.__file__).parent)
 SMALL: dict[str, Any] = {

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.questions.specification import looks_up_to
 from swarm_logistics_env.spi.ratio import RatioTest, paired_ratio
 from swarm_logistics_env.spi.summaries import at_stake
-from swarm_logistics_env.studies.specification import looks_up_to
-from swarm_logistics_env.studies.until_clear import SPENDING
+from swarm_logistics_env.verdicts.until_clear import SPENDING
 
 STUDIES, TRAINED_STUDIES = 3_000, 1_000
 P_O, P_F, LEARNED_P = 39.0, 34.0, 300.0  # true means [items]

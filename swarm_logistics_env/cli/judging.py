@@ -13,20 +13,20 @@ from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, PolicySpec
+from swarm_logistics_env.questions.plan import Origin
+from swarm_logistics_env.questions.specification import FIRST_LOOK
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, fixed, percent, slug
 from swarm_logistics_env.report.write import write_report
+from swarm_logistics_env.runs.engines import engine_named
+from swarm_logistics_env.runs.notes import StoredStudy
+from swarm_logistics_env.runs.recorded import import_results, origin_of
+from swarm_logistics_env.runs.store import FILE_NAME
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.declaration import StoredStudy
-from swarm_logistics_env.studies.importing import import_results, origin_of
-from swarm_logistics_env.studies.plan import Origin
-from swarm_logistics_env.studies.play import engine_named
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.runs import FILE_NAME
-from swarm_logistics_env.studies.specification import FIRST_LOOK
+from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.warehouse.faults import text_of
 
 from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustOption, scenario_of

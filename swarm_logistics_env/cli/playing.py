@@ -206,8 +206,8 @@ def list_command(
     ] = False,
 ) -> None:
     """List policies, trainings, failure modes, studies or a scenario."""
+    from swarm_logistics_env.questions.presets import PRESETS
     from swarm_logistics_env.studies import Study
-    from swarm_logistics_env.studies.presets import PRESETS
 
     from .terminal import show_table
 

@@ -12,17 +12,16 @@ from typer import Argument, Exit, Option, echo
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
+from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.section import NOTHING, bracketed, percent, said, slug
+from swarm_logistics_env.runs.engines import Engine, Shard, Tally, engine_named
+from swarm_logistics_env.runs.notes import merge
+from swarm_logistics_env.runs.store import Runs, export
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import CONFIDENCE
-from swarm_logistics_env.studies.declaration import merge
-from swarm_logistics_env.studies.gate import SUBJECTS, Gate, GateAnswer, answers, match
-from swarm_logistics_env.studies.plan import Shard
-from swarm_logistics_env.studies.play import Engine, Tally, engine_named
-from swarm_logistics_env.studies.runs import Runs, export
-from swarm_logistics_env.studies.until_clear import MOST_SEEDS
 from swarm_logistics_env.tasks.task import Run
+from swarm_logistics_env.verdicts.gate import SUBJECTS, Gate, GateAnswer, answers, match
+from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS
 
 from .app import Repeated, TrustOption
 from .terminal import say, say_what_was_played, show_power, show_report, show_table

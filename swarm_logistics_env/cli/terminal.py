@@ -18,9 +18,9 @@ from swarm_logistics_env.report.answer import MOST_LINES, answer, digest, in_a_s
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import NOTHING, Section, Texts, levels, number
 from swarm_logistics_env.report.write import how_to_get_figures, section_markdown, write_report
-from swarm_logistics_env.studies.play import Tally
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import POWER, Verdict
+from swarm_logistics_env.runs.engines import Tally
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import POWER, Verdict
 
 _PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
 

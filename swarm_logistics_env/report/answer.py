@@ -11,11 +11,13 @@ from textwrap import wrap
 from typing import NamedTuple
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.studies.comparison import CONFIDENCE
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import POWER, UNAFFECTED, Cell, Verdict, grouped
 from swarm_logistics_env.tasks.task import DEFAULT
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import POWER, UNAFFECTED, Verdict
 
 from . import section
 from .section import Section, said

@@ -8,10 +8,12 @@ import numpy as np
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm
 from swarm_logistics_env.spi.inputs import Numbers
-from swarm_logistics_env.studies.comparison import CONFIDENCE, Arm
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 from .section import (
     NOTHING,

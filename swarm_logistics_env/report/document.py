@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from importlib.metadata import version
 from typing import NamedTuple
 
+from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import CONFIDENCE
+from swarm_logistics_env.questions.plan import Origin, Plan
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
-from swarm_logistics_env.studies.comparison import CONFIDENCE
-from swarm_logistics_env.studies.plan import Origin, Plan
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import grouped
+from swarm_logistics_env.verdicts.results import StudyResults
 
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures

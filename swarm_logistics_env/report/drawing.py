@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from swarm_logistics_env.studies.measures import RateCurve
-from swarm_logistics_env.studies.verdict import Verdict
+from swarm_logistics_env.verdicts.mid_run_faults import RateCurve
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

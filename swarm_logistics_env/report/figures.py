@@ -5,11 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 
+from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Comparison
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
-from swarm_logistics_env.studies.comparison import CONFIDENCE, Comparison
-from swarm_logistics_env.studies.measures import RateCurve, mid_run_faults, rate_curves, window_of
-from swarm_logistics_env.studies.results import VERDICT_COLUMNS, StudyResults, frame
-from swarm_logistics_env.studies.verdict import Verdict, grouped
+from swarm_logistics_env.verdicts.columns import VERDICT_COLUMNS, frame
+from swarm_logistics_env.verdicts.mid_run_faults import (
+    RateCurve,
+    mid_run_faults,
+    rate_curves,
+    window_of,
+)
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 from . import drawing
 from .answer import Answer

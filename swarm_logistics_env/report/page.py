@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
-from swarm_logistics_env.studies.comparison import Arm
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Verdict, grouped
+from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import Arm
 from swarm_logistics_env.tasks.task import DEFAULT, Outcome
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from .answer import Answer

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.questions.comparison import CONFIDENCE
+from swarm_logistics_env.questions.specification import seeds_in_words
 from swarm_logistics_env.spi.estimate import SIGNS, Estimate
-from swarm_logistics_env.studies.comparison import CONFIDENCE
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.specification import seeds_in_words
-from swarm_logistics_env.studies.verdict import Cell, Verdict
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd

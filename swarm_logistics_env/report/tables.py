@@ -7,17 +7,15 @@ from functools import partial
 
 import numpy as np
 
+from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.studies.comparison import CONFIDENCE
-from swarm_logistics_env.studies.measures import (
-    Agreement,
-    RepairCurve,
-    agreements,
-    resiliences,
-)
-from swarm_logistics_env.studies.presets import Reference
-from swarm_logistics_env.studies.results import StudyResults
-from swarm_logistics_env.studies.verdict import Cell, Verdict, grouped
+from swarm_logistics_env.verdicts.agreement import Agreement, agreements
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.mid_run_faults import RepairCurve, resiliences
+from swarm_logistics_env.verdicts.reference import Reference
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 from . import section
 from .figures import rate_figures

@@ -14,10 +14,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError, how_to_install
-from swarm_logistics_env.records import becoming, plain
+from swarm_logistics_env.records import becoming, plain, write_csv
 from swarm_logistics_env.spi.estimate import SIGNS
-from swarm_logistics_env.studies.results import CELL_COLUMNS, VERDICT_COLUMNS, StudyResults, frame
-from swarm_logistics_env.studies.runs import write_csv
+from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
+from swarm_logistics_env.verdicts.results import StudyResults
 
 from .document import Document, document
 from .drawing import images
@@ -40,11 +40,11 @@ def write_report(
     pictures, page = directory / "figures", directory / "report.html"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
-        write_csv(paths[1], frame(results.cells, CELL_COLUMNS))
-        write_csv(paths[2], frame(results.verdicts, VERDICT_COLUMNS))
+        write_csv(paths[1], frame(results.cells, CELL_COLUMNS), StudyError)
+        write_csv(paths[2], frame(results.verdicts, VERDICT_COLUMNS), StudyError)
         write_text(paths[3], latex_tables((whole.answer.section, *whole.summary)))
         for figure in whole.figures():
-            write_csv(pictures / f"{figure.name}.csv", figure.data)
+            write_csv(pictures / f"{figure.name}.csv", figure.data, StudyError)
         if advice := how_to_get_figures():
             write_text(paths[0], markdown(whole, note=advice))
             return paths

@@ -337,3 +337,6 @@ def refuse_untrusted(
             f"{place}: {said[0]} is code, which runs when it is loaded: should be a name that the "
             "package knows, or be allowed by --trust-code (trust_code=True)"
         )
+
+
+Outcomes = Mapping[tuple[str, int], Outcome]  # by the key of the case, and the seed

@@ -22,13 +22,13 @@ from swarm_logistics_env.episode import run_episode
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.policies import Policy, load
 from swarm_logistics_env.policies.learned import Score
+from swarm_logistics_env.questions.comparison import Arm
 from swarm_logistics_env.records import becoming, file_name, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import Arm
-from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.warehouse import Fault
 
 FILE_NAME = "training.json"

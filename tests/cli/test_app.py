@@ -14,8 +14,8 @@ from swarm_logistics_env import Scenario, policies
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.cli.app import command_line
 from swarm_logistics_env.cli.terminal import show
+from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.report.section import Section
-from swarm_logistics_env.studies.presets import PRESETS
 from swarm_logistics_env.train import preset_names
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from tests.cli.conftest import Command

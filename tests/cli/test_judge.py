@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from swarm_logistics_env.cli import judging
+from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.presets import PRESETS
 from tests.cli.conftest import Command
 
 LAB = """robots;fault;faulty;boxes

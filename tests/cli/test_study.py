@@ -17,8 +17,8 @@ import pytest
 
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.policies.spec import WEIGHTS
+from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 from tests.cli.conftest import Command
 
 FILE = """

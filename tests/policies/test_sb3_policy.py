@@ -13,7 +13,7 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.cli.study_commands import study_of
 from swarm_logistics_env.errors import PolicyError, StudyError
 from swarm_logistics_env.policies import Policy, PolicySpec
-from swarm_logistics_env.studies.specification import read_study_file
+from swarm_logistics_env.questions.specification import read_study_file
 
 pytest.importorskip("stable_baselines3")
 

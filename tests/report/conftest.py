@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from swarm_logistics_env.studies.comparison import Setting
-from swarm_logistics_env.studies.results import StudyResults
-from tests.studies.made_up import paper, published
+from swarm_logistics_env.questions.comparison import Setting
+from swarm_logistics_env.verdicts.results import StudyResults
+from tests.made_up import paper, published
 
 NARROW = Setting("parameter", "warehouse_width", 5.0)
 

@@ -10,8 +10,8 @@ import pytest
 from swarm_logistics_env import spi
 from swarm_logistics_env.report.answer import MOST_LINES, answer, digest
 from swarm_logistics_env.report.section import limits, said
-from swarm_logistics_env.studies.results import StudyResults
-from tests.studies.made_up import paper
+from swarm_logistics_env.verdicts.results import StudyResults
+from tests.made_up import paper
 
 
 def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:

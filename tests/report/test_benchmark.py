@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from swarm_logistics_env.questions.plan import make_plan
+from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.plan import make_plan
-from swarm_logistics_env.studies.presets import PRESETS
 
 SMALL = {"warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.0}
 SMALL |= {"n_robots": 4, "n_items": 6, "duration": 60.0, "restock": True}

@@ -8,15 +8,20 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from swarm_logistics_env.questions.comparison import NO_FAULT, OTHER_BEHAVIOUR, Setting
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import NO_FAULT, OTHER_BEHAVIOUR, Setting
-from swarm_logistics_env.studies.measures import RateCurve, Resilience, rate_curves, resiliences
-from swarm_logistics_env.studies.results import StudyResults, judge
 from swarm_logistics_env.tasks.task import Outcome
-from tests.studies.made_up import delivered, judged
+from swarm_logistics_env.verdicts.mid_run_faults import (
+    RateCurve,
+    Resilience,
+    rate_curves,
+    resiliences,
+)
+from swarm_logistics_env.verdicts.results import StudyResults, judge
+from tests.made_up import delivered, judged
 
 ONSET, END = 600.0, 2000.0
 SEEDS = 8

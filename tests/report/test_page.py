@@ -22,7 +22,7 @@ from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.page import axis, watch_command
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.results import StudyResults
+from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.watch import Session, messages
 from swarm_logistics_env.watch.messages import recorded_page
 from tests.conftest import SMALL

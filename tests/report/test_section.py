@@ -14,15 +14,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.questions.comparison import Setting
 from swarm_logistics_env.report.answer import answer, digest, in_a_sentence
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, concluded, fixed, levels, percent
 from swarm_logistics_env.report.write import latex_tables, markdown, write_report
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import Setting
-from swarm_logistics_env.studies.results import StudyResults
 from swarm_logistics_env.tasks.task import Outcome
-from tests.studies.made_up import delivered, judged, paper
+from swarm_logistics_env.verdicts.results import StudyResults
+from tests.made_up import delivered, judged, paper
 
 NUMBERS = st.floats(-3.0, 3.0) | st.floats(-0.02, 0.02) | st.floats(0.98, 1.02)
 

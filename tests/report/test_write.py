@@ -14,8 +14,8 @@ import pytest
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import Section, counted_as, limits, sentence
 from swarm_logistics_env.report.write import latex_tables, markdown, section_markdown, write_report
-from swarm_logistics_env.studies.results import StudyResults
-from tests.studies.made_up import paper
+from swarm_logistics_env.verdicts.results import StudyResults
+from tests.made_up import paper
 
 
 def test_no_headline_counts_a_verdict_that_assumes_normal_differences(few: StudyResults) -> None:

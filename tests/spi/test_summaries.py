@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import sem, t, trim_mean
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.studies.specification import looks_up_to
+from swarm_logistics_env.questions.specification import looks_up_to
 from verification.verdict_errors import share_equivalent, wrong_verdicts
 
 P = [31.0, 38, 35, 44, 40, 29, 36]

@@ -22,12 +22,12 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.policies.spec import WEIGHTS
+from swarm_logistics_env.runs.notes import NOTE, merge
+from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.runs.store import FILE_NAME, Runs, export
 from swarm_logistics_env.spi import IndicatorError, read_trials
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.declaration import NOTE, merge
-from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export
-from tests.studies.made_up import alter, made_old
+from tests.made_up import alter, made_old
 
 STUDY = """\
 policies = ["swarm-dt", "random-walk"]

@@ -13,11 +13,11 @@ import pytest
 
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.questions.specification import Specification
 from swarm_logistics_env.records import file_name, steers
+from swarm_logistics_env.runs.recorded import import_results
 from swarm_logistics_env.spi import IndicatorError, read_trials
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.specification import Specification
 
 # A label of 300 signs leaves a drawing no room for its axes.
 pytestmark = pytest.mark.filterwarnings("ignore:constrained_layout:UserWarning")

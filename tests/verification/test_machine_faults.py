@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
+from swarm_logistics_env.runs.store import FILE_NAME, Runs, export
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 

@@ -9,12 +9,11 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.runs.engines import Shard
+from swarm_logistics_env.runs.notes import StoredStudy, merge
+from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.declaration import StoredStudy, merge
-from swarm_logistics_env.studies.plan import Shard
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs
-
-from .made_up import alter
+from tests.made_up import alter
 
 
 def test_every_run_is_in_one_shard() -> None:

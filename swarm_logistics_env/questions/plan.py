@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, pairwise, product
-from typing import Self
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.trials import Trial
 from swarm_logistics_env.tasks.task import Case, Fields, Run, TaskFault
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
-from .specification import (
-    BOTH,
-    Ablation,
-    Factor,
-    Faults,
-    Parameter,
-    Sizes,
-    Specification,
-)
-from .verdict import grouped
+from .specification import BOTH, Ablation, Factor, Faults, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of S for the steps in `Sizes.superlinear`
 Place = tuple[str, str, Arm]  # of a cell: label of the policy, table, arm
@@ -123,43 +113,6 @@ class Plan:
             f"{run} conditions{shared} x {most}{len(self.seeds)} seeds{first} = "
             f"{most}{run * len(self.seeds)} runs"
         )
-
-
-@dataclass(frozen=True)
-class Shard:
-    """Part `number` of `count`, counted from 1.
-
-    Raises:
-        StudyError: there is no such part.
-    """
-
-    number: int
-    count: int
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.number <= self.count:
-            raise StudyError(f"shard {self}: should be i/n with i from 1 to n")
-
-    @classmethod
-    def parse(cls, text: str) -> Self:
-        """Return the shard that "i/n" means."""
-        match = re.fullmatch(r"(\d+)/(\d+)", text)
-        if match is None:
-            raise StudyError(f"shard {text}: should be i/n, e.g. 2/8")
-        return cls(int(match[1]), int(match[2]))
-
-    def __str__(self) -> str:
-        return f"{self.number}/{self.count}"
-
-    @property
-    def directory(self) -> str:
-        """Name of the directory of its store: shards on one disk never share a file."""
-        return f"shard-{self.number}-of-{self.count}"
-
-    def of(self, runs: Sequence[Run]) -> Sequence[Run]:
-        """Return every n-th run from the i-th on."""
-        # Count all runs, not the missing ones, so that a shard depends on nothing but the plan.
-        return runs[self.number - 1 :: self.count]
 
 
 def make_plan(

@@ -11,9 +11,9 @@ from swarm_logistics_env import Scenario, policies, run_episode, spi
 from swarm_logistics_env.errors import PolicyError, StudyError
 from swarm_logistics_env.policies.spec import WEIGHTS, trainings_of
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.gate import Gate, answers
-from swarm_logistics_env.studies.results import StudyResults, judge
-from tests.studies.made_up import delivered
+from swarm_logistics_env.verdicts.gate import Gate, answers
+from swarm_logistics_env.verdicts.results import StudyResults, judge
+from tests.made_up import delivered
 
 SHIPPED = [*trainings_of("ppo-robust@all")[:2], "ppo-delivery"]
 SMALL = Scenario(n_robots=4, n_items=6, restock=True, duration=60.0)

@@ -17,13 +17,14 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Comparison
+from swarm_logistics_env.questions.plan import Plan
 from swarm_logistics_env.spi.equivalence import ALPHA
-from swarm_logistics_env.tasks.task import Case, Run
+from swarm_logistics_env.tasks.task import Case, Outcomes, Run
 
-from .comparison import CONFIDENCE, Arm, Comparison
-from .plan import Plan
-from .runs import Outcomes
-from .verdict import Cell, Verdict, grouped, judge_one
+from .cell import Cell
+from .verdict import Verdict, judge_one
 
 MOST_SEEDS = 200
 SPENDING: spi.Spending = "linear"

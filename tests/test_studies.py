@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.questions.declaration import Declaration
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
+from swarm_logistics_env.runs.notes import note
+from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.declaration import Declaration, note
-from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs
 from tests.conftest import SMALL
-from tests.studies.made_up import alter, digest
+from tests.made_up import alter, digest
 
 DYING = """
 import os, pathlib, signal

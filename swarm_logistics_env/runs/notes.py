@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import to_json
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.fingerprint import UNSTABLE, changes
-from swarm_logistics_env.spi.equivalence import MARGIN
+from swarm_logistics_env.questions.declaration import Declaration
+from swarm_logistics_env.questions.plan import Origin, Plan
+from swarm_logistics_env.questions.specification import Specification
 
-from .plan import Origin, Plan
-from .runs import Runs
-from .specification import Specification
+from .store import Runs
 
 NOTE = "study"
-_Count = Annotated[int, Field(gt=0, strict=True)]
 
 
 class StoredSpecification(BaseModel):
@@ -42,31 +41,6 @@ class StoredSpecification(BaseModel):
         declared = Specification(**{**self.model_dump(), "task": asked.task})
         theirs = declared.model_dump(mode="json", exclude=free)
         return [name for name in mine if mine[name] != theirs[name]]
-
-
-class Declaration(BaseModel):
-    """What a study declared before its first run.
-
-    Attributes:
-        first_seed, seeds: the smallest seed, and how many there are of every condition.
-        looks: numbers of seeds, from the first on, at which comparisons may stop; empty: none.
-        margin: of equivalence, as a share of P_o.
-    """
-
-    model_config = ConfigDict(frozen=True, from_attributes=True)
-
-    first_seed: Annotated[int, Field(ge=0, strict=True)]
-    seeds: _Count
-    looks: tuple[_Count, ...] = ()
-    margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
-
-    def covers(self, plan: Plan) -> bool:
-        """Return whether the verdicts of a plan were declared, and so are not exploratory."""
-        if plan.origin is not None:
-            return True  # nothing is added to what was imported
-        # A part of the declared seeds is a choice as well, made with the results at hand.
-        seeds = range(self.first_seed, self.first_seed + self.seeds)
-        return plan.seeds == seeds and self.looks in ((), plan.specification.looks)
 
 
 class StoredStudy(BaseModel):

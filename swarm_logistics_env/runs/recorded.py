@@ -10,18 +10,19 @@ from pathlib import Path
 import numpy as np
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.policies.spec import PolicySpec
+from swarm_logistics_env.questions.comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
+from swarm_logistics_env.questions.declaration import Declaration
+from swarm_logistics_env.questions.plan import Origin, Plan
+from swarm_logistics_env.questions.specification import Specification
 from swarm_logistics_env.records import file_name
 from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials
 from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
-from .comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
-from .declaration import Declaration, note
-from .plan import Origin, Plan
-from .runs import Runs
-from .specification import Specification
-from .verdict import grouped
+from .notes import note
+from .store import Runs
 
 
 def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = None) -> int:

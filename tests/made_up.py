@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from swarm_logistics_env.questions.comparison import NO_FAULT, Setting
+from swarm_logistics_env.runs.rows import digest_of
+from swarm_logistics_env.runs.store import Runs, export
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import NO_FAULT, Setting
-from swarm_logistics_env.studies.presets import PAPER
-from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.rows import digest_of
-from swarm_logistics_env.studies.runs import Runs, export
 from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.verdicts.reference import PAPER
+from swarm_logistics_env.verdicts.results import StudyResults, judge
 
 
 def digest(directory: Path, to: Path) -> str:

@@ -22,13 +22,14 @@ from typing import NamedTuple, Self
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.questions.specification import seeds_in_words
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate, Verdict
 from swarm_logistics_env.tasks.task import TaskFault, TaskScenario
 
+from .cell import Cell, same_runs
 from .results import StudyResults
-from .specification import seeds_in_words
-from .verdict import Cell, judge_one, same_runs
+from .verdict import judge_one
 
 # All about a condition but its policy: scenario, faults, behaviour and table.
 _Content = tuple[TaskScenario, tuple[TaskFault, ...], int, str]

@@ -13,17 +13,18 @@ from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
 
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.questions.declaration import Declaration
+from swarm_logistics_env.questions.plan import Plan, make_plan, refuse_changed_policies
+from swarm_logistics_env.questions.presets import load_preset
+from swarm_logistics_env.questions.specification import Specification, read_study_file
+from swarm_logistics_env.runs.engines import Engine, Shard, Tally, engine_named, play
+from swarm_logistics_env.runs.notes import StoredStudy, note
+from swarm_logistics_env.runs.recorded import imported_plan
+from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.tasks.task import Run, Task, refuse_untrusted
-
-from .declaration import Declaration, StoredStudy, note
-from .importing import imported_plan
-from .plan import Plan, Shard, make_plan, refuse_changed_policies
-from .play import Engine, Tally, engine_named, play
-from .presets import load_preset
-from .results import CELL_COLUMNS, VERDICT_COLUMNS, StudyResults, frame, judge
-from .runs import FILE_NAME, Runs
-from .specification import Specification, read_study_file
-from .until_clear import standing
+from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
+from swarm_logistics_env.verdicts.results import StudyResults, judge
+from swarm_logistics_env.verdicts.until_clear import standing
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,14 +17,14 @@ import pytest
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
-from swarm_logistics_env.studies import Study, play
-from swarm_logistics_env.studies.declaration import merge
-from swarm_logistics_env.studies.plan import Shard
-from swarm_logistics_env.studies.play import engine_named
+from swarm_logistics_env.runs import engines as play
+from swarm_logistics_env.runs.engines import Shard, engine_named
+from swarm_logistics_env.runs.notes import merge
+from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Case, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from tests.conftest import SMALL
-from tests.studies.made_up import digest
+from tests.made_up import digest
 
 has_ray = importlib.util.find_spec("ray") is not None
 
@@ -130,7 +130,7 @@ def test_other_behaviour_meets_the_same_worlds_and_nothing_is_remembered() -> No
 def test_workers_end_with_a_parent_that_is_killed() -> None:
     script = (
         "import os, signal\n"
-        "from swarm_logistics_env.studies.worker_processes import workers\n"
+        "from swarm_logistics_env.runs.worker_processes import workers\n"
         "if __name__ == '__main__':\n"
         "    with workers(2) as pool:\n"
         "        print(len({pool.submit(os.getpid).result() for _ in range(20)}), flush=True)\n"

@@ -14,16 +14,16 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.questions.specification import looks_up_to
 from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.section import sentence
+from swarm_logistics_env.runs.engines import Shard
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.plan import Shard
-from swarm_logistics_env.studies.specification import looks_up_to
-from swarm_logistics_env.studies.until_clear import SPENDING
-from swarm_logistics_env.studies.verdict import Verdict
 from swarm_logistics_env.tasks.task import Outcome, Run
-from tests.studies.made_up import delivered
+from swarm_logistics_env.verdicts.until_clear import SPENDING
+from swarm_logistics_env.verdicts.verdict import Verdict
+from tests.made_up import delivered
 from verification.verdict_errors import MODELS, wrong_verdicts
 
 MEANS = {"FM2": 38.5, "FM3": 34.0, "FM4": 15.0}  # of 40 items; R is 0.0025, -0.11 and -0.585

@@ -23,9 +23,10 @@ from swarm_logistics_env.cli.terminal import say_what_was_played
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.records import write_csv
+from swarm_logistics_env.runs.store import FILE_NAME, Runs, export
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.runs import FILE_NAME, Runs, export, write_csv
 from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 
@@ -83,7 +84,11 @@ def test_csv_says_what_the_store_holds_sorted_and_without_wall_times(
 def test_no_text_in_a_csv_is_a_formula_and_each_is_read_again(text: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "one.csv")
-        write_csv(path, pd.DataFrame({"policy": [text, "us"], "low": [-1.5, 2.0], "P": [4, 4]}))
+        write_csv(
+            path,
+            pd.DataFrame({"policy": [text, "us"], "low": [-1.5, 2.0], "P": [4, 4]}),
+            StudyError,
+        )
         found = read_trials(path, ignore=["low"])
         with path.open(newline="") as file:
             _, (cell, number, _), _ = csv.reader(file)
@@ -180,7 +185,7 @@ def test_a_policy_that_fails_with_any_text_leaves_a_study_that_is_finished_and_r
 
 MAKER = """
 import pathlib, sys
-from swarm_logistics_env.studies.runs import Runs
+from swarm_logistics_env.runs.store import Runs
 
 for line in sys.stdin:
     with Runs(pathlib.Path(line.strip())) as runs:

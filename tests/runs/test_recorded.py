@@ -8,13 +8,13 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.questions.comparison import OTHER_BEHAVIOUR
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
+from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.runs.store import Runs
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import OTHER_BEHAVIOUR
-from swarm_logistics_env.studies.importing import import_results
-from swarm_logistics_env.studies.measures import resiliences
-from swarm_logistics_env.studies.runs import Runs
+from swarm_logistics_env.verdicts.mid_run_faults import resiliences
 
 
 def imported(tmp_path: Path, text: str, **stated: str) -> Study:

@@ -11,11 +11,12 @@ import pytest
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
+from swarm_logistics_env.questions.comparison import OTHER_BEHAVIOUR
+from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import OTHER_BEHAVIOUR
-from swarm_logistics_env.studies.presets import PAPER, PRESETS
 from swarm_logistics_env.tasks.task import Case, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.verdicts.reference import PAPER
 from swarm_logistics_env.warehouse import Fault
 
 # The specification of the statistics prints these to three decimals.

@@ -19,13 +19,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import ModuleType
+from typing import Self
 
 from swarm_logistics_env.errors import StudyError, how_to_install, suggest
 from swarm_logistics_env.policies.current_folder import found_here
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.tasks.task import Outcome, Run
 
-from .runs import Runs
+from .store import Runs
 from .worker_processes import Played, in_processes, pickled, play_pickled
 
 Engine = Callable[[Iterable[Run]], Played]
@@ -38,6 +39,43 @@ _NOT_OWN = (
     str(Path(__file__).parents[1]), "<",
     *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Part `number` of `count`, counted from 1.
+
+    Raises:
+        StudyError: there is no such part.
+    """
+
+    number: int
+    count: int
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.number <= self.count:
+            raise StudyError(f"shard {self}: should be i/n with i from 1 to n")
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the shard that "i/n" means."""
+        match = re.fullmatch(r"(\d+)/(\d+)", text)
+        if match is None:
+            raise StudyError(f"shard {text}: should be i/n, e.g. 2/8")
+        return cls(int(match[1]), int(match[2]))
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    @property
+    def directory(self) -> str:
+        """Name of the directory of its store: shards on one disk never share a file."""
+        return f"shard-{self.number}-of-{self.count}"
+
+    def of(self, runs: Sequence[Run]) -> Sequence[Run]:
+        """Return every n-th run from the i-th on."""
+        # Count all runs, not the missing ones, so that a shard depends on nothing but the plan.
+        return runs[self.number - 1 :: self.count]
 
 
 @dataclass(frozen=True)

@@ -8,21 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from swarm_logistics_env.questions.comparison import Setting
+from swarm_logistics_env.questions.declaration import Declaration
 from swarm_logistics_env.report.tables import warnings
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.comparison import Setting
-from swarm_logistics_env.studies.declaration import Declaration
-from swarm_logistics_env.studies.measures import agreements
-from swarm_logistics_env.studies.results import (
-    CELL_COLUMNS,
-    VERDICT_COLUMNS,
-    StudyResults,
-    frame,
-    judge,
-)
-from swarm_logistics_env.studies.verdict import Verdict
 from swarm_logistics_env.tasks.task import Outcome
-from tests.studies.made_up import judged, paper, published
+from swarm_logistics_env.verdicts.agreement import agreements
+from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
+from swarm_logistics_env.verdicts.results import StudyResults, judge
+from swarm_logistics_env.verdicts.verdict import Verdict
+from tests.made_up import judged, paper, published
 
 
 def by_question(results: StudyResults) -> dict[tuple[str, str, float], Verdict]:

@@ -11,11 +11,11 @@ import pytest
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.studies.gate import Gate, answers, match
-from swarm_logistics_env.studies.results import StudyResults, judge
-from swarm_logistics_env.studies.verdict import same_runs
 from swarm_logistics_env.tasks.task import Outcome
-from tests.studies.made_up import delivered
+from swarm_logistics_env.verdicts.cell import same_runs
+from swarm_logistics_env.verdicts.gate import Gate, answers, match
+from swarm_logistics_env.verdicts.results import StudyResults, judge
+from tests.made_up import delivered
 
 SPREAD = (0, 2, -1, 1, 3, -2)
 # Mean P by (N, m); m = -1: removed.

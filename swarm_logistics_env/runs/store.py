@@ -7,14 +7,13 @@ import json
 import re
 import sqlite3
 import time
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import becoming, canonical_json, plain
-from swarm_logistics_env.spi.trials_table import inert
+from swarm_logistics_env.records import becoming, canonical_json, plain, write_csv
 from swarm_logistics_env.tasks.task import Outcome, Run
 
 from .rows import Row, case_of, content_of, digest_of, outcome_of
@@ -49,8 +48,6 @@ _ADD = """INSERT INTO runs VALUES (?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO UPDATE
     digest = excluded.digest WHERE runs.failed"""
 # What SQLite finds wrong with an index, or with a value: no row but the damaged ones is concerned.
 _OF_ROWS = re.compile(r"(row \d+ missing from index|non-unique entry in index|NULL value in) ")
-
-Outcomes = Mapping[tuple[str, int], Outcome]  # by the key of the case, and the seed
 
 
 class Runs:
@@ -373,22 +370,5 @@ def export(runs: Runs, path: Path) -> tuple[int, str]:
         frame["delivery_times"] = frame["delivery_times"].map(
             lambda times: " ".join(map(repr, times)), na_action="ignore"
         )
-    write_csv(path, frame)
+    write_csv(path, frame, StudyError)
     return len(frame), hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def write_csv(path: Path, table: pd.DataFrame) -> None:
-    """Write a table as CSV with Unix line ends; floats in shortest exact form.
-
-    A text that a spreadsheet would compute as a formula has an apostrophe before it, and a line in
-    it ends in the Unix way, or it would end the row.
-
-    Raises:
-        StudyError: the file cannot be written.
-    """
-    texts = table.select_dtypes(exclude="number")
-    harmless = texts.map(
-        lambda cell: inert("\n".join(re.split(r"\r\n?", cell))) if isinstance(cell, str) else cell
-    )
-    with becoming(path, StudyError) as part:
-        table.assign(**harmless).to_csv(part, index=False, lineterminator="\n")

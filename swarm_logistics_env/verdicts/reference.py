@@ -1,8 +1,4 @@
-"""The studies that come with the package, and published values: the paper's, and how near we come.
-
-Source: Milner, Sooriyabandara and Hauert, Swarm Performance Indicators: Metrics for Robustness,
-Fault Tolerance, Scalability and Adaptability; Tables I to III and the text around them.
-"""
+"""Reference: what was published of the paper's swarm."""
 
 from __future__ import annotations
 
@@ -14,12 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from swarm_logistics_env.errors import StudyError, suggest
+from swarm_logistics_env.questions.comparison import NO_FAULT, Comparison, Question, Setting
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Factor
 from swarm_logistics_env.spi.estimate import Estimate
-
-from .comparison import NO_FAULT, Comparison, Question, Setting
-from .specification import Specification, read_study_file
 
 
 @dataclass(frozen=True)
@@ -86,17 +79,3 @@ def _read_reference(path: Path) -> Reference:
 
 
 PAPER = _read_reference(Path(__file__).parent / "paper_values.toml")
-
-_FOLDER = Path(__file__).parent / "preset_studies"
-PRESETS = {path.stem: read_study_file(path) for path in sorted(_FOLDER.glob("*.toml"))}
-
-
-def load_preset(name: str) -> Specification:
-    """Return the preset study of that name.
-
-    Raises:
-        StudyError: there is none.
-    """
-    if name not in PRESETS:
-        raise StudyError(f"no study preset {name!r}{suggest(name, PRESETS)}")
-    return PRESETS[name]

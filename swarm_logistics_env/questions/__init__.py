@@ -1,0 +1,1 @@
+"""Questions: from a specification to the conditions and comparisons that it needs."""

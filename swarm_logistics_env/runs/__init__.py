@@ -1,0 +1,1 @@
+"""Runs: the engines that play them, and the one store that keeps them."""

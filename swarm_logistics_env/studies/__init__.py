@@ -1,5 +1,0 @@
-"""Studies: from a specification to runs, a store, verdicts and a report."""
-
-from .study import Study
-
-__all__ = ["Study"]

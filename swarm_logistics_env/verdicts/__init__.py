@@ -1,0 +1,1 @@
+"""Verdicts: what the runs say, cell by cell and comparison by comparison."""

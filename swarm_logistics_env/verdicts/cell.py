@@ -1,0 +1,139 @@
+"""Cell: P of one policy under one condition."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm
+from swarm_logistics_env.spi import Interval
+from swarm_logistics_env.tasks.task import Outcome
+
+from .reference import Reference
+
+_UNKNOWN = Interval(np.nan, None, None)
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """P of one policy under one condition.
+
+    Attributes:
+        policy: label of the policy.
+        table: heading of the report's table.
+        arm: the setting and the case.
+        outcomes: of the runs that succeeded, seed by seed; of several trainings one after another.
+        problem: why runs are missing; None: they are complete.
+        published: P of the reference; None: it has none.
+        counted: whether it is one of the cells of the reference's tables.
+        confidence: level of its intervals.
+    """
+
+    policy: str
+    table: str
+    arm: Arm
+    outcomes: tuple[Outcome, ...]
+    problem: str | None
+    published: float | None = None
+    counted: bool = False
+    confidence: ClassVar[float] = CONFIDENCE
+
+    @classmethod
+    def of(
+        cls,
+        policy: str,
+        table: str,
+        arm: Arm,
+        found: Sequence[Outcome | None],
+        *,
+        paired: bool = True,
+        reference: Reference | None = None,
+    ) -> Self:
+        """Return a cell from the outcomes of its runs, seed by seed; None: not played."""
+        missing = found.count(None)
+        failed = sum(outcome is not None and outcome.error is not None for outcome in found)
+        if not paired and missing < len(found):
+            missing = 0  # unpaired results need not be equally many everywhere
+        problems = [
+            f"{count} of {len(found)} runs {what}"
+            for count, what in ((failed, "failed"), (missing, "missing"))
+            if count
+        ]
+        kept = tuple(one for one in found if one is not None and one.error is None)
+        problem = ", ".join(problems) or None
+        published = reference.performance.get(arm.setting) if reference else None
+        counted = reference is not None and arm.setting in reference.cells
+        return cls(policy, table, arm, kept, problem, published, counted)
+
+    @cached_property
+    def by_seed(self) -> NDArray[np.float64]:
+        """P seed by seed, shape (n_seeds,); of K trainings (K, n_seeds) if no run is missing."""
+        p = np.array([outcome.delivered for outcome in self.outcomes], dtype=np.float64)
+        several = len(self.arm.case.trainings)
+        return p.reshape(several, -1) if several > 1 and not self.problem else p
+
+    @property
+    def n_seeds(self) -> int:
+        """Number of runs that succeeded; of several trainings all together."""
+        return len(self.outcomes)
+
+    @property
+    def saturated(self) -> bool:
+        """Whether a run delivered every item, so that P is capped."""
+        return any(outcome.capped for outcome in self.outcomes)
+
+    @cached_property
+    def mean(self) -> Interval:
+        """Mean P with its interval at `CONFIDENCE`; NaN: no run."""
+        return (
+            self._possible(spi.mean_interval(self.by_seed, CONFIDENCE))
+            if self.n_seeds
+            else _UNKNOWN
+        )
+
+    @cached_property
+    def one_run(self) -> Interval:
+        """Mean P with the interval of one further run at `CONFIDENCE`."""
+        p = self.by_seed.ravel()
+        return self._possible(spi.prediction_interval(p, CONFIDENCE)) if p.size else _UNKNOWN
+
+    def _possible(self, interval: Interval) -> Interval:
+        """Return an interval that ends at the number of items where none comes back."""
+        scenario = self.arm.case.scenario
+        if interval.high is None or getattr(scenario, "restock", True):
+            return interval
+        most: float = getattr(scenario, "n_items", math.inf)
+        return interval._replace(high=min(interval.high, most))
+
+    @property
+    def stalled(self) -> float:
+        """Share of runs with less than a quarter of the cell's median P."""
+        return spi.share_stalled(self.by_seed.ravel()) if self.n_seeds else 0.0
+
+    @property
+    def words(self) -> str:
+        """The condition in words, e.g. "N = 10"."""
+        return str(self.arm.setting)
+
+    @property
+    def published_inside(self) -> bool | None:
+        """Whether the published P lies in the interval of one run; None: unknown."""
+        p, (_, low, high) = self.published, self.one_run
+        return None if p is None or low is None or high is None else low <= p <= high
+
+
+def same_runs(before: Sequence[Outcome], after: Sequence[Outcome]) -> bool:
+    """Return whether two conditions gave the same run at every seed, by the digests of the runs.
+
+    Conditions without a run did not.
+    """
+    digests = [outcome.digest for outcome in before]
+    is_equal = digests == [outcome.digest for outcome in after]
+    return is_equal and bool(digests) and None not in digests
