@@ -22,7 +22,7 @@ from swarm_logistics_env.verdicts.agreement import Agreement, agreement
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.reference import PAPER
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.verdicts.verdict import UNDEFINED, Verdict
 
 SEEDS, SEEDS_WHERE_SKEWED = 20, 100
 NO_DRIFT = {"heading_drift": 0.0}
@@ -183,8 +183,8 @@ def _summary(parts: Sequence[StudyResults]) -> str:
     return f"""\
 Of {len(of_text)} claims of the paper's text this re-implementation supports
 {counted["supported"]} and contradicts {counted["contradicted"]}{about};
-{counted["open"]} are open; {counted["no verdict"]}, on the
-warehouse's width, have no verdict, as they cannot fail: A cannot fall below 0 where a
+{counted["open"]} are open; {counted["untestable"]}, on the
+warehouse's width, are untestable: A cannot fall below 0 where a
 parameter at least doubles. {len(beside)} more, that P falls without taxis, are not in
 the text: {_counted(beside)}. Of FM3_send, the other reading of FM3: {_counted(other)}.
 {PAPER.whose}"""
@@ -203,7 +203,7 @@ def _counted(tests: Iterable[Verdict]) -> str:
 
 
 def _said(test: Verdict) -> str:
-    said = section.counted_as(test, test.claim_verdict_holm)
+    said = section.counted_as(test, test.on_claim.adjusted if test.on_claim else UNDEFINED)
     return "contradicted" if said == "refuted" else said
 
 

@@ -50,7 +50,7 @@ def larger_swarms(found: StudyResults) -> Answer:
                 found.policies.index(test.compared.policy),
                 f"{test.compared.n_robots}, m = {test.after.value:g}",
                 *interval,
-                decided=test.holm in DECIDED,
+                decided=test.on_threshold.adjusted in DECIDED,
             )
             for test in tests
             if (interval := test.interval)

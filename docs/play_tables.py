@@ -69,7 +69,7 @@ def robust_block(results: StudyResults) -> str:
         for symbol in ("R", "FT"):
             test = by_symbol[symbol]
             row.append(f"{section.ratio(test)}, {section.concluded(test)}")
-            told.setdefault(section.said(test.answer_holm), []).append(f"{symbol} under {label}")
+            told.setdefault(test.on_property.adjusted, []).append(f"{symbol} under {label}")
         rows.append(row)
     found = "; ".join(f"{words}: {section.listed(what)}" for words, what in told.items())
     head = "", "P", "R above 0?", "FT above 0?"

@@ -125,7 +125,7 @@ def after_repairs(found: StudyResults) -> str:
             np.array([np.count_nonzero(run > REPAIRED_AT) for run in found.times_of(arm)]) * 1.0
             for arm in arms
         )
-        back = section.said(spi.equivalence(whole, after[1], margin=margin).verdict)
+        back = spi.equivalence(whole, after[1], margin=margin).verdict
         body.append((policy, mode, *(_change(whole, counts) for counts in after), back))
     head = ("policy", "mode", "not repaired [%]", "repaired [%]", "all back")
     return f"{table(head, body)}\n\n{_over(found)}"

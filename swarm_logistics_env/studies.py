@@ -24,7 +24,7 @@ from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.tasks.task import Run, Task, refuse_untrusted
 from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.results import StudyResults, judge
-from swarm_logistics_env.verdicts.until_clear import standing
+from swarm_logistics_env.verdicts.until_clear import progress_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -219,7 +219,7 @@ class Study:
         if not self.specification.until_clear:
             return [run for run in whole if run.key not in done]
         outcomes = store.outcomes(run for run in whole if run.key in done)
-        return list(standing(self.plan(), outcomes).wanted)
+        return list(progress_of(self.plan(), outcomes).next_runs)
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.

@@ -17,6 +17,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.verdicts.reference import PAPER
 from swarm_logistics_env.verdicts.results import StudyResults, judge
+from swarm_logistics_env.verdicts.verdict import Decision
 
 
 def digest(directory: Path, to: Path) -> str:
@@ -40,6 +41,12 @@ def made_old(store: Path) -> None:
         for table in ("runs", "notes"):
             database.execute(f"ALTER TABLE {table} DROP COLUMN digest")
         database.execute("PRAGMA user_version = 4")
+
+
+def decided(decision: Decision | None) -> Decision:
+    """Return a decision, which the question has."""
+    assert decision is not None
+    return decision
 
 
 def delivered(count: float, **fields: Any) -> Outcome:

@@ -169,7 +169,7 @@ def judge_command(
             say(f"{why}; the same command goes on:", str(context.obj))
         # Several trainings and untrusted code need options that this command does not repeat.
         elif not (tally.left or plays_benchmark or policy.trainings or trust_code) and any(
-            v.answer_holm == "inconclusive" for v in results.verdicts
+            v.on_property.adjusted == "open" for v in results.verdicts
         ):
             more = max(JUDGE_SEEDS, 2 * most)
             say(

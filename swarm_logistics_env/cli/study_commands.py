@@ -14,7 +14,7 @@ from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.records import plain
-from swarm_logistics_env.report.section import NOTHING, bracketed, percent, said, slug
+from swarm_logistics_env.report.section import NOTHING, bracketed, percent, slug
 from swarm_logistics_env.runs.engines import Engine, Shard, Tally, engine_named
 from swarm_logistics_env.runs.notes import merge
 from swarm_logistics_env.runs.store import Runs, export
@@ -264,9 +264,9 @@ def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str
             value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
         if estimate is not None:
             value, levels = bracketed(estimate, 3), {estimate.confidence}
-            says = f"above {estimate.threshold:g}: {said(answer.verdict)}"
+            says = f"above {estimate.threshold:g}: {answer.verdict}"
             if estimate.untestable:
-                says = f"no verdict: cannot be below {estimate.threshold:g}"
+                says = f"untestable: cannot be below {estimate.threshold:g}"
         rows.append((answer.name, value, says))
     show_table(title, ("", f"value [{percent(*levels)}]", "verdict under Holm"), rows, *left_out)
 

@@ -18,7 +18,7 @@ from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, com
 from .specification import BOTH, Ablation, Factor, Faults, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of S for the steps in `Sizes.superlinear`
-Place = tuple[str, str, Arm]  # of a cell: label of the policy, table, arm
+CellKey = tuple[str, str, Arm]  # label of the policy, table, arm
 
 
 class Origin(Record):
@@ -79,8 +79,8 @@ class Plan:
         return named or self.specification.seed_numbers
 
     @cached_property
-    def cells(self) -> tuple[Place, ...]:
-        """Every place whose P the report shows, those of a factor together."""
+    def cells(self) -> tuple[CellKey, ...]:
+        """The key of every cell that the report shows, those of a factor together."""
         cells = [
             (comparison.policy, comparison.table, arm)
             for comparison in self.comparisons

@@ -17,10 +17,10 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.task import DEFAULT
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import POWER, UNAFFECTED, Verdict
+from swarm_logistics_env.verdicts.verdict import POWER, UNAFFECTED, UNDEFINED, Verdict
 
 from . import section
-from .section import Section, said
+from .section import Section
 
 MOST_LINES = 30  # of the answer of `paper` at a terminal
 _EFFECT = 0.1  # of an indicator, for which seeds are counted
@@ -90,7 +90,7 @@ class Line(NamedTuple):
             if all(str(one.problem).endswith(" missing") for one in self.tests):
                 return "not played yet"
             return f"{words}: {test.problem}"
-        if all(one.estimate and one.conclusion is None for one in self.tests):
+        if all(one.estimate and one.conclusion == UNDEFINED for one in self.tests):
             return f"no verdict: {self.indicator} lacks runs"
         if len(self.tests) > 1:
             return words
@@ -99,9 +99,9 @@ class Line(NamedTuple):
             return f"{words}, exact"
         if test.estimate.untestable:
             return f"{words}: it cannot be below {test.compared.threshold:g}"
-        if "unbounded" in test.flags and test.answer_holm in section.DECIDED:
+        if "unbounded" in test.flags and test.on_property.adjusted in section.DECIDED:
             return f"{words} by its test; P_o is too near 0 for an interval"
-        if test.conclusion != "inconclusive":
+        if test.conclusion != "open":
             return words
         # An effect on the side of the value, which 80 % power finds.
         estimate, threshold = test.estimate, test.estimate.threshold
@@ -115,7 +115,9 @@ class Line(NamedTuple):
     @property
     def contradicts(self) -> bool:
         """Whether a verdict contradicts what the study's reference claims."""
-        return any(test.claim_verdict_holm == "refuted" for test in self.tests)
+        return any(
+            test.on_claim is not None and test.on_claim.adjusted == "refuted" for test in self.tests
+        )
 
 
 class Answer(NamedTuple):
@@ -213,7 +215,7 @@ def _about(tests: Sequence[Verdict]) -> str:
     compared, after = tests[0].compared, tests[0].after
     before = compared.original.setting
     usual = compared.definition.adjectives.get(0.0)
-    asked = "" if tests[0].asked == usual else f", {tests[0].asked}"
+    asked = "" if tests[0].property_name == usual else f", {tests[0].property_name}"
     names = {test.after.name for test in tests}
     start = f" from {after.onset:g} s" if after.onset else ""
     values = [f"{test.after.value:g}" for test in tests]
@@ -289,7 +291,7 @@ def _last(results: StudyResults) -> str:
         few = "below ten seeds" if results.plan.paired else "unpaired"
         parts.append(f"provisional ({few} they assume normality)")
     if "cannot_fail" in flags:
-        parts.append("no verdict where it cannot lie below the threshold, as P cannot below 0")
+        parts.append("untestable where it cannot lie below the threshold, as P cannot below 0")
     if "too_few_seeds" in flags:
         parts.append("two seeds give no verdict")
     if results.damage:
@@ -302,7 +304,7 @@ def _last(results: StudyResults) -> str:
         parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
     if any(cell.stalled for cell in results.cells):
         parts.append("some runs stalled (P below a quarter of the median; --full names them)")
-    undecided = [test for test in tests if test.conclusion == "inconclusive"]
+    undecided = [test for test in tests if test.conclusion == "open"]
     if undecided:
         parts.append(
             f"so many more {runs} would tell such a value from the threshold in 4 of 5 studies"
@@ -310,17 +312,19 @@ def _last(results: StudyResults) -> str:
     beside = [test for test in undecided if section.lies_above(test) is not None]
     reasons = {
         "so few seeds may hide stalls": any("hidden_stalls" in test.flags for test in beside),
-        "Holm counts all questions": any(test.plain in section.DECIDED for test in beside),
+        "Holm counts all questions": any(
+            test.on_threshold.plain in section.DECIDED for test in beside
+        ),
     }
     if why := " or ".join(reason for reason, holds in reasons.items() if holds):
         parts.append(f"open beside an interval on one side of it: {why}")
-    claims = [test for test in tests if test.claim]
+    claims = [test for test in tests if test.on_claim is not None]
     told = reference.claims if reference else {}
     of_text = [test for test in claims if test.compared.question in told]
     of_others = [test for test in claims if test not in of_text]
     for where, here in ((" in the paper's text", of_text), (" beside it" * bool(told), of_others)):
         if here:
-            found = section.counted(said(test.claim_verdict_holm) for test in here)
+            found = section.counted(test.on_claim.adjusted for test in here if test.on_claim)
             parts.append(f"of {section.plural(len(here), 'claim')}{where} {found}")
     line = "; ".join(parts)
     return f"{line[0].upper()}{line[1:]}."
@@ -341,7 +345,7 @@ def in_a_sentence(results: StudyResults) -> str:
         told += f"; {value}; {asked}: {section.concluded(worst)} (Holm)"
     else:
         words = section.concluded(*results.verdicts)
-        if words == said(worst.answer_holm):  # all alike
+        if words == worst.on_property.adjusted:  # all alike
             words = f"{len(results.verdicts)} {words}"
         told += f"; of {len(results.verdicts)} questions {words} (Holm)"
         told += f"; the lowest is {value}" if known else ""

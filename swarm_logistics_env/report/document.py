@@ -207,7 +207,7 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
         f"We measured performance P in {trials}. We report {listed(names)}, each a ratio of mean "
         f"performances, with {holds} that inverts {test}.{stops} An indicator is called above its "
         f"threshold (supported) or below it (refuted) where this test rejects at {side} on that "
-        "side, else inconclusive (open); it has no verdict where it cannot lie below. Beside it "
+        "side, else open; it is untestable where it cannot lie below. Beside it "
         "stands whether two one-sided tests find that P changes by less than "
         f"{100 * plan.specification.margin:.3g} % of P_o; p is adjusted by Holm's method over all "
         f"comparisons of one indicator for one policy. Computed with {_version()}."

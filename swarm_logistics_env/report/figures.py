@@ -132,7 +132,7 @@ def _category(test: Verdict) -> str:
 def _point(results: StudyResults, test: Verdict, category: str, published: float | None) -> Point:
     policy = test.compared.policy
     value, low, high = test.interval or (None, None, None)
-    style, decided = results.policies.index(policy), test.holm in DECIDED
+    style, decided = results.policies.index(policy), test.on_threshold.adjusted in DECIDED
     return Point(policy, style, category, value, low, high, published, decided, test.saturated)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.questions.specification import seeds_in_words
-from swarm_logistics_env.spi.estimate import SIGNS, Estimate
+from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
@@ -28,9 +28,8 @@ SATURATED = "†"
 _SAME = 1e-9  # a value so near a threshold differs from it by rounding alone
 NOTHING = "–"
 DECIDED = ("supported", "refuted", "equivalent")
-UNAFFECTED = SIGNS["unaffected"].word
-# The words for verdicts, in the order in which they are counted.
-WORDS = {verdict: sign.word for verdict, sign in SIGNS.items()}
+# The words of decisions, in the order in which they are counted.
+WORDS = (*DECIDED, "open", "unaffected", "untestable", "undefined")
 FLAGS = {
     "single_seed": "One seed gives a value, but no interval and no verdict",
     "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
@@ -214,17 +213,12 @@ def lies_above(test: Verdict) -> bool | None:
     return low > threshold
 
 
-def said(verdict: str | None) -> str:
-    """Return a verdict in words."""
-    return WORDS[verdict or "blocked"]
-
-
 def concluded(*tests: Verdict) -> str:
     """Return the answers under Holm, then what else is known: "open; P changes by less than 10 %".
 
     Of several tests they are counted, unless all are the same.
     """
-    words = [said(test.answer_holm) for test in tests]
+    words = [test.on_property.adjusted for test in tests]
     told = [words[0] if len(set(words)) == 1 else counted(words)]
     same = Counter(_unchanged(test) for test in tests if test.conclusion == "equivalent")
     for known, count in same.items():
@@ -241,26 +235,24 @@ def _unchanged(test: Verdict) -> str:
 
 def answered(test: Verdict) -> str:
     """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
-    plain, adjusted = said(test.answer), said(test.answer_holm)
+    plain, adjusted = test.on_property
     return plain if plain == adjusted else f"{plain} ({adjusted})"
 
 
-def counted_as(test: Verdict, verdict: str | None) -> str:
+def counted_as(test: Verdict, verdict: str) -> str:
     """Return what a verdict on this test counts as in `counted`.
 
     A count is a headline: a verdict that assumes normal differences does not stand in it.
     """
     if verdict in DECIDED and "assumes_normal" in test.flags:
         return _NOT_COUNTED
-    return said(verdict)
+    return verdict
 
 
 def counted(verdicts: Iterable[str]) -> str:
     """Return how many of each word, e.g. "7 supported, 1 refuted"."""
     counts = Counter(verdicts)
-    return ", ".join(
-        f"{counts[word]} {word}" for word in (*WORDS.values(), _NOT_COUNTED) if counts[word]
-    )
+    return ", ".join(f"{counts[word]} {word}" for word in (*WORDS, _NOT_COUNTED) if counts[word])
 
 
 def listed(names: Sequence[str]) -> str:
@@ -305,9 +297,9 @@ def sentence(results: StudyResults, test: Verdict) -> Sentence:
     swarm = (
         "" if compared.original.setting.kind in ("size", "policy") else f", N = {compared.n_robots}"
     )
-    head = f"{compared.policy}, {test.asked}? {compared.label}{swarm}."
+    head = f"{compared.policy}, {test.property_name}? {compared.label}{swarm}."
     text = " ".join(_parts(results, test))
-    return Sentence(head, text, test.conclusion or "blocked", said(test.answer_holm))
+    return Sentence(head, text, test.conclusion, test.on_property.adjusted)
 
 
 def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
@@ -323,7 +315,7 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
     if estimate.n_trainings is not None:
         seeds = f"{estimate.n_trainings} trainings x {seeds}"
     if estimate.identical:
-        yield f"{indicator} = {estimate.value:.3f} exactly, over {seeds}: {UNAFFECTED}."
+        yield f"{indicator} = {estimate.value:.3f} exactly, over {seeds}: unaffected."
         yield "Both conditions gave the same runs, so there is nothing to test."
         return
     found = limits(estimate, 3)
@@ -333,21 +325,21 @@ def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
     yield f"{indicator}{capped} = {value}{level} over {seeds}."
     if not estimate.untestable:
         # One seed gives no p, and Holm's placeholder of 1 says nothing.
-        adjusted_p = None if estimate.p_value is None else test.p_holm
-        yield f"Unadjusted: {said(test.answer)}{_p(estimate.p_value)};"
-        yield f"Holm-adjusted: {said(test.answer_holm)}{_p(adjusted_p)}."
-    if test.claim:
-        plain, adjusted = map(said, (test.claim_verdict, test.claim_verdict_holm))
+        adjusted_p = None if estimate.p_value is None else test.p_adjusted
+        yield f"Unadjusted: {test.on_property.plain}{_p(estimate.p_value)};"
+        yield f"Holm-adjusted: {test.on_property.adjusted}{_p(adjusted_p)}."
+    if test.on_claim is not None:
+        plain, adjusted = test.on_claim
         both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
         yield f'Claim "{test.claim}": {both}.'
-    if test.equivalence is not None:
-        same, holm = said(test.equivalence.verdict), said(test.equivalence_holm)
-        adjusted = "" if same == holm else f" ({holm} under Holm)"
+    if test.equivalence is not None and test.on_equivalence is not None:
+        unchanged, holm = test.on_equivalence
+        under_holm = "" if unchanged == holm else f" ({holm} under Holm)"
         change = test.equivalence.change
         told = bracketed(change, 3, [-test.margin, test.margin])
         if change.low is not None and not change.identical:
             told += f" ({percent(change.confidence)})"
-        yield f"{test.unchanged}? Change {told}: {same}{adjusted}."
+        yield f"{test.equivalence_name}? Change {told}: {unchanged}{under_holm}."
     yield from (f"{FLAGS[flag]}." for flag in test.flags)
     if "hidden_stalls" in test.flags:
         yield f"It needs at least {spi.seeds_against_stalls(estimate)} seeds."

@@ -15,7 +15,7 @@ from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.mid_run_faults import RepairCurve, resiliences
 from swarm_logistics_env.verdicts.reference import Reference
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict
 
 from . import section
 from .figures import rate_figures
@@ -81,7 +81,7 @@ def _answers(indicator: str, tests: Sequence[Verdict], *, published: bool) -> It
     yield column(f"{indicator} [{section.percent(level)}]", tests, shown)
     if published:
         yield column(f"{indicator} paper", tests, lambda test: section.number(test.published))
-    for name, asked in grouped(tests, lambda test: test.asked).items():
+    for name, asked in grouped(tests, lambda test: test.property_name).items():
         yield column(name, asked, section.answered)
         if published:
             yield column("paper", asked, _claimed)
@@ -126,7 +126,7 @@ def claims(heading: str, tests: Sequence[Verdict]) -> list[Texts]:
 
 def _on_claim(test: Verdict) -> str:
     """Return the verdict on a claim; of an open one the side on which its interval lies."""
-    said = section.counted_as(test, test.claim_verdict_holm)
+    said = section.counted_as(test, test.on_claim.adjusted if test.on_claim else UNDEFINED)
     above = section.lies_above(test)
     if said == "open" and above is not None:
         return f"open, leans {'for' if above == test.claimed else 'against'}"
@@ -254,7 +254,7 @@ def _index(estimate: Estimate | None) -> Texts:
     """Return an index with its interval, and its verdict."""
     if estimate is None:
         return NOTHING, "undefined"
-    said = section.UNAFFECTED if estimate.identical else section.said(estimate.verdict)
+    said = UNAFFECTED if estimate.identical else estimate.verdict
     capped = section.SATURATED * ("capped" in estimate.flags)
     return section.bracketed(estimate, 3), said + capped
 

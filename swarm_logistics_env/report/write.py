@@ -15,7 +15,6 @@ from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError, how_to_install
 from swarm_logistics_env.records import becoming, plain, write_csv
-from swarm_logistics_env.spi.estimate import SIGNS
 from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.results import StudyResults
 
@@ -157,13 +156,25 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         answer=document.answer,
         level=percent(document.answer.level),
         axis=axis(document.answer),
-        signs=SIGNS,
+        colours=_COLOURS,
         drawings=drawings,
         latex=latex_tables((document.answer.section, *document.summary)),
         # A text must not end the script that it stands in.
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
     )
+
+
+# Of decisions, on light and on dark paper, after Okabe and Ito.
+_COLOURS = {
+    "supported": ("#006b4c", "#3fc79a"),
+    "refuted": ("#a84300", "#f5915a"),
+    "equivalent": ("#005b94", "#6cb8ee"),
+    "open": ("#5b6068", "#a9afb8"),
+    "unaffected": ("#5b6068", "#a9afb8"),
+    "untestable": ("#5b6068", "#a9afb8"),
+    "undefined": ("#a84300", "#f5915a"),
+}
 
 
 _ESCAPES = {

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from .definitions import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .equivalence import Equivalence, equivalence
-from .estimate import Estimate, Options, Verdict
+from .estimate import DecisionWord, Estimate, Options
 from .inputs import IndicatorError
 from .multiplicity import (
     FaultBudget,
@@ -40,6 +40,7 @@ from .summaries import (
 from .trials import Trial, Trials, read_trials
 
 __all__ = [
+    "DecisionWord",
     "Equivalence",
     "Estimate",
     "FaultBudget",
@@ -50,7 +51,6 @@ __all__ = [
     "SurvivalCurve",
     "Trial",
     "Trials",
-    "Verdict",
     "adaptability",
     "adjust",
     "adjusted_p_values",
@@ -87,6 +87,7 @@ _TWO_CHECKS = "use check_policy, or check_wrapper"
 REMOVED = {
     "spi.ScalingFit": "fit a law to P over N with scipy.optimize.curve_fit",
     "spi.SelfRepair": "use spi.repair_times with spi.kaplan_meier",
+    "spi.Verdict": "use spi.DecisionWord",
     "spi.Simulation": "judge the real runs alone",
     "spi.compare_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
     "spi.fit_scaling": "fit a law to P over N with scipy.optimize.curve_fit",

@@ -1,6 +1,6 @@
 """Equivalence: whether a change leaves P within a margin, by two one-sided tests (Schuirmann 1987).
 
-An inconclusive verdict is no evidence that a fault does no harm. This test gives such evidence: it
+An open verdict is no evidence that a fault does no harm. This test gives such evidence: it
 rejects "P falls by the margin or more", and "P rises by it or more".
 """
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from .estimate import Estimate, Verdict, judge
+from .estimate import DecisionWord, Estimate, judge
 from .inputs import IndicatorError, between_0_and_1
 
 MARGIN = 0.1
@@ -72,16 +72,16 @@ class Equivalence:
         return below.p_value if self.change.value > 0.0 else above.p_value
 
     @property
-    def verdict(self) -> Verdict:
-        """Equivalent, refuted (the change exceeds the margin) or inconclusive."""
+    def verdict(self) -> DecisionWord:
+        """Equivalent, refuted (the change exceeds the margin) or open."""
         return self.verdict_for(self.p_value)
 
-    def verdict_for(self, p_value: float | None) -> Verdict:
+    def verdict_for(self, p_value: float | None) -> DecisionWord:
         """Return the verdict at a p, e.g. one that Holm adjusted."""
         if self.identical:
             return "equivalent"
         if p_value is None or not p_value < self.alpha:
-            return "inconclusive"
+            return "open"
         return "equivalent" if self._within else "refuted"
 
     @property

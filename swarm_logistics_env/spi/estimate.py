@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal, NamedTuple, TypeAlias, TypedDict
+from typing import Literal, TypeAlias, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,31 +25,14 @@ from .summaries import at_stake, pairing_correlation
 
 # Performances by name, with their weights in the numerator; the last is the denominator.
 Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float]]
-Verdict = Literal["supported", "refuted", "equivalent", "inconclusive"]
+DecisionWord = Literal["supported", "refuted", "equivalent", "open"]
+# Words of version 0.3, which stored files may hold.
+_FORMER_WORDS = {"inconclusive": "open", "blocked": "undefined"}
 
 
-class Sign(NamedTuple):
-    """How a verdict is shown.
-
-    Attributes:
-        word: what it is called in reports.
-        light, dark: hexadecimal colours on white and on black paper, after Okabe and Ito.
-    """
-
-    word: str
-    light: str
-    dark: str
-
-
-SIGNS = {
-    "supported": Sign("supported", "#006b4c", "#3fc79a"),
-    "refuted": Sign("refuted", "#a84300", "#f5915a"),
-    "equivalent": Sign("equivalent", "#005b94", "#6cb8ee"),
-    "inconclusive": Sign("open", "#5b6068", "#a9afb8"),
-    "unaffected": Sign("same runs", "#5b6068", "#a9afb8"),
-    "untestable": Sign("no verdict", "#5b6068", "#a9afb8"),
-    "blocked": Sign("undefined", "#a84300", "#f5915a"),
-}
+def current_word(word: str) -> str:
+    """Return the word of this version for a decision that an older one wrote."""
+    return _FORMER_WORDS.get(word, word)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,12 +110,12 @@ class Estimate:
         return "cannot_fail" in self.flags
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> DecisionWord:
         """On theta > threshold, one-sided (1 - confidence)/2 on each side, unadjusted."""
         return self.verdict_for(self.p_value)
 
     @property
-    def answer(self) -> Verdict:
+    def answer(self) -> DecisionWord:
         """The verdict; of identical runs what their exact value says, which is no evidence.
 
         Gates ask for it: "is it above the threshold?" has an answer there.
@@ -141,17 +124,17 @@ class Estimate:
             return self.verdict
         return "supported" if self.value > self.threshold else "refuted"
 
-    def verdict_for(self, p_value: float | None) -> Verdict:
-        """Return the verdict at a two-sided p, e.g. one that Holm adjusted; None: inconclusive."""
+    def verdict_for(self, p_value: float | None) -> DecisionWord:
+        """Return the verdict at a two-sided p, e.g. one that Holm adjusted; None: open."""
         if p_value is None or self.probability is None or not p_value < 1.0 - self.confidence:
-            return "inconclusive"
+            return "open"
         return "supported" if self.probability > 0.5 else "refuted"
 
     def __str__(self) -> str:
         """Return value, interval and verdict in one line."""
-        shown = SIGNS["untestable" if self.untestable else self.verdict]
+        word: str = "untestable" if self.untestable else self.verdict
         if self.identical:
-            shown = SIGNS["unaffected"]
+            word = "unaffected"
         limits = ""
         if self.low is not None and self.high is not None and not self.identical:
             limits = f" [{self.low:.3f}, {self.high:.3f}]"
@@ -162,7 +145,7 @@ class Estimate:
         p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
         return (
             f"{self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
-            f"{shown.word} ({n}{p})"
+            f"{word} ({n}{p})"
         )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .equivalence import Equivalence
-from .estimate import Estimate, Verdict
+from .estimate import DecisionWord, Estimate
 from .inputs import IndicatorError, Numbers, between_0_and_1, count, numbers
 
 
@@ -35,13 +35,13 @@ def holm(p_values: ArrayLike) -> Numbers:
     return adjusted
 
 
-def adjust(estimates: Sequence[Estimate | Equivalence]) -> tuple[Verdict, ...]:
+def adjust(estimates: Sequence[Estimate | Equivalence]) -> tuple[DecisionWord, ...]:
     """Verdicts of one declared family (all modes x m of one indicator, say) under Holm.
 
     In the order given. An estimate without a p (one seed) counts in the family and stays
-    inconclusive. One of identical runs is no evidence and outside the family: it stays inconclusive
+    open. One of identical runs is no evidence and outside the family: it stays open
     on a threshold, and is equivalent. One that cannot fail is outside the family, too, and
-    inconclusive. The family-wise error is 1 - confidence, of equivalences their alpha.
+    open. The family-wise error is 1 - confidence, of equivalences their alpha.
 
     Raises:
         IndicatorError: The estimates' confidences differ.

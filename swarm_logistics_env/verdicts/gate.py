@@ -24,12 +24,12 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.specification import seeds_in_words
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.spi.estimate import Estimate, Verdict
+from swarm_logistics_env.spi.estimate import DecisionWord, Estimate
 from swarm_logistics_env.tasks.task import TaskFault, TaskScenario
 
 from .cell import Cell, same_runs
 from .results import StudyResults
-from .verdict import judge_one
+from .verdict import judge_comparison
 
 # All about a condition but its policy: scenario, faults, behaviour and table.
 _Content = tuple[TaskScenario, tuple[TaskFault, ...], int, str]
@@ -164,7 +164,7 @@ class Gate(NamedTuple):
         """Return whether an exact value, which leaves nothing to chance, makes the gate fail."""
         return value < self.number if self.below else value > self.number
 
-    def fails_on(self, verdict: Verdict) -> bool:
+    def fails_on(self, verdict: DecisionWord) -> bool:
         """Return whether a verdict on "above the number" makes the gate fail."""
         holds, opposite = ("refuted", "supported") if self.below else ("supported", "refuted")
         return verdict != opposite if self.possibly else verdict == holds
@@ -190,7 +190,7 @@ class GateAnswer(NamedTuple):
     name: str
     fails: bool
     estimate: Estimate | None = None
-    verdict: Verdict | None = None
+    verdict: DecisionWord | None = None
     exact: float | None = None
     problem: str | None = None
 
@@ -239,7 +239,7 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
         if gate.at not in name:
             continue
         cells, margin = new.cells_of(comparison), new.plan.specification.margin
-        found = judge_one(comparison, cells, paired=new.plan.paired, margin=margin)
+        found = judge_comparison(comparison, cells, paired=new.plan.paired, margin=margin)
         estimate = found.estimate
         if estimate is None:
             yield name, str(found.problem)

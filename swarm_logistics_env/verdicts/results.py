@@ -8,14 +8,14 @@ from functools import cached_property
 
 from swarm_logistics_env.questions.comparison import Arm, Comparison
 from swarm_logistics_env.questions.declaration import Declaration
-from swarm_logistics_env.questions.plan import Place, Plan
+from swarm_logistics_env.questions.plan import CellKey, Plan
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.tasks.task import Outcome, Outcomes
 
 from .cell import Cell
 from .reference import PAPER, Reference
-from .until_clear import standing
-from .verdict import Verdict, judge_one, under_holm
+from .until_clear import progress_of
+from .verdict import Verdict, adjust_families, judge_comparison
 
 Times = tuple[Numbers, ...]
 
@@ -51,32 +51,33 @@ class StudyResults:
     damage: str | None = None
 
     @cached_property
-    def by_place(self) -> dict[Place, Cell]:
-        """The cells by policy, table and arm."""
-        return {(one.policy, one.table, one.arm): one for one in self.cells}
+    def _cells_by_key(self) -> dict[CellKey, Cell]:
+        return {(cell.policy, cell.table, cell.arm): cell for cell in self.cells}
 
     def cells_of(self, comparison: Comparison) -> dict[Arm, Cell]:
         """Return the cells of a comparison's arms."""
-        where = comparison.policy, comparison.table
-        return {arm: self.by_place[*where, arm] for arm in comparison.arms}
+        policy, table = comparison.policy, comparison.table
+        return {arm: self._cells_by_key[policy, table, arm] for arm in comparison.arms}
 
     @property
     def policies(self) -> tuple[str, ...]:
         """Labels of the policies that are judged, the baseline first."""
-        return tuple(dict.fromkeys(one.compared.policy for one in self.verdicts))
+        return tuple(dict.fromkeys(verdict.compared.policy for verdict in self.verdicts))
 
     def outcome(self, arm: Arm, seed: int) -> Outcome | None:
         """Return what an arm's run at a seed gave; None: it failed, or is missing."""
-        found = self.outcomes.get((arm.case.key, seed))
-        return None if found is None or found.error is not None else found
+        outcome = self.outcomes.get((arm.case.key, seed))
+        return None if outcome is None or outcome.error is not None else outcome
 
     def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...]:
         """Return an arm's outcomes by seed; none if one failed, is missing or has no times."""
-        found = [self.outcome(arm, seed) for seed in self.plan.seeds]
-        complete = tuple(one for one in found if one is not None and one.untimed is None)
+        outcomes = [self.outcome(arm, seed) for seed in self.plan.seeds]
+        timed = tuple(
+            outcome for outcome in outcomes if outcome is not None and outcome.untimed is None
+        )
         # Unpaired results need not be equally many everywhere.
-        is_whole = len(complete) == len(found) or not self.plan.paired
-        return complete if is_whole else ()
+        is_complete = len(timed) == len(outcomes) or not self.plan.paired
+        return timed if is_complete else ()
 
     def times_of(self, arm: Arm) -> Times:
         """Return an arm's delivery times [s] seed by seed; none as `outcomes_of`."""
@@ -91,44 +92,57 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         outcomes: of its runs, by the key of the case and the seed.
         declared: what was declared before the first run; None: what the plan says.
     """
-    margin = plan.specification.margin
-    reference = PAPER if plan.specification.reference else None
-    declared = declared or Declaration.model_validate(plan.specification)
-    exploratory = not declared.covers(plan)
+    specification = plan.specification
+    reference = PAPER if specification.reference else None
+    declared = declared or Declaration.model_validate(specification)
+    is_exploratory = not declared.covers(plan)
     verdicts: Iterable[Verdict] = ()
-    if plan.specification.until_clear:
-        found = standing(plan, outcomes)
-        plan = replace(plan, specification=plan.specification.replace(seeds=found.shared_seeds))
-        verdicts = found.verdicts
-    cells: dict[Place, Cell] = {}
-    for place in plan.cells:
-        cases = place[-1].case.trainings
-        runs = [outcomes.get((one.key, seed)) for one in cases for seed in plan.seeds]
-        cells[place] = Cell.of(*place, runs, paired=plan.paired, reference=reference)
-    if not plan.specification.until_clear:
-        judged = []
-        for each in plan.comparisons:
-            of_arms = {arm: cells[each.policy, each.table, arm] for arm in each.arms}
-            judged.append(judge_one(each, of_arms, paired=plan.paired, margin=margin))
-        verdicts = under_holm(judged)
+    if specification.until_clear:
+        progress = progress_of(plan, outcomes)
+        plan = replace(plan, specification=specification.replace(seeds=progress.shared_seeds))
+        verdicts = progress.verdicts
+    cells: dict[CellKey, Cell] = {}
+    for policy, table, arm in plan.cells:
+        runs = [
+            outcomes.get((case.key, seed)) for case in arm.case.trainings for seed in plan.seeds
+        ]
+        cells[policy, table, arm] = Cell.of(
+            policy, table, arm, runs, paired=plan.paired, reference=reference
+        )
+    if not specification.until_clear:
+        verdicts = adjust_families(
+            [
+                judge_comparison(
+                    comparison,
+                    {
+                        arm: cells[comparison.policy, comparison.table, arm]
+                        for arm in comparison.arms
+                    },
+                    paired=plan.paired,
+                    margin=specification.margin,
+                )
+                for comparison in plan.comparisons
+            ]
+        )
     return StudyResults(
         plan,
         reference,
         tuple(cells.values()),
-        tuple(_beside(reference, one) for one in verdicts),
-        exploratory,
+        tuple(_with_claim(verdict, reference) for verdict in verdicts),
+        is_exploratory,
         outcomes,
         declared.looks,
-        late_margin=declared.margin != margin,
+        late_margin=declared.margin != specification.margin,
     )
 
 
-def _beside(reference: Reference | None, verdict: Verdict) -> Verdict:
+def _with_claim(verdict: Verdict, reference: Reference | None) -> Verdict:
     """Return a verdict with what the study or its reference claims, and what was published."""
-    claimed, published = verdict.compared.claim, None
+    claimed = verdict.compared.claim
+    published = None
     if reference:
-        known = reference.estimate(verdict.compared)
-        published = known.value if known else None
+        estimate = reference.estimate(verdict.compared)
+        published = estimate.value if estimate else None
         if claimed is None:
             claimed = reference.claims.get(verdict.compared.question)
     return replace(verdict, claimed=claimed, published=published)

@@ -24,146 +24,185 @@ from swarm_logistics_env.spi.equivalence import ALPHA
 from swarm_logistics_env.tasks.task import Case, Outcomes, Run
 
 from .cell import Cell
-from .verdict import Verdict, judge_one
+from .verdict import Decision, Verdict, judge_comparison
 
 MOST_SEEDS = 200
 SPENDING: spi.Spending = "linear"
 
 
-class Standing(NamedTuple):
+class Progress(NamedTuple):
     """The state of the comparisons of a study at its latest look.
 
     Attributes:
         verdicts: on every comparison, as it was when it stopped or at the last complete look.
-        wanted: the runs that the next look needs; empty: everything is clear, or the most seeds
+        next_runs: the runs that the next look needs; empty: everything is clear, or the most seeds
             are played.
         shared_seeds: number of seeds that every condition has, counted at the looks.
     """
 
     verdicts: tuple[Verdict, ...]
-    wanted: tuple[Run, ...]
+    next_runs: tuple[Run, ...]
     shared_seeds: int
 
 
-def standing(plan: Plan, outcomes: Outcomes) -> Standing:
+def progress_of(plan: Plan, outcomes: Outcomes) -> Progress:
     """Return the state of a plan's comparisons after these outcomes."""
-    runs = _Looks(plan, outcomes)
-    wanted, verdicts = runs.missing(plan.cases, runs.looks[0]), dict[Comparison, Verdict]()
-    for members in grouped(plan.comparisons, lambda comparison: comparison.family).values():
-        family = _Family(members, runs)
-        wanted |= family.wanted
-        verdicts |= family.judged()
-    shared = [n_seeds for n_seeds in runs.looks if not runs.missing(plan.cases, n_seeds)]
-    in_order = tuple(verdicts[comparison] for comparison in plan.comparisons)
-    # Seed by seed, so that a study that is stopped early has something of every question.
-    evenly = tuple(sorted(wanted.values(), key=lambda run: run.seed))
-    return Standing(in_order, evenly, max(shared, default=runs.looks[0]))
+    looks = _Looks(plan, outcomes)
+    next_runs = looks.missing(plan.cases, looks.seeds[0])
+    verdicts = dict[Comparison, Verdict]()
+    families = grouped(plan.comparisons, lambda comparison: comparison.family)
+    for comparisons in families.values():
+        family = _Family(comparisons, looks)
+        next_runs |= family.next_runs
+        verdicts |= family.verdicts()
+    complete = [n_seeds for n_seeds in looks.seeds if not looks.missing(plan.cases, n_seeds)]
+    return Progress(
+        tuple(verdicts[comparison] for comparison in plan.comparisons),
+        # Seed by seed, so that a study that is stopped early has something of every question.
+        tuple(sorted(next_runs.values(), key=lambda run: run.seed)),
+        max(complete, default=looks.seeds[0]),
+    )
 
 
 class _Looks:
-    """The outcomes of a plan, as far as each look sees them."""
+    """The outcomes of a plan, as far as each look sees them.
+
+    Attributes:
+        seeds: the numbers of seeds at which comparisons may stop.
+    """
 
     def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
-        self.plan, self.looks = plan, plan.specification.looks
+        self.seeds = plan.specification.looks
+        self._plan = plan
         self._outcomes = outcomes
 
     def missing(self, cases: Iterable[Case], n_seeds: int) -> dict[str, Run]:
         """Return the runs of cases that are not played yet, by their keys."""
-        runs = (Run(case, self.plan.code, s) for case in cases for s in self.plan.seeds[:n_seeds])
+        seeds = self._plan.seeds[:n_seeds]
+        runs = (Run(case, self._plan.code, seed) for case in cases for seed in seeds)
         return {run.key: run for run in runs if (run.case.key, run.seed) not in self._outcomes}
 
-    def judged(self, comparisons: Iterable[Comparison], n_seeds: int) -> dict[Comparison, Verdict]:
+    def judge(self, comparisons: Iterable[Comparison], n_seeds: int) -> dict[Comparison, Verdict]:
         """Judge comparisons at a look, as far as it is played."""
         # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
         # side of the margin.
         confidence = 1 - self.alpha(n_seeds, 1 - CONFIDENCE)
         alpha = self.alpha(n_seeds, 2 * ALPHA) / 2
-        margin, found = self.plan.specification.margin, dict[Comparison, Verdict]()
-        for comparison in comparisons:
-            cells = self._cells(comparison, n_seeds)
-            found[comparison] = judge_one(
-                comparison, cells, paired=True, margin=margin, confidence=confidence, alpha=alpha
+        return {
+            comparison: judge_comparison(
+                comparison,
+                self._cells(comparison, n_seeds),
+                paired=True,
+                margin=self._plan.specification.margin,
+                confidence=confidence,
+                alpha=alpha,
             )
-        return found
+            for comparison in comparisons
+        }
 
     def _cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
-        seeds, arms, known = self.plan.seeds[:n_seeds], comparison.arms, self._outcomes
+        seeds = self._plan.seeds[:n_seeds]
+        keys = [arm.case.key for arm in comparison.arms]
+        complete = [seed for seed in seeds if all((key, seed) in self._outcomes for key in keys)]
         # Before the first look is complete, the seeds of all arms tell a value and no verdict.
-        there = [seed for seed in seeds if all((arm.case.key, seed) in known for arm in arms)]
+        seeds = complete or seeds
         return {
-            arm: Cell.of("", "", arm, [known.get((arm.case.key, s)) for s in there or seeds])
-            for arm in arms
+            arm: Cell.of("", "", arm, [self._outcomes.get((arm.case.key, seed)) for seed in seeds])
+            for arm in comparison.arms
         }
 
     def alpha(self, n_seeds: int, alpha: float) -> float:
         """Return what is spent of an error up to the look at `n_seeds`, or the next one."""
-        spent = spi.look_alphas(self.looks, alpha, spending=SPENDING)
-        return spent[bisect_left(self.looks, n_seeds)]
+        spent = spi.look_alphas(self.seeds, alpha, spending=SPENDING)
+        return spent[bisect_left(self.seeds, n_seeds)]
 
 
 class _Family:
     """The comparisons of one indicator for one policy, judged look after look.
 
     Attributes:
-        wanted: the runs that its next look needs and that are not played yet, by their keys.
+        next_runs: the runs that its next look needs and that are not played yet, by their keys.
     """
 
-    def __init__(self, members: Sequence[Comparison], runs: _Looks) -> None:
-        self.wanted: dict[str, Run] = {}
-        self._runs, self._open = runs, list(members)
-        self._found: dict[Comparison, Verdict] = {}
-        for n_seeds in runs.looks:
-            # A failed run blocks a comparison in this call: it stays in the family, without seeds.
-            playing = [c for c in self._open if c not in self._found or self._found[c].estimate]
-            self.wanted = runs.missing([arm.case for c in playing for arm in c.arms], n_seeds)
-            if not (self.wanted and self._found):
-                self._found |= runs.judged(playing, n_seeds)
-            if self.wanted:
+    def __init__(self, comparisons: Sequence[Comparison], looks: _Looks) -> None:
+        self.next_runs: dict[str, Run] = {}
+        self._looks = looks
+        self._open = list(comparisons)
+        self._verdicts: dict[Comparison, Verdict] = {}
+        for n_seeds in looks.seeds:
+            playing = [
+                comparison for comparison in self._open if not self._is_undefined(comparison)
+            ]
+            cases = [arm.case for comparison in playing for arm in comparison.arms]
+            self.next_runs = looks.missing(cases, n_seeds)
+            is_first = not self._verdicts
+            if is_first or not self.next_runs:
+                self._verdicts |= looks.judge(playing, n_seeds)
+            if self.next_runs:
                 break
             self._stop_clear_ones(n_seeds)
 
+    def _is_undefined(self, comparison: Comparison) -> bool:
+        # A failed run ends a comparison in this call: it stays in the family, without seeds.
+        return comparison in self._verdicts and self._verdicts[comparison].estimate is None
+
     def _stop_clear_ones(self, n_seeds: int) -> None:
         """Note p on the scale on which 0.05 decides, and stop by Holm's steps, smallest p first."""
-        tested = list[tuple[float, Comparison, spi.Estimate]]()
+        p_values = dict[Comparison, float]()
         for comparison in list(self._open):
-            estimate = self._found[comparison].estimate
-            if estimate and (
-                estimate.identical or estimate.untestable
-            ):  # nothing to test, at any number of seeds
-                self._stop(comparison, n_seeds)
-            elif estimate and estimate.p_value is not None:
-                tested.append((estimate.p_value, comparison, estimate))
-        for p, comparison, estimate in sorted(tested, key=lambda one: one[0]):
+            estimate = self._verdicts[comparison].estimate
+            if estimate is None:
+                continue
+            if estimate.identical or estimate.untestable:
+                self._stop(comparison, n_seeds)  # nothing to test, at any number of seeds
+            elif estimate.p_value is not None:
+                p_values[comparison] = estimate.p_value
+        for comparison, p in sorted(p_values.items(), key=lambda item: item[1]):
             # Once one stays open the level stays as it is, and every larger p is above it.
-            level = self._runs.alpha(n_seeds, (1 - CONFIDENCE) / len(self._open))
+            level = self._looks.alpha(n_seeds, (1 - CONFIDENCE) / len(self._open))
             is_clear = p < level
-            self._found[comparison] = replace(
-                self._found[comparison],
-                p_holm=min(1.0, p * (1 - CONFIDENCE) / level),
-                verdict_holm=estimate.verdict_for(p) if is_clear else "inconclusive",
+            verdict = self._verdicts[comparison]
+            plain = verdict.on_threshold.plain
+            self._verdicts[comparison] = replace(
+                verdict,
+                p_adjusted=min(1.0, p * (1 - CONFIDENCE) / level),
+                on_threshold=Decision(plain, plain if is_clear else "open"),
             )
             if is_clear:
                 self._stop(comparison, n_seeds)
 
     def _stop(self, comparison: Comparison, n_seeds: int) -> None:
         self._open.remove(comparison)
-        self._found[comparison] = replace(self._found[comparison], stopped_at=n_seeds)
+        self._verdicts[comparison] = replace(self._verdicts[comparison], stopped_at=n_seeds)
 
-    def judged(self) -> dict[Comparison, Verdict]:
-        """Return every comparison, with the equivalences under Holm, each at its own look."""
-        tests = {c: one.equivalence for c, one in self._found.items() if one.equivalence}
-        if len(tests) < len(self._found):  # not asked, or one is blocked
-            return self._found
-        left = {c: test for c, test in tests.items() if not test.identical}
+    def verdicts(self) -> dict[Comparison, Verdict]:
+        """Return every verdict, with the equivalences under Holm, each at its own look."""
+        tests = {
+            comparison: verdict.equivalence
+            for comparison, verdict in self._verdicts.items()
+            if verdict.equivalence
+        }
+        if len(tests) < len(self._verdicts):  # S has none, or one is undefined
+            return self._verdicts
+        untold = {comparison: test for comparison, test in tests.items() if not test.identical}
 
-        def ratio(comparison: Comparison) -> float:
+        def multiple_of_level(comparison: Comparison) -> float:
             """Return p as a multiple of the level that it needs."""
-            p, n_seeds = left[comparison].p_value, left[comparison].change.n_seeds
-            return 1.0 if p is None else p / self._runs.alpha(n_seeds, 2 * ALPHA / len(left)) * 2
+            test = untold[comparison]
+            if test.p_value is None:
+                return 1.0
+            # Both sides share the error that is spent, and Holm's step divides it.
+            level = self._looks.alpha(test.change.n_seeds, 2 * ALPHA / len(untold)) / 2
+            return test.p_value / level
 
-        while left and ratio(first := min(left, key=ratio)) < 1.0:
-            del left[first]
+        while untold:
+            comparison = min(untold, key=multiple_of_level)
+            if multiple_of_level(comparison) >= 1.0:
+                break
+            del untold[comparison]
         for comparison, test in tests.items():
-            verdict = "inconclusive" if comparison in left else test.verdict
-            self._found[comparison] = replace(self._found[comparison], equivalence_holm=verdict)
-        return self._found
+            adjusted = "open" if comparison in untold else test.verdict
+            self._verdicts[comparison] = replace(
+                self._verdicts[comparison], on_equivalence=Decision(test.verdict, adjusted)
+            )
+        return self._verdicts

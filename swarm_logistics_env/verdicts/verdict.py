@@ -1,10 +1,11 @@
-"""Cells and verdicts: P under each condition, and what every comparison of a study says."""
+"""Verdict: what a study says of one comparison, and Holm's adjustment over a family of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal, NamedTuple, TypeAlias
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.grouping import grouped
@@ -15,8 +16,33 @@ from swarm_logistics_env.spi.equivalence import ALPHA
 from .cell import Cell, same_runs
 
 POWER = 0.8
-UNAFFECTED = "unaffected"
-UNTESTABLE = "untestable"
+UNAFFECTED: Literal["unaffected"] = "unaffected"
+UNTESTABLE: Literal["untestable"] = "untestable"
+UNDEFINED: Literal["undefined"] = "undefined"
+Word: TypeAlias = spi.DecisionWord | Literal["unaffected", "untestable", "undefined"]
+_OPPOSITE: dict[Word, Word] = {"supported": "refuted", "refuted": "supported"}
+
+
+class Decision(NamedTuple):
+    """What is decided on one question.
+
+    Attributes:
+        plain: the word at the question's own level: supported, refuted, equivalent or open;
+            unaffected: both conditions gave the same runs, which is no evidence; untestable: the
+            indicator cannot lie below the threshold; undefined: a run that it needs failed or is
+            missing.
+        adjusted: the word after Holm's adjustment over the family; undefined, too, where another
+            comparison of the family is.
+    """
+
+    plain: Word
+    adjusted: Word = UNDEFINED
+
+    @property
+    def opposite(self) -> Decision:
+        """The decision on the contrary."""
+        plain, adjusted = self
+        return Decision(_OPPOSITE.get(plain, plain), _OPPOSITE.get(adjusted, adjusted))
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,15 +50,15 @@ class Verdict:
     """What a study says of one comparison.
 
     Attributes:
-        compared: what is compared.
-        estimate: the indicator; None: blocked.
-        problem: why it is blocked, e.g. by a failed run; None: it is not.
-        equivalence: whether P is unchanged; None: blocked, or not asked.
+        compared: the comparison.
+        estimate: the indicator; None: undefined.
+        problem: why it is undefined, e.g. by a failed run; None: it is not.
+        equivalence: the test whether P is unchanged; None: undefined, or S, which has none.
         saturated: whether it rests on a P that is capped.
         margin: the largest change that counts as none, as a share of P_o.
-        p_holm, verdict_holm: of the estimate under Holm; None: nothing to test, or a blocked
-            family.
-        equivalence_holm: verdict of the equivalence under Holm; None as `equivalence`.
+        on_threshold: the decision on "the indicator lies above the threshold".
+        on_equivalence: the decision on "P is unchanged"; None: S has no such question.
+        p_adjusted: p of the estimate after Holm; None: nothing to test, or an undefined family.
         stopped_at: number of seeds at which it was clear, in a study that runs until then; None: it
             is not, or the study is another.
         published: the reference's value of the indicator; None: it has none.
@@ -45,21 +71,21 @@ class Verdict:
     equivalence: Equivalence | None
     saturated: bool
     margin: float
-    p_holm: float | None = None
-    verdict_holm: spi.Verdict | None = None
-    equivalence_holm: spi.Verdict | None = None
+    on_threshold: Decision
+    on_equivalence: Decision | None
+    p_adjusted: float | None = None
     stopped_at: int | None = None
     published: float | None = None
     claimed: bool | None = None
 
     @property
     def value(self) -> float | None:
-        """The estimate; None: blocked."""
+        """The estimate; None: undefined."""
         return None if self.estimate is None else self.estimate.value
 
     @property
     def interval(self) -> Interval | None:
-        """The estimate with the limits of its interval; None: blocked."""
+        """The estimate with the limits of its interval; None: undefined."""
         e = self.estimate
         return None if e is None else Interval(e.value, e.low, e.high)
 
@@ -69,79 +95,53 @@ class Verdict:
         return self.estimate.flags if self.estimate else ()
 
     @property
-    def asked(self) -> str:
-        """What is asked, e.g. "tolerant", "FT > 0.5" or "P falls"."""
-        definition, below = self.compared.definition, self.claimed is False
-        return definition.property_name(self.compared.threshold, claimed_below=below)
-
-    @property
     def after(self) -> Setting:
         """The setting of the changed condition."""
         return self.compared.changed.setting
 
     @property
-    def plain(self) -> str | None:
-        """Whether it lies above the threshold.
-
-        "unaffected": equal runs, no evidence; "untestable": it cannot lie below the threshold.
-        """
-        if self.estimate is None:
-            return None
-        if self.estimate.identical:
-            return UNAFFECTED
-        return UNTESTABLE if self.estimate.untestable else self.estimate.verdict
+    def property_name(self) -> str:
+        """The property in question, e.g. "tolerant", "FT > 0.5" or "P falls"."""
+        is_below = self.claimed is False
+        definition = self.compared.definition
+        return definition.property_name(self.compared.threshold, claimed_below=is_below)
 
     @property
-    def holm(self) -> str | None:
-        """The same after Holm."""
-        return self.plain if self.plain in (UNAFFECTED, UNTESTABLE) else self.verdict_holm
-
-    @property
-    def claim_verdict(self) -> str | None:
-        """The verdict on the claim; None: nothing is claimed."""
-        return self._on_claim(self.plain)
-
-    @property
-    def claim_verdict_holm(self) -> str | None:
-        """The same after Holm."""
-        return self._on_claim(self.holm)
-
-    @property
-    def answer(self) -> str | None:
-        """The verdict on the property."""
-        return self.claim_verdict if self._asks_for_fall else self.plain
-
-    @property
-    def answer_holm(self) -> str | None:
-        """The same after Holm."""
-        return self.claim_verdict_holm if self._asks_for_fall else self.holm
-
-    def _on_claim(self, found: str | None) -> str | None:
-        if self.claimed is False:
-            return {"supported": "refuted", "refuted": "supported"}.get(found or "", found)
-        return None if self.claimed is None else found
-
-    @property
-    def _asks_for_fall(self) -> bool:
+    def _property_is_a_fall(self) -> bool:
         # "P falls" is asked as it is claimed; every other property is one above the threshold.
         return self.compared.definition.compares == "policy" and self.claimed is False
+
+    @property
+    def on_property(self) -> Decision:
+        """The decision on the property."""
+        return self.on_threshold.opposite if self._property_is_a_fall else self.on_threshold
 
     @property
     def claim(self) -> str | None:
         """What is claimed, e.g. "not tolerant"; None: nothing."""
         if self.claimed is None:
             return None
-        return self.asked if self.claimed or self._asks_for_fall else f"not {self.asked}"
+        is_the_property = self.claimed or self._property_is_a_fall
+        return self.property_name if is_the_property else f"not {self.property_name}"
 
     @property
-    def conclusion(self) -> str | None:
-        """The answer under Holm, but "equivalent" if that is inconclusive and P unchanged."""
-        unchanged = self.equivalence_holm == "equivalent"
-        is_open = self.answer_holm == "inconclusive"
-        return "equivalent" if is_open and unchanged else self.answer_holm
+    def on_claim(self) -> Decision | None:
+        """The decision on the claim; None: nothing is claimed."""
+        if self.claimed is None:
+            return None
+        return self.on_threshold if self.claimed else self.on_threshold.opposite
 
     @property
-    def unchanged(self) -> str | None:
+    def conclusion(self) -> Word:
+        """The adjusted decision on the property; equivalent if that is open and P unchanged."""
+        word = self.on_property.adjusted
+        is_unchanged = (
+            self.on_equivalence is not None and self.on_equivalence.adjusted == "equivalent"
+        )
+        return "equivalent" if word == "open" and is_unchanged else word
+
+    @property
+    def equivalence_name(self) -> str | None:
         """What is tested for equivalence, e.g. "P_F within 10 % of P_o"; None: nothing."""
         return self.compared.definition.unchanged(self.margin)
 
@@ -158,7 +158,7 @@ class Verdict:
         return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
 
 
-def judge_one(
+def judge_comparison(
     comparison: Comparison,
     cells: Mapping[Arm, Cell],
     *,
@@ -167,9 +167,9 @@ def judge_one(
     confidence: float = CONFIDENCE,
     alpha: float = ALPHA,
 ) -> Verdict:
-    """Return a comparison's verdict, without what Holm makes of it.
+    """Judge a comparison, without Holm's adjustment: `adjust_families` does that.
 
-    A comparison that needs a run which failed or is missing is blocked.
+    A comparison that needs a run which failed or is missing is undefined.
 
     Args:
         cells: those of the comparison's arms.
@@ -177,55 +177,86 @@ def judge_one(
         alpha: error of each of the two tests of equivalence, in (0, 0.5).
     """
     saturated = [arm for arm in comparison.arms if cells[arm].saturated]
-    estimate, same = None, None
+    # S is not tested for equivalence.
+    has_equivalence = comparison.definition.unchanged(margin) is not None
+    estimate, unchanged = None, None
     problems = [
         f"{arm.setting}: {cells[arm].problem}" for arm in comparison.arms if cells[arm].problem
     ]
     if not problems:
-        pair = (cells[arm].outcomes for arm in (comparison.original, comparison.changed))
+        original, changed = (cells[arm] for arm in (comparison.original, comparison.changed))
         # The removed robots make the third condition another one by construction.
-        identical = comparison.removed is None and same_runs(*pair)
+        identical = comparison.removed is None and same_runs(original.outcomes, changed.outcomes)
         samples = {arm: cells[arm].by_seed for arm in comparison.arms}
         try:
             estimate = comparison.estimate(
                 samples, capped=saturated, paired=paired, identical=identical, confidence=confidence
             )
-            if comparison.definition.unchanged(margin) is not None:  # S has no such question
-                named = dict(zip(("p_o", "p_new", "p_s"), comparison.arguments.values()))
-                same = equivalence(
-                    *(samples[arm] for arm in named.values()),
+            if has_equivalence:
+                arms = {"p_o": comparison.original, "p_new": comparison.changed}
+                if comparison.removed is not None:
+                    arms["p_s"] = comparison.removed
+                unchanged = equivalence(
+                    **{name: samples[arm] for name, arm in arms.items()},
                     margin=margin,
                     alpha=alpha,
                     paired=paired,
-                    saturated=[name for name, arm in named.items() if arm in saturated],
+                    saturated=[name for name, arm in arms.items() if arm in saturated],
                     identical=identical,
                 )
         except spi.IndicatorError as error:
-            nothing = not samples[comparison.original].any()
-            estimate, problems = None, ["it delivers nothing" if nothing else str(error)]
-    return Verdict(comparison, estimate, "; ".join(problems) or None, same, bool(saturated), margin)
+            delivers_nothing = not samples[comparison.original].any()
+            estimate = None
+            problems = ["it delivers nothing" if delivers_nothing else str(error)]
+    on_equivalence = Decision(unchanged.verdict if unchanged else UNDEFINED)
+    return Verdict(
+        comparison,
+        estimate,
+        "; ".join(problems) or None,
+        unchanged,
+        bool(saturated),
+        margin,
+        on_threshold=_on_threshold(estimate),
+        on_equivalence=on_equivalence if has_equivalence else None,
+    )
 
 
-def under_holm(found: Sequence[Verdict]) -> Iterator[Verdict]:
-    """Yield verdicts with what Holm makes of them, family by family, in their order.
+def _on_threshold(estimate: Estimate | None) -> Decision:
+    """Decide whether the indicator lies above its threshold; what needs no test needs no family."""
+    if estimate is None:
+        return Decision(UNDEFINED)
+    if estimate.identical:
+        return Decision(UNAFFECTED, UNAFFECTED)
+    if estimate.untestable:
+        return Decision(UNTESTABLE, UNTESTABLE)
+    return Decision(estimate.verdict)
 
-    A blocked comparison leaves its family without adjusted verdicts: it would be too small.
+
+def adjust_families(verdicts: Sequence[Verdict]) -> Iterator[Verdict]:
+    """Yield verdicts after Holm's adjustment, family by family, in their order.
+
+    An undefined comparison leaves its family without adjusted decisions: it would be too small.
     """
     adjusted: dict[Comparison, Verdict] = {}
-    for family in grouped(found, lambda one: one.compared.family).values():
-        estimates = [one.estimate for one in family if one.estimate]
-        same = [one.equivalence for one in family if one.equivalence]
-        none = (None,) * len(family)
-        is_whole = len(estimates) == len(family)
-        p_values = spi.adjusted_p_values(estimates) if is_whole else none
-        verdicts = spi.adjust(estimates) if is_whole else none
-        unchanged = spi.adjust(same) if len(same) == len(family) else none
-        for one, p, verdict, as_before in zip(family, p_values, verdicts, unchanged):
-            adjusted[one.compared] = replace(
-                one,
-                p_holm=p,
-                # What is no evidence, or cannot fail, has no verdict.
-                verdict_holm=None if p is None else verdict,
-                equivalence_holm=as_before,
-            )
-    yield from (adjusted[one.compared] for one in found)
+    for family in grouped(verdicts, lambda verdict: verdict.compared.family).values():
+        estimates = [verdict.estimate for verdict in family if verdict.estimate]
+        if len(estimates) == len(family):
+            p_values = spi.adjusted_p_values(estimates)
+            words = spi.adjust(estimates)
+            family = [
+                replace(verdict, p_adjusted=p, on_threshold=_adjust(verdict.on_threshold, p, word))
+                for verdict, p, word in zip(family, p_values, words)
+            ]
+        equivalences = [verdict.equivalence for verdict in family if verdict.equivalence]
+        if len(equivalences) == len(family):
+            family = [
+                replace(verdict, on_equivalence=Decision(test.verdict, word))
+                for verdict, test, word in zip(family, equivalences, spi.adjust(equivalences))
+            ]
+        adjusted |= {verdict.compared: verdict for verdict in family}
+    yield from (adjusted[verdict.compared] for verdict in verdicts)
+
+
+def _adjust(decision: Decision, p: float | None, word: spi.DecisionWord) -> Decision:
+    """Put the adjusted word into a decision; without a p it was decided without a test."""
+    return decision if p is None else Decision(decision.plain, word)

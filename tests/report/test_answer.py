@@ -9,9 +9,9 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.report.answer import MOST_LINES, answer, digest
-from swarm_logistics_env.report.section import limits, said
+from swarm_logistics_env.report.section import limits
 from swarm_logistics_env.verdicts.results import StudyResults
-from tests.made_up import paper
+from tests.made_up import decided, paper
 
 
 def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
@@ -30,7 +30,7 @@ def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
         told = limits(test.estimate or test.interval, 2)
         assert told == f"[{low:.2f}, {high:.2f}]" or abs(low) < 0.005
         assert (line.interval(0.95), line.interval(0.9)) == (told, f"{told} 95 %")
-        assert line.verdict.startswith(said(test.answer_holm))
+        assert line.verdict.startswith(test.on_property.adjusted)
         assert line.question.startswith(test.compared.indicator)
         more = re.fullmatch(r"open: (\d+) more seeds tell 0.1", line.verdict)
         if more:
@@ -45,7 +45,7 @@ def test_what_is_alike_shares_a_line_and_no_question_is_lost(few: StudyResults) 
     assert sum(len(line.tests) for line in lines) == len(few.verdicts)
     for line in (line for line in lines if len(line.tests) > 1):
         assert len({test.compared.family for test in line.tests}) == 1
-        counts = Counter(said(test.answer_holm) for test in line.tests)
+        counts = Counter(test.on_property.adjusted for test in line.tests)
         for word, count in counts.items():
             assert (word if len(counts) == 1 else f"{count} {word}") in line.verdict
     asked = [line.question for line in lines if "FM4" in line.question]
@@ -66,7 +66,7 @@ def test_digest_fits_the_screen_and_nothing_is_cut(
 
 
 def test_claims_are_counted_and_what_contradicts_the_paper_is_marked(few: StudyResults) -> None:
-    claims = Counter(said(test.claim_verdict_holm) for test in few.verdicts if test.claim)
+    claims = Counter(decided(test.on_claim).adjusted for test in few.verdicts if test.claim)
     # Two of them are not in the text: that P falls without taxis.
     count, supported = claims.total() - 2, claims["supported"] - 2
     last = answer(few).last
@@ -86,7 +86,7 @@ def test_words_for_what_is_no_plain_verdict() -> None:
     assert undefined == {"undefined: it delivers nothing"}
     same = answer(paper(same=frozenset({"FM2"})), most=None)
     exact = {line.verdict for line in same.lines if line.question.startswith("R FM2")}
-    assert exact == {"same runs, exact"}
+    assert exact == {"unaffected, exact"}
     assert "provisional" not in same.last
 
 

@@ -51,17 +51,17 @@ def test_it_is_the_two_tests_of_the_indicators() -> None:
         (0.0, {"paired": False}, "equivalent"),
         (-0.3, {}, "refuted"),
         (0.3, {"paired": False}, "refuted"),
-        (0.0, {"saturated": ["p_o"]}, "inconclusive"),
-        (0.0, {"saturated": ["p_new"]}, "inconclusive"),
+        (0.0, {"saturated": ["p_o"]}, "open"),
+        (0.0, {"saturated": ["p_new"]}, "open"),
         (0.5, {"saturated": ["p_new"]}, "refuted"),
-        (0.5, {"saturated": ["p_o"]}, "inconclusive"),
+        (0.5, {"saturated": ["p_o"]}, "open"),
     ],
 )
 def test_clear_changes_have_their_verdict_unless_a_cap_could_turn_it(
     change: float, asked: dict[str, Any], verdict: str
 ) -> None:
     found = spi.equivalence(*poisson(1, change), **asked)
-    assert (found.verdict, "capped" in found.flags) == (verdict, verdict == "inconclusive")
+    assert (found.verdict, "capped" in found.flags) == (verdict, verdict == "open")
 
 
 def test_fault_tolerance_compares_with_the_robots_removed() -> None:
@@ -75,10 +75,10 @@ def test_equal_runs_are_equivalent_exactly_and_equal_counts_or_one_seed_are_not(
     p = [30.0, 41.0, 36.0]
     same, by_chance = spi.equivalence(p, p, identical=True), spi.equivalence(p, p)
     assert (same.verdict, same.p_value) == ("equivalent", None)
-    assert by_chance.verdict == "inconclusive"
+    assert by_chance.verdict == "open"
     assert "degenerate" in by_chance.flags
     one = spi.equivalence([39], [38])
-    assert (one.p_value, one.verdict) == (None, "inconclusive")
+    assert (one.p_value, one.verdict) == (None, "open")
     assert spi.seeds_for_equivalence(one) is None
 
 

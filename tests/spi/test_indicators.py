@@ -53,7 +53,7 @@ def test_adaptability_uses_the_size_of_the_change_only() -> None:
 @over_indicators
 def test_one_seed_gives_the_value_and_nothing_else(name: str) -> None:
     found = INDICATORS[name]([39], [35], **({"p_s": [30]} if name == "FT" else {}))
-    assert (found.verdict, found.flags) == ("inconclusive", ("single_seed",))
+    assert (found.verdict, found.flags) == ("open", ("single_seed",))
     assert (found.n_seeds, found.threshold, found.mean_denominator) == (1, 0.0, 39)
     assert {found.low, found.high, found.p_value, found.probability} == {None}
     assert {found.difference_sd, found.degrees_of_freedom, found.pairing_correlation} == {None}
@@ -138,8 +138,8 @@ def test_what_no_performance_can_refute_has_no_verdict_and_all_else_can_be_eithe
     assert judged([40] * 4, much, nothing).value > threshold  # every indicator can succeed
     if found.untestable:
         assert found.value >= threshold - 1e-9
-        assert (found.verdict, found.p_value, found.probability) == ("inconclusive", None, None)
-        assert f"above {threshold:g}: no verdict" in str(found)
+        assert (found.verdict, found.p_value, found.probability) == ("open", None, None)
+        assert f"above {threshold:g}: untestable" in str(found)
         assert spi.adjusted_p_values([found, judged([5, 6, 7], [3, 4, 9], [1, 2, 2])])[0] is None
         assert spi.minimum_detectable_effect(found) is spi.seeds_for_power(found, 9.0) is None
 
@@ -149,7 +149,7 @@ def test_what_cannot_fail_leaves_holms_family_to_the_others() -> None:
     doubled = INDICATORS["A"](P * 3, LESS * 3, x_new=20)
     assert doubled.flags == ("cannot_fail",)
     assert spi.adjusted_p_values([doubled, clear, clear])[1] == 2 * (clear.p_value or 1.0)
-    assert spi.adjust([doubled, clear]) == ("inconclusive", "supported")
+    assert spi.adjust([doubled, clear]) == ("open", "supported")
 
 
 def waits(n: int) -> np.ndarray:
@@ -184,16 +184,16 @@ GREATER = np.array([47.1, 46.9, 47.0, 47.2, 46.8])
     ("name", "samples", "threshold", "saturated", "verdict"),
     [
         ("R", (MANY, HALF), 0, ("p_o",), "refuted"),  # the true P_o is larger still
-        ("R", (MANY, HALF), 0, ("p_f",), "inconclusive"),  # the true P_F may be as large as P_o
+        ("R", (MANY, HALF), 0, ("p_f",), "open"),  # the true P_F may be as large as P_o
         ("R", (HALF, MANY), 0, ("p_f",), "supported"),
         # Of a true P_o of 80 the loss is but .086; of a larger P_S it is larger still.
-        ("FT", (MANY, FEWER, GREATER), -0.1, ("p_o",), "inconclusive"),
+        ("FT", (MANY, FEWER, GREATER), -0.1, ("p_o",), "open"),
         ("FT", (MANY, FEWER, GREATER), -0.1, ("p_s",), "refuted"),
         # The sign of FT does not depend on P_o.
         ("FT", (MANY, FEWER, GREATER), 0.0, ("p_o",), "refuted"),
-        ("FT", (MANY, GREATER, FEWER), 0.1, ("p_o",), "inconclusive"),
+        ("FT", (MANY, GREATER, FEWER), 0.1, ("p_o",), "open"),
         ("A", (MANY, FEWER), 0.6, ("p_new",), "supported"),
-        ("A", (FEWER, MANY), 1.0, ("p_o",), "inconclusive"),
+        ("A", (FEWER, MANY), 1.0, ("p_o",), "open"),
     ],
 )
 def test_a_cap_blocks_the_side_on_which_it_can_move_the_indicator(
@@ -202,13 +202,13 @@ def test_a_cap_blocks_the_side_on_which_it_can_move_the_indicator(
     x: dict[str, float] = {"x_new": 30} if name == "A" else {}
     found = INDICATORS[name](*samples, threshold=threshold, saturated=saturated, **x)
     assert (found.verdict, *spi.adjust([found])) == (verdict, verdict)
-    assert ("capped" in found.flags, found.p_value == 1.0) == ((verdict == "inconclusive",) * 2)
+    assert ("capped" in found.flags, found.p_value == 1.0) == ((verdict == "open",) * 2)
 
 
 def test_the_same_runs_have_an_exact_value_that_is_no_evidence() -> None:
     r = spi.robustness(MANY, MANY, n=25, m=2, identical=True)
     assert (r.value, r.low, r.high) == (0.08, 0.08, 0.08)
-    assert (r.verdict, r.answer, r.p_value) == ("inconclusive", "supported", None)
+    assert (r.verdict, r.answer, r.p_value) == ("open", "supported", None)
     assert r.flags == ("identical",)
     assert spi.relative_change(MANY, MANY, identical=True).answer == "refuted"  # 0 is not above 0
     with pytest.raises(IndicatorError, match="identical = True, but p_f and p_o differ"):

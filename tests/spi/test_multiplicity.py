@@ -34,12 +34,12 @@ UNCLEAR = spi.robustness(P_O, [45.0, 20, 38, 50, 30], n=25, m=2)
 def test_adjusted_verdicts_keep_their_direction_and_what_is_untested_counts() -> None:
     family = [estimate(0.001, 0.9995), estimate(0.02, 0.01), estimate(0.03, 0.985)]
     assert spi.adjust(family) == ("supported", "refuted", "supported")
-    assert spi.adjust([*family, estimate(None)]) == ("supported", *["inconclusive"] * 3)
+    assert spi.adjust([*family, estimate(None)]) == ("supported", *["open"] * 3)
 
 
 def test_identical_runs_stand_outside_the_family() -> None:
     assert spi.adjusted_p_values([SAME, ROBUST, SAME]) == (None, ROBUST.p_value, None)
-    assert spi.adjust([SAME, ROBUST]) == ("inconclusive", "supported")
+    assert spi.adjust([SAME, ROBUST]) == ("open", "supported")
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_the_first_unsupported_number_ends_the_fault_budget(
     by_m: dict[int, spi.Estimate], robots: int, limit: int | None
 ) -> None:
     verdicts = [each.verdict for each in (ROBUST, BROKEN, UNCLEAR)]
-    assert verdicts == ["supported", "refuted", "inconclusive"]
+    assert verdicts == ["supported", "refuted", "open"]
     assert spi.fault_budget(by_m) == (robots, limit)
 
 

@@ -76,7 +76,7 @@ def test_verdict_and_interval_agree(pairs: list[tuple[int, int]], threshold: flo
             continue
         expected = {(True, False): "supported", (False, True): "refuted"}
         by_interval = (r.low > threshold, r.high < threshold)
-        assert r.verdict == expected.get(by_interval, "inconclusive")
+        assert r.verdict == expected.get(by_interval, "open")
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_no_spread_two_seeds_and_rounding_errors_are_no_evidence(
     p_o: list[float], p_f: list[float], asked: dict[str, Any], flags: tuple[str, ...]
 ) -> None:
     r = spi.robustness(p_o, p_f, n=25, m=7, **asked)
-    assert (r.verdict, r.probability, r.p_value) == ("inconclusive", 0.5, 1.0)
+    assert (r.verdict, r.probability, r.p_value) == ("open", 0.5, 1.0)
     assert r.flags == flags
     assert ((r.low, r.high) == (None, None)) == ("degenerate" in flags)
 

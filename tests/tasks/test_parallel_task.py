@@ -117,7 +117,7 @@ def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Pa
     # Removing is not among its failures, so FT is not asked.
     assert {v.compared.indicator for v in results.verdicts} == {"R"}
     # Random actions do not look: a blind robot changes nothing, and the report says so.
-    assert [v.plain == "unaffected" for v in results.verdicts] == [True, False]
+    assert [v.on_threshold.plain == "unaffected" for v in results.verdicts] == [True, False]
     assert any(p % 1 for cell in results.cells for p in cell.by_seed)
 
 

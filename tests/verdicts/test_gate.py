@@ -56,8 +56,8 @@ def fails(text: str, old: StudyResults, new: StudyResults) -> bool:
 
 def test_a_gate_names_the_verdicts_that_fail_or_is_refused() -> None:
     gate, above = Gate.parse("possibly R < 0"), Gate.parse("possibly  change>-1e-1 at N = 5")
-    assert [gate.fails_on(v) for v in ("supported", "inconclusive", "refuted")] == [0, 1, 1]
-    assert [above.fails_on(v) for v in ("supported", "inconclusive", "refuted")] == [1, 1, 0]
+    assert [gate.fails_on(v) for v in ("supported", "open", "refuted")] == [0, 1, 1]
+    assert [above.fails_on(v) for v in ("supported", "open", "refuted")] == [1, 1, 0]
     for text in ("", "R <", "R <= 0", "Q < 0", "R < 0 and S < 0", "R < nan"):
         with pytest.raises(StudyError, match="should be"):
             Gate.parse(text)
@@ -102,7 +102,7 @@ def test_a_gate_over_several_comparisons_keeps_its_error_over_all_of_them(gate: 
 def test_a_capped_p_is_never_called_equivalent() -> None:
     same = results({**WELL, (10, 1): 60}, margin=0.9)
     outcomes = {key: replace(one, all_delivered=True) for key, one in same.outcomes.items()}
-    for found, verdict in ((same, "equivalent"), (judge(same.plan, outcomes), "inconclusive")):
+    for found, verdict in ((same, "equivalent"), (judge(same.plan, outcomes), "open")):
         tests = [v.equivalence for v in found.verdicts if v.compared.indicator == "R"]
         assert {test.verdict for test in tests if test} == {verdict}
 
@@ -192,7 +192,7 @@ def test_a_gate_on_what_cannot_be_passes() -> None:
     widths = {"name": "handling_time", "values": [1.0, 2.0]}
     found = results({(10, 0): 40}, sizes=[], faults=[], parameters=[widths])
     (answer,) = answers(Gate.parse("possibly A < 0"), found, found)
-    assert (answer.fails, answer.verdict) == (False, "inconclusive")
+    assert (answer.fails, answer.verdict) == (False, "open")
     (answer,) = answers(Gate.parse("possibly A < 0.5"), found, found)
     assert answer.estimate is not None
     assert not answer.estimate.untestable

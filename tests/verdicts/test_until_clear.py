@@ -23,7 +23,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcome, Run
 from swarm_logistics_env.verdicts.until_clear import SPENDING
 from swarm_logistics_env.verdicts.verdict import Verdict
-from tests.made_up import delivered
+from tests.made_up import decided, delivered
 from verification.verdict_errors import MODELS, wrong_verdicts
 
 MEANS = {"FM2": 38.5, "FM3": 34.0, "FM4": 15.0}  # of 40 items; R is 0.0025, -0.11 and -0.585
@@ -63,12 +63,14 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     study, engine = Study(seeds=60, until_clear=True, parameters=[drift]), Engine()
     study.run(engine)
     doubled, half = study.findings().verdicts
-    assert (doubled.plain, doubled.holm, doubled.conclusion) == ("untestable",) * 3
-    assert (doubled.p_holm, doubled.stopped_at) == (None, 20)
-    assert (half.conclusion, half.p_holm is None) == ("supported", False)
+    assert (doubled.on_threshold.plain, doubled.on_threshold.adjusted, doubled.conclusion) == (
+        "untestable",
+    ) * 3
+    assert (doubled.p_adjusted, doubled.stopped_at) == (None, 20)
+    assert (half.conclusion, half.p_adjusted is None) == ("supported", False)
     (line, _), last = answer(study.findings())[2:]
-    assert line.verdict == "no verdict: it cannot be below 0"
-    assert "no verdict where it cannot lie below the threshold" in last
+    assert line.verdict == "untestable: it cannot be below 0"
+    assert "untestable where it cannot lie below the threshold" in last
     told = sentence(study.findings(), doubled).text
     assert "it cannot lie below the threshold, so it is not tested" in told
     assert "djusted" not in told
@@ -80,7 +82,12 @@ def verdicts_of(study: Study) -> dict[str, Verdict]:
 
 def told(study: Study) -> dict[str, tuple[Any, ...]]:
     return {
-        mode: (test.stopped_at, test.estimate and test.estimate.n_seeds, test.holm, test.interval)
+        mode: (
+            test.stopped_at,
+            test.estimate and test.estimate.n_seeds,
+            test.on_threshold.adjusted,
+            test.interval,
+        )
         for mode, test in verdicts_of(study).items()
     }
 
@@ -100,7 +107,7 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
     found = told(study)
     assert found["FM4"][:3] == (20, 20, "refuted")
     assert 20 < found["FM3"][1] < 60
-    assert found["FM2"][:3] == (None, 60, "inconclusive")
+    assert found["FM2"][:3] == (None, 60, "open")
     modes = [mode_of(run) for run in engine.played]
     seeds = {mode: modes.count(mode) for mode in MEANS}
     assert seeds == {mode: found[mode][1] for mode in MEANS}
@@ -126,7 +133,7 @@ def test_stopped_before_the_first_look_it_has_a_value_of_every_question_and_no_v
     study.run(Engine(most=35))
     found = verdicts_of(study)
     assert {test.estimate and test.estimate.n_seeds for test in found.values()} <= {8, 9}
-    assert {test.conclusion for test in found.values()} == {None}
+    assert {test.conclusion for test in found.values()} == {"undefined"}
 
 
 def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
@@ -140,7 +147,7 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
         study = until_clear(30)
         study.run(Engine(poisson))
         found = [
-            (e.n_seeds, e.p_value or 0.0, t.holm)
+            (e.n_seeds, e.p_value or 0.0, t.on_threshold.adjusted)
             for t in verdicts_of(study).values()
             if (e := t.estimate)
         ]
@@ -151,7 +158,7 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
                 spi.look_alphas(looks, alpha, spending=SPENDING)[look]
                 for alpha in (0.05, 0.05 / n_open)
             )
-            is_clear = verdict != "inconclusive"
+            is_clear = verdict != "open"
             assert is_clear == (p < level)
             softened += level <= p < alone
             n_open -= is_clear
@@ -264,9 +271,9 @@ def test_every_step_of_holm_at_a_look_has_a_level_of_its_own() -> None:
     found, _ = family(
         20, {mode: with_p(p_of_r, sampled(n), p) for n, (mode, p) in enumerate(wanted.items(), 1)}
     )
-    assert {mode: (test.holm, test.stopped_at) for mode, test in found.items()} == dict.fromkeys(
-        wanted, ("supported", 20)
-    )
+    assert {
+        mode: (test.on_threshold.adjusted, test.stopped_at) for mode, test in found.items()
+    } == dict.fromkeys(wanted, ("supported", 20))
 
 
 @pytest.mark.parametrize(
@@ -296,12 +303,14 @@ def test_equivalences_step_down_too_each_at_the_level_of_its_own_look(
     assert {test.stopped_at for test in found.values()} == {None}
     alphas = [test.equivalence.alpha for test in found.values() if test.equivalence]
     assert alphas == pytest.approx([levels[0]] * 3)
-    assert {m for m, test in found.items() if test.equivalence_holm == "equivalent"} == equivalent
+    assert {
+        m for m, test in found.items() if decided(test.on_equivalence).adjusted == "equivalent"
+    } == equivalent
 
 
 def test_a_comparison_of_the_same_runs_stops_at_the_first_look() -> None:
     found, engine = family(60, {"FM2": P_O})
-    assert (found["FM2"].holm, found["FM2"].stopped_at) == ("unaffected", 20)
+    assert (found["FM2"].on_threshold.adjusted, found["FM2"].stopped_at) == ("unaffected", 20)
     assert len(engine.played) == 40
 
 
