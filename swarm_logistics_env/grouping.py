@@ -11,7 +11,7 @@ Group = TypeVar("Group")
 
 def grouped(items: Iterable[Item], by: Callable[[Item], Group]) -> dict[Group, list[Item]]:
     """Return the items by what they have in common, in order of appearance."""
-    found: dict[Group, list[Item]] = {}
+    groups: dict[Group, list[Item]] = {}
     for item in items:
-        found.setdefault(by(item), []).append(item)
-    return found
+        groups.setdefault(by(item), []).append(item)
+    return groups

@@ -81,8 +81,8 @@ class Study:
         Raises:
             StudyError: the file cannot be read, or a field of it is unknown or cannot be.
         """
-        found = read_study_file(Path(path), trust_code=trust_code)
-        return cls(out=out, **{**dict(found), **fields})
+        specification = read_study_file(Path(path), trust_code=trust_code)
+        return cls(out=out, **{**dict(specification), **fields})
 
     @classmethod
     def stored(cls, out: str | Path, *, task: Task | None = None, trust_code: bool = False) -> Self:
@@ -99,16 +99,18 @@ class Study:
                 found.
         """
         out = Path(out)
-        noted = StoredStudy.existing(out)
-        asked = noted.specification
+        stored = StoredStudy.existing(out)
+        fields = {**stored.specification.model_dump(), "out": out}
         if task is None:
-            refuse_untrusted(out, asked.task, trust_code=trust_code)
-        study = cls(**{**asked.model_dump(), "task": task or asked.task, "out": out})
-        specification = study.specification
-        if noted.imported is not None:
-            study._plan = imported_plan(specification, noted.imported)
+            refuse_untrusted(out, stored.specification.task, trust_code=trust_code)
         else:
-            study._plan = make_plan(specification, code=noted.code, identities=noted.identities)
+            fields["task"] = task
+        study = cls(**fields)
+        specification = study.specification
+        if stored.imported is not None:
+            study._plan = imported_plan(specification, stored.imported)
+        else:
+            study._plan = make_plan(specification, code=stored.code, identities=stored.identities)
         return study
 
     @property
@@ -174,22 +176,22 @@ class Study:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
-        whole, errors = self._runs(shard), list[str | None]()
+        all_runs, errors = self._runs(shard), list[str | None]()
         start, left = time.monotonic(), 0
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
-            noted = StoredStudy.of(store)
+            stored = StoredStudy.of(store)
             damage = store.discard_damaged()
-            changed = tuple(noted.changes(plan)) if noted and len(store) else ()
+            changed = tuple(stored.changes(plan)) if stored and len(store) else ()
             changed += (damage,) if damage else ()
             note(store, plan, self._declared(store))
-            kept = len({run.key for run in whole} & store.succeeded())
+            n_before = len({run.key for run in all_runs} & store.succeeded())
             tried: set[str] = set()
             # A run that failed in this call is not tried again.
-            while missing := self._missing(whole, store, tried):
+            while missing := self._missing(all_runs, store, tried):
                 if not tried:
                     refuse_changed_policies(missing)
-                works = bool(kept) or None in errors
+                works = bool(n_before) or None in errors
                 finished = play(
                     missing, engine, store, self.specification.name, end, has_worked=works
                 )
@@ -202,23 +204,23 @@ class Study:
         return Tally(
             len(errors),
             len(failed),
-            kept,
+            n_before,
             time.monotonic() - start,
             next(iter(failed), None),
             left,
-            gave_up=bool(left) and not (is_late or kept or None in errors),
+            gave_up=bool(left) and not (is_late or n_before or None in errors),
             changes=changed,
         )
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs
 
-    def _missing(self, whole: Sequence[Run], store: Runs, tried: Collection[str]) -> list[Run]:
+    def _missing(self, runs: Sequence[Run], store: Runs, tried: Collection[str]) -> list[Run]:
         """Return what is to be played next, but for what was tried already."""
         done = store.succeeded() | set(tried)
         if not self.specification.until_clear:
-            return [run for run in whole if run.key not in done]
-        outcomes = store.outcomes(run for run in whole if run.key in done)
+            return [run for run in runs if run.key not in done]
+        outcomes = store.outcomes(run for run in runs if run.key in done)
         return list(progress_of(self.plan(), outcomes).next_runs)
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
@@ -230,13 +232,13 @@ class Study:
         Args:
             shard: of which part; None: of all.
         """
-        whole = self._runs(shard)
+        runs = self._runs(shard)
         try:
             with self._store(existing=True) as store:
-                done = len({run.key for run in whole} & store.succeeded())
-                return done, done + len(self._missing(whole, store, ()))
+                done = len({run.key for run in runs} & store.succeeded())
+                return done, done + len(self._missing(runs, store, ()))
         except StudyError:  # nothing has been run
-            return 0, len(whole)
+            return 0, len(runs)
 
     def is_exploratory(self) -> bool:
         """Return whether verdicts over the asked seeds would be exploratory.
@@ -258,8 +260,8 @@ class Study:
         plan = self.plan()
         with self._store(existing=True) as store:
             declared = self._declared(store)
-            found = judge(plan, store.outcomes(plan.runs), declared)
-            return replace(found, damage=store.damage())
+            results = judge(plan, store.outcomes(plan.runs), declared)
+            return replace(results, damage=store.damage())
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error.

@@ -166,10 +166,10 @@ def compared(table: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
         table: heading of the report's table.
         arms: the original one first.
     """
-    original, *others = arms
+    original, *changed = arms
     kind, removed = original.setting.kind, original.case.task.removed
     by_setting = {arm.setting: arm for arm in arms}
-    for before, after in zip(arms, others) if kind == "size" else ((original, x) for x in others):
+    for before, after in zip(arms, changed) if kind == "size" else ((original, x) for x in changed):
         setting = after.setting
         reference = Setting("fault", removed or "", setting.value, setting.onset)
         if setting in (reference, OTHER_BEHAVIOUR):

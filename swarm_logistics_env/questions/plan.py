@@ -102,16 +102,16 @@ class Plan:
         return tuple(Run(case, self.code, seed) for seed in self.seeds for case in self.cases)
 
     def __str__(self) -> str:
-        asked, run = len(self.cells), len(self.cases)
+        n_cells, n_cases = len(self.cells), len(self.cases)
         # Of several trainings each has its conditions.
-        shared = f" ({asked - run} shared)" if asked >= run else ""
+        shared = f" ({n_cells - n_cases} shared)" if n_cells >= n_cases else ""
         start = self.specification.first_seed
         first = f" from {start} on" if start else ""
         most = "at most " if self.specification.until_clear else ""
         return (
-            f"{self.specification.name}: {len(self.comparisons)} comparisons of {asked} cells; "
-            f"{run} conditions{shared} x {most}{len(self.seeds)} seeds{first} = "
-            f"{most}{run * len(self.seeds)} runs"
+            f"{self.specification.name}: {len(self.comparisons)} comparisons of {n_cells} cells; "
+            f"{n_cases} conditions{shared} x {most}{len(self.seeds)} seeds{first} = "
+            f"{most}{n_cases * len(self.seeds)} runs"
         )
 
 
@@ -125,7 +125,7 @@ def make_plan(
 
     Args:
         code: version of the code that played it; None: that of this process.
-        identities: of its policies when it was played; None: they are loaded and asked.
+        identities: of its policies when it was played; None: they are loaded, and say so.
 
     Raises:
         StudyError: the specification varies nothing, a step of it cannot be, or a policy of several
@@ -151,10 +151,13 @@ def make_plan(
         Case(policy, identities[part], specification.scenario, task=task)
         for part, policy in parts.items()
     ]
-    asked = _asked(specification, cases)
-    # What two factors ask alike is asked once, or Holm's family would count it twice.
+    # What two factors compare alike is compared once, or Holm's family would count it twice.
     comparisons = tuple(
-        dict.fromkeys(one for one in asked if one.indicator in specification.indicators)
+        dict.fromkeys(
+            comparison
+            for comparison in _comparisons(specification, cases)
+            if comparison.indicator in specification.indicators
+        )
     )
     if not comparisons:
         raise StudyError(
@@ -163,9 +166,11 @@ def make_plan(
         )
     # Only comparisons with the robots removed have a time to come back, which needs the null.
     nulls = {
-        (one.table, one.original): Arm(OTHER_BEHAVIOUR, replace(one.original.case, behaviour=1))
-        for one in comparisons
-        if one.removed and one.changed.setting.onset
+        (comparison.table, comparison.original): Arm(
+            OTHER_BEHAVIOUR, replace(comparison.original.case, behaviour=1)
+        )
+        for comparison in comparisons
+        if comparison.removed and comparison.changed.setting.onset
     }
     return Plan(specification, comparisons, code or task.code(), identities, nulls)
 
@@ -177,8 +182,8 @@ def refuse_changed_policies(runs: Iterable[Run]) -> None:
         case.policy.refuse_other(case.identity, case.task.policies)
 
 
-def _asked(specification: Specification, cases: Sequence[Case]) -> Iterator[Comparison]:
-    """Yield what is asked; `cases` are those of the policies, then those of the ablations."""
+def _comparisons(specification: Specification, cases: Sequence[Case]) -> Iterator[Comparison]:
+    """Yield all comparisons; `cases` are those of the policies, then those of the ablations."""
     n_policies = len(specification.policies)
     for base in cases[:n_policies]:
         for sizes in specification.sizes:
@@ -187,9 +192,9 @@ def _asked(specification: Specification, cases: Sequence[Case]) -> Iterator[Comp
             yield from _robustness(faults, base, specification.indicators)
         for parameter in specification.parameters:
             yield from _adaptability(parameter, base)
-        for ablation, lesser in zip(specification.ablations, cases[n_policies:]):
-            if lesser.identity != base.identity:
-                yield from _ablation(ablation, base, lesser)
+        for ablation, ablated in zip(specification.ablations, cases[n_policies:]):
+            if ablated.identity != base.identity:
+                yield from _ablation(ablation, base, ablated)
 
 
 def _title(factor: Factor, general: str, manner: str = "") -> str:
@@ -239,15 +244,15 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
         )
 
     def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Fields) -> Arm:
-        failing = [task.fault(one, m, onset, lasts, manner) for one in mode.split(BOTH)]
+        failing = [task.fault(name, m, onset, lasts, manner) for name in mode.split(BOTH)]
         return _arm(base, Setting("fault", mode, m, onset), faults.scenario, *failing)
 
     arms = [original]
     for onset, mode, m in product(faults.onsets, faults.modes, faults.robots):
         arms.append(arm(mode, m, onset, faults.duration, faults.manner))
     # Some tasks cannot remove robots in mid-run, and need not where nobody asks.
-    wanted = [one for one in comparing("fault") if one.symbol in indicators]
-    if task.removed is not None and any(one.needs_removed for one in wanted):
+    wanted = [definition for definition in comparing("fault") if definition.symbol in indicators]
+    if task.removed is not None and any(definition.needs_removed for definition in wanted):
         # The robots that are removed are those that would have failed.
         whom: Fields = {} if faults.role is None else {"role": faults.role}
         for onset, m in product(faults.onsets, faults.robots):
@@ -266,14 +271,16 @@ def _adaptability(parameter: Parameter, base: Case) -> Iterator[Comparison]:
     yield from compared(table, arms)
 
 
-def _ablation(ablation: Ablation, base: Case, lesser: Case) -> Iterator[Comparison]:
+def _ablation(ablation: Ablation, base: Case, ablated: Case) -> Iterator[Comparison]:
     table = _title(ablation, "Ablation")
     n_robots = base.task.vary(base.scenario, ablation.scenario).n_robots
-    whole, part = (
+    original, changed = (
         _arm(case, Setting("policy", case.policy.title, n_robots), ablation.scenario)
-        for case in (base, lesser)
+        for case in (base, ablated)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".
     threshold = -ablation.fall if ablation.fall else 0.0
     for definition in comparing("policy"):
-        yield Comparison(table, definition.symbol, whole, part, threshold=threshold, claim=False)
+        yield Comparison(
+            table, definition.symbol, original, changed, threshold=threshold, claim=False
+        )

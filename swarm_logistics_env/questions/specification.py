@@ -41,19 +41,19 @@ HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
 FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 20, 10
 
 
-def _told_apart(policies: tuple[PolicySpec, ...]) -> tuple[PolicySpec, ...]:
+def _with_distinct_labels(policies: tuple[PolicySpec, ...]) -> tuple[PolicySpec, ...]:
     """Return policies; files with the same name on their cards are called by their paths."""
     counts = Counter(policy.title for policy in policies)
-    found = tuple(
+    labelled = tuple(
         policy.replace(label=policy.name)
         if counts[policy.label] > 1 and policy.label == called(policy.name)
         else policy
         for policy in policies
     )
-    for title, count in Counter(policy.title for policy in found).items():
+    for title, count in Counter(policy.title for policy in labelled).items():
         if count > 1:
             raise ValueError(f"policy {title!r} is given twice")
-    return found
+    return labelled
 
 
 PolicySource = Annotated[PolicySpec, BeforeValidator(PolicySpec.of)]
@@ -129,13 +129,13 @@ class Faults(Factor):
 
     def __str__(self) -> str:
         """Return in words how long, how far and how steadily robots fail; empty: for good."""
-        said = [] if self.duration is None else [f"for {self.duration:g} s"]
-        said += [] if self.factor is None else [f"factor {self.factor:g}"]
+        parts = [] if self.duration is None else [f"for {self.duration:g} s"]
+        parts += [] if self.factor is None else [f"factor {self.factor:g}"]
         if self.intermittent is not None:
             held, paused = self.intermittent
-            said.append(f"{held:g} s failed, {paused:g} s not, in turn")
-        said += [] if self.role is None else [f"role {self.role}"]
-        return ", ".join(said)
+            parts.append(f"{held:g} s failed, {paused:g} s not, in turn")
+        parts += [] if self.role is None else [f"role {self.role}"]
+        return ", ".join(parts)
 
 
 def _from_above_0(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -203,7 +203,7 @@ class Specification(Record):
     name: FileName = "study"
     task: TaskSource = DEFAULT
     policies: Annotated[
-        tuple[PolicySource, ...], Field(min_length=1), AfterValidator(_told_apart)
+        tuple[PolicySource, ...], Field(min_length=1), AfterValidator(_with_distinct_labels)
     ] = (PolicySpec(name="swarm-dt"),)
     seeds: Annotated[int, Field(gt=0, le=MOST_SEEDS)] = 20
     first_seed: Annotated[int, Field(ge=0, le=HIGHEST_FIRST_SEED)] = 0
@@ -235,8 +235,11 @@ class Specification(Record):
     def trusting(self) -> Self:
         """Return the specification with policies that may be files which run code."""
         policies = (policy.replace(trusted=True) for policy in self.policies)
-        parts = (one.replace(policy=one.policy.replace(trusted=True)) for one in self.ablations)
-        return self.replace(policies=tuple(policies), ablations=tuple(parts))
+        ablations = (
+            ablation.replace(policy=ablation.policy.replace(trusted=True))
+            for ablation in self.ablations
+        )
+        return self.replace(policies=tuple(policies), ablations=tuple(ablations))
 
     @field_validator("scenario", mode="before")
     @classmethod
@@ -249,9 +252,11 @@ class Specification(Record):
         return value
 
     @model_validator(mode="after")
-    def _known(self) -> Self:
+    def _names_are_known(self) -> Self:
         task, parameters = self.played, [factor.name for factor in self.parameters]
-        modes = (one for factor in self.faults for mode in factor.modes for one in mode.split(BOTH))
+        modes = (
+            mode for factor in self.faults for modes in factor.modes for mode in modes.split(BOTH)
+        )
         _refuse_unknown("failure mode", modes, {*task.failure_modes} - {task.removed})
         if "n_robots" in parameters:
             raise ValueError("swarm sizes belong in `sizes`, where S judges them")
@@ -260,10 +265,10 @@ class Specification(Record):
         return self
 
 
-def _refuse_unknown(what: str, names: Iterable[str], known: Collection[str]) -> None:
+def _refuse_unknown(what: str, names: Iterable[str], allowed: Collection[str]) -> None:
     for name in names:
-        if name not in known:
-            raise ValueError(f"no {what} {name!r}{suggest(name, known)}")
+        if name not in allowed:
+            raise ValueError(f"no {what} {name!r}{suggest(name, allowed)}")
 
 
 def looks_up_to(most: int) -> tuple[int, ...]:
@@ -308,6 +313,6 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
 
 def seeds_in_words(seeds: Sequence[int]) -> str:
     """Return ascending seeds as ranges, e.g. "0 to 3, 8"; at least one."""
-    breaks = [place for place, (a, b) in enumerate(pairwise(seeds), start=1) if b != a + 1]
+    breaks = [index for index, (a, b) in enumerate(pairwise(seeds), start=1) if b != a + 1]
     parts = [seeds[a:b] for a, b in pairwise([0, *breaks, len(seeds)])]
     return ", ".join(f"{p[0]}" if len(p) == 1 else f"{p[0]} to {p[-1]}" for p in parts)

@@ -109,8 +109,8 @@ class Tally:
     def place(self) -> str:
         """File and line at which it did, outside this package and the libraries if possible."""
         frames = _FRAME.findall(self.traceback or "")
-        own = [frame for frame in frames if not frame[0].startswith(_NOT_OWN)]
-        return ":".join([*frames, *own][-1]) if frames else "no file"
+        users = [frame for frame in frames if not frame[0].startswith(_NOT_OWN)]
+        return ":".join([*frames, *users][-1]) if frames else "no file"
 
 
 def play(
@@ -243,7 +243,7 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
         StudyError: ray is not installed, or there is no cluster at that address.
     """
     waiting = deque(runs)
-    ray, ours = _connected(address, cores)
+    ray, started_here = _connected(address, cores)
     pending: dict[Hashable, Run] = {}
     try:
         sent = ray.remote(num_cpus=1, max_retries=RETRIES)(play_pickled)
@@ -263,7 +263,7 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
     finally:
         for task in pending:
             ray.cancel(task, force=True)
-        if ours:
+        if started_here:
             ray.shutdown()
 
 

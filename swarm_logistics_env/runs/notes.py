@@ -28,19 +28,19 @@ class StoredSpecification(BaseModel):
     name: str
     task: str
 
-    def differing(self, asked: Specification) -> list[str]:
+    def differing(self, specification: Specification) -> list[str]:
         """Return which fields of what is asked are not those that were declared.
 
         How far it is played, and how it is judged, may change: `Declaration` tells whether verdicts
         are exploratory then, and `StudyResults.late_margin` whether equivalence is.
         """
         free = {"seeds", "first_seed", "until_clear", "margin", "reference"}
-        mine = asked.model_dump(mode="json", exclude=free)
-        if mine["task"] != self.task:
+        new = specification.model_dump(mode="json", exclude=free)
+        if new["task"] != self.task:
             return ["task"]  # whose scenarios have other fields
-        declared = Specification(**{**self.model_dump(), "task": asked.task})
-        theirs = declared.model_dump(mode="json", exclude=free)
-        return [name for name in mine if mine[name] != theirs[name]]
+        declared = Specification(**{**self.model_dump(), "task": specification.task})
+        stored = declared.model_dump(mode="json", exclude=free)
+        return [name for name in new if new[name] != stored[name]]
 
 
 class StoredStudy(BaseModel):
@@ -83,13 +83,13 @@ class StoredStudy(BaseModel):
             StudyError: there is none, it notes nothing, or the note does not read.
         """
         with Runs.existing(directory) as runs:
-            found = cls.of(runs)
-        if found is None:
+            stored = cls.of(runs)
+        if stored is None:
             raise StudyError(
                 f"the store in {directory} does not note its study: run the study once more there "
                 "(finished runs are kept), then it will"
             )
-        return found
+        return stored
 
     def changes(self, plan: Plan) -> Iterator[str]:
         """Yield sentences on why stored runs are not those of a plan."""
@@ -105,14 +105,14 @@ class StoredStudy(BaseModel):
 
 def note(runs: Runs, plan: Plan, declared: Declaration) -> None:
     """Note a study in its store, for `StoredStudy.of`."""
-    told = {
+    content = {
         "specification": plan.specification,
         "code": plan.code,
         "identities": plan.identities,
         "declared": declared,
         "imported": plan.origin,
     }
-    runs.note(NOTE, to_json(told).decode())
+    runs.note(NOTE, to_json(content).decode())
 
 
 def merge(directories: Sequence[Path], out: Path) -> int:
@@ -129,15 +129,15 @@ def merge(directories: Sequence[Path], out: Path) -> int:
             results of one run, or `out` holds a study.
     """
     stored = {directory: StoredStudy.existing(directory) for directory in directories}
-    first, one = next(iter(stored.items()))
+    first, study = next(iter(stored.items()))
     for directory, other in stored.items():
         if other.imported is not None:
             raise StudyError(f"{directory} was imported: only studies that were run are merged")
-        if other != one:
+        if other != study:
             raise StudyError(f"{first} and {directory} differ: should be shards of one study")
     with Runs.new(out, "merge") as runs:
         for directory in directories:
             with Runs.existing(directory) as shard:
                 runs.absorb(shard)
-        runs.note(NOTE, one.model_dump_json())
+        runs.note(NOTE, study.model_dump_json())
         return len(runs)

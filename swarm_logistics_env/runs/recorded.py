@@ -102,7 +102,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     ]
     return Plan(
         specification,
-        tuple(one for title, arms in tables for one in compared(title, arms)),
+        tuple(comparison for title, arms in tables for comparison in compared(title, arms)),
         RECORDED.code(),
         {},
         nulls={
@@ -145,12 +145,12 @@ def _tables(trials: Sequence[Trial]) -> Iterator[tuple[str, _Varied]]:
     Yields:
         The heading in the report, and the rows with what each has of that thing.
     """
-    for (_, table), here in grouped(trials, lambda row: (row.policy, row.table)).items():
-        plain = [row for row in here if row.fault == NO_FAULT]
+    for (_, table), rows in grouped(trials, lambda row: (row.policy, row.table)).items():
+        plain = [row for row in rows if row.fault == NO_FAULT]
         sized = [row for row in plain if row.n_robots is not None]
         of = f"{table}: " if table else ""
         yield from _split(f"{of}Scalability", sized, lambda row: row.parameters, _sizes)
-        yield from _split(f"{of}Fault tolerance and robustness", here, _all_but(None), _faults)
+        yield from _split(f"{of}Fault tolerance and robustness", rows, _all_but(None), _faults)
         for name in dict.fromkeys(name for row in plain for name, _ in row.parameters):
             values = partial(_values, name, dict(plain[0].parameters)[name])
             yield from _split(f"{of}Adaptability to {name}", plain, _all_but(name), values)
@@ -163,11 +163,11 @@ def _split(
     varied: Callable[[Sequence[Trial]], _Varied],
 ) -> Iterator[tuple[str, _Varied]]:
     """Yield a table for each group of rows that have the same fixed values and differ otherwise."""
-    found = {key: varied(group) for key, group in grouped(rows, fixed).items()}
-    tables = {key: table for key, table in found.items() if len(table) > 1}
+    tables_by_values = {key: varied(group) for key, group in grouped(rows, fixed).items()}
+    tables = {key: table for key, table in tables_by_values.items() if len(table) > 1}
     for key, table in tables.items():
-        told = ", ".join(f"{name} = {value:g}" for name, value in key)
-        yield f"{general} ({told})" if len(tables) > 1 else general, table
+        values_text = ", ".join(f"{name} = {value:g}" for name, value in key)
+        yield f"{general} ({values_text})" if len(tables) > 1 else general, table
 
 
 def _all_but(varied: str | None) -> Callable[[Trial], _Fixed]:

@@ -86,10 +86,10 @@ def outcome_of(text: str) -> Outcome:
     Raises:
         ValueError: it does not read, or a field is unknown or missing: P is never guessed.
     """
-    found = _OUTCOME.validate_json(text, strict=True)
+    fields = _OUTCOME.validate_json(text, strict=True)
     if json.loads(text).keys() != _FIELDS:
         raise ValueError(f"an outcome should have the fields {sorted(_FIELDS)}")
-    return found
+    return fields
 
 
 def case_of(text: str) -> dict[str, Any]:

@@ -68,16 +68,16 @@ class Runs:
 
     def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
         self.path = path
-        place = str(path or ":memory:")
+        database = str(path or ":memory:")
         if path is not None and read_only:
             # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
-            place = f"{path.absolute().as_uri()}?immutable=1"
+            database = f"{path.absolute().as_uri()}?immutable=1"
         elif path is not None:
             _make_folder(path.parent)
         with self._explained():
             # Autocommit: transactions are opened by hand, one per run.
             self._connection = sqlite3.connect(
-                place, timeout=TIMEOUT, isolation_level=None, uri=read_only
+                database, timeout=TIMEOUT, isolation_level=None, uri=read_only
             )
             # What is not UTF-8 is damaged, and told by its digest.
             self._connection.text_factory = lambda text: text.decode("utf-8", "backslashreplace")
@@ -106,7 +106,7 @@ class Runs:
 
     @classmethod
     @contextmanager
-    def new(cls, out: Path, way: str) -> Iterator[Self]:
+    def new(cls, out: Path, verb: str) -> Iterator[Self]:
         """Yield an empty store; what was written into it is that of `out` once the block ends well.
 
         Killed or failed before, it leaves nothing that looks like a store.
@@ -119,7 +119,7 @@ class Runs:
         """
         path = out / FILE_NAME
         if path.exists():
-            raise StudyError(f"{out} holds a study already: {way} into a new directory")
+            raise StudyError(f"{out} holds a study already: {verb} into a new directory")
         _make_folder(out)
         with becoming(path, StudyError) as part, cls(part) as runs:
             yield runs
@@ -176,12 +176,12 @@ class Runs:
 
     def discard_damaged(self) -> str | None:
         """Take damaged rows out, so that they can be played again; return what `damage` did."""
-        told = self.damage()
-        if told is not None:
+        damage = self.damage()
+        if damage is not None:
             with self._transaction():
                 for row in list(self._rows(sound=False)):
                     self._execute("DELETE FROM runs WHERE rowid = ?", (row.rowid,))
-        return told
+        return damage
 
     def succeeded(self) -> set[str]:
         """Return the keys of the runs that need not run again."""
@@ -206,7 +206,7 @@ class Runs:
         """
         import pandas as pd
 
-        found = []
+        records = []
         for row in sorted(self._rows(None if keys is None else set(keys)), key=lambda row: row.key):
             outcome = outcome_of(row.outcome)
             result = json.loads(row.outcome) | {"delivered": outcome.delivered}
@@ -214,8 +214,8 @@ class Runs:
                 result = dict.fromkeys(result) | {"error": outcome.error}
             case = case_of(row.run)
             case |= {name: canonical_json(case[name]) for name in ("scenario", "faults")}
-            found.append({"run": row.key} | case | result)
-        return pd.DataFrame(found, dtype=object)
+            records.append({"run": row.key} | case | result)
+        return pd.DataFrame(records, dtype=object)
 
     def note(self, name: str, value: str) -> None:
         """Note a fact about the study; an earlier one of this name is replaced."""
@@ -229,14 +229,14 @@ class Runs:
         Raises:
             StudyError: a note is damaged.
         """
-        found = self._execute(f"SELECT name, value, {self._digest_column} FROM notes")
-        for name, value, digest in found:
+        rows = self._execute(f"SELECT name, value, {self._digest_column} FROM notes")
+        for name, value, digest in rows:
             if digest not in (None, digest_of(name, value)):
                 raise StudyError(
                     f"the store {self.path} is damaged: a note in it is not as it was written; its "
                     "runs can be exported (swarm-logistics study export)"
                 )
-        return {name: value for name, value, _ in found}
+        return {name: value for name, value, _ in rows}
 
     def _rows(self, keys: Collection[str] | None = None, *, sound: bool = True) -> Iterator[Row]:
         """Yield the rows that are sound, or else those that are not.
@@ -307,8 +307,8 @@ class Runs:
     def _check(self, version: int) -> None:
         """Raise StudyError if SQLite finds damage that no digest would: rows that are lost."""
         columns = {name for (name,) in self._execute("SELECT name FROM pragma_table_info('runs')")}
-        found = [text for (text,) in self._execute("PRAGMA integrity_check") if text != "ok"]
-        worst = [text for text in found if not _OF_ROWS.match(text)]
+        problems = [text for (text,) in self._execute("PRAGMA integrity_check") if text != "ok"]
+        worst = [text for text in problems if not _OF_ROWS.match(text)]
         if ("digest" in columns) != (version == SCHEMA_VERSION):
             worst.append(f"schema {version} with other columns")
         if worst:
@@ -316,7 +316,7 @@ class Runs:
                 f"the store {self.path} is damaged ({worst[0].splitlines()[-1]}): should be "
                 "replaced by a copy, or the study run into a new directory"
             )
-        if found:
+        if problems:
             with suppress(StudyError):  # it may be read-only
                 self._execute("REINDEX")
 
@@ -326,12 +326,12 @@ class Runs:
             self._execute(f"ALTER TABLE {table} ADD COLUMN digest TEXT NOT NULL DEFAULT ''")
         self._digest_column = "NULL"
         for row in list(self._rows()):
-            told = (digest_of(*row.content), row.rowid)
-            self._execute("UPDATE runs SET digest = ? WHERE rowid = ?", told)
+            values = (digest_of(*row.content), row.rowid)
+            self._execute("UPDATE runs SET digest = ? WHERE rowid = ?", values)
         self._digest_column = "digest"
         for name, value in self._execute("SELECT name, value FROM notes"):
-            told = (digest_of(name, value), name)
-            self._execute("UPDATE notes SET digest = ? WHERE name = ?", told)
+            values = (digest_of(name, value), name)
+            self._execute("UPDATE notes SET digest = ? WHERE name = ?", values)
 
     def _change_to_wal(self) -> None:
         give_up = time.monotonic() + TIMEOUT

@@ -128,9 +128,9 @@ def _played(
 def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
     """Start worker processes, and end them at once with the block, or when this process dies."""
     context = multiprocessing.get_context("spawn")
-    theirs, ours = context.Pipe(duplex=False)
+    worker_end, own_end = context.Pipe(duplex=False)
     with patch.dict(os.environ, _OF_WORKERS):
-        pool = ProcessPoolExecutor(count, context, _end_with_parent, (theirs,))
+        pool = ProcessPoolExecutor(count, context, _end_with_parent, (worker_end,))
     try:
         with patch.dict(os.environ, _OF_WORKERS), _without_main(), _interrupts_ignored():
             started = [pool.submit(os.getpid) for _ in range(count)]
@@ -142,9 +142,9 @@ def workers(count: int) -> Generator[ProcessPoolExecutor, None, None]:
             ) from None
         yield pool
     finally:
-        ours.close()
+        own_end.close()
         pool.shutdown(cancel_futures=True)
-        theirs.close()
+        worker_end.close()
 
 
 @contextmanager
@@ -200,18 +200,18 @@ def pickled(run: Run) -> bytes:
 
 
 def play_pickled(
-    message: bytes, found: tuple[str, ...] | None, watch: _Watch | None = None
+    message: bytes, modules: tuple[str, ...] | None, watch: _Watch | None = None
 ) -> Outcome:
     """Play a run that was sent to this worker.
 
     Args:
         message: the run.
-        found: modules to be found in the current folder, see `look_here`.
+        modules: those to be found in the current folder, see `look_here`.
         watch: what ends the run where it takes too long.
     """
     os.environ[QUIET] = "1"
-    if found is not None:
-        look_here(found)
+    if modules is not None:
+        look_here(modules)
     try:
         run: Run = pickle.loads(message)
     except RAISED_BY_OTHERS:  # a policy that only the parent can import

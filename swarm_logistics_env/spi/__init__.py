@@ -107,9 +107,9 @@ def refuse(module: str, name: str) -> NoReturn:
 
     No other error: `hasattr` and `getattr(module, name, None)` ask about any name.
     """
-    place = f"{module.partition('.')[2]}.{name}"
-    if place in REMOVED:
-        raise AttributeError(f"{place} was removed in 0.3.0: {REMOVED[place]}")
+    public_name = f"{module.partition('.')[2]}.{name}"
+    if public_name in REMOVED:
+        raise AttributeError(f"{public_name} was removed in 0.3.0: {REMOVED[public_name]}")
     raise AttributeError(f"module {module!r} has no attribute {name!r}")
 
 

@@ -227,27 +227,29 @@ def judge(
     if identical:  # the same runs leave nothing to test
         value = untested.value
         return replace(untested, low=value, high=value, flags=("identical",))
-    found = untested
+    estimate = untested
     if n_seeds == 1:
-        found = replace(untested, flags=("single_seed",))
+        estimate = replace(untested, flags=("single_seed",))
     else:
-        found = _tested(untested, weighted, offset, saturated)
+        estimate = _tested(untested, weighted, offset, saturated)
     # D is a sum of weighted P, and no P is below 0.
     if min(term.weight(threshold - offset) for term in weighted.values()) >= 0.0:
-        of_interval = [flag for flag in found.flags if flag in _OF_INTERVAL]
-        return replace(found, p_value=None, probability=None, flags=("cannot_fail", *of_interval))
-    return found
+        of_interval = [flag for flag in estimate.flags if flag in _OF_INTERVAL]
+        return replace(
+            estimate, p_value=None, probability=None, flags=("cannot_fail", *of_interval)
+        )
+    return estimate
 
 
 def _tested(
-    asked: Estimate, weighted: Mapping[str, Term], offset: float, saturated: Collection[str]
+    untested: Estimate, weighted: Mapping[str, Term], offset: float, saturated: Collection[str]
 ) -> Estimate:
     """Return the estimate with the test that its seeds allow, and what is to be said of it."""
-    n_seeds, paired, threshold = asked.n_seeds, asked.paired, asked.threshold
+    n_seeds, paired, threshold = untested.n_seeds, untested.paired, untested.threshold
     terms, null = list(weighted.values()), threshold - offset
-    asking = {"offset": offset, "threshold": threshold, "confidence": asked.confidence}
+    asking = {"offset": offset, "threshold": threshold, "confidence": untested.confidence}
     skewness, correlation, stakes = None, None, (0.0, 0.0)
-    if asked.n_trainings is not None:
+    if untested.n_trainings is not None:
         test = ratio_of_samples(terms, partial(over_trainings, paired=paired), **asking)
     elif paired:
         correlation = pairing_correlation(terms[0].sample, terms[1].sample)
@@ -265,10 +267,10 @@ def _tested(
     # The true P of one that is capped is larger, and moves D by the sign of its weight.
     leaning = test.value - threshold
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
-    few = asked.n_trainings is not None and asked.n_trainings < LEAST_TRAININGS
+    few = untested.n_trainings is not None and untested.n_trainings < LEAST_TRAININGS
     blocked = capped or degenerate or n_seeds < LEAST_SEEDS or few
     normal = not paired or n_seeds < MIN_SEEDS
-    hidden = test.p_seen < 1.0 - asked.confidence <= test.p_value
+    hidden = test.p_seen < 1.0 - untested.confidence <= test.p_value
     p_value = 1.0 if blocked else test.p_value
     flags = {
         "skewed": skewness is not None and _skewed(skewness, n_seeds),
@@ -281,14 +283,14 @@ def _tested(
         "few_trainings": few,
     }
     return replace(
-        asked,
+        untested,
         value=test.value,
         low=None if degenerate else test.low,
         high=None if degenerate else test.high,
         probability=1.0 - p_value / 2 if test.mean_difference > 0.0 else p_value / 2,
         p_value=p_value,
         pairing_correlation=correlation,
-        difference_sd=None if asked.n_trainings is not None else test.difference_sd,
+        difference_sd=None if untested.n_trainings is not None else test.difference_sd,
         difference_skewness=skewness,
         at_stake=stakes,
         degrees_of_freedom=test.degrees_of_freedom,
@@ -316,8 +318,8 @@ def _checked(
         if name not in samples:
             raise IndicatorError(f"saturated = {name!r}: should be among {', '.join(samples)}")
     if identical:
-        first, *others = samples
-        for name in others:
+        first, *further = samples
+        for name in further:
             if not paired or not np.array_equal(samples[first], samples[name]):
                 raise IndicatorError(
                     f"identical = True, but {first} and {name} differ: should be paired and equal"

@@ -32,9 +32,9 @@ def performance(name: str, values: ArrayLike, *, or_trainings: bool = False) -> 
         )
     if array.size == 0:
         raise IndicatorError(f"{name} is empty: should hold one number per seed (or size)")
-    for place, value in np.ndenumerate(array):
+    for index, value in np.ndenumerate(array):
         if not 0.0 <= value < math.inf:
-            where = ", ".join(map(str, place))
+            where = ", ".join(map(str, index))
             raise IndicatorError(f"{name}[{where}] = {value:g}: should be finite, not negative")
     most = float(array.max())
     if most > LARGEST or 0.0 < most < SMALLEST:
@@ -56,17 +56,17 @@ def numbers(name: str, values: ArrayLike) -> Numbers:
                 raise IndicatorError(
                     f"{name}[{where}] is masked: should be left out, or be a number"
                 )
-        given = np.asarray(values)
+        array = np.asarray(values)
         times = (np.timedelta64, np.datetime64)  # numpy would turn them into counts of some unit
-        if given.dtype.kind in "cmM" or (
-            given.dtype.kind == "O" and any(isinstance(one, times) for one in given.flat)
+        if array.dtype.kind in "cmM" or (
+            array.dtype.kind == "O" and any(isinstance(element, times) for element in array.flat)
         ):
-            what = "complex" if given.dtype.kind == "c" else "times of numpy or pandas"
+            what = "complex" if array.dtype.kind == "c" else "times of numpy or pandas"
             raise IndicatorError(
-                f"{name} is of {what} ({given.dtype}): should be an array of real numbers, as "
+                f"{name} is of {what} ({array.dtype}): should be an array of real numbers, as "
                 "seconds for times"
             )
-        return np.asarray(given, dtype=np.float64)
+        return np.asarray(array, dtype=np.float64)
     except OverflowError:
         raise IndicatorError(f"{name} has a number that is too large: up to {LARGEST:g}") from None
     except (TypeError, ValueError) as error:

@@ -107,8 +107,8 @@ def seeds_for_equivalence(equivalence: Equivalence, power: float = 0.8) -> int |
         return None
 
     def enough(n: int) -> bool:
-        each = (_power_at(test, -test.threshold, n, PLANNED_LIMIT) for test in tests)
-        return sum(each) - 1.0 >= power
+        powers = (_power_at(test, -test.threshold, n, PLANNED_LIMIT) for test in tests)
+        return sum(powers) - 1.0 >= power
 
     return _least_seeds(enough)
 

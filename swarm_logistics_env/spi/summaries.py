@@ -89,11 +89,11 @@ def median_interval(times: ArrayLike, confidence: float = 0.95) -> Interval:
     from scipy.special import bdtr
 
     between_0_and_1("confidence", confidence)
-    known = numbers("times", times)
-    if known.ndim != 1 or not known.size or not (known >= 0.0).all():
+    seconds = numbers("times", times)
+    if seconds.ndim != 1 or not seconds.size or not (seconds >= 0.0).all():
         raise IndicatorError(f"times: should be a sequence of times from 0 on, got {times!r}")
-    ascending, n = np.sort(known), known.size
-    value = float(np.median(known))
+    ascending, n = np.sort(seconds), seconds.size
+    value = float(np.median(seconds))
     # The k-th time from either end is a limit where at most so few are expected beyond it.
     k = int(np.count_nonzero(bdtr(np.arange(n // 2), n, 0.5) <= (1.0 - confidence) / 2))
     if not k:

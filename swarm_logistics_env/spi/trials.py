@@ -94,7 +94,7 @@ class Trials:
         Raises:
             IndicatorError: no run meets them.
         """
-        found = [
+        trials = [
             row
             for row in self.rows
             if all(
@@ -102,10 +102,10 @@ class Trials:
                 for name, value in conditions.items()
             )
         ]
-        if not found:
-            asked = ", ".join(f"{name} = {value!r}" for name, value in conditions.items())
-            raise IndicatorError(f"{self.file} has no trial with {asked}")
-        return tuple(sorted(found, key=lambda row: row.seed or 0))
+        if not trials:
+            conditions_text = ", ".join(f"{name} = {value!r}" for name, value in conditions.items())
+            raise IndicatorError(f"{self.file} has no trial with {conditions_text}")
+        return tuple(sorted(trials, key=lambda row: row.seed or 0))
 
     def performance(self, **conditions: object) -> Numbers:
         """Return P of the runs that `select` gives, shape (n,)."""
@@ -141,29 +141,29 @@ def read_trials(
             value.
     """
     path = Path(path)
-    rows, others, digest = read_rows(path, columns or {}, ignore, decimal)
-    varying = [name for name in others if len({row.cells[name] for row in rows}) > 1]
+    rows, parameters, digest = read_rows(path, columns or {}, ignore, decimal)
+    varying = [name for name in parameters if len({row.cells[name] for row in rows}) > 1]
     faults = dict.fromkeys(row.text("fault") for row in rows)
     _check_columns(path, rows[0], faults)
     # Each fault in small letters to how its first row has it.
     spelled = {name.casefold(): name for name in reversed(faults)}
     trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
-    found = _events(trials) if "time" in rows[0].names else _runs(trials)
-    _check_pairing(path, found)
-    _check_durations(path, found)
+    complete = _events(trials) if "time" in rows[0].names else _runs(trials)
+    _check_pairing(path, complete)
+    _check_durations(path, complete)
     notes = [
         f"The faults {spelled[name.casefold()]} and {name} are taken for one."
         for name in faults
         if name not in spelled.values()
     ]
-    counts = Counter(trial.condition for trial in found)
+    counts = Counter(trial.condition for trial in complete)
     if varying and min(counts.values()) == 1 < max(counts.values()):
         notes.append(
-            f"{len(found)} trials in {len(counts)} conditions, told apart by "
+            f"{len(complete)} trials in {len(counts)} conditions, told apart by "
             f"{' and '.join(varying)}, some of a single trial: leave out what was only noted, as "
             f"by --ignore {varying[0]!r}."
         )
-    return Trials(path.name, digest, tuple(found), tuple(notes))
+    return Trials(path.name, digest, tuple(complete), tuple(notes))
 
 
 def _check_columns(path: Path, row: Row, faults: Iterable[str]) -> None:
@@ -171,7 +171,7 @@ def _check_columns(path: Path, row: Row, faults: Iterable[str]) -> None:
     lacking = {}
     if not {"performance", "time"} & row.names.keys():
         lacking["performance"] = "column 'performance', or time, for one delivery a row"
-    fails = any(_FAULT_NAMES.get(one.lower()) not in (NO_FAULT, REPEATED) for one in faults)
+    fails = any(_FAULT_NAMES.get(fault.lower()) not in (NO_FAULT, REPEATED) for fault in faults)
     if fails and "faulty" not in row.names:
         lacking["faulty"] = "column 'faulty', for how many robots fail"
     if lacking:

@@ -69,14 +69,16 @@ class Row(NamedTuple):
         """Return the name of a column in the file; None: it is not there, or left out."""
         return self.names.get(column) if column in NAMES else column
 
-    def number(self, column: str, least: float = -math.inf, *, whole: bool = False) -> float:
+    def number(
+        self, column: str, least: float = -math.inf, *, must_be_whole: bool = False
+    ) -> float:
         """Return a cell as a finite number of at least `least`."""
         cell = self.text(column)
         plain = cell if self.decimal == "." else cell.replace(".", " ").replace(self.decimal, ".")
         value = float(plain) if _NUMBER.fullmatch(plain) else math.inf
-        if math.isfinite(value) and value >= least and (not whole or value.is_integer()):
+        if math.isfinite(value) and value >= least and (not must_be_whole or value.is_integer()):
             return value
-        should = f"should be a {'whole ' * whole}number"
+        should = f"should be a {'whole ' * must_be_whole}number"
         should += f", {least:g} or more" if math.isfinite(least) else ""
         if "," in cell and self.decimal == ".":
             should += " without a sign between thousands; --decimal , where decimals have a comma"
@@ -97,7 +99,7 @@ class Row(NamedTuple):
         cell = self.text(column)
         if not cell:
             return None
-        value = self.number(column, least, whole=True)
+        value = self.number(column, least, must_be_whole=True)
         if re.fullmatch(r"\+?\d+", cell):
             return int(cell)
         if "e" in cell.lower() or value >= _LARGEST_EXACT:
@@ -140,17 +142,17 @@ def read_rows(
         raise IndicatorError(f"--decimal {decimal}: should be . or ,")
     text, digest = _text(path)
     header, cells = _cells(path, text)
-    names, others = _columns(path, header, columns, ignore)
+    names, parameters = _columns(path, header, columns, ignore)
     if not cells:
         raise IndicatorError(f"{path} holds no trial: should have a row for each below the names")
     rows = [
         Row(f"{path}, line {line}", line, row, names, decimal or ".") for line, row in cells.items()
     ]
-    _refuse_rows_of_robots(rows, [name for name in header if name in ignore], others)
+    _refuse_rows_of_robots(rows, [name for name in header if name in ignore], parameters)
     if decimal is None:
-        for column in (*(column for column in names if column not in _TEXTS), *others):
+        for column in (*(column for column in names if column not in _TEXTS), *parameters):
             _refuse_thousands(rows, column)
-    return rows, others, digest
+    return rows, parameters, digest
 
 
 def _text(path: Path) -> tuple[str, str]:
@@ -204,15 +206,15 @@ def _rows(path: Path, text: str, start: int, delimiter: str) -> Iterator[tuple[i
 
     `csv.reader` does not tell where a quote opens that is never closed.
     """
-    one = re.compile(rf" *({_QUOTED}) *|[^{re.escape(delimiter)}\r\n]*")
-    place, line = start, len(_LINE_END.findall(text, 0, start)) + 1
+    cell_pattern = re.compile(rf" *({_QUOTED}) *|[^{re.escape(delimiter)}\r\n]*")
+    position, line = start, len(_LINE_END.findall(text, 0, start)) + 1
     first, row, n_columns = line, list[str](), 0
     while True:
-        found = one.match(text, place)
-        assert found is not None  # it matches nothing, too
-        quoted, place = found[1], found.end()
-        after = text[place : place + 1]
-        if quoted is None and found[0].lstrip().startswith('"'):
+        match = cell_pattern.match(text, position)
+        assert match is not None  # it matches nothing, too
+        quoted, position = match[1], match.end()
+        after = text[position : position + 1]
+        if quoted is None and match[0].lstrip().startswith('"'):
             raise IndicatorError(
                 f"{path}, line {line}: opens a quote that is never closed, and what follows would "
                 'be one cell: close it by ", or take it out'
@@ -228,16 +230,16 @@ def _rows(path: Path, text: str, start: int, delimiter: str) -> Iterator[tuple[i
                 f"{path}, line {line}: opens a quote that holds whole rows: should be closed in "
                 "the row that it opens in"
             )
-        row.append(_read(quoted[1:-1].replace('""', '"') if quoted else found[0]))
+        row.append(_read(quoted[1:-1].replace('""', '"') if quoted else match[0]))
         line += len(lines) - 1
         if after == delimiter:
-            place += 1
+            position += 1
             continue
         yield first, row
         n_columns = n_columns or len(row) * any(row)
         if not after:
             return
-        place += 2 if text.startswith("\r\n", place) else 1
+        position += 2 if text.startswith("\r\n", position) else 1
         line += 1
         first, row = line, []
 
@@ -256,7 +258,7 @@ def _is_robot(name: str) -> bool:
 
 
 def _refuse_rows_of_robots(
-    rows: Sequence[Row], ignored: Sequence[str], others: Sequence[str]
+    rows: Sequence[Row], ignored: Sequence[str], parameters: Sequence[str]
 ) -> None:
     """Refuse rows that differ in an ignored column of robots and in what each delivered alone."""
     of_robots = [name for name in ignored if _is_robot(name)]
@@ -266,7 +268,7 @@ def _refuse_rows_of_robots(
     compared = [name for column, name in names.items() if column != "performance"]
     trials: dict[tuple[str, ...], Row] = {}
     for row in rows:
-        trial = tuple(row.cells[name] for name in (*compared, *others))
+        trial = tuple(row.cells[name] for name in (*compared, *parameters))
         first = trials.setdefault(trial, row)
         for robot in of_robots:
             if row.cells[robot] != first.cells[robot]:
@@ -286,16 +288,16 @@ _ONE_TRIAL_A_ROW = (
 def _refuse_thousands(rows: Sequence[Row], column: str) -> None:
     """Refuse a column in which "1.200" beside "980" may be 1200 or 1.2."""
     first = {row.text(column): row for row in reversed(rows) if row.text(column)}
-    whole = {cell: row for cell, row in first.items() if cell.isdecimal()}
-    grouped = [cell for cell in first if re.fullmatch(r"[1-9]\d{0,2}\.\d{3}", cell)]
-    if not (whole and grouped) or len(whole) + len(grouped) < len(first):
+    plain_numbers = {cell: row for cell, row in first.items() if cell.isdecimal()}
+    with_points = [cell for cell in first if re.fullmatch(r"[1-9]\d{0,2}\.\d{3}", cell)]
+    if not (plain_numbers and with_points) or len(plain_numbers) + len(with_points) < len(first):
         return
-    largest, smallest = max(whole, key=float), min(grouped, key=float)
+    largest, smallest = max(plain_numbers, key=float), min(with_points, key=float)
     if float(largest) >= 10.0 * float(smallest):
         raise first[smallest].error(
             column,
             f"is {smallest.replace('.', '')} or {float(smallest):g}, beside {largest} in line "
-            f"{whole[largest].line}: should be without a sign between thousands; or say "
+            f"{plain_numbers[largest].line}: should be without a sign between thousands; or say "
             "--decimal . where decimals have a point",
         )
 
@@ -311,7 +313,7 @@ def _columns(
         if name not in header:
             raise IndicatorError(f"{path} has no column {name!r}: {_one_of(name, header)}")
     names = {_MEANING[column]: name for column, name in columns.items()}
-    given, others, of_robots = {*names}, list[str](), list[str]()
+    chosen, parameters, of_robots = {*names}, list[str](), list[str]()
     for name in header:
         if not name or name in ignore or name in columns.values():
             continue
@@ -321,29 +323,29 @@ def _columns(
         if _is_robot(name):
             of_robots.append(name)
             continue
-        known = _MEANING.get(word)
-        if known is None or (known in given and name not in NAMES):
+        meaning = _MEANING.get(word)
+        if meaning is None or (meaning in chosen and name not in NAMES):
             close = difflib.get_close_matches(word, _MEANING, n=1, cutoff=0.75)
-            if close and known is None and len(word) > 3:
+            if close and meaning is None and len(word) > 3:
                 raise IndicatorError(
                     f"{path} has a column {name!r}; did you mean {close[0]!r}? Else rename it, or "
                     f"leave it out by --ignore {name!r}"
                 )
-            others.append(name)
-        elif known in names:
+            parameters.append(name)
+        elif meaning in names:
             raise IndicatorError(
-                f"{path} has columns {names[known]!r} and {name!r}, both {known}: say "
-                f"which it is by --column {known}=NAME, and leave the other out by --ignore NAME"
+                f"{path} has columns {names[meaning]!r} and {name!r}, both {meaning}: say "
+                f"which it is by --column {meaning}=NAME, and leave the other out by --ignore NAME"
             )
         else:
-            names[known] = name
+            names[meaning] = name
     if of_robots and "time" not in names:
         raise IndicatorError(
             f"{path} has a column {of_robots[0]!r}, so its rows may be robots instead of trials: "
             f"{_ONE_TRIAL_A_ROW}, and leave the column out; where it is the swarm's size, say "
             f"--column robots={of_robots[0]!r}"
         )
-    return names, others
+    return names, parameters
 
 
 def _word(name: str) -> str:
@@ -352,7 +354,7 @@ def _word(name: str) -> str:
     return re.sub(r"\W+", "_", bare.strip().lower()).strip("_")
 
 
-def _one_of(name: str, known: Iterable[str]) -> str:
-    names = [each for each in known if each]
+def _one_of(name: str, choices: Iterable[str]) -> str:
+    names = [choice for choice in choices if choice]
     close = difflib.get_close_matches(name, names, n=1)
     return f"did you mean {close[0]!r}?" if close else f"should be one of {', '.join(names)}"

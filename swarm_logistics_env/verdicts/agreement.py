@@ -44,15 +44,15 @@ def agreements(results: StudyResults) -> tuple[Agreement, ...]:
 
 def agreement(policy: str, cells: Sequence[Cell]) -> Agreement:
     """Return the agreement of these cells, all of them with a published value and with runs."""
-    known = [(cell, cell.published) for cell in cells if cell.published is not None]
-    ratio = np.array([cell.mean.value / published for cell, published in known])
+    published_cells = [(cell, cell.published) for cell in cells if cell.published is not None]
+    ratio = np.array([cell.mean.value / published for cell, published in published_cells])
     return Agreement(
         policy,
         tuple(cells),
         tuple(cell for cell in cells if cell.published_inside is False),
         tuple(
             cell
-            for cell, p in known
+            for cell, p in published_cells
             if cell.mean.low is not None and cell.mean.low <= p <= (cell.mean.high or 0.0)
         ),
         float(np.abs(np.log(ratio)).mean()) if ratio.all() else None,

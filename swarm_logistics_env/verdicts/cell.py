@@ -51,26 +51,28 @@ class Cell:
         policy: str,
         table: str,
         arm: Arm,
-        found: Sequence[Outcome | None],
+        outcomes: Sequence[Outcome | None],
         *,
         paired: bool = True,
         reference: Reference | None = None,
     ) -> Self:
         """Return a cell from the outcomes of its runs, seed by seed; None: not played."""
-        missing = found.count(None)
-        failed = sum(outcome is not None and outcome.error is not None for outcome in found)
-        if not paired and missing < len(found):
+        missing = outcomes.count(None)
+        failed = sum(outcome is not None and outcome.error is not None for outcome in outcomes)
+        if not paired and missing < len(outcomes):
             missing = 0  # unpaired results need not be equally many everywhere
         problems = [
-            f"{count} of {len(found)} runs {what}"
+            f"{count} of {len(outcomes)} runs {what}"
             for count, what in ((failed, "failed"), (missing, "missing"))
             if count
         ]
-        kept = tuple(one for one in found if one is not None and one.error is None)
+        succeeded = tuple(
+            outcome for outcome in outcomes if outcome is not None and outcome.error is None
+        )
         problem = ", ".join(problems) or None
         published = reference.performance.get(arm.setting) if reference else None
         counted = reference is not None and arm.setting in reference.cells
-        return cls(policy, table, arm, kept, problem, published, counted)
+        return cls(policy, table, arm, succeeded, problem, published, counted)
 
     @cached_property
     def by_seed(self) -> NDArray[np.float64]:

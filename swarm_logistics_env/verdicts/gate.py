@@ -70,22 +70,22 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     unmatched, notes = list[_Unmatched](), list[str]()
     for label, old_label in partners.items():
         named = label if label == old_label else f"{old_label} -> {label}"
-        theirs, ours = before.get(old_label, {}), after.get(label, {})
-        common = [content for content in ours if content in theirs]
+        old_cells, new_cells = before.get(old_label, {}), after.get(label, {})
+        common = [content for content in new_cells if content in old_cells]
         if not common:
-            names = tuple(_name(named, cell) for cell in (*theirs.values(), *ours.values()))
+            names = tuple(_name(named, cell) for cell in (*old_cells.values(), *new_cells.values()))
             problem = (
                 f"policy {named!r} is judged under no condition of both studies: the old one "
                 f"judges {[*before]}, the new one {[*after]}"
             )
             unmatched.append((named, problem, names))
             continue
-        matches += [(_name(named, ours[c]), theirs[c], ours[c]) for c in common]
-        for study, own in (("old", theirs), ("new", ours)):
-            alone = [f"{c.words} ({c.table})" for at, c in own.items() if at not in common]
+        matches += [(_name(named, new_cells[c]), old_cells[c], new_cells[c]) for c in common]
+        for study, cells in (("old", old_cells), ("new", new_cells)):
+            alone = [f"{c.words} ({c.table})" for at, c in cells.items() if at not in common]
             if alone:
-                told = f"{named}, {'; '.join(alone)}"
-                notes.append(f"Only in the {study} study, and not compared: {told}.")
+                names_text = f"{named}, {'; '.join(alone)}"
+                notes.append(f"Only in the {study} study, and not compared: {names_text}.")
     seeds = None
     if old.plan.paired and new.plan.paired:
         seeds = tuple(sorted({*old.plan.seeds} & {*new.plan.seeds}))
@@ -102,7 +102,7 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
 
 def _judged(results: StudyResults) -> _Judged:
     """Return each condition of a judged policy once, by the policy's label and by all but it."""
-    found: _Judged = {}
+    cells_by_policy: _Judged = {}
     for cell in results.cells:
         case = cell.arm.case
         if case.policy.title != cell.policy:  # the second policy of an ablation
@@ -110,8 +110,8 @@ def _judged(results: StudyResults) -> _Judged:
         # Imported tables may differ in P at one condition.
         table = "" if results.plan.origin is None else cell.table
         content = (case.scenario, case.faults, case.behaviour, table)
-        found.setdefault(cell.policy, {}).setdefault(content, cell)
-    return found
+        cells_by_policy.setdefault(cell.policy, {}).setdefault(content, cell)
+    return cells_by_policy
 
 
 def _name(policy: str, cell: Cell) -> str:
@@ -204,45 +204,45 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswe
     Raises:
         StudyError: the gate is about nothing that the studies hold.
     """
-    found = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
-    asked = list(found)
-    if not asked:
+    subjects = _changes(gate, old, new) if gate.subject == "change" else _indicators(gate, new)
+    values = list(subjects)
+    if not values:
         raise StudyError(
             f"gate {gate.text!r}: the studies hold nothing that it names, so it tests nothing"
         )
-    verdicts = iter(spi.adjust([value for _, value in asked if isinstance(value, Estimate)]))
-    said = []
-    for name, value in asked:
+    verdicts = iter(spi.adjust([value for _, value in values if isinstance(value, Estimate)]))
+    gate_answers = []
+    for name, value in values:
         if isinstance(value, str):
-            said.append(GateAnswer(name, fails=True, problem=value))
+            gate_answers.append(GateAnswer(name, fails=True, problem=value))
         elif isinstance(value, float):
-            said.append(GateAnswer(name, gate.holds_for(value), exact=value))
+            gate_answers.append(GateAnswer(name, gate.holds_for(value), exact=value))
         else:
             verdict = next(verdicts)
             is_impossible = gate.below and value.untestable
-            said.append(
+            gate_answers.append(
                 GateAnswer(name, gate.fails_on(verdict) and not is_impossible, value, verdict)
             )
-    return tuple(said)
+    return tuple(gate_answers)
 
 
 def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
     # A comparison tested against several thresholds answers once.
     comparisons = dict.fromkeys(
-        replace(one.compared, threshold=gate.number)
-        for one in new.verdicts
-        if one.compared.indicator == gate.subject
+        replace(judged.compared, threshold=gate.number)
+        for judged in new.verdicts
+        if judged.compared.indicator == gate.subject
     )
     for comparison in comparisons:
-        asked = f"{comparison.label} ({comparison.table})"
-        name = f"{comparison.policy}: {comparison.indicator}, {asked}"
+        label = f"{comparison.label} ({comparison.table})"
+        name = f"{comparison.policy}: {comparison.indicator}, {label}"
         if gate.at not in name:
             continue
         cells, margin = new.cells_of(comparison), new.plan.specification.margin
-        found = judge_comparison(comparison, cells, paired=new.plan.paired, margin=margin)
-        estimate = found.estimate
+        verdict = judge_comparison(comparison, cells, paired=new.plan.paired, margin=margin)
+        estimate = verdict.estimate
         if estimate is None:
-            yield name, str(found.problem)
+            yield name, str(verdict.problem)
         else:
             yield name, estimate.value if estimate.identical else estimate
 
@@ -252,9 +252,9 @@ def _changes(gate: Gate, old: StudyResults, new: StudyResults) -> Iterator[tuple
     for policy, problem, names in matching.unmatched:
         if any(gate.at in name for name in names):
             yield f"{policy}: change", problem
-    for name, one, other in matching.matches:
+    for name, old_cell, new_cell in matching.matches:
         if gate.at in name:
-            yield name, _change(gate, (old, one), (new, other), matching.seeds)
+            yield name, _change(gate, (old, old_cell), (new, new_cell), matching.seeds)
 
 
 def _change(
@@ -263,8 +263,8 @@ def _change(
     after: tuple[StudyResults, Cell],
     seeds: Sequence[int] | None,
 ) -> _Found:
-    (old, one), (new, other) = before, after
-    if problem := one.problem or other.problem:
+    (old, old_cell), (new, new_cell) = before, after
+    if problem := old_cell.problem or new_cell.problem:
         return problem
     if seeds is not None:
         if not seeds:
@@ -274,16 +274,18 @@ def _change(
                 "seeds"
             )
         # Over shared seeds the runs of these alone tell whether P is capped.
-        one, other = (_over(seeds, results, of) for results, of in (before, after))
-        if same_runs(one.outcomes, other.outcomes):
+        old_cell, new_cell = (_over(seeds, results, of) for results, of in (before, after))
+        if same_runs(old_cell.outcomes, new_cell.outcomes):
             return 0.0
     try:
         return spi.relative_change(
-            one.by_seed,
-            other.by_seed,
+            old_cell.by_seed,
+            new_cell.by_seed,
             threshold=gate.number,
             paired=seeds is not None,
-            saturated=[name for name, of in (("p_o", one), ("p_new", other)) if of.saturated],
+            saturated=[
+                name for name, of in (("p_o", old_cell), ("p_new", new_cell)) if of.saturated
+            ],
         )
     except spi.IndicatorError as error:
         return str(error)
@@ -292,5 +294,5 @@ def _change(
 def _over(seeds: Sequence[int], results: StudyResults, cell: Cell) -> Cell:
     """Return a cell over some of its seeds, of each training if there are several."""
     cases = cell.arm.case.trainings
-    found = [results.outcomes.get((case.key, seed)) for case in cases for seed in seeds]
-    return Cell.of(cell.policy, cell.table, cell.arm, found)
+    outcomes = [results.outcomes.get((case.key, seed)) for case in cases for seed in seeds]
+    return Cell.of(cell.policy, cell.table, cell.arm, outcomes)

@@ -89,11 +89,16 @@ def _resilience(results: StudyResults, comparison: Comparison) -> Resilience:
 
 def mid_run_faults(results: StudyResults) -> list[Comparison]:
     """Return a comparison for every fault in mid-run: FT's, or else R's."""
-    late = [one.compared for one in results.verdicts if one.compared.changed.setting.onset > 0]
-    by_fault = grouped(late, lambda one: (one.policy, one.table, one.changed))
+    late = [verdict.compared for verdict in results.verdicts if verdict.after.onset > 0]
+    by_fault = grouped(
+        late, lambda comparison: (comparison.policy, comparison.table, comparison.changed)
+    )
     return [
-        next((one for one in asked if one.removed is not None), asked[0])
-        for asked in by_fault.values()
+        next(
+            (comparison for comparison in comparisons if comparison.removed is not None),
+            comparisons[0],
+        )
+        for comparisons in by_fault.values()
     ]
 
 
@@ -160,7 +165,10 @@ def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurv
     for runs, arm in arms.items():
         times = results.times_of(arm) if arm else ()
         if times:
-            ends = [np.searchsorted(one, [seconds - window, seconds], "right") for one in times]
+            ends = [
+                np.searchsorted(run_times, [seconds - window, seconds], "right")
+                for run_times in times
+            ]
             counts = np.diff(ends, axis=1)[:, 0]
             limits = np.array([spi.mean_interval(n, CONFIDENCE) for n in counts.T], np.float64)
             curves.append(RateCurve(runs, seconds, *limits.T))

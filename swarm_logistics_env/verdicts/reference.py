@@ -40,7 +40,11 @@ class Reference:
     @cached_property
     def claims(self) -> Mapping[Question, bool]:
         """Whether the text says that the indicator is above the threshold."""
-        return {asked: said for one in self.sentences.values() for asked, said in one.items()}
+        return {
+            question: is_above
+            for claims in self.sentences.values()
+            for question, is_above in claims.items()
+        }
 
     def estimate(self, comparison: Comparison) -> Estimate | None:
         """Return the published value of an indicator, without interval, where there is one."""
@@ -57,25 +61,25 @@ def _setting(kind: Factor, name: str, value: float) -> Setting:
 
 def _read_reference(path: Path) -> Reference:
     """Return the published values in a TOML file; `paper_values.toml` says what it holds."""
-    told = tomllib.loads(path.read_text(encoding="utf-8"))
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
     performance = {
         Setting(kind, name, float(value)): p
-        for kind, rows in told["performance"].items()
+        for kind, rows in table["performance"].items()
         for name, row in rows.items()
         for value, p in row.items()
     }
-    repeated = {Setting(*one) for one in told["repeated"]}
+    repeated = {Setting(*setting) for setting in table["repeated"]}
     cells = tuple(setting for setting in performance if setting not in repeated)
     sentences: dict[str, dict[Question, bool]] = {}
-    for sentence in told["sentences"]:
+    for sentence in table["sentences"]:
         claims = sentences[sentence["text"]] = {}
-        for one in sentence["claims"]:
-            symbol, name, threshold = one["indicator"], one["name"], one.get("threshold", 0.0)
+        for claim in sentence["claims"]:
+            symbol, name, threshold = claim["indicator"], claim["name"], claim.get("threshold", 0.0)
             kind = DEFINITIONS[symbol].compares
-            for before, after in one["steps"]:
+            for before, after in claim["steps"]:
                 settings = _setting(kind, name, before), _setting(kind, name, after)
-                claims[Question(symbol, *settings, threshold)] = one["above"]
-    return Reference(told["source"], performance, cells, sentences, told["whose"])
+                claims[Question(symbol, *settings, threshold)] = claim["above"]
+    return Reference(table["source"], performance, cells, sentences, table["whose"])
 
 
 PAPER = _read_reference(Path(__file__).parent / "paper_values.toml")
