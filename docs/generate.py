@@ -21,7 +21,7 @@ from swarm_logistics_env.questions.specification import Specification
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
 from swarm_logistics_env.train.training import Training, load_training, preset_names
-from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, Columns, Row
+from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, Columns, Judged
 
 FACTORS = ("sizes", "faults", "parameters", "ablations")
 PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")
@@ -116,7 +116,7 @@ def about(study: Specification) -> str:
     return f"{study.seeds} seeds, {world}; tables: {tables}"
 
 
-def columns_of(columns: Columns[Row]) -> str:
+def columns_of(columns: Columns[Judged]) -> str:
     """Return the columns of a table of results with what they mean."""
     rows = [(f"`{name}`", text) for name, (*_, text) in columns.items()]
     return table(("column", "meaning"), rows)

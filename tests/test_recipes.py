@@ -64,7 +64,7 @@ def presence(world: Warehouse, before: Before) -> Earned:
 @ spi/definitions.py @def scalability(
 def kept(p_o, p_f, **asked):
     terms = {"p_f": (p_f, 1.0), "p_o": (p_o, 0.0)}
-    return judge("K", terms, offset=0.0, **asked)
+    return estimate_ratio("K", terms, offset=0.0, **asked)
 @ spi/definitions.py @        Definition(
         Definition(
             symbol="K", heading="performance kept K", compares="fault", function=kept,
