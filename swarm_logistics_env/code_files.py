@@ -1,7 +1,9 @@
-"""Python files of the user's own: a path is that file, whatever else has its name.
+"""Python files of the user's own, by path or by a module's name.
 
-What such a file imports from its own folder is found there, and is kept apart from modules of the
-same names that others imported. The folder is never on Python's path.
+A path is that file, whatever else has its name. What such a file imports from its own folder is
+found there, and is kept apart from modules of the same names that others imported. The folder is
+never on Python's path. A module's name may also be that of a file in the folder in which a command
+runs, see `CurrentFolder`.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import threading
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib.abc import MetaPathFinder
 from importlib.machinery import (
     EXTENSION_SUFFIXES,
     SOURCE_SUFFIXES,
@@ -29,10 +32,8 @@ from importlib.machinery import (
 )
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType, FrameType, ModuleType
 from typing import Any
-
-import cloudpickle
 
 PACKAGE = Path(__file__).parent
 _lock = threading.RLock()
@@ -176,9 +177,9 @@ class _Folder:
         self._path = path
         self._modules: dict[str, ModuleType] = {}  # by name, while nothing is imported from here
         self._depth = 0
-        self._wanted: str | None = None
-        self._changed = 0
-        self._known: set[str] = set()
+        self._top_module: str | None = None
+        self._changed_at = 0  # [ns]
+        self._module_names: set[str] = set()  # as they were then
 
     def execute(self, path: Path) -> ModuleType:
         """Return the module of a file in the folder, or in a package in it."""
@@ -195,6 +196,8 @@ class _Folder:
         module = sys.modules[name] = module_from_spec(spec)
         with self._importing(None):
             spec.loader.exec_module(module)
+        import cloudpickle  # a command that names no file starts sooner without
+
         cloudpickle.register_pickle_by_value(module)  # no other process can import it
         return module
 
@@ -216,7 +219,7 @@ class _Folder:
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Find a module of this folder, as finders on `sys.meta_path` do."""
-        if name.partition(".")[0] != self._wanted:
+        if name.partition(".")[0] != self._top_module:
             return None
         loader: Any = functools.partial(_Loader, self)
         kinds = (loader, SOURCE_SUFFIXES), (ExtensionFileLoader, EXTENSION_SUFFIXES)
@@ -228,21 +231,19 @@ class _Folder:
 
     def _names(self) -> set[str]:
         """Return the modules and packages in the folder; Python's and installed ones go first."""
-        changed = self._path.stat().st_mtime_ns
-        if changed != self._changed:
-            files = {file.stem for file in self._path.glob("*.py") if file.stem.isidentifier()}
-            files |= {file.parent.name for file in self._path.glob("*/__init__.py")}
-            self._changed, self._known = (
-                changed,
-                {name for name in files if not _is_installed(name)},
-            )
-        return self._known
+        changed_at = self._path.stat().st_mtime_ns
+        if changed_at != self._changed_at:
+            names = {file.stem for file in self._path.glob("*.py") if file.stem.isidentifier()}
+            names |= {file.parent.name for file in self._path.glob("*/__init__.py")}
+            self._module_names = {name for name in names if not _is_installed(name)}
+            self._changed_at = changed_at
+        return self._module_names
 
     @contextmanager
-    def _importing(self, wanted: str | None) -> Iterator[None]:
-        """Let `wanted` be found in this folder; None: nothing, as for an installed module."""
+    def _importing(self, top_module: str | None) -> Iterator[None]:
+        """Let a module be found in this folder; None: nothing, as for an installed module."""
         with _lock:
-            outer, self._wanted = self._wanted, wanted
+            outer, self._top_module = self._top_module, top_module
             self._depth += 1
             if self._depth == 1:
                 displaced = self._exchange(self._modules)
@@ -250,7 +251,7 @@ class _Folder:
             try:
                 yield
             finally:
-                self._wanted = outer
+                self._top_module = outer
                 self._depth -= 1
                 if self._depth == 0:
                     sys.meta_path.remove(self)
@@ -266,3 +267,84 @@ class _Folder:
         }
         sys.modules.update(modules)
         return out
+
+
+class CurrentFolder(MetaPathFinder):
+    """Finds modules of the folder in which a command runs: those that somebody named, no others.
+
+    A command may run in a folder of somebody else's files. On `sys.path`, that folder would give a
+    file of its own for each optional module that a library looks for and does not have.
+
+    Attributes:
+        allowed: modules of the top level that may be found, whoever imports them.
+        imported: those that were: they find their neighbours, also later, while a policy decides.
+        allows_all: whether every module is found.
+    """
+
+    def __init__(self) -> None:
+        self.allowed: set[str] = set()
+        self.imported: set[str] = set()
+        self.allows_all = False
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return where the module is in this folder; None: it is not, or nobody named it."""
+        if path is not None:  # a part of a package, which knows where its parts are
+            return None
+        if not (self.allows_all or name in self.allowed or _importer() in self.imported):
+            return None
+        spec = PathFinder.find_spec(name, [""])
+        if spec is not None:
+            self.imported.add(name)
+        return spec
+
+
+def _importer() -> str:
+    """Return the top-level module whose code imports now."""
+    frame: FrameType | None = sys._getframe(2)  # the caller of `find_spec`
+    module = ""
+    while frame is not None:
+        module = str(frame.f_globals.get("__name__")).partition(".")[0]
+        if module not in ("importlib", "_frozen_importlib"):
+            break
+        frame = frame.f_back
+    return module
+
+
+_current_folder = CurrentFolder()
+
+
+def search_current_folder(modules: Iterable[str] = ()) -> None:
+    """Let these modules be found in the current folder, after all installed ones.
+
+    A command does so, and the workers that it starts; a script has the path that Python gives it.
+    """
+    _current_folder.allowed.update(modules)
+    if _current_folder not in sys.meta_path:
+        sys.meta_path.append(_current_folder)
+
+
+def allow_import(module: str) -> None:
+    """Let a module that somebody named be found in the current folder, if that is searched."""
+    _current_folder.allowed.add(module.partition(".")[0])
+
+
+def current_folder_modules() -> tuple[str, ...] | None:
+    """Return the modules that were found, for a worker's `search_current_folder`.
+
+    None: the current folder is not searched.
+    """
+    if _current_folder not in sys.meta_path:
+        return None
+    return tuple(sorted(_current_folder.imported))
+
+
+@contextmanager
+def allow_all_imports() -> Iterator[None]:
+    """Let everything be found, as a file needs whose code somebody trusts."""
+    before, _current_folder.allows_all = _current_folder.allows_all, True
+    try:
+        yield
+    finally:
+        _current_folder.allows_all = before

@@ -20,8 +20,8 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, NonNegativeFlo
 from pydantic.dataclasses import dataclass as validated
 
 from swarm_logistics_env import streams
+from swarm_logistics_env.code_files import allow_import
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, StudyError, suggest
-from swarm_logistics_env.policies.current_folder import name_module
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.records import canonical_json
 
@@ -310,7 +310,7 @@ def task_of(source: object) -> Task:
             raise StudyError(
                 f"no task {source!r} (a name or 'package.module:OBJECT'){suggest(source, NAMES)}"
             )
-        name_module(module)
+        allow_import(module)
         try:
             found = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError, ValueError, SystemExit) as error:
