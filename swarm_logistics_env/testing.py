@@ -48,21 +48,21 @@ def check_policy(
         CheckError: two episodes of one seed part; it names the first step.
         PolicyError: commands of the wrong shape, or not finite.
     """
-    chosen = load(policy) if isinstance(policy, str) else policy
-    asked = scenario or Scenario()
+    player = load(policy) if isinstance(policy, str) else policy
+    conditions = scenario or Scenario()
 
     def trajectory(player: Policy, seed: int) -> list[bytes]:
-        play = Play(asked, player, seed)
-        places: list[bytes] = []
-        while not play.is_over and len(places) < steps:
+        play = Play(conditions, player, seed)
+        positions: list[bytes] = []
+        while not play.is_over and len(positions) < steps:
             play.step()
-            places.append(play.world.state.robot_position.tobytes())
-        return places
+            positions.append(play.world.state.robot_position.tobytes())
+        return positions
 
-    first = trajectory(chosen, seed)
-    trajectory(chosen, seed + 1)
-    _compare(first, trajectory(chosen, seed), "after another episode: reset should forget it")
-    copy = pickle.loads(pickle.dumps(chosen))
+    first = trajectory(player, seed)
+    trajectory(player, seed + 1)
+    _compare(first, trajectory(player, seed), "after another episode: reset should forget it")
+    copy = pickle.loads(pickle.dumps(player))
     _compare(first, trajectory(copy, seed), "with a pickled copy of the policy")
 
 
@@ -81,9 +81,9 @@ def check_wrapper(
             episodes of one seed that part.
     """
     first = list(_moments(make(), policy, seed, steps))
-    pair = _moments(make(), policy, seed, steps), _moments(make(), policy, seed + 1, steps)
-    again = [one for one, _ in zip_longest(*pair)][: len(first)]
-    _compare(first, again, "beside another live world")
+    again, other = (_moments(make(), policy, s, steps) for s in (seed, seed + 1))
+    second = [moment for moment, _ in zip_longest(again, other)][: len(first)]
+    _compare(first, second, "beside another live world")
 
 
 def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[Moment]:
@@ -119,8 +119,8 @@ def _checked(env: Any, step: int, observations: Moment) -> Moment:
 
 
 def _compare(first: list[Any], second: list[Any], where: str) -> None:
-    for step, (one, other) in enumerate(zip_longest(first, second)):
-        if one != other:
+    for step, (moment, other) in enumerate(zip_longest(first, second)):
+        if moment != other:
             raise CheckError(f"the same seed gives another episode {where}: they part at {step}")
 
 

@@ -14,7 +14,7 @@ from typer import Argument, Option, echo
 from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies import display_name, known_policies, load
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.scenario import SOURCES
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import ROLES
@@ -159,7 +159,7 @@ def watch_command(
         serve(session, port, echo, show=webbrowser.open if shows else None)
         return
     page = recorded_page(session, session.scenario.duration if until is None else until)
-    with becoming(save, SetupError) as part:
+    with atomic_write(save, SetupError) as part:
         part.write_text(page, encoding="utf-8")
     echo(f"{save}: {session.state.time:g} s, {len(page) / 1e6:.2f} MB")
 

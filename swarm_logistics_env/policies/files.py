@@ -22,7 +22,7 @@ from swarm_logistics_env.motion.frame import LEAD, OUTPUTS
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.records import becoming, canonical_json
+from swarm_logistics_env.records import atomic_write, canonical_json
 from swarm_logistics_env.scenario import Scenario
 
 SUFFIX = ".safetensors"
@@ -118,7 +118,7 @@ def write_policy(path: Path, card: PolicyCard, tensors: Mapping[str, NDArray[np.
     """
     check_tensors(card.network, tensors)
     content = file_content(card.to_json(), tensors)
-    with becoming(path, PolicyError) as part:
+    with atomic_write(path, PolicyError) as part:
         part.write_bytes(content)
 
 
@@ -197,7 +197,7 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
     about = {CARD: policy.card.to_json(), DEVIATIONS: " ".join(map(str, deviations.tolist()))}
     helper.set_model_props(model, about)
     checker.check_model(model)
-    with becoming(Path(path), PolicyError) as part:
+    with atomic_write(Path(path), PolicyError) as part:
         part.write_bytes(model.SerializeToString())
 
 

@@ -23,7 +23,7 @@ from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.policies import Policy, load
 from swarm_logistics_env.policies.learned import Score
 from swarm_logistics_env.questions.comparison import Arm
-from swarm_logistics_env.records import becoming, file_name, read_table
+from swarm_logistics_env.records import atomic_write, file_name, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
@@ -74,7 +74,7 @@ def enter(directory: Path, training: Training, command: str) -> None:
             )
     began = datetime.now(UTC).isoformat(timespec="seconds")
     sessions.append({"began": began, "versions": versions()})
-    with becoming(path, TrainingError) as part:
+    with atomic_write(path, TrainingError) as part:
         record = {"command": command, "training": asked, "sessions": sessions}
         part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 

@@ -29,7 +29,7 @@ from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
 from swarm_logistics_env.motion.memory import body_of, in_frame, length_of
 from swarm_logistics_env.policies.learned import STREAM
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.train.training import Training, make_worlds
 from swarm_logistics_env.warehouse.packing import unpacked_at
@@ -264,7 +264,7 @@ def save_checkpoint(directory: Path, learner: PPO, log: Any) -> None:
     }
     content = io.BytesIO()
     torch.save(state, content)
-    with becoming(directory / CHECKPOINT, TrainingError) as part, part.open("wb") as file:
+    with atomic_write(directory / CHECKPOINT, TrainingError) as part, part.open("wb") as file:
         file.write(_head(content.getbuffer()))
         file.write(content.getbuffer())
         file.flush()

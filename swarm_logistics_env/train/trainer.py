@@ -19,7 +19,7 @@ from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import (
     enter,
@@ -170,7 +170,7 @@ class TrainingLog:
         """Write curve.csv, whole or not at all."""
         from pandas import DataFrame
 
-        with becoming(directory / CURVE, TrainingError) as part:
+        with atomic_write(directory / CURVE, TrainingError) as part:
             DataFrame(self.curve).to_csv(part, index=False, na_rep="nan")
 
     def draw(self, picture: Path, title: str, seeds: int) -> None:
@@ -188,7 +188,7 @@ class TrainingLog:
             axes.set(title=title, xlabel="million agent-steps", ylabel=y_label, ylim=(0.0, None))
 
         _, png = images(curve, 0.62 * WIDTH)
-        with becoming(picture, TrainingError) as part:
+        with atomic_write(picture, TrainingError) as part:
             part.write_bytes(png)
 
 
