@@ -303,7 +303,7 @@ def task_of(source: object) -> Task:
     Raises:
         StudyError: there is none.
     """
-    found = source
+    task = source
     if isinstance(source, str):
         module, colon, attribute = NAMES.get(source, source).partition(":")
         if not colon:
@@ -312,30 +312,30 @@ def task_of(source: object) -> Task:
             )
         allow_import(module)
         try:
-            found = getattr(importlib.import_module(module), attribute)
+            task = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError, ValueError, SystemExit) as error:
             raise StudyError(f"task {source!r} cannot be imported: {error}") from None
-    if not isinstance(found, Task):
+    if not isinstance(task, Task):
         raise StudyError(f"{source!r} is no task: should have the attributes of tasks.Task")
-    return found
+    return task
 
 
 def refuse_untrusted(
-    place: Path, task: str | None, policies: tuple[PolicySpec, ...] = (), *, trust_code: bool
+    path: Path, task: str | None, policies: tuple[PolicySpec, ...] = (), *, trust_code: bool
 ) -> None:
     """Raise StudyError if what a file names would run code when it is loaded.
 
     Args:
-        place: the file.
+        path: of the file.
         task, policies: that it names.
         trust_code: whether they may.
     """
-    said = [f"task {task!r}"] if isinstance(task, str) and ":" in task else []
-    said += [f"policy {policy.name!r}" for policy in policies if policy.runs_code]
-    if said and not trust_code:
+    names_of_code = [f"task {task!r}"] if isinstance(task, str) and ":" in task else []
+    names_of_code += [f"policy {policy.name!r}" for policy in policies if policy.runs_code]
+    if names_of_code and not trust_code:
         raise StudyError(
-            f"{place}: {said[0]} is code, which runs when it is loaded: should be a name that the "
-            "package knows, or be allowed by --trust-code (trust_code=True)"
+            f"{path}: {names_of_code[0]} is code, which runs when it is loaded: should be a name "
+            "that the package knows, or be allowed by --trust-code (trust_code=True)"
         )
 
 
