@@ -232,25 +232,26 @@ def attack(settings: Attack, engine: Engine, out: Path) -> AttackResult:
         if damage := store.discard_damaged():
             warnings.warn(f"{damage}: what is asked is played again", stacklevel=2)
 
-        def delivered(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:
+        def count_deliveries(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:
             outcomes = _outcomes(base, engine, store, pairs)
             return np.array([outcome.delivered for outcome in outcomes], np.float64)
 
         def play(pairs: Sequence[tuple[int, int]]) -> Sequence[float]:
             """Play a fault's k-th run with seed k, beside the run without a fault."""
             seeds = [seed for _, seed in pairs]
-            sound = delivered([(None, seed) for seed in range(max(*seeds, _NAMED_SEEDS - 1) + 1)])
+            n_seeds = max(*seeds, _NAMED_SEEDS - 1) + 1
+            sound = count_deliveries([(None, seed) for seed in range(n_seeds)])
             if not sound.any():
                 raise SetupError(
                     f"{policy.title} delivers nothing without faults, so no fault can cost "
                     "anything: should be another policy, a longer duration or more robots"
                 )
-            failed = delivered([(faults[index], seed) for index, seed in pairs])
+            failed = count_deliveries([(faults[index], seed) for index, seed in pairs])
             return list(failed - sound[seeds])
 
         worst, tried = search(faults, play, settings.budget, settings.seed)
         named = [Fault(mode, settings.robots) for mode in settings.modes]
-        tries = delivered([*product(named, range(_NAMED_SEEDS))]).reshape(len(named), -1)
+        tries = count_deliveries([*product(named, range(_NAMED_SEEDS))]).reshape(len(named), -1)
         worst_named = named[int(tries.mean(axis=1).argmin())]
         conditions = (None, faults[worst], worst_named)
         # Seeds that neither the search can have met, nor the choice among the named modes.
@@ -290,8 +291,8 @@ def _outcomes(
         Run(replace(base, faults=() if fault is None else (fault,)), code, seed)
         for fault, seed in pairs
     ]
-    done = store.succeeded()
-    missing = {run.key: run for run in runs if run.key not in done}
+    finished = store.succeeded()
+    missing = {run.key: run for run in runs if run.key not in finished}
     for run, outcome in engine(missing.values()):
         store.add(run, outcome)
         if outcome.error is not None:

@@ -64,15 +64,15 @@ def file_of_module(name: str) -> Path | None:
 
     None: another kind of module, or none.
     """
-    top, *rest = name.split(".")
+    top, *submodules = name.split(".")
     try:
         spec = importlib.util.find_spec(top)
     except ValueError:  # a module that no file made
         return None
     stems = [Path(spec.origin.removesuffix(".py"))] if spec and spec.origin else []
-    if rest:
+    if submodules:
         folders = spec.submodule_search_locations if spec else None
-        stems = [Path(folder, *rest) for folder in folders or ()]
+        stems = [Path(folder, *submodules) for folder in folders or ()]
     for stem in stems:
         for path in (stem.with_suffix(".py"), stem / "__init__.py"):
             if path.is_file() and is_users_own(str(path.resolve())):
@@ -87,15 +87,15 @@ def source_files(paths: Iterable[Path]) -> dict[Path, CodeType | bytes]:
     only while a function runs is among them. What is no Python that can be compiled is bytes.
     """
     sources: dict[Path, CodeType | bytes] = {}
-    waiting = deque(paths)
-    while waiting:
-        path = waiting.popleft()
+    queue = deque(paths)
+    while queue:
+        path = queue.popleft()
         if path not in sources and path.is_file():
             sources[path] = content = path.read_bytes()
             with contextlib.suppress(SyntaxError, ValueError):  # it cannot be imported either
                 sources[path] = code = compile(content, path.name, "exec", dont_inherit=True)
                 names = {part for name in names_in(code) for part in name.split(".")}
-                waiting += (file for name, file in _neighbours(path) if name in names)
+                queue += (file for name, file in _neighbours(path) if name in names)
     return sources
 
 
@@ -135,18 +135,20 @@ def is_users_own(file: str | None) -> bool:
     path = Path(file).absolute()
     # Another environment's packages may be on the path, too.
     is_package = not {"site-packages", "dist-packages"}.isdisjoint(path.parts)
-    return not is_package and not any(path.is_relative_to(folder) for folder in _installed())
+    return not is_package and not any(
+        path.is_relative_to(folder) for folder in _installed_folders()
+    )
 
 
 @functools.cache
 def _is_installed(name: str) -> bool:
     """Return whether Python or an installed package has a module of that name."""
-    folders = [str(folder) for folder in _installed()]
+    folders = [str(folder) for folder in _installed_folders()]
     return name in sys.stdlib_module_names or PathFinder.find_spec(name, folders) is not None
 
 
 @functools.cache
-def _installed() -> tuple[Path, ...]:
+def _installed_folders() -> tuple[Path, ...]:
     names = ("stdlib", "platstdlib", "purelib", "platlib")
     folders = [sysconfig.get_path(name) for name in names]
     return (PACKAGE, *map(Path, [*folders, *site.getsitepackages(), site.getusersitepackages()]))
@@ -185,7 +187,7 @@ class _Folder:
         """Return the module of a file in the folder, or in a package in it."""
         parts = [*path.relative_to(self._path).with_suffix("").parts]
         if len(parts) > 1:
-            with self._importing(parts[0]):
+            with self._enable_import(parts[0]):
                 return importlib.import_module(".".join(parts).removesuffix(".__init__"))
         # No other file has this name, and no module of Python's or of an installed package.
         stem = path.stem.replace(".", "_")
@@ -194,7 +196,7 @@ class _Folder:
         assert spec is not None
         assert spec.loader is not None
         module = sys.modules[name] = module_from_spec(spec)
-        with self._importing(None):
+        with self._enable_import(None):
             spec.loader.exec_module(module)
         import cloudpickle  # a command that names no file starts sooner without
 
@@ -212,7 +214,7 @@ class _Folder:
     ) -> ModuleType:
         """Import a module as an import statement of a module in this folder does."""
         top = (str(importer.get("__package__")) if level else name).partition(".")[0]
-        with self._importing(top if top in self._names() else None):
+        with self._enable_import(top if top in self._names() else None):
             return builtins.__import__(name, globals, locals, fromlist or (), level)
 
     def find_spec(
@@ -240,13 +242,13 @@ class _Folder:
         return self._module_names
 
     @contextmanager
-    def _importing(self, top_module: str | None) -> Iterator[None]:
+    def _enable_import(self, top_module: str | None) -> Iterator[None]:
         """Let a module be found in this folder; None: nothing, as for an installed module."""
         with _lock:
             outer, self._top_module = self._top_module, top_module
             self._depth += 1
             if self._depth == 1:
-                displaced = self._exchange(self._modules)
+                displaced_modules = self._exchange(self._modules)
                 sys.meta_path.insert(0, self)
             try:
                 yield
@@ -255,7 +257,7 @@ class _Folder:
                 self._depth -= 1
                 if self._depth == 0:
                     sys.meta_path.remove(self)
-                    self._modules = self._exchange(displaced)
+                    self._modules = self._exchange(displaced_modules)
 
     def _exchange(self, modules: Mapping[str, ModuleType]) -> dict[str, ModuleType]:
         """Put modules of this folder's names into Python's table; return those that were there."""

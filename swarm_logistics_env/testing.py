@@ -81,9 +81,10 @@ def check_wrapper(
             episodes of one seed that part.
     """
     first = list(_moments(make(), policy, seed, steps))
-    again, other = (_moments(make(), policy, s, steps) for s in (seed, seed + 1))
-    second = [moment for moment, _ in zip_longest(again, other)][: len(first)]
-    _compare(first, second, "beside another live world")
+    second, third = (_moments(make(), policy, s, steps) for s in (seed, seed + 1))
+    # Both worlds live at the same time; the third has another seed and is not looked at.
+    moments = [moment for moment, _ in zip_longest(second, third)][: len(first)]
+    _compare(first, moments, "beside another live world")
 
 
 def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[Moment]:
@@ -94,7 +95,7 @@ def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[
     world = env.unwrapped.warehouse
     start(player, world.scenario, seed)
     for step in range(steps):
-        yield _checked(env, step, observations)
+        yield _check_observations(env, step, observations)
         if not env.agents:
             return
         rows = world.observe()
@@ -109,19 +110,23 @@ def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[
         yield {agent: repr(reward) for agent, reward in rewards.items()}
 
 
-def _checked(env: Any, step: int, observations: Moment) -> Moment:
+def _check_observations(env: Any, step: int, observations: Moment) -> Moment:
     for agent in env.agents:
         space: Box = env.observation_space(agent)
-        seen = observations.get(agent)
-        if not isinstance(seen, np.ndarray) or not space.contains(seen):
-            raise CheckError(f"{agent}'s observation at step {step} is outside of {space}: {seen}")
+        observation = observations.get(agent)
+        if not isinstance(observation, np.ndarray) or not space.contains(observation):
+            raise CheckError(
+                f"{agent}'s observation at step {step} is outside of {space}: {observation}"
+            )
     return {agent: value.tobytes() for agent, value in observations.items()}
 
 
-def _compare(first: list[Any], second: list[Any], where: str) -> None:
+def _compare(first: list[Any], second: list[Any], situation: str) -> None:
     for step, (moment, other) in enumerate(zip_longest(first, second)):
         if moment != other:
-            raise CheckError(f"the same seed gives another episode {where}: they part at {step}")
+            raise CheckError(
+                f"the same seed gives another episode {situation}: they part at {step}"
+            )
 
 
 if not TYPE_CHECKING:

@@ -61,7 +61,7 @@ class Network(_Part):
 
     @field_validator("inputs", "outputs")
     @classmethod
-    def _known(cls, names: tuple[str, ...], about: ValidationInfo) -> tuple[str, ...]:
+    def _check_names(cls, names: tuple[str, ...], about: ValidationInfo) -> tuple[str, ...]:
         expected = INPUTS if about.field_name == "inputs" else OUTPUTS
         if names != expected:
             raise ValueError(f"should be the {len(expected)} names that this version knows")
@@ -91,7 +91,7 @@ class Score(_Part):
 
     @field_validator("low", "high", mode="before")
     @classmethod
-    def _finite(cls, limit: Any) -> Any:
+    def _replace_infinity(cls, limit: Any) -> Any:
         return None if isinstance(limit, float) and math.isinf(limit) else limit
 
 
@@ -136,18 +136,18 @@ def hyperbolic_tangent(x: np.float32) -> np.float32:
     """
     x = min(max(x, np.float32(-7.9053111)), np.float32(7.9053111))
     x2 = x * x
-    over = np.float32(-2.76076847742355e-16)
-    over = over * x2 + np.float32(2.00018790482477e-13)
-    over = over * x2 + np.float32(-8.60467152213735e-11)
-    over = over * x2 + np.float32(5.12229709037114e-08)
-    over = over * x2 + np.float32(1.48572235717979e-05)
-    over = over * x2 + np.float32(6.37261928875436e-04)
-    over = over * x2 + np.float32(4.89352455891786e-03)
-    under = np.float32(1.19825839466702e-06)
-    under = under * x2 + np.float32(1.18534705686654e-04)
-    under = under * x2 + np.float32(2.26843463243900e-03)
-    under = under * x2 + np.float32(4.89352518554385e-03)
-    return x * over / under
+    numerator = np.float32(-2.76076847742355e-16)
+    numerator = numerator * x2 + np.float32(2.00018790482477e-13)
+    numerator = numerator * x2 + np.float32(-8.60467152213735e-11)
+    numerator = numerator * x2 + np.float32(5.12229709037114e-08)
+    numerator = numerator * x2 + np.float32(1.48572235717979e-05)
+    numerator = numerator * x2 + np.float32(6.37261928875436e-04)
+    numerator = numerator * x2 + np.float32(4.89352455891786e-03)
+    denominator = np.float32(1.19825839466702e-06)
+    denominator = denominator * x2 + np.float32(1.18534705686654e-04)
+    denominator = denominator * x2 + np.float32(2.26843463243900e-03)
+    denominator = denominator * x2 + np.float32(4.89352518554385e-03)
+    return x * numerator / denominator
 
 
 @kernel

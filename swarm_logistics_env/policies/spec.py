@@ -161,7 +161,7 @@ class PolicySpec(Record):
 
     @field_validator("parameters")
     @classmethod
-    def _policys_own(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
+    def _refuse_reserved_names(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
         # These are `load`'s: whether to trust code is not for a file to say.
         for name in ("name", "trust_code", "trusted"):
             if name in parameters:
@@ -169,7 +169,7 @@ class PolicySpec(Record):
         return parameters
 
     @model_serializer
-    def _written(self) -> str | dict[str, JsonValue]:
+    def _serialize(self) -> str | dict[str, JsonValue]:
         if not (self.parameters or self.label):
             return self.name
         return {"name": self.name, "parameters": self.parameters, "label": self.label}
@@ -216,7 +216,7 @@ class PolicySpec(Record):
         """
         if self.made is None and self.name in makers:
             return self._make(makers)
-        policy = self._make(makers) if planned is None else self._as_planned(makers, planned)
+        policy = self._make(makers) if planned is None else self._make_planned(makers, planned)
         try:
             return copy.deepcopy(policy)
         except RAISED_BY_OTHERS as error:  # of code that is not ours
@@ -225,11 +225,11 @@ class PolicySpec(Record):
                 "arrays, not an environment, as each run gets a copy"
             ) from error
 
-    def _as_planned(self, makers: Makers, planned: str) -> Policy:
+    def _make_planned(self, makers: Makers, planned: str) -> Policy:
         if self.made is not None:
             # Its class may have come to this process by its content; files of it are read here.
             if files := changed_files(planned, self._identity_of(self.made)):
-                raise self._other_than_planned(f"{', '.join(files)} changed")
+                raise self._change_error(f"{', '.join(files)} changed")
             return self._make(makers)
         key = (self.name, canonical_json(self.parameters), planned)
         if key not in _planned_policies:
@@ -244,10 +244,10 @@ class PolicySpec(Record):
         """
         policy = self._make(makers)
         if change := changes(planned, self._identity_of(policy)):
-            raise self._other_than_planned(change)
+            raise self._change_error(change)
         return policy
 
-    def _other_than_planned(self, change: str) -> PolicyError:
+    def _change_error(self, change: str) -> PolicyError:
         return PolicyError(
             f"policy {self.title!r} is not what was planned: {change}; start the study anew"
         )
@@ -257,14 +257,14 @@ class PolicySpec(Record):
         if self.made is not None:
             if not makers:
                 check_policy(self.made)
-            made: Policy = self.made
-            return made
+            policy: Policy = self.made
+            return policy
         if self.name in makers:
             try:
-                made = makers[self.name](**self.parameters)
+                policy = makers[self.name](**self.parameters)
             except TypeError as error:
                 raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
-            return made
+            return policy
         if makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         if makers and self.name.endswith(SB3_SUFFIX):

@@ -191,7 +191,9 @@ class ParallelTask:
         for name in fields:
             if name not in names:
                 raise StudyError(f"task {self.name}: no field {name!r}{suggest(name, names)}")
-        return base.replace(**{name: self._checked(name, value) for name, value in fields.items()})
+        return base.replace(
+            **{name: self._field_value(name, value) for name, value in fields.items()}
+        )
 
     def fault(
         self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
@@ -272,7 +274,7 @@ class ParallelTask:
             arguments[self._failures[REMOVED]] = absent
         return self._make_env(**arguments)
 
-    def _checked(self, name: str, value: object) -> object:
+    def _field_value(self, name: str, value: object) -> object:
         """Return the value of a field; one that is a number by default has to be one."""
         kind = self._numbers.get(name)
         if kind is None:

@@ -53,7 +53,7 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
         """Begin an episode; observations and infos of all possible agents."""
         observations, infos = self.env.reset(seed=seed, options=options)
         self.agents = list(self.possible_agents)
-        return self._padded(self.env.agents, observations, infos)
+        return self._pad(self.env.agents, observations, infos)
 
     def step(self, actions: ByAgent) -> tuple[ByAgent, ...]:
         """Step with the actions of the agents that are there; all possible agents are answered."""
@@ -64,7 +64,7 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
         is_over = not self.env.agents
         is_cut = is_over and any(truncations.values())
         active = present if is_over else self.env.agents
-        observations, infos = self._padded(active, observations, infos)
+        observations, infos = self._pad(active, observations, infos)
         if is_over:
             self.agents = []
         return (
@@ -75,7 +75,7 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
             infos,
         )
 
-    def _padded(
+    def _pad(
         self, active: Sequence[str], observations: ByAgent, infos: ByAgent
     ) -> tuple[ByAgent, ByAgent]:
         padded_observations: ByAgent = {}
@@ -253,20 +253,20 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
             for fault in self._faults
         ]
         observations, infos = self.env.reset(seed=seed, options=options)
-        return self._observed(observations), infos
+        return self._faulty_observations(observations), infos
 
     def step(self, actions: ByAgent) -> tuple[ByAgent, ...]:
         """Step with the actions that failing robots execute; observations as they sense them."""
-        executed = {agent: self._executed(agent, action) for agent, action in actions.items()}
+        executed = {agent: self._faulty_action(agent, action) for agent, action in actions.items()}
         observations, rewards, terminations, truncations, infos = self.env.step(executed)
         self._steps += 1
-        return self._observed(observations), rewards, terminations, truncations, infos
+        return self._faulty_observations(observations), rewards, terminations, truncations, infos
 
     def _modes(self, agent: str) -> set[str]:
         time, row = self._steps * self._period, self._rows[agent]
         return {fault.mode for fault, rows in self._failing if row in rows and fault.active(time)}
 
-    def _executed(self, agent: str, action: Value) -> Value:
+    def _faulty_action(self, agent: str, action: Value) -> Value:
         modes = self._modes(agent)
         if "silent" in modes:
             action = self._failures["silent"]
@@ -275,11 +275,13 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         self._last[agent] = action
         return action
 
-    def _observed(self, observations: ByAgent) -> ByAgent:
+    def _faulty_observations(self, observations: ByAgent) -> ByAgent:
         self.true_observations = observations
-        return {agent: self._sensed(agent, value) for agent, value in observations.items()}
+        return {
+            agent: self._faulty_observation(agent, value) for agent, value in observations.items()
+        }
 
-    def _sensed(self, agent: str, value: Value) -> Value:
+    def _faulty_observation(self, agent: str, value: Value) -> Value:
         modes = self._modes(agent)
         if "blind" in modes:
             return create_zero_array(self.observation_space(agent))

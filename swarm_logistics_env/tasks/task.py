@@ -29,7 +29,7 @@ Seconds: TypeAlias = NDArray[np.float64]
 Fields: TypeAlias = Mapping[str, object]  # of a record, by name
 
 
-def _ascending(times: Seconds) -> Seconds:
+def _check_ascending(times: Seconds) -> Seconds:
     if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
         raise ValueError("should ascend")
     return times
@@ -38,7 +38,7 @@ def _ascending(times: Seconds) -> Seconds:
 Times = Annotated[
     Seconds,
     BeforeValidator(lambda times: np.asarray(times, dtype=np.float64)),
-    AfterValidator(_ascending),
+    AfterValidator(_check_ascending),
     PlainSerializer(lambda times: times.tolist()),
 ]
 
@@ -46,7 +46,7 @@ Times = Annotated[
 _LONGEST_ERROR = 20_000  # characters
 
 
-def _storable(error: object) -> object:
+def _make_storable(error: object) -> object:
     """Return a text as files and databases hold it: no half signs, and not without end."""
     if not isinstance(error, str):
         return error
@@ -81,7 +81,7 @@ class Outcome:
     failed_robots: tuple[int, ...] = ()
     anchoring_seconds: NonNegativeFloat | None = 0.0
     digest: str | None = None
-    error: Annotated[str | None, BeforeValidator(_storable)] = None
+    error: Annotated[str | None, BeforeValidator(_make_storable)] = None
     wall_seconds: float = 0.0  # a clock may be set back
     untimed: NonNegativeFloat | None = None
 

@@ -142,10 +142,10 @@ def _train(
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
         log.references = log.references or reference_means(training)
-        total, done = training.agent_steps, learner.num_timesteps
-        with ProgressBar(training.name, total, "agent-steps", done=done) as progress:
+        total, n_learned = training.agent_steps, learner.num_timesteps
+        with ProgressBar(training.name, total, "agent-steps", done=n_learned) as progress:
             callback = TrainingCallback(training, log, out, progress)
-            learner.learn(total - done, [callback, *callbacks], reset_num_timesteps=False)
+            learner.learn(total - n_learned, [callback, *callbacks], reset_num_timesteps=False)
     learner.env.close()
     evaluation = training.evaluation
     log.draw(out / PICTURE, f"{training.name}, N = {evaluation.n_robots}", evaluation.seeds)

@@ -82,12 +82,12 @@ class Training(Part):
 
     @field_validator("rewards")
     @classmethod
-    def _terms(cls, rewards: dict[str, float]) -> dict[str, float]:
+    def _check_terms(cls, rewards: dict[str, float]) -> dict[str, float]:
         RewardTerms(rewards)
         return rewards
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _check_consistency(self) -> Self:
         if any(scenario.message_size for _, scenario in self.each_world):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         sizes = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
