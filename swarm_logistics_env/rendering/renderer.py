@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError, how_to_install
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
@@ -193,7 +193,7 @@ def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
         SetupError: as `check_film` raises it; or there are no frames, or ffmpeg fails.
     """
     check_film(path)
-    with becoming(path, SetupError) as whole:
+    with atomic_write(path, SetupError) as whole:
         if path.suffix.lower() == ".mp4":
             return _encode(frames, frame_rate, [*_MP4, str(whole)])
         with tempfile.TemporaryDirectory() as folder:

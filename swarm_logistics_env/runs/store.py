@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import becoming, canonical_json, plain, write_csv
+from swarm_logistics_env.records import atomic_write, canonical_json, plain, write_csv
 from swarm_logistics_env.tasks.task import Outcome, Run
 
 from .rows import StoredRow, case_of, content_of, outcome_of, row_digest
@@ -121,7 +121,7 @@ class Runs:
         if path.exists():
             raise StudyError(f"{out} holds a study already: {verb} into a new directory")
         _make_folder(out)
-        with becoming(path, StudyError) as part, cls(part) as runs:
+        with atomic_write(path, StudyError) as part, cls(part) as runs:
             yield runs
 
     def __enter__(self) -> Self:
