@@ -73,7 +73,12 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(tables, "example", lambda out, name: study(out / name, examples[name]))
     for name in ("OUT", "BENCHMARK", "ENTRIES"):
         monkeypatch.setattr(tables, name, tmp_path / name)
-    for name, value in {"PAGE": page, "MEDIA": tmp_path, "PROCESSES": 1}.items():
+    for name, value in {
+        "PAGE": page,
+        "RESULTS": tmp_path / "csv",
+        "MEDIA": tmp_path,
+        "PROCESSES": 1,
+    }.items():
         monkeypatch.setattr(tables, name, value)
     monkeypatch.setattr(tables.front_page, "main", lambda: None)
     return page
@@ -89,6 +94,14 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     assert first.count("Between.\n") == 7
     assert "\nold\n" not in first
     assert {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")} == {"S", "FT", "A"}
+    front_page = tables.front_page
+    monkeypatch.setattr(front_page, "RESULTS", tmp_path / "csv")
+    for study in ("policies", "clearing", "leans"):
+        rows = front_page.values(front_page.read("estimates"), study)
+        assert rows
+        assert all(value.text in first for row in rows.values() for value in row.values())
+    n_supported = sum(claim["verdict"] == "supported" for claim in front_page.read("claims"))
+    assert f"this re-implementation supports\n{n_supported} and contradicts" in first
     page.write_text(first.replace("N = 5", "N = 6"))
     played, run = [], Study.run
 
@@ -145,8 +158,8 @@ def test_every_question_has_its_command_and_figure_and_its_intervals_stand_in_a_
 def test_jackknife_of_a_mean_is_its_t_interval(script: Callable[[str], Any]) -> None:
     sample = np.array([3.0, 5.0, 4.0, 9.0])
     jackknife = script("question_tables").jackknife_interval
-    found = jackknife(4, lambda seeds: float(sample[seeds].mean()))
-    assert found == pytest.approx(spi.mean_interval(sample))
+    interval = jackknife(4, lambda seeds: float(sample[seeds].mean()))
+    assert interval == pytest.approx(spi.mean_interval(sample))
 
 
 @EACH
