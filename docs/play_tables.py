@@ -285,8 +285,9 @@ def estimate_rows(
             yield row("clearing", str(cell.arm.setting), cell.policy, clearing_interval(cell), 0)
     n_seeds = len(leans.plan.seeds)
     for title, cells in leans_cells(leans).items():
-        for policy, cell in cells.items():
-            yield row("leans", title, policy, cell.mean, section.digits_of(cell.mean.value))
+        for policy in leans.policies:
+            mean = cells[policy].mean
+            yield row("leans", title, policy, mean, section.digits_of(mean.value))
 
 
 def clearing_interval(cell: Cell) -> Interval:
