@@ -128,6 +128,10 @@ docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate.py
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
 
+# A recorded run to look at: no page needs it.
+docs/media/run.html: $(DEV)/installed
+	$(DEV)/bin/swarm-logistics watch --fault FM4:3@60 --save $@ --until 150
+
 # What the pages print is held by `make test`; this runs what they do not show.
 docs-check: $(DEV)/installed
 	$(DEV)/bin/python docs/blocks.py --small

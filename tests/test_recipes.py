@@ -172,7 +172,7 @@ assert (space.low[-1], space.high[-1], *space.shape) == (0.0, 2.0, observations.
 sys.path.append(sys.argv[1])
 import generate
 
-page = generate.written("environment")
+page = generate.page_text("environment")
 assert "| `odometry_scale` | `1.0` | factor of velocities; off |" in page
 assert "| 140 | `speed` | m/s | [0, 2] | without direction |" in page
 """
