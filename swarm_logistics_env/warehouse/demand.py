@@ -17,19 +17,19 @@ from .structs import DELIVERED, NOBODY, World
 @inlined_kernel
 def is_requested(world: World, item: int) -> bool:
     """Return whether a request for `item` is open."""
-    requested, found = world.progress.requested, False
-    for place in range(len(requested)):
-        found |= requested[place] == item
-    return found
+    requested, is_open = world.progress.requested, False
+    for index in range(len(requested)):
+        is_open |= requested[index] == item
+    return is_open
 
 
 @kernel
 def ask(world: World) -> None:
     """Ask for items until `n_requests` requests are open or there is nothing to ask for."""
     requested = world.progress.requested
-    for place in range(len(requested)):
-        if requested[place] == NOBODY:
-            requested[place] = next_item(world)
+    for index in range(len(requested)):
+        if requested[index] == NOBODY:
+            requested[index] = next_item(world)
 
 
 @kernel
@@ -37,12 +37,12 @@ def close_request(world: World, item: int) -> None:
     """Close the oldest request for an item that was delivered; all of them if it left for good."""
     requested, n_kept, n_closed = world.progress.requested, 0, 0
     most = len(requested) if world.items.status[item] == DELIVERED else 1
-    for place in range(len(requested)):
-        other = requested[place]
-        if other == item and n_closed < most:
+    for index in range(len(requested)):
+        open_item = requested[index]
+        if open_item == item and n_closed < most:
             n_closed += 1
         else:
-            requested[n_kept] = other
+            requested[n_kept] = open_item
             n_kept += 1
     requested[n_kept:] = NOBODY
 
@@ -57,13 +57,13 @@ def next_item(world: World) -> int:
         return NOBODY
     chosen = NOBODY
     if world.parameters.is_independent:
-        left = total * uniform(items.demand_key[0], progress.n_drawn[0])
+        remaining = total * uniform(items.demand_key[0], progress.n_drawn[0])
         progress.n_drawn[0] += 1
         for item in range(len(items.status)):
             weight = weight_of(world, item)
-            if weight > 0.0 and left >= 0.0:  # of equal numbers by rounding, the last one
+            if weight > 0.0 and remaining >= 0.0:  # of equal numbers by rounding, the last one
                 chosen = item
-            left -= weight
+            remaining -= weight
         return chosen
     while chosen == NOBODY:
         chosen = next_of_cycle(world)

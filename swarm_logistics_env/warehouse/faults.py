@@ -94,11 +94,11 @@ class Fault(Record):
         intermittent: tuple[float, float] | None = None,
         role: str | None = None,
     ) -> None:
-        given = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
-        super().__init__(**given, factor=factor, intermittent=intermittent, role=role)
+        fields = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
+        super().__init__(**fields, factor=factor, intermittent=intermittent, role=role)
 
     @model_serializer(mode="wrap")
-    def _written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _serialize(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # Without a role it is written as before there were roles, so that stored runs stay known.
         written: dict[str, Any] = write(self)
         if self.role is None:
@@ -106,9 +106,9 @@ class Fault(Record):
         return written
 
     @model_validator(mode="after")
-    def _possible(self) -> Self:
-        found = failure_mode(self.mode)
-        if self.factor is not None and found.factor is None:
+    def _check_combination(self) -> Self:
+        own_mode = failure_mode(self.mode)
+        if self.factor is not None and own_mode.factor is None:
             able = ", ".join(name for name, mode in FAILURE_MODES.items() if mode.factor)
             raise ValueError(f"{self.mode} takes no factor; modes that do: {able}")
         for name in ("duration", "intermittent"):
@@ -159,16 +159,16 @@ def checked_faults(
             f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)], ["FM1:2"] or '
             '[{"mode": "FM1", "robots": 2}]'
         )
-    return tuple(_read(name, fault) for fault in faults)
+    return tuple(_as_fault(name, fault) for fault in faults)
 
 
-def _read(name: str, given: FaultLike) -> Fault:
-    if isinstance(given, Fault):
-        return given
-    if isinstance(given, str):
-        return fault_of(given)
+def _as_fault(name: str, fault: FaultLike) -> Fault:
+    if isinstance(fault, Fault):
+        return fault
+    if isinstance(fault, str):
+        return fault_of(fault)
     try:
-        return Fault(**given)
+        return Fault(**fault)
     except TypeError as error:  # Python names what is unknown or missing
         raise FaultError(f"{name}: {error}; known: {', '.join(Fault.model_fields)}") from None
 
@@ -189,8 +189,8 @@ def fault_of(text: str) -> Fault:
             f"fault {text!r}: should be MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200, "
             "with ROBOTS a whole number and ONSET and DURATION in seconds"
         )
-    given: dict[str, Any] = match.groupdict()
-    return Fault(**{name: text for name, text in given.items() if text is not None})
+    parts: dict[str, Any] = match.groupdict()
+    return Fault(**{name: text for name, text in parts.items() if text is not None})
 
 
 def text_of(fault: Fault) -> str | None:
@@ -261,7 +261,7 @@ class Occurrence:
                 changes.append(self._switches[robot][n_switches])
         return min(changes)
 
-    def left(self, time: float, end: float) -> tuple[float, float]:
+    def remaining_factors(self, time: float, end: float) -> tuple[float, float]:
         """Return the factors on speed and view at `time` [s] of an episode until `end` [s]."""
         mode, fault = self.mode, self.fault
         speed, view = mode.speed, mode.view
@@ -333,7 +333,7 @@ def apply_faults(
     for occurrence in occurrences:
         occurrence.choose_by_role(state)
         mode, robots = occurrence.mode, occurrence.holds_for(state.time)
-        speed_left, view_left = occurrence.left(state.time, scenario.duration)
+        speed_left, view_left = occurrence.remaining_factors(state.time, scenario.duration)
         able.max_speed[robots] *= speed_left
         able.max_turn_rate[robots] *= speed_left
         able.view_range[robots] *= view_left

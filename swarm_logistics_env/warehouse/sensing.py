@@ -23,12 +23,12 @@ from .surroundings import (
     ROBOT_SEEN,
     Pose,
     choose,
+    describe_items,
+    describe_neighbours,
     in_frame,
     listen,
     scan_discs,
     scan_solids,
-    tell_of_items,
-    tell_of_neighbours,
 )
 
 
@@ -78,7 +78,7 @@ def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
     touches = is_anchored = False
     for index in range(n_found):
         if world.nearby.square[index] < limit:
-            other = world.robot_grid.members[world.nearby.place[index]]
+            other = world.robot_grid.members[world.nearby.slot[index]]
             touches = True
             is_anchored |= failed[other] and not failed[me]
     return touches, is_anchored
@@ -91,7 +91,7 @@ def touches_items(world: World, n_found: int) -> bool:
     touches = False
     for index in range(n_found):
         if world.nearby.square[index] < limit:
-            item = world.item_grid.members[world.nearby.place[index]]
+            item = world.item_grid.members[world.nearby.slot[index]]
             touches |= world.items.covered[item] == 0
     return touches
 
@@ -100,14 +100,14 @@ _N_RANGES = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a
 # Things with a place: items, neighbours, and the teller of the lowest timer.
 _N_THINGS = row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1
 # A robot draws in a step: an error for every beam, whether each is dropped, then errors of places.
-_DROPPED, _PLACES, _DRAWS = _N_RANGES, 2 * _N_RANGES, 2 * _N_RANGES + 2 * _N_THINGS
+_DROPPED, _POSITIONS, _DRAWS = _N_RANGES, 2 * _N_RANGES, 2 * _N_RANGES + 2 * _N_THINGS
 
 
 @inlined_kernel
 def full_range(world: World, robot: int) -> float:
     """Return what a robot's beams read that meet nothing [m], also where its rangers are blind."""
-    own = world.able.ranger_range[robot]
-    return own if own > 0.0 else world.parameters.ranger_range
+    reach = world.able.ranger_range[robot]
+    return reach if reach > 0.0 else world.parameters.ranger_range
 
 
 @kernel
@@ -121,7 +121,7 @@ def disturb(me: int, world: World, out: Sensed) -> None:
     if parameters.ranger_noise > 0.0 or parameters.sensor_dropout > 0.0:
         disturb_beams(key, first, full_range(world, me), parameters, out)
     if parameters.position_noise > 0.0:
-        disturb_places(key, first + _PLACES, parameters, out)
+        disturb_positions(key, first + _POSITIONS, parameters, out)
 
 
 @kernel
@@ -142,7 +142,7 @@ def disturb_beams(
 
 
 @kernel
-def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sensed) -> None:
+def disturb_positions(key: np.uint64, first: int, parameters: Parameters, out: Sensed) -> None:
     """Add noise to the places of what is there in a row, from number `first` of the stream."""
     far = max(parameters.view_range, parameters.radio_range)
     for thing in range(_N_THINGS):
@@ -233,7 +233,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
         out[row.LOWEST_TIMER + 2] = left
         out[row.LOWEST_TIMER + 3] = timer
     n_chosen = choose(me, world, grid, n_found, ROBOT_SEEN)
-    tell_of_neighbours(pose, world, n_chosen, out)
+    describe_neighbours(pose, world, n_chosen, out)
     return is_anchored
 
 
@@ -252,4 +252,4 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     if world.robots.item[me] != NOBODY:
         world.robots.contact[me] |= touches_items(world, n_found)
     n_chosen = choose(me, world, grid, n_found, ITEM_SEEN)
-    tell_of_items(me, pose, world, n_chosen, out)
+    describe_items(me, pose, world, n_chosen, out)

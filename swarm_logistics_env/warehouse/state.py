@@ -114,9 +114,9 @@ class WarehouseState:
     @property
     def item_requested(self) -> Flags:
         """Which items are asked for (I,): a request for them is open."""
-        asked = np.zeros(len(self.item_status), np.bool_)
-        asked[self.open_requests[self.open_requests != NOBODY]] = True
-        return asked
+        is_requested = np.zeros(len(self.item_status), np.bool_)
+        is_requested[self.open_requests[self.open_requests != NOBODY]] = True
+        return is_requested
 
     @property
     def carries_requested(self) -> Flags:

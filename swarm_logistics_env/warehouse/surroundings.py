@@ -59,9 +59,9 @@ def scan_disc(forward: float, left: float, square: float, radius: float, scan: S
         return
     middle = nearest_beam(forward, left)
     # Outwards from the beam that looks nearest to its centre: if that one misses, all do.
-    for way in (1, -1):
-        for turned in range(_N_BEAMS // 2):
-            beam = (middle + way * (turned if way > 0 else turned + 1)) % _N_BEAMS
+    for direction in (1, -1):
+        for turn in range(_N_BEAMS // 2):
+            beam = (middle + direction * (turn if direction > 0 else turn + 1)) % _N_BEAMS
             along = forward * _BEAM_X[beam] + left * _BEAM_Y[beam]
             if along <= 0.0 or along * along <= clearance:
                 break
@@ -73,10 +73,10 @@ def scan_disc(forward: float, left: float, square: float, radius: float, scan: S
 @inlined_kernel
 def nearest_beam(forward: float, left: float) -> int:
     """Return the number of the beam that looks nearest to a direction in the robot's frame."""
-    across, ahead = abs(left), abs(forward)
+    abs_left, abs_forward = abs(left), abs(forward)
     beam = 0
     for border in _BORDERS:
-        beam += across > border * ahead
+        beam += abs_left > border * abs_forward
     if forward < 0.0:
         beam = _N_BEAMS // 2 - beam
     if left < 0.0:
@@ -90,17 +90,17 @@ def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
     reach = scan[0]
     for axis in range(2):
         if axis == 0:
-            back, front, ahead, aside = pose.x, width - pose.x, pose.cosine, -pose.sine
+            back, front, axis_forward, axis_left = pose.x, width - pose.x, pose.cosine, -pose.sine
         else:
-            back, front, ahead, aside = pose.y, height - pose.y, pose.sine, pose.cosine
+            back, front, axis_forward, axis_left = pose.y, height - pose.y, pose.sine, pose.cosine
         if min(back, front) >= reach:
             continue
         back, front = max(back, 0.0), max(front, 0.0)
         for beam in range(_N_BEAMS):
-            towards = _BEAM_X[beam] * ahead + _BEAM_Y[beam] * aside
+            towards = _BEAM_X[beam] * axis_forward + _BEAM_Y[beam] * axis_left
             # Without a branch: all beams together are a few vector instructions.
-            found = np.float32((front if towards > 0.0 else back) / abs(towards))
-            scan[beam] = found if found < scan[beam] else scan[beam]
+            distance = np.float32((front if towards > 0.0 else back) / abs(towards))
+            scan[beam] = distance if distance < scan[beam] else scan[beam]
 
 
 @inlined_kernel
@@ -129,9 +129,9 @@ def scan_discs(
         n_scanned += int(nearby.square[index] < limit)
     for number in range(n_scanned):
         index = nearby.scanned[number]
-        place = nearby.place[index]
+        slot = nearby.slot[index]
         nearby.forward[number], nearby.left[number] = in_frame(
-            pose, grid.places[place, 0], grid.places[place, 1]
+            pose, grid.position[slot, 0], grid.position[slot, 1]
         )
         nearby.scanned_square[number] = nearby.square[index]
     meet_middle_beams(nearby, n_scanned, radius)
@@ -180,14 +180,14 @@ def send_messages(world: World) -> None:
     n, n_kept = len(message), len(robots.told_before)
     for robot in range(n):
         sends = robots.present[robot] and able.obeys[robot]
-        for place in range(message.shape[1]):
-            given = world.commands.now[robot, MESSAGE + place] if sends else 0.0
-            given = min(max(given, -1.0), 1.0)
-            before[(step % n_kept) * n + robot, place] = given
+        for part in range(message.shape[1]):
+            number = world.commands.now[robot, MESSAGE + part] if sends else 0.0
+            number = min(max(number, -1.0), 1.0)
+            before[(step % n_kept) * n + robot, part] = number
             if able.radio_delay[robot] > 0:
-                then = step - able.radio_delay[robot]
-                given = before[(then % n_kept) * n + robot, place] if then >= 0 else 0.0
-            message[robot, place] = given
+                sent_step = step - able.radio_delay[robot]
+                number = before[(sent_step % n_kept) * n + robot, part] if sent_step >= 0 else 0.0
+            message[robot, part] = number
 
 
 @kernel
@@ -210,17 +210,19 @@ def run_timers(world: World) -> None:
             elapsed = (step - robots.last_in_delivery[robot]) * period
             timer = elapsed if elapsed < limit else timer
         robots.timer[robot] = timer
-        told = timer
-        aged = robots.heard[robot] + period
-        if parameters.is_gossip and is_present and aged < limit:
-            told = aged if math.isnan(told) else min(told, aged)
-        robots.told_before[step % n_kept, robot] = told
+        broadcast = timer
+        aged_timer = robots.heard[robot] + period
+        if parameters.is_gossip and is_present and aged_timer < limit:
+            broadcast = aged_timer if math.isnan(broadcast) else min(broadcast, aged_timer)
+        robots.told_before[step % n_kept, robot] = broadcast
         if is_present and able.radio_delay[robot] > 0:
-            then = step - able.radio_delay[robot]
-            told = robots.told_before[then % n_kept, robot] if then >= 0 else math.nan
+            sent_step = step - able.radio_delay[robot]
+            broadcast = (
+                robots.told_before[sent_step % n_kept, robot] if sent_step >= 0 else math.nan
+            )
             # The limit may have fallen since it was told.
-            told = told if told < limit else math.nan
-        robots.told[robot] = 0.0 if is_present and not able.honest[robot] else told
+            broadcast = broadcast if broadcast < limit else math.nan
+        robots.told[robot] = 0.0 if is_present and not able.honest[robot] else broadcast
 
 
 @inlined_kernel
@@ -234,52 +236,52 @@ def listen(me: int, world: World, n_found: int) -> tuple[int, float]:
     limit, loss = world.parameters.radio_range**2, world.parameters.radio_loss
     lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
     for index in range(n_found):
-        other, square = world.robot_grid.members[nearby.place[index]], nearby.square[index]
+        other, square = world.robot_grid.members[nearby.slot[index]], nearby.square[index]
         is_heard = (square <= limit) & able.sends[other] & able.hears[me]
         if loss > 0.0 and is_heard:
             step = world.progress.step[0]
             is_heard = not is_missed(robots.sensor_key[me], other, step, RADIO, loss)
         nearby.is_heard[index] = is_heard
         # Without branches, as what they hang on cannot be predicted.
-        told = robots.told[other]
-        is_lower = (told < lowest_timer) | ((told == lowest_timer) & (square < lowest_square))
+        timer = robots.told[other]
+        is_lower = (timer < lowest_timer) | ((timer == lowest_timer) & (square < lowest_square))
         is_lower &= is_heard
         lowest = other if is_lower else lowest
         lowest_square = square if is_lower else lowest_square
-        lowest_timer = told if is_lower else lowest_timer
+        lowest_timer = timer if is_lower else lowest_timer
     return lowest, lowest_timer
 
 
 @inlined_kernel
-def rank_nearest(nearby: Nearby, count: int, wanted: int) -> int:
-    """List in `nearby.nearest` the `wanted` nearest of `count` chosen things, nearest first.
+def rank_nearest(nearby: Nearby, count: int, n_wanted: int) -> int:
+    """List in `nearby.nearest` the `n_wanted` nearest of `count` chosen things, nearest first.
 
     If two are equally near, the one that comes first is chosen.
 
-    Returns how many there are, at most `wanted`.
+    Returns how many there are, at most `n_wanted`.
     """
     squares = nearby.chosen_square
-    for one in range(count):
+    for index in range(count):
         # Counted without a branch: a few vector instructions for all the others.
-        square, n_nearer = squares[one], 0
-        for other in range(one):
+        square, n_nearer = squares[index], 0
+        for other in range(index):
             n_nearer += squares[other] <= square
-        for other in range(one + 1, count):
+        for other in range(index + 1, count):
             n_nearer += squares[other] < square
-        if n_nearer < wanted:
-            nearby.nearest[n_nearer] = one
-    return min(count, wanted)
+        if n_nearer < n_wanted:
+            nearby.nearest[n_nearer] = index
+    return min(count, n_wanted)
 
 
 @inlined_kernel
-def tell_of_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
+def describe_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
     """Fill the block of items in a row from the chosen items."""
     robots, nearby = world.robots, world.nearby
-    for place in range(rank_nearest(nearby, n_chosen, row.N_ITEMS_IN_VIEW)):
-        item = nearby.chosen[nearby.nearest[place]]
+    for rank in range(rank_nearest(nearby, n_chosen, row.N_ITEMS_IN_VIEW)):
+        item = nearby.chosen[nearby.nearest[rank]]
         position = world.items.position
         forward, left = in_frame(pose, position[item, 0], position[item, 1])
-        column = row.ITEMS + place * row.ITEM_WIDTH
+        column = row.ITEMS + rank * row.ITEM_WIDTH
         out[column] = 1.0
         out[column + 1] = forward
         out[column + 2] = left
@@ -295,7 +297,7 @@ def choose(me: int, world: World, grid: Grid, n_found: int, purpose: int) -> int
     limit = view_range**2 if view_range > 0.0 else -1.0
     dropout, n_chosen, step = world.parameters.sensor_dropout, 0, world.progress.step[0]
     for index in range(n_found):
-        other, square = grid.members[nearby.place[index]], nearby.square[index]
+        other, square = grid.members[nearby.slot[index]], nearby.square[index]
         is_heard, is_seen = purpose == ROBOT_SEEN and nearby.is_heard[index], square <= limit
         if dropout > 0.0 and is_seen:
             is_seen = not is_missed(world.robots.sensor_key[me], other, step, purpose, dropout)
@@ -306,16 +308,16 @@ def choose(me: int, world: World, grid: Grid, n_found: int, purpose: int) -> int
 
 
 @inlined_kernel
-def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
+def describe_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
     """Fill the blocks of neighbours and of their messages in a row from the chosen neighbours."""
     robots, parameters = world.robots, world.parameters
     nearby, width = world.nearby, world.robots.message.shape[1]
-    for place in range(rank_nearest(nearby, n_chosen, row.N_NEIGHBOURS)):
-        index = nearby.nearest[place]
+    for rank in range(rank_nearest(nearby, n_chosen, row.N_NEIGHBOURS)):
+        index = nearby.nearest[rank]
         other, is_heard = nearby.chosen[index], nearby.chosen_heard[index]
         forward, left = in_frame(pose, robots.position[other, 0], robots.position[other, 1])
         tells = is_heard and not math.isnan(robots.told[other])
-        column = row.NEIGHBOURS + place * row.NEIGHBOUR_WIDTH
+        column = row.NEIGHBOURS + rank * row.NEIGHBOUR_WIDTH
         out[column] = 1.0
         out[column + 1] = forward
         out[column + 2] = left
@@ -323,4 +325,4 @@ def tell_of_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> 
         out[column + 4] = robots.told[other] if tells else parameters.timer_limit
         if is_heard and width > 0:
             for part in range(width):
-                out[row.MESSAGES + place * width + part] = robots.message[other, part]
+                out[row.MESSAGES + rank * width + part] = robots.message[other, part]
