@@ -192,12 +192,12 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._n_steps += 1
         self._returns += step.rewards
         # In the order of the worlds, so that what episodes share does not depend on the threads.
-        told = sorted(self._worlds.told)
-        for world in told:
+        worlds = sorted(self._worlds.reported)
+        for world in worlds:
             self._note(world)
         infos = list(map(dict.copy, self._abouts))
         dones = step.terminated | step.truncated
-        for world in told:
+        for world in worlds:
             if self._worlds.is_over[world] or dones[self._worlds.rows[world]].any():
                 self._end(world, step, dones, infos)
         return step.observations, step.rewards, dones, infos
@@ -310,9 +310,9 @@ class LogDeliveries(BaseCallback):  # type: ignore[misc]  # not in the environme
 
     def _on_rollout_end(self) -> None:
         # A VecMonitor around the worlds replaces what they say of an episode.
-        ended = [each for each in self.model.ep_info_buffer or () if "delivered" in each]
+        ended = [info for info in self.model.ep_info_buffer or () if "delivered" in info]
         if ended:
-            delivered = float(np.mean([each["delivered"] for each in ended]))
+            delivered = float(np.mean([info["delivered"] for info in ended]))
             self.logger.record("rollout/delivered_mean", delivered)
 
 

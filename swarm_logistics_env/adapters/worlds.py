@@ -65,7 +65,7 @@ class Worlds:
         self.is_over = [False] * n_worlds
         self.present = np.zeros(self.n_rows, np.bool_)
         self._n_robots = [0] * n_worlds
-        self.told: list[int] = []
+        self.reported: list[int] = []
         self._commands = np.zeros((self.n_rows, *self.command_space.shape))
         self._layers = [layers_of(env) for env in self.envs]
         # The largest worlds are stepped first, so that all threads end at about the same time.
@@ -104,9 +104,9 @@ class Worlds:
 
     def note_present(self, world: int) -> None:
         """Update which rows of a world are robots that are there."""
-        there, rows = self.envs[world].warehouse.state.robot_present, self.rows[world]
+        is_present, rows = self.envs[world].warehouse.state.robot_present, self.rows[world]
         self.present[rows] = False
-        self.present[rows.start : rows.start + len(there)] = there
+        self.present[rows.start : rows.start + len(is_present)] = is_present
 
     def give(self, commands: ArrayLike) -> None:
         """Take the commands (R, 4) of the next step.
@@ -117,11 +117,11 @@ class Worlds:
         """
         if not any(self._n_robots):
             raise SetupError("step before reset: call reset() first")
-        given = numbers_of(commands, "actions", self._commands.shape)
-        self._commands[:] = given
+        numbers = numbers_of(commands, "actions", self._commands.shape)
+        self._commands[:] = numbers
         if not np.isfinite(self._commands).all():
             row = np.argwhere(~np.isfinite(self._commands))[0, 0]
-            raise CommandError(f"actions[{row}] = {given[row]}: should be finite")
+            raise CommandError(f"actions[{row}] = {numbers[row]}: should be finite")
 
     def step(self) -> RowsStep:
         """Take one control period in every world, with the commands that were given."""
@@ -129,7 +129,7 @@ class Worlds:
         terminated, truncated = np.zeros((2, self.n_rows), np.bool_)
         rewards = np.zeros(self.n_rows, np.float32)
         outcome = RowsStep(self.blank(), rewards, terminated, truncated)
-        self.told = []
+        self.reported = []
         if self._shared_out:
             outcome = self._step_together(outcome)
         for world in self._alone:
@@ -146,17 +146,17 @@ class Worlds:
             env.close()
 
     def _step_together(self, outcome: RowsStep) -> RowsStep:
-        layers = [self._layers[world] for world in self._shared_out]
-        self._pool.is_watched[:] = [len(each) > 1 or each[-1].is_watched for each in layers]
-        for world, (*wrappers, _) in zip(self._shared_out, layers):
+        stacks = [self._layers[world] for world in self._shared_out]
+        self._pool.is_watched[:] = [len(stack) > 1 or stack[-1].is_watched for stack in stacks]
+        for world, (*wrappers, _) in zip(self._shared_out, stacks):
             for wrapper in wrappers:
                 robots = self._robots(world)
                 self._commands[robots] = wrapper.before_step(self._commands[robots].copy())
         # The worlds keep what they sensed, whatever the wrappers make of it.
         changed: dict[int, NDArray[np.float32]] = {}
 
-        def arrived(place: int, sensed: NDArray[np.float32]) -> None:
-            world = self._shared_out[place]
+        def take_over(index: int, sensed: NDArray[np.float32]) -> None:
+            world = self._shared_out[index]
             *wrappers, core = self._layers[world]
             step = core.outcome(sensed)
             for wrapper in reversed(wrappers):
@@ -165,7 +165,7 @@ class Worlds:
                 changed[world] = step[0]
             self._take(world, step, outcome)
 
-        self._pool.step(self._commands, outcome.observations, arrived)
+        self._pool.step(self._commands, outcome.observations, take_over)
         if changed:
             outcome = outcome._replace(observations=outcome.observations.copy())
             for world, rows in changed.items():
@@ -178,7 +178,7 @@ class Worlds:
         outcome.rewards[robots] = rewards
         outcome.terminated[robots], outcome.truncated[robots] = terminated, truncated
         self.is_over[world] = not self.envs[world].agents
-        self.told.append(world)
+        self.reported.append(world)
 
     def _robots(self, world: int) -> slice:
         first = self.rows[world].start

@@ -32,13 +32,13 @@ class RewardTerms:
             raise SetupError(
                 f'rewards = {weights!r}: should be None or a dict, as {{"delivery": 1.0}}'
             )
-        given = DEFAULT_WEIGHTS if weights is None else weights
-        for name, weight in given.items():
+        weights = DEFAULT_WEIGHTS if weights is None else weights
+        for name, weight in weights.items():
             if name not in REWARD_TERMS:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
             finite_number(f"rewards[{name!r}]", weight)
-        self._terms = [(REWARD_TERMS[name], weight) for name, weight in given.items()]
-        self.pays_steadily = not _AT_DELIVERIES.issuperset(given)
+        self._terms = [(REWARD_TERMS[name], weight) for name, weight in weights.items()]
+        self.pays_steadily = not _AT_DELIVERIES.issuperset(weights)
 
     def begin(self, world: Warehouse) -> None:
         """Store the state at the start of an episode."""

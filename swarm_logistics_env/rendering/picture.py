@@ -53,7 +53,7 @@ class Picture:
         for number in np.flatnonzero(state.item_status == STORED).tolist():
             self._stamp(sprites.item(self._item_half, False), items[number])
         for carrier in np.flatnonzero(state.carries_requested).tolist():
-            if (leader := palette.followed(state, scenario, carrier)) != NOBODY:
+            if (leader := palette.leader_of(state, scenario, carrier)) != NOBODY:
                 self._draw_arrow(robots[carrier], robots[leader])
         self._canvas.set_clip(None)
         self._draw_robots(state, robots)
@@ -108,9 +108,9 @@ class Picture:
         picture.fill(palette.DELIVERY_WORD, (*area.topleft, max(1, wall // 2), area.height))
         name = words("DELIVERY", self._text_height, palette.DELIVERY_WORD)
         name = pygame.transform.rotate(name, 90)
-        place = name.get_rect(center=area.center)
-        picture.fill(palette.DELIVERY_AREA, place.inflate(6, 12))
-        picture.blit(name, place)
+        box = name.get_rect(center=area.center)
+        picture.fill(palette.DELIVERY_AREA, box.inflate(6, 12))
+        picture.blit(name, box)
         picture.set_clip(None)
 
     def _legend(self) -> list[tuple[Surface, Point]]:
@@ -156,18 +156,18 @@ class Picture:
     def _draw_arrow(self, start: Point, end: Point) -> None:
         width = max(2.0, self._robot_radius / 3.5)
         head = 4.0 + 2.5 * width
-        way = Vector2(end) - start
+        offset = Vector2(end) - start
         # The tip stops short of the robot; robots that touch leave no room for an arrow.
-        tip = way.length() - self._robot_radius - 2.0
+        tip = offset.length() - self._robot_radius - 2.0
         if tip < self._robot_radius + head:
             return
         half, neck = width / 2, tip - head
         side = [(0.0, half), (neck, half), (neck, 0.45 * head), (tip, 0.0)]
         corners = side + [(x, -y) for x, y in reversed(side)]
-        angle = Vector2(1.0, 0.0).angle_to(way)
-        turned = [Vector2(corner).rotate(angle) + start for corner in corners]
+        angle = Vector2(1.0, 0.0).angle_to(offset)
+        vertices = [Vector2(corner).rotate(angle) + start for corner in corners]
         # Whole pixels: else the smooth edges lie beside the shape.
-        shape = [(round(x), round(y)) for x, y in turned]
+        shape = [(round(x), round(y)) for x, y in vertices]
         pygame.draw.polygon(self._canvas, palette.LINK, shape)
         pygame.draw.aalines(self._canvas, palette.LINK, True, shape)
 
@@ -177,15 +177,17 @@ class Picture:
         for robot in np.flatnonzero(state.robot_present & state.failed).tolist():
             sprite = sprites.badge(palette.mark(state.failure_modes[robot]), height)
             x, y = robots[robot]
-            place = sprite.get_rect(center=(x + away, y - away))
-            self._canvas.blit(sprite, place.clamp(self._canvas.get_rect()))
+            box = sprite.get_rect(center=(x + away, y - away))
+            self._canvas.blit(sprite, box.clamp(self._canvas.get_rect()))
 
     def _write_caption(self, state: WarehouseState) -> None:
         total = "" if self._scenario.restock else f" of {self._scenario.n_items}"
         scores = f"time {state.time:.1f} s    N = {state.n_robots}    P = {state.delivered}{total}"
         counts = Counter(mode for modes in state.failure_modes for mode in modes)
-        told = [f"{palette.mark((mode,))}: {mode} ×{n}" for mode, n in counts.items()]
-        failures = f"{state.failed.sum()} failed ({', '.join(told)})" if told else "no failures"
+        entries = [f"{palette.mark((mode,))}: {mode} ×{n}" for mode, n in counts.items()]
+        failures = (
+            f"{state.failed.sum()} failed ({', '.join(entries)})" if entries else "no failures"
+        )
         for line, text in enumerate((scores, failures)):
             written = words(text, self._text_height)
             at = self._margin, self._caption + line * self._line

@@ -193,23 +193,23 @@ def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
         SetupError: as `check_film` raises it; or there are no frames, or ffmpeg fails.
     """
     check_film(path)
-    with becoming(path, SetupError) as whole:
+    with becoming(path, SetupError) as partial:
         if path.suffix.lower() == ".mp4":
-            return _encode(frames, frame_rate, [*_MP4, str(whole)])
+            return _encode(frames, frame_rate, [*_MP4, str(partial)])
         with tempfile.TemporaryDirectory() as folder:
             palette = Path(folder, "palette")
             palette.write_bytes(_palette())
             side = f"{_PALETTE_SIDE}x{_PALETTE_SIDE}"
             source = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", side, "-i", str(palette)]
-            return _encode(frames, frame_rate, [*source, *_GIF, str(whole)])
+            return _encode(frames, frame_rate, [*source, *_GIF, str(partial)])
 
 
 def _palette() -> bytes:
-    colours = np.zeros((_PALETTE_SIDE**2, 4), np.uint8)
-    known = film_colours()
-    colours[: len(known), :3], colours[: len(known), 3] = known, 255
+    pixels = np.zeros((_PALETTE_SIDE**2, 4), np.uint8)
+    colours = film_colours()
+    pixels[: len(colours), :3], pixels[: len(colours), 3] = colours, 255
     # The last colour is transparent and stands for what did not change.
-    return colours.tobytes()
+    return pixels.tobytes()
 
 
 def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> int:
@@ -223,9 +223,9 @@ def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> in
     command = [_ffmpeg(), "-y", "-hide_banner", "-loglevel", "error", *source, *output]
     count = 0
     with (
-        tempfile.TemporaryFile() as said,
+        tempfile.TemporaryFile() as messages,
         subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=messages
         ) as process,
     ):
         assert process.stdin is not None
@@ -241,8 +241,8 @@ def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> in
             with contextlib.suppress(BrokenPipeError):
                 process.stdin.close()
         if process.wait() != 0:
-            said.seek(0)
-            reason = said.read().decode(errors="replace").strip()
+            messages.seek(0)
+            reason = messages.read().decode(errors="replace").strip()
             raise SetupError(f"ffmpeg cannot write the film (exit {process.returncode}): {reason}")
     return count
 

@@ -126,21 +126,23 @@ class IndicatorReward(Wrapper):
             raise SetupError(f"credit = {credit!r}{suggest(str(credit), CREDITS)}")
         self.credit, self.constant = credit, constant
         self.own_reward = finite_number("own_reward", own_reward)
-        self._own = self.unwrapped.scenario
-        self.condition = Condition(self._own.n_robots)
+        self._base = self.unwrapped.scenario
+        self.condition = Condition(self._base.n_robots)
         self._references: GivenPerformances | RunningMeans
         if isinstance(references, RunningMeans):
             self._references = self.measured = references
         else:
-            given = references if isinstance(references, Mapping) else {self.condition: references}
-            is_one = given is not references
-            self._references = GivenPerformances(given, whatever_changes=is_one)
+            performances = (
+                references if isinstance(references, Mapping) else {self.condition: references}
+            )
+            is_single_number = performances is not references
+            self._references = GivenPerformances(performances, whatever_changes=is_single_number)
             self.measured = RunningMeans()
-            if is_one:
+            if is_single_number:
                 self._references.divisor(self.condition)
         # Errors that can be known before the first episode are raised now.
         for scenario in self.env.scenarios:
-            self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._own)))
+            self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._base)))
         self.payments: dict[str, Payment] = {}
         self._indicators: dict[str, Payment] = {}
         self._is_over, self._delivered = False, 0
@@ -153,9 +155,9 @@ class IndicatorReward(Wrapper):
         """
         payments = {}
         for name in self.weights:
-            paid = indicator_of(name, condition, self._own, self._references) or Payment()
+            paid = indicator_of(name, condition, self._base, self._references) or Payment()
             if isinstance(self._references, RunningMeans):
-                slope = derivative_of(name, condition, self._own, self._references)
+                slope = derivative_of(name, condition, self._base, self._references)
                 paid = Payment(paid.share + slope.share, paid.constant + slope.constant)
             payments[name] = paid
         return payments
@@ -197,12 +199,12 @@ class IndicatorReward(Wrapper):
 
     def after_step(self, outcome: ArrayStep) -> ArrayStep:
         """Return the result of the step with this wrapper's rewards."""
-        observations, own, terminations, truncations = outcome
+        observations, inner_rewards, terminations, truncations = outcome
         world = self.unwrapped.warehouse
         state = world.state
-        rewards = self.own_reward * own if self.own_reward else np.zeros(state.n_robots)
+        rewards = self.own_reward * inner_rewards if self.own_reward else np.zeros(state.n_robots)
         deliverers = state.delivered_by[self._delivered :]
-        if world.is_eventful and condition_of(world, self._own) != self.condition:
+        if world.is_eventful and condition_of(world, self._base) != self.condition:
             self._take_condition()
         if self._paid is not self._due or deliverers:
             self._pay(rewards, deliverers, state.robot_present | terminations)
@@ -225,12 +227,12 @@ class IndicatorReward(Wrapper):
             rewards[robot] += self._due.share
 
     def _take_condition(self) -> None:
-        self.condition = condition_of(self.unwrapped.warehouse, self._own)
+        self.condition = condition_of(self.unwrapped.warehouse, self._base)
         self.payments = self.payments_of(self.condition)
         self._indicators = {
             name: indicator
             for name in self.weights
-            if (indicator := indicator_of(name, self.condition, self._own, self._references))
+            if (indicator := indicator_of(name, self.condition, self._base, self._references))
         }
         weighted = [(self.weights[name], paid) for name, paid in self.payments.items()]
         share = sum(weight * paid.share for weight, paid in weighted)
@@ -242,9 +244,9 @@ def _checked_weights(weights: str | Mapping[str, float]) -> dict[str, float]:
     checked = {weights: 1.0} if isinstance(weights, str) else dict(weights)
     if not checked:
         raise SetupError(f"weights = {weights!r}: should name at least one indicator")
-    known = (*INDICATORS, "P")
+    names = (*INDICATORS, "P")
     for name, weight in checked.items():
-        if name not in known:
-            raise SetupError(f"no indicator {name!r} is paid{suggest(str(name), known)}")
+        if name not in names:
+            raise SetupError(f"no indicator {name!r} is paid{suggest(str(name), names)}")
         finite_number(f"weights[{name!r}]", weight)
     return checked
