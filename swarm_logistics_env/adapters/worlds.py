@@ -99,12 +99,14 @@ class Worlds:
         first = self.envs[world].reset_arrays(seed, options)
         observations[rows] = 0.0
         observations[rows.start : rows.start + len(first)] = first
-        self._n_robots[world], self.is_over[world] = len(first), False
+        self._n_robots[world] = len(first)
+        self.is_over[world] = False
         self.note_present(world)
 
     def note_present(self, world: int) -> None:
         """Update which rows of a world are robots that are there."""
-        is_present, rows = self.envs[world].warehouse.state.robot_present, self.rows[world]
+        is_present = self.envs[world].warehouse.state.robot_present
+        rows = self.rows[world]
         self.present[rows] = False
         self.present[rows.start : rows.start + len(is_present)] = is_present
 
@@ -153,7 +155,7 @@ class Worlds:
                 robots = self._robots(world)
                 self._commands[robots] = wrapper.before_step(self._commands[robots].copy())
         # The worlds keep what they sensed, whatever the wrappers make of it.
-        changed: dict[int, NDArray[np.float32]] = {}
+        changed_rows: dict[int, NDArray[np.float32]] = {}
 
         def take_over(index: int, sensed: NDArray[np.float32]) -> None:
             world = self._shared_out[index]
@@ -162,13 +164,13 @@ class Worlds:
             for wrapper in reversed(wrappers):
                 step = wrapper.after_step(step)
             if step[0] is not sensed:
-                changed[world] = step[0]
+                changed_rows[world] = step[0]
             self._take(world, step, outcome)
 
         self._pool.step(self._commands, outcome.observations, take_over)
-        if changed:
+        if changed_rows:
             outcome = outcome._replace(observations=outcome.observations.copy())
-            for world, rows in changed.items():
+            for world, rows in changed_rows.items():
                 outcome.observations[self._robots(world)] = rows
         return outcome
 
@@ -206,17 +208,18 @@ def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:
             )
     if len({id(env.unwrapped) for env in worlds}) < len(worlds):
         raise SetupError("make_env gave the same environment twice: should make one each time")
-    seen = [env.observation_space("robot_0") for env in worlds]
-    commands = [env.action_space("robot_0") for env in worlds]
-    if len({(space.shape, command.shape) for space, command in zip(seen, commands)}) > 1:
+    observation_spaces = [env.observation_space("robot_0") for env in worlds]
+    command_spaces = [env.action_space("robot_0") for env in worlds]
+    row_shapes = [space.shape for space in observation_spaces]
+    command_shapes = [space.shape for space in command_spaces]
+    if len(set(zip(row_shapes, command_shapes))) > 1:
         raise SetupError(
-            f"observations {[space.shape for space in seen]} and commands "
-            f"{[command.shape for command in commands]}: should be of one length in all worlds, "
-            "so of one message_size"
+            f"observations {row_shapes} and commands {command_shapes}: should be of one length in "
+            "all worlds, so of one message_size"
         )
-    low = np.min([space.low for space in seen], axis=0)
-    high = np.max([space.high for space in seen], axis=0)
-    return Box(low, high, dtype=np.float32), commands[0]
+    low = np.min([space.low for space in observation_spaces], axis=0)
+    high = np.max([space.high for space in observation_spaces], axis=0)
+    return Box(low, high, dtype=np.float32), command_spaces[0]
 
 
 def maker(
@@ -239,7 +242,7 @@ def maker(
 
     def make_env(world: int) -> World:
         size = sizes[world % len(sizes)]
-        sized = {} if size is None else {"n_robots": size}
-        return SwarmLogisticsEnv(scenario, **sized, **fields)
+        size_field = {} if size is None else {"n_robots": size}
+        return SwarmLogisticsEnv(scenario, **size_field, **fields)
 
     return make_env

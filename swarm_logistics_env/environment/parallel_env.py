@@ -220,7 +220,8 @@ class SwarmLogisticsEnv(DictView):
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
         """Return what `step_arrays` does of the step that the warehouse has just taken."""
-        world, was_present = self.warehouse, self._present
+        world = self.warehouse
+        was_present = self._present
         n = len(was_present)
         terminations, truncations = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
         if not (world.is_eventful or self.is_watched):

@@ -166,11 +166,11 @@ def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -
         SetupError: they remove all at 0 s.
         FaultError: a fault names robots that are not there.
     """
-    gone = set[int]()
+    removed = set[int]()
     for fault in faults:
         if fault.onset <= GRACE and not failure_mode(fault.mode).present:
-            gone.update(failed_robots(fault, seed, n_robots).tolist())
-    if len(gone) == n_robots:
+            removed.update(failed_robots(fault, seed, n_robots).tolist())
+    if len(removed) == n_robots:
         raise SetupError(
             f"faults remove all {n_robots} robots at 0 s: should leave at least one to begin with"
         )

@@ -81,7 +81,8 @@ class Spaces:
         low, high = bounds(scenario)
         self.observation = Box(low, high, dtype=np.float32)
         self.action = Box(-1.0, 1.0, (4 + scenario.message_size,), dtype=np.float32)
-        self._own, self._declared = scenario, {scenario}
+        self._own = scenario
+        self._declared = {scenario}
         self.most = {name: getattr(scenario, name) for name in _BOUND_THE_STATE}
 
     def widen(self, scenario: Scenario) -> None:
@@ -225,16 +226,16 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         agents = self.agents
         if not agents:
             self.refuse_to_step()
-        wanted = self.action_space(agents[0]).shape
-        commands = gather_commands(actions, agents, self.possible_agents, wanted)
+        shape = self.action_space(agents[0]).shape
+        commands = gather_commands(actions, agents, self.possible_agents, shape)
         outcome: tuple[NDArray[Any], ...]
         if len(agents) == self.n_rows:
             outcome = self.step_arrays(commands)
         else:
             rows = [_row(agent) for agent in agents]
-            placed = np.zeros((self.n_rows, *wanted))
-            placed[rows] = commands
-            outcome = tuple(part[rows] for part in self.step_arrays(placed))
+            padded = np.zeros((self.n_rows, *shape))
+            padded[rows] = commands
+            outcome = tuple(part[rows] for part in self.step_arrays(padded))
         observations, rewards, terminations, truncations = outcome
         return (
             dict(zip(agents, observations, strict=True)),

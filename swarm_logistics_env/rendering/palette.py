@@ -96,8 +96,8 @@ def leader_of(state: WarehouseState, scenario: Scenario, robot: int) -> int:
     heard = state.robot_present & state.sends & (square <= scenario.radio_range**2)
     heard &= ~np.isnan(state.robot_told)
     heard[robot] = False
-    first = int(np.lexsort((square, state.robot_told, ~heard))[0])
-    return first if heard[first] else NOBODY
+    leader = int(np.lexsort((square, state.robot_told, ~heard))[0])
+    return leader if heard[leader] else NOBODY
 
 
 class Event(NamedTuple):

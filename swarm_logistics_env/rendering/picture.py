@@ -67,7 +67,8 @@ class Picture:
 
     def _lay_out(self, scenario: Scenario) -> None:
         """Draw what changes with the scenario alone."""
-        self._scenario, margin = scenario, self._margin
+        self._scenario = scenario
+        margin = self._margin
         across, down = scenario.warehouse_width, scenario.warehouse_height
         self._scale = scale = self._longer_side / max(across, down)
         self.floor = Rect(0, margin, round(scale * across), round(scale * down))
@@ -120,21 +121,21 @@ class Picture:
         pictures = {name: sprites.robot(radius, name, 0, False) for name in palette.ACTIVITIES}
         pictures["requested item"] = sprites.item(0.9 * radius, True)
         pictures["timer"] = sprites.halo(0.6 * radius, 0)
-        placed = []
+        entries = []
         x, y = self._margin, self._caption + 2 * self._line
         for name, picture in pictures.items():
             word = words(name, height)
             wide = picture.get_width() + gap
             if x + wide + word.get_width() > self.width - self._margin:
                 x, y = self._margin, y + self._line
-            placed += [(picture, (x, y)), (word, (x + wide, y))]
+            entries += [(picture, (x, y)), (word, (x + wide, y))]
             x += wide + word.get_width() + height
-        return placed
+        return entries
 
     def _pixels(self, positions: NDArray[np.float64]) -> list[Point]:
         """Return positions (K, 2) [m] as K pixels."""
-        placed = positions * (self._scale, -self._scale) + self.floor.bottomleft
-        return [(x, y) for x, y in np.rint(placed).astype(int).tolist()]
+        pixels = positions * (self._scale, -self._scale) + self.floor.bottomleft
+        return [(x, y) for x, y in np.rint(pixels).astype(int).tolist()]
 
     def _stamp(self, sprite: Surface, at: Point) -> None:
         self._canvas.blit(sprite, sprite.get_rect(center=at))
@@ -149,8 +150,9 @@ class Picture:
         steps = np.rint(np.degrees(state.robot_heading) / _HEADING_STEP).astype(int)
         headings = (_HEADING_STEP * steps % 360).tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
-            does, is_faulty = palette.activity(state, robot), bool(state.failed[robot])
-            sprite = sprites.robot(self._robot_radius, does, headings[robot], is_faulty)
+            activity = palette.activity(state, robot)
+            is_faulty = bool(state.failed[robot])
+            sprite = sprites.robot(self._robot_radius, activity, headings[robot], is_faulty)
             self._stamp(sprite, robots[robot])
 
     def _draw_arrow(self, start: Point, end: Point) -> None:
@@ -161,7 +163,8 @@ class Picture:
         tip = offset.length() - self._robot_radius - 2.0
         if tip < self._robot_radius + head:
             return
-        half, neck = width / 2, tip - head
+        half = width / 2
+        neck = tip - head
         side = [(0.0, half), (neck, half), (neck, 0.45 * head), (tip, 0.0)]
         corners = side + [(x, -y) for x, y in reversed(side)]
         angle = Vector2(1.0, 0.0).angle_to(offset)

@@ -207,17 +207,18 @@ def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
 def _palette() -> bytes:
     pixels = np.zeros((_PALETTE_SIDE**2, 4), np.uint8)
     colours = film_colours()
-    pixels[: len(colours), :3], pixels[: len(colours), 3] = colours, 255
+    pixels[: len(colours), :3] = colours
+    pixels[: len(colours), 3] = 255
     # The last colour is transparent and stands for what did not change.
     return pixels.tobytes()
 
 
 def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> int:
-    coming = iter(frames)
-    first = next(coming, None)
-    if first is None:
+    frame_iterator = iter(frames)
+    first_frame = next(frame_iterator, None)
+    if first_frame is None:
         raise SetupError("a film needs at least one frame")
-    height, width, _ = first.shape
+    height, width, _ = first_frame.shape
     pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
     source = [*pixels, "-r", f"{frame_rate:g}", "-i", "-"]
     command = [_ffmpeg(), "-y", "-hide_banner", "-loglevel", "error", *source, *output]
@@ -231,7 +232,7 @@ def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> in
         assert process.stdin is not None
         try:
             with contextlib.suppress(BrokenPipeError):  # ffmpeg has said why it ended
-                for frame in itertools.chain([first], coming):
+                for frame in itertools.chain([first_frame], frame_iterator):
                     process.stdin.write(frame.tobytes())
                     count += 1
         except BaseException:

@@ -79,8 +79,8 @@ def robot(radius: float, activity: str, heading: int, is_faulty: bool) -> Surfac
     sheet = _sheet(nose, INK)
     corners = Vector2(nose, 0.0), Vector2(base, half_width), Vector2(base, -half_width)
     middle = Vector2(sheet.get_rect().center)
-    turned = [middle + _LARGER * corner.rotate(-heading) for corner in corners]
-    pygame.draw.polygon(sheet, INK, turned)
+    vertices = [middle + _LARGER * corner.rotate(-heading) for corner in corners]
+    pygame.draw.polygon(sheet, INK, vertices)
     _disc(sheet, INK, radius)
     _disc(sheet, ACTIVITIES[activity], radius * (0.7 if is_faulty else 0.87) - 0.4)
     if activity != "searching":

@@ -17,13 +17,17 @@ from .structs import Grid, Nearby, Sensed, World
 @inlined_kernel
 def choose(me: int, world: World, grid: Grid, n_found: int, purpose: int) -> int:
     """List in `nearby.chosen` what `me` sees, and of robots whom it hears; returns how many."""
-    nearby, view_range = world.nearby, world.able.view_range[me]
+    nearby = world.nearby
+    view_range = world.able.view_range[me]
     # Without cameras it does not even see what lies at its centre.
     limit = view_range**2 if view_range > 0.0 else -1.0
-    dropout, n_chosen, step = world.parameters.sensor_dropout, 0, world.progress.step[0]
+    dropout = world.parameters.sensor_dropout
+    n_chosen = 0
+    step = world.progress.step[0]
     for index in range(n_found):
         other, square = grid.members[nearby.slot[index]], nearby.square[index]
-        is_heard, is_seen = purpose == ROBOT_SEEN and nearby.is_heard[index], square <= limit
+        is_heard = purpose == ROBOT_SEEN and nearby.is_heard[index]
+        is_seen = square <= limit
         if dropout > 0.0 and is_seen:
             is_seen = not is_missed(world.robots.sensor_key[me], other, step, purpose, dropout)
         nearby.chosen[n_chosen], nearby.chosen_square[n_chosen] = other, square
@@ -43,7 +47,8 @@ def rank_nearest(nearby: Nearby, count: int, n_wanted: int) -> int:
     squares = nearby.chosen_square
     for index in range(count):
         # Counted without a branch: a few vector instructions for all the others.
-        square, n_nearer = squares[index], 0
+        square = squares[index]
+        n_nearer = 0
         for other in range(index):
             n_nearer += squares[other] <= square
         for other in range(index + 1, count):
@@ -73,7 +78,8 @@ def describe_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed
 def describe_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
     """Fill the blocks of neighbours and of their messages in a row from the chosen neighbours."""
     robots, parameters = world.robots, world.parameters
-    nearby, width = world.nearby, world.robots.message.shape[1]
+    nearby = world.nearby
+    width = world.robots.message.shape[1]
     for rank in range(rank_nearest(nearby, n_chosen, row.N_NEIGHBOURS)):
         index = nearby.nearest[rank]
         other, is_heard = nearby.chosen[index], nearby.chosen_heard[index]

@@ -78,18 +78,18 @@ def place_restocked(world: World, item: int) -> bool:
 
 
 def _draw_centres(
-    scenario: Scenario, seed: int, what: str, count: int, radius: float, obstacles: Numbers
+    scenario: Scenario, seed: int, kind: str, count: int, radius: float, obstacles: Numbers
 ) -> Numbers:
     centres = np.zeros((count, 2))
     high_x, high_y = scenario.storage_width - radius, scenario.warehouse_height - radius
     reach = scenario.obstacle_radius + radius
     for arrangement in range(_ARRANGEMENTS):
-        again = f" {arrangement}" if arrangement else ""
-        keys = row_keys(seed, f"places of {what}{again}", count)
+        suffix = f" {arrangement}" if arrangement else ""
+        keys = row_keys(seed, f"places of {kind}{suffix}", count)
         if strew(keys, centres, radius, high_x, high_y, obstacles, reach):
             return centres
     raise ScenarioError(
-        f"no room for {count} {what} of radius {radius} m: should be fewer {what}, fewer "
+        f"no room for {count} {kind} of radius {radius} m: should be fewer {kind}, fewer "
         "obstacles or a larger warehouse"
     )
 

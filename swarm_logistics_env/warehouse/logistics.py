@@ -25,14 +25,7 @@ from .demand import ask, close_request, is_requested
 from .grid import look_around
 from .layout import place_restocked
 from .physics import EMPTY_ROBOT, FREE_ITEM, LADEN_ROBOT, NO_ONE, collide_with, put_item
-from .structs import (
-    CARRIED,
-    DELIVERED,
-    NOBODY,
-    STORED,
-    Integers,
-    World,
-)
+from .structs import CARRIED, DELIVERED, NOBODY, STORED, Integers, World
 
 FORWARD, LEFT, TURN, GRIPPER, MESSAGE = range(5)  # columns of a command row; messages are the rest
 # Columns of `Robots.handling`, and the kinds that the first one holds.
@@ -80,16 +73,18 @@ def drive(world: World) -> None:
         left = min(max(commands[robot, LEFT], -1.0), 1.0) if parameters.is_holonomic else 0.0
         norm = math.sqrt(forward * forward + left * left)
         speed = able.max_speed[robot] / max(norm, 1.0)
-        turn, most = min(max(commands[robot, TURN], -1.0), 1.0), able.max_turn_rate[robot]
-        drift = robots.heading_drift[robot] if most > 0.0 else 0.0
-        angle = (turn * most + drift) * parameters.control_period
+        turn = min(max(commands[robot, TURN], -1.0), 1.0)
+        max_turn_rate = able.max_turn_rate[robot]
+        drift = robots.heading_drift[robot] if max_turn_rate > 0.0 else 0.0
+        angle = (turn * max_turn_rate + drift) * parameters.control_period
         heading = robots.heading[robot]
         cosine, sine = math.cos(heading + 0.5 * angle), math.sin(heading + 0.5 * angle)
         wanted_velocity[robot, 0] = speed * (forward * cosine - left * sine)
         wanted_velocity[robot, 1] = speed * (forward * sine + left * cosine)
         if angle != 0.0:
-            turned = heading + angle
-            robots.heading[robot] = turned - 2.0 * math.pi * round(turned / (2.0 * math.pi))
+            new_heading = heading + angle
+            n_turns = round(new_heading / (2.0 * math.pi))
+            robots.heading[robot] = new_heading - 2.0 * math.pi * n_turns
 
 
 @inlined_kernel
@@ -132,7 +127,8 @@ def is_being_lifted(world: World, item: int) -> bool:
     """Return whether a robot is about to lift an item."""
     if world.parameters.handling_steps == 0:
         return False
-    handling, is_lifted = world.robots.handling, False
+    handling = world.robots.handling
+    is_lifted = False
     for robot in range(len(handling)):
         is_lifted |= handling[robot, KIND] == LIFTING and handling[robot, ITEM] == item
     return is_lifted
@@ -364,7 +360,9 @@ def deliver(world: World) -> tuple[int, bool]:
     Returns how many there were, and whether all that came back found room.
     """
     robots, items, progress, engine = world.robots, world.items, world.progress, world.engine
-    n_delivered, is_room, index = 0, True, 0
+    n_delivered = 0
+    is_room = True
+    index = 0
     while index < len(progress.requested) and progress.requested[index] != NOBODY:
         item = progress.requested[index]
         robot = items.carrier[item]

@@ -112,9 +112,9 @@ def put_item(engine: Engine, item: int, position: Numbers) -> None:
 
 
 @kernel
-def collide_with(engine: Engine, shape: int, whom: int) -> None:
+def collide_with(engine: Engine, shape: int, categories: int) -> None:
     """Give a shape a filter, of no group."""
-    call_at(engine.functions.cpShapeSetFilter, (shape, (0, whom)))
+    call_at(engine.functions.cpShapeSetFilter, (shape, (0, categories)))
 
 
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other

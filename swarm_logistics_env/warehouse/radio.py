@@ -16,7 +16,8 @@ def send_messages(world: World) -> None:
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
     robots, able, step = world.robots, world.able, world.progress.step[0]
     message, before = robots.message, robots.message_before
-    n, n_kept = len(message), len(robots.told_before)
+    n = len(message)
+    n_kept = len(robots.told_before)
     for robot in range(n):
         sends = robots.present[robot] and able.obeys[robot]
         for part in range(message.shape[1]):
@@ -44,7 +45,8 @@ def run_timers(world: World) -> None:
     for robot in range(len(robots.timer)):
         if robots.in_delivery[robot]:
             robots.last_in_delivery[robot] = step
-        timer, is_present = math.nan, robots.present[robot]
+        timer = math.nan
+        is_present = robots.present[robot]
         if is_present and robots.last_in_delivery[robot] >= 0:
             elapsed = (step - robots.last_in_delivery[robot]) * period
             timer = elapsed if elapsed < limit else timer

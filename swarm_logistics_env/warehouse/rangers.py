@@ -68,7 +68,8 @@ def scan_discs(
     pose: Pose, reach: float, radius: float, grid: Grid, nearby: Nearby, n_found: int, scan: Sensed
 ) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet discs nearby, within `reach` [m]."""
-    limit, n_scanned = (reach + radius) ** 2, 0
+    limit = (reach + radius) ** 2
+    n_scanned = 0
     # Written always and counted only if near: no branch to mispredict.
     for index in range(n_found):
         nearby.scanned[n_scanned] = index

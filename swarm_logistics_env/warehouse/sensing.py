@@ -29,7 +29,8 @@ def sense(world: World, rows: Sensed) -> int:
 
     Returns how many robots that have not failed touch one that has.
     """
-    robots, n_anchored = world.robots, 0
+    robots = world.robots
+    n_anchored = 0
     for me in range(len(rows)):
         rows[me, :] = 0.0
         robots.contact[me] = False
@@ -110,7 +111,8 @@ def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     forward = velocity_x * pose.cosine + velocity_y * pose.sine
     left = velocity_y * pose.cosine - velocity_x * pose.sine
     limit = parameters.max_speed
-    carried, timer = robots.item[me], robots.timer[me]
+    carried = robots.item[me]
+    timer = robots.timer[me]
     runs = not math.isnan(timer)
     out[row.CARRYING] = 1.0 if carried != NOBODY else 0.0
     out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and is_requested(world, carried) else 0.0

@@ -38,7 +38,8 @@ def disturb(me: int, world: World, out: Sensed) -> None:
     What is measured stays within the column's range.
     """
     parameters = world.parameters
-    key, first = world.robots.sensor_key[me], world.progress.step[0] * _DRAWS
+    key = world.robots.sensor_key[me]
+    first = world.progress.step[0] * _DRAWS
     if parameters.ranger_noise > 0.0 or parameters.sensor_dropout > 0.0:
         disturb_beams(key, first, full_range(world, me), parameters, out)
     if parameters.position_noise > 0.0:
@@ -81,8 +82,10 @@ def disturb_positions(key: np.uint64, first: int, parameters: Parameters, out: S
 @kernel
 def fail_rangers(me: int, world: World, out: Sensed) -> None:
     """Make of the beams in a row what rangers that have failed report, in place."""
-    able, frozen = world.able, world.robots.frozen_beams[me]
-    bias, reach = able.ranger_bias[me], full_range(world, me)
+    able = world.able
+    frozen = world.robots.frozen_beams[me]
+    bias = able.ranger_bias[me]
+    reach = full_range(world, me)
     if bias != 0.0:
         for beam in range(N_RANGES):
             if out[beam] < np.float32(reach):

@@ -87,8 +87,8 @@ class FaultInjection(Wrapper):
     @property
     def failed_robots(self) -> tuple[int, ...]:
         """The robots that this wrapper's faults affect in this episode, ascending."""
-        named = [fault.robots for fault in self.injected if isinstance(fault.robots, tuple)]
-        return tuple(sorted(set().union(*named)))
+        groups = [fault.robots for fault in self.injected if isinstance(fault.robots, tuple)]
+        return tuple(sorted(set().union(*groups)))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's faults added to theirs."""
@@ -117,15 +117,15 @@ class FaultInjection(Wrapper):
             onsets = [draw(self._onset, rng)]
         if isinstance(self._fault.robots, tuple):
             return tuple(self._fault.replace(onset=onset) for onset in onsets)
-        faults, before = [], set[int]()
+        faults, failed = [], set[int]()
         size = self._fault.robots
         for number, onset in enumerate(onsets, start=1):
             # The first group has to exist; later groups are drawn from the robots that are left.
             group = self._fault.replace(robots=max(size, min(number * size, n_robots)))
-            chosen = set(failed_robots(group, seed, n_robots).tolist())
-            if more := tuple(sorted(chosen - before)):
-                faults.append(self._fault.replace(robots=more, onset=onset))
-            before = chosen
+            failing = set(failed_robots(group, seed, n_robots).tolist())
+            if new_robots := tuple(sorted(failing - failed)):
+                faults.append(self._fault.replace(robots=new_robots, onset=onset))
+            failed = failing
         return tuple(faults)
 
 

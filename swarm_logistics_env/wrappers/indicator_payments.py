@@ -35,7 +35,8 @@ class GivenPerformances:
     def __init__(
         self, performances: Mapping[Condition, float], *, whatever_changes: bool = False
     ) -> None:
-        self._performances, self._whatever_changes = dict(performances), whatever_changes
+        self._performances = dict(performances)
+        self._whatever_changes = whatever_changes
         for condition, items in self._performances.items():
             if not isinstance(condition, Condition):
                 raise SetupError(f"references: key {condition!r} should be a Condition")
@@ -224,7 +225,8 @@ def derivative_of(name: str, condition: Condition, base: Scenario, means: Runnin
     Summed over the conditions that have it as reference, each as often as it was played, so that
     the mean return over all episodes has the gradient of the mean indicator.
     """
-    slope, mean = 0.0, means.mean(condition)
+    slope = 0.0
+    mean = means.mean(condition)
     if mean is None:
         return Payment()
     for tested in means.conditions:

@@ -124,7 +124,8 @@ class IndicatorReward(Wrapper):
         self.weights = _checked_weights(weights)
         if credit not in CREDITS:
             raise SetupError(f"credit = {credit!r}{suggest(str(credit), CREDITS)}")
-        self.credit, self.constant = credit, constant
+        self.credit = credit
+        self.constant = constant
         self.own_reward = finite_number("own_reward", own_reward)
         self._base = self.unwrapped.scenario
         self.condition = Condition(self._base.n_robots)
@@ -145,7 +146,8 @@ class IndicatorReward(Wrapper):
             self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._base)))
         self.payments: dict[str, Payment] = {}
         self._indicators: dict[str, Payment] = {}
-        self._is_over, self._delivered = False, 0
+        self._is_over = False
+        self._delivered = 0
 
     def payments_of(self, condition: Condition) -> dict[str, Payment]:
         """Return what an episode of that condition would pay, by indicator; unweighted.
@@ -155,11 +157,11 @@ class IndicatorReward(Wrapper):
         """
         payments = {}
         for name in self.weights:
-            paid = indicator_of(name, condition, self._base, self._references) or Payment()
+            payment = indicator_of(name, condition, self._base, self._references) or Payment()
             if isinstance(self._references, RunningMeans):
                 slope = derivative_of(name, condition, self._base, self._references)
-                paid = Payment(paid.share + slope.share, paid.constant + slope.constant)
-            payments[name] = paid
+                payment = Payment(payment.share + slope.share, payment.constant + slope.constant)
+            payments[name] = payment
         return payments
 
     @property
@@ -194,7 +196,8 @@ class IndicatorReward(Wrapper):
         if self._is_over:
             self.measured.add(self.condition, self._delivered)
         self._is_over = False
-        self._paid, self._delivered = Payment(), 0
+        self._paid = Payment()
+        self._delivered = 0
         self._take_condition()
 
     def after_step(self, outcome: ArrayStep) -> ArrayStep:
@@ -215,14 +218,14 @@ class IndicatorReward(Wrapper):
     def _pay(
         self, rewards: NDArray[np.float64], deliverers: list[int], present: NDArray[np.bool_]
     ) -> None:
-        once = self._due.constant - self._paid.constant
+        lump_sum = self._due.constant - self._paid.constant
         # Items that were delivered before a change in mid-run were paid another share.
-        once += (self._due.share - self._paid.share) * self._delivered
+        lump_sum += (self._due.share - self._paid.share) * self._delivered
         self._paid = self._due
         if self.credit == "team":
-            rewards[present] += once + self._due.share * len(deliverers)
+            rewards[present] += lump_sum + self._due.share * len(deliverers)
             return
-        rewards[present] += once / max(int(np.count_nonzero(present)), 1)
+        rewards[present] += lump_sum / max(int(np.count_nonzero(present)), 1)
         for robot in deliverers:
             rewards[robot] += self._due.share
 
@@ -234,9 +237,9 @@ class IndicatorReward(Wrapper):
             for name in self.weights
             if (indicator := indicator_of(name, self.condition, self._base, self._references))
         }
-        weighted = [(self.weights[name], paid) for name, paid in self.payments.items()]
-        share = sum(weight * paid.share for weight, paid in weighted)
-        constant = sum(weight * paid.constant for weight, paid in weighted)
+        weighted = [(self.weights[name], payment) for name, payment in self.payments.items()]
+        share = sum(weight * payment.share for weight, payment in weighted)
+        constant = sum(weight * payment.constant for weight, payment in weighted)
         self._due = Payment(share, constant if self.constant else 0.0)
 
 

@@ -213,12 +213,12 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
     def _declare(self, name: str, values: Iterable[Any]) -> tuple[Scenario, ...]:
         """Declare the spaces of all scenarios with one of these values of a field; return them."""
         scenarios = self.env.scenarios
-        changed = dict.fromkeys(
+        declared = dict.fromkeys(
             scenario.replace(**{name: value}) for scenario in scenarios for value in values
         )
-        for scenario in changed:
+        for scenario in declared:
             self.declare_spaces(scenario)
-        return tuple(changed)
+        return tuple(declared)
 
     def _n_alike_inside(self) -> int:
         """Return the number of wrappers of the same class inside; it gives each its own draws."""

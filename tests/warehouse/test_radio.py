@@ -46,3 +46,12 @@ def test_who_is_seen_and_not_heard_tells_neither_its_timer_nor_a_message(build: 
     assert rows[1, at + 3 : at + 5].tolist() == [0.0, world.scenario.timer_limit]
     assert rows[1, row.MESSAGES : row.MESSAGES + 2].tolist() == [0.5, 0.0]
     assert rows[2, row.MESSAGES : row.MESSAGES + 2].tolist() == [0.5, 0.5]
+
+
+def test_a_liar_whose_radio_is_late_as_well_tells_zero_at_once(build: Build) -> None:
+    faults = [Fault("FM1", (0,)), Fault("radio_delayed", (0,))]
+    world = build([(8.1, 5.0), (7.0, 5.0)], [FAR], faults)
+    for step in range(40):
+        steps(world, WEST if step < 3 else STAY, STAY)
+        assert world.state.robot_told[0] == 0.0
+    assert world.state.robot_timer[0] > 2.5
