@@ -228,7 +228,7 @@ def maker(
     n_robots: int | Sequence[int] | None,
     fields: Mapping[str, Any],
 ) -> Callable[[int], World]:
-    """Return what makes plain environments, of one size or of several in turn.
+    """Return a function that makes plain environments, of one size or of several in turn.
 
     Raises:
         SetupError: there are no sizes, or more than worlds.

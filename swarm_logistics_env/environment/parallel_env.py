@@ -219,7 +219,7 @@ class SwarmLogisticsEnv(DictView):
         return self._rewards.pays_steadily or self.max_cycles is not None
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
-        """Return what `step_arrays` does of the step that the warehouse has just taken."""
+        """Return the result of `step_arrays` for the step that the warehouse has just taken."""
         world = self.warehouse
         was_present = self._present
         n = len(was_present)

@@ -45,7 +45,7 @@ class RewardTerms:
         self._before = Before(world)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
-        """Return what the step just taken earns each robot, (N,)."""
+        """Return the reward of the step just taken, (N,): one number for each robot."""
         total = np.zeros(world.state.n_robots)
         for term, weight in self._terms:
             earned = term(world, self._before)

@@ -78,7 +78,7 @@ def mark(modes: tuple[str, ...]) -> str:
 
 
 def activity(state: WarehouseState, robot: int) -> str:
-    """Return what a robot does, a key of `ACTIVITIES`."""
+    """Return the activity of a robot, a key of `ACTIVITIES`."""
     if state.robot_item[robot] == NOBODY:
         return "searching"
     return "delivering" if state.carries_requested[robot] else "shuffling"

@@ -115,7 +115,7 @@ class Picture:
         picture.set_clip(None)
 
     def _legend(self) -> list[tuple[Surface, Point]]:
-        """Return what the colours mean, as pictures and words, each with its left end."""
+        """Return the legend of colours: pictures and words, each with its left end."""
         height = self._text_height
         radius, gap = 0.42 * height, height // 4
         pictures = {name: sprites.robot(radius, name, 0, False) for name in palette.ACTIVITIES}

@@ -80,7 +80,7 @@ def next_item(world: World) -> int:
 
 @kernel
 def next_of_cycle(world: World) -> int:
-    """Return what this cycle asks for after the item that it asked for last; NOBODY: nothing.
+    """Return the item that this cycle asks for after its last one, or NOBODY.
 
     Each item draws a number in every cycle; the lowest comes first, of equal ones the first item.
     """

@@ -152,7 +152,7 @@ def item_lifted(world: World, robot: int) -> tuple[int, float]:
 
 @kernel
 def end_handling(world: World) -> None:
-    """Let robots go on whose time is over."""
+    """Make those robots idle whose handling time is over."""
     handling = world.robots.handling
     for robot in range(len(handling)):
         if handling[robot, LAST_STEP] <= world.progress.step[0]:

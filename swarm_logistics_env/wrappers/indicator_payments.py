@@ -220,7 +220,7 @@ def indicator_of(
 
 
 def derivative_of(name: str, condition: Condition, base: Scenario, means: RunningMeans) -> Payment:
-    """Return what an episode pays for being a reference of others: the derivative, centred.
+    """Return the payment of an episode as a reference of others: the derivative, centred.
 
     Summed over the conditions that have it as reference, each as often as it was played, so that
     the mean return over all episodes has the gradient of the mean indicator.

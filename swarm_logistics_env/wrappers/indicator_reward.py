@@ -150,7 +150,7 @@ class IndicatorReward(Wrapper):
         self._delivered = 0
 
     def payments_of(self, condition: Condition) -> dict[str, Payment]:
-        """Return what an episode of that condition would pay, by indicator; unweighted.
+        """Return the unweighted payments of an episode of that condition, by indicator.
 
         Raises:
             SetupError: a reference is missing or 0, or an indicator is undefined.

@@ -15,12 +15,12 @@ from tests.warehouse.conftest import FAR, STAY, WEST, Build, steps
 def test_gossip_ends_at_the_timers_limit_however_often_it_was_passed_on(build: Build) -> None:
     world = build([(8.1, 5.0), (7.6, 5.0), (7.6, 5.5)], [FAR], relay="gossip", timer_limit=1.0)
     state = world.state
-    told = []
+    n_tellers = []
     for step in range(30):
         rows = steps(world, WEST if step < 3 else STAY, STAY, STAY)
         assert (np.isnan(state.robot_told) | (state.robot_told < 1.0)).all()
-        told.append(int((~np.isnan(state.robot_told)).sum()))
-    assert (max(told), told[-1]) == (3, 0)
+        n_tellers.append(int((~np.isnan(state.robot_told)).sum()))
+    assert (max(n_tellers), n_tellers[-1]) == (3, 0)
     assert not rows[:, row.LOWEST_TIMER].any()
 
 

@@ -67,9 +67,9 @@ class Plain:
     def __init__(self, world: Warehouse, me: int) -> None:
         self.state, self.scenario, self.me = world.state, world.scenario, me
         self.modes = [set(modes) for modes in world.state.failure_modes]
-        there = world.state.robot_present.copy()
-        there[me] = False
-        self.others = np.flatnonzero(there)
+        is_other = world.state.robot_present.copy()
+        is_other[me] = False
+        self.others = np.flatnonzero(is_other)
         self.items = np.flatnonzero(world.state.item_status == STORED)
 
     def row(self) -> NDArray[np.float64]:
@@ -78,8 +78,8 @@ class Plain:
         blocks = (self.scans(), self.items_in_view(), self.robots_near(), self.itself())
         return np.concatenate([np.ravel(block) for block in blocks])
 
-    def seen(self, places: NDArray[np.float64]) -> NDArray[np.complex128]:
-        away = (places - self.state.robot_position[self.me]) @ np.array([1.0, 1j])
+    def seen(self, positions: NDArray[np.float64]) -> NDArray[np.complex128]:
+        away = (positions - self.state.robot_position[self.me]) @ np.array([1.0, 1j])
         return np.asarray(away * np.exp(-1j * self.state.robot_heading[self.me]))
 
     @property
@@ -90,57 +90,60 @@ class Plain:
     def scans(self) -> list[NDArray[np.float64]]:
         s, state = self.scenario, self.state
         to_obstacles = to_discs(self.seen(state.obstacle_position), s.obstacle_radius)
-        found = [
+        scans = [
             to_discs(self.seen(state.robot_position[self.others]), s.robot_radius),
             np.minimum(self.to_walls(), to_obstacles),
             to_discs(self.seen(state.item_position[self.items]), s.item_radius),
         ]
         modes = self.modes[self.me]
         shift = 99.0 * bool({"rangers_blind", "dead"} & modes) + 0.2 * ("rangers_biased" in modes)
-        return [np.minimum(each + shift, s.ranger_range) for each in found]
+        return [np.minimum(scan + shift, s.ranger_range) for scan in scans]
 
     def to_walls(self) -> NDArray[np.float64]:
         """Return how far each beam goes until it leaves the arena."""
-        way = BEAMS * np.exp(1j * self.state.robot_heading[self.me])
+        directions = BEAMS * np.exp(1j * self.state.robot_heading[self.me])
         nearest = np.full(row.N_BEAMS, np.inf)
         sides = (self.scenario.warehouse_width, self.scenario.warehouse_height)
         for at, along, side in zip(
-            self.state.robot_position[self.me], (way.real, way.imag), sides, strict=True
+            self.state.robot_position[self.me],
+            (directions.real, directions.imag),
+            sides,
+            strict=True,
         ):
             far = np.where(along > 0.0, side, 0.0) - at
             nearest = np.minimum(nearest, np.where(np.abs(along) > 1e-12, far / along, np.inf))
         return np.asarray(np.maximum(nearest, 0.0))
 
     def items_in_view(self) -> NDArray[np.float64]:
-        block, place = np.zeros((row.N_ITEMS_IN_VIEW, 5)), 0
+        block, rank = np.zeros((row.N_ITEMS_IN_VIEW, 5)), 0
         away = self.seen(self.state.item_position[self.items])
-        for at in np.argsort(abs(away))[: row.N_ITEMS_IN_VIEW]:
-            if abs(away[at]) <= self.view:
-                item = self.items[at]
+        for index in np.argsort(abs(away))[: row.N_ITEMS_IN_VIEW]:
+            if abs(away[index]) <= self.view:
+                item = self.items[index]
                 is_known = item in self.state.robot_memory[self.me]
-                asked = item == self.state.requested
-                block[place] = 1, away[at].real, away[at].imag, asked, is_known
-                place += 1
+                is_requested = item == self.state.requested
+                block[rank] = 1, away[index].real, away[index].imag, is_requested, is_known
+                rank += 1
         return block
 
     def robots_near(self) -> NDArray[np.float64]:
         """Return the neighbours, nearest first, and the teller of the lowest timer heard."""
         deaf, mute = {"FM3", "FM3_hear", "dead"}, {"FM3", "FM3_send", "dead"}
-        block, place, tellers = np.zeros((row.N_NEIGHBOURS, 5)), 0, []
+        block, rank, tellers = np.zeros((row.N_NEIGHBOURS, 5)), 0, []
         away = self.seen(self.state.robot_position[self.others])
-        for at in np.argsort(abs(away)):
-            other, x, y = self.others[at], away[at].real, away[at].imag
+        for index in np.argsort(abs(away)):
+            other, x, y = self.others[index], away[index].real, away[index].imag
             is_mute = deaf & self.modes[self.me] or mute & self.modes[other]
-            is_heard = abs(away[at]) <= self.scenario.radio_range and not is_mute
-            told = self.state.robot_told[other]
-            tells = is_heard and not math.isnan(told)
+            is_heard = abs(away[index]) <= self.scenario.radio_range and not is_mute
+            timer = self.state.robot_told[other]
+            tells = is_heard and not math.isnan(timer)
             if tells:
-                tellers.append((told, abs(away[at]), x, y))
-            if (is_heard or abs(away[at]) <= self.view) and place < row.N_NEIGHBOURS:
-                block[place] = 1, x, y, tells, told if tells else self.scenario.timer_limit
-                place += 1
-        told, _, x, y = min(tellers, default=(0.0, 0.0, 0.0, 0.0))
-        return np.array([*block.ravel(), bool(tellers), x, y, told])
+                tellers.append((timer, abs(away[index]), x, y))
+            if (is_heard or abs(away[index]) <= self.view) and rank < row.N_NEIGHBOURS:
+                block[rank] = 1, x, y, tells, timer if tells else self.scenario.timer_limit
+                rank += 1
+        timer, _, x, y = min(tellers, default=(0.0, 0.0, 0.0, 0.0))
+        return np.array([*block.ravel(), bool(tellers), x, y, timer])
 
     def itself(self) -> list[float]:
         s, state, me = self.scenario, self.state, self.me
@@ -167,8 +170,8 @@ class Plain:
             (state.item_position[solid[: len(solid) * (state.robot_item[self.me] != NOBODY)]],
              s.item_radius),
         ]  # fmt: skip
-        for places, radius in things:
-            gaps += (abs(self.seen(places)) - radius).tolist()
+        for positions, radius in things:
+            gaps += (abs(self.seen(positions)) - radius).tolist()
         return float(min(gaps)) - s.robot_radius
 
 

@@ -34,24 +34,26 @@ def test_noise_leaves_beams_that_meet_nothing_as_they_are() -> None:
 
 
 def test_what_is_missed_is_drawn_for_each_robot_thing_and_sense_alone(build: Build) -> None:
-    places = np.array([(1.0, 5.0), (1.4, 5.0), (2.0, 5.0)])
+    positions = np.array([(1.0, 5.0), (1.4, 5.0), (2.0, 5.0)])
     world = build(
-        places, [(1.2, 5.5)], radio_loss=0.5, sensor_dropout=0.5, message_size=1, view_range=2.0
+        positions, [(1.2, 5.5)], radio_loss=0.5, sensor_dropout=0.5, message_size=1, view_range=2.0
     )
-    n, far = len(places), np.abs(places[:, :1] - places[:, 0])
+    n, distance = len(positions), np.abs(positions[:, :1] - positions[:, 0])
     missed = []
     for _ in range(250):
         rows = world.step(np.hstack([np.zeros((n, 4)), np.ones((n, 1))]))
-        heard, there = np.zeros((n, n), bool), np.zeros((n, n), bool)
+        heard, seen = np.zeros((n, n), bool), np.zeros((n, n), bool)
         for me in range(n):
-            for place in range(n - 1):
-                at = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * place
-                if rows[me, at]:
-                    other = np.abs(far[me] - np.hypot(*rows[me, at + 1 : at + 3])).argmin()
-                    there[me, other], heard[me, other] = True, rows[me, row.MESSAGES + place]
+            for rank in range(n - 1):
+                column = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * rank
+                if rows[me, column]:
+                    other = np.abs(
+                        distance[me] - np.hypot(*rows[me, column + 1 : column + 3])
+                    ).argmin()
+                    seen[me, other], heard[me, other] = True, rows[me, row.MESSAGES + rank]
         items = rows[:, row.ITEMS] > 0.5
         pairs = ~np.eye(n, dtype=bool)
-        missed.append([*heard[pairs], *items, (there & ~heard)[0, 2], (there & ~heard)[2, 0]])
+        missed.append([*heard[pairs], *items, (seen & ~heard)[0, 2], (seen & ~heard)[2, 0]])
     shares = np.mean(missed, axis=0)
     assert shares[:9] == pytest.approx(np.full(9, 0.5), abs=0.12)
     assert shares[9:] == pytest.approx(np.full(2, 0.25), abs=0.1), "seen, though not heard"
@@ -63,14 +65,14 @@ def test_what_is_missed_is_drawn_for_each_robot_thing_and_sense_alone(build: Bui
 
 
 def test_every_error_is_drawn_by_itself(build: Build) -> None:
-    places = [(1.0, 1.0), (1.4, 1.0), (1.0, 1.4), (1.4, 1.4)]
-    items = [(x + 0.2, y + 0.2) for x, y in places] + [(0.6, 1.2), (1.2, 0.6)]
+    positions = [(1.0, 1.0), (1.4, 1.0), (1.0, 1.4), (1.4, 1.4)]
+    items = [(x + 0.2, y + 0.2) for x, y in positions] + [(0.6, 1.2), (1.2, 0.6)]
     exact, noisy = (
-        build(places, items, warehouse_width=3.0, warehouse_height=2.0, delivery_width=1.0,
+        build(positions, items, warehouse_width=3.0, warehouse_height=2.0, delivery_width=1.0,
               ranger_noise=noise, position_noise=noise)
         for noise in (0.0, 0.01)
     )  # fmt: skip
-    stay = np.zeros((len(places), 4))
+    stay = np.zeros((len(positions), 4))
     errors = np.array([(noisy.step(stay) - exact.step(stay)).ravel() for _ in range(60)])
     errors = errors[:, errors.std(axis=0) > 1e-4]
     assert errors.shape[1] > 100
