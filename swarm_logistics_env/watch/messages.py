@@ -156,7 +156,7 @@ def _arena(play: Play) -> Message:
         age = int(_TIMER_STEPS * ages[robot]) if ages[robot] < 1.0 else None
         mark = palette.mark(state.failure_modes[robot])
         robots.append(
-            [palette.activity(state, robot), age, mark, palette.followed(state, scenario, robot)]
+            [palette.activity(state, robot), age, mark, palette.leader_of(state, scenario, robot)]
         )
     asked, stored = state.item_requested, state.item_status == STORED
     places, carriers = _millimetres(state.item_position[asked]), state.item_carrier[asked].tolist()
