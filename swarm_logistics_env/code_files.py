@@ -135,9 +135,8 @@ def is_users_own(file: str | None) -> bool:
     path = Path(file).absolute()
     # Another environment's packages may be on the path, too.
     is_package = not {"site-packages", "dist-packages"}.isdisjoint(path.parts)
-    return not is_package and not any(
-        path.is_relative_to(folder) for folder in _installed_folders()
-    )
+    is_installed = any(path.is_relative_to(folder) for folder in _installed_folders())
+    return not is_package and not is_installed
 
 
 @functools.cache

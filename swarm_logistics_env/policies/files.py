@@ -6,10 +6,11 @@ without Python. Models that stable-baselines3 saved execute the code in them whe
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -263,3 +264,22 @@ class StableBaselinesPolicy(StableBaselinesModel):
                 f"{path} maps observations {shapes[0]} to commands {shapes[1]}: should map "
                 f"{row_shape} to {command_shape}"
             )
+
+
+def maker_of_file(name: str, trust_code: bool) -> Callable[..., Policy] | None:
+    """Return what reads the policy file of that path; None: its name is not one of a policy file.
+
+    Raises:
+        PolicyError: reading it would execute the code in it, and nobody trusts that.
+    """
+    path = Path(name)
+    if path.suffix == SUFFIX:
+        return functools.partial(read_policy, path)
+    if path.suffix == SB3_SUFFIX:
+        if not trust_code:
+            raise PolicyError(
+                f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
+                "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
+            )
+        return functools.partial(StableBaselinesPolicy, path)
+    return None

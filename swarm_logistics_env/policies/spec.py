@@ -32,7 +32,7 @@ from swarm_logistics_env.policies.files import (
     SB3_SUFFIX,
     SUFFIX,
     StableBaselinesModel,
-    StableBaselinesPolicy,
+    maker_of_file,
     read_card,
     read_policy,
 )
@@ -87,12 +87,8 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
             f"policy {name!r} is {len(trainings)} trainings: should name one of "
             f"{', '.join(trainings)}"
         )
-    make = (
-        NAMES.get(name)
-        or _entry_point_maker(name)
-        or _file_maker(name, trust_code)
-        or _import_maker(name)
-    )
+    make = NAMES.get(name) or _entry_point_maker(name) or maker_of_file(name, trust_code)
+    make = make or _import_maker(name)
     if make is None:
         names = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         hint = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, names)
@@ -268,7 +264,7 @@ class PolicySpec(Record):
         if makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         if makers and self.name.endswith(SB3_SUFFIX):
-            _file_maker(self.name, self.trusted)  # refuses what nobody trusts
+            maker_of_file(self.name, self.trusted)  # refuses what nobody trusts
             return StableBaselinesModel(Path(self.name))
         return load(self.name, trust_code=self.trusted, **self.parameters)
 
@@ -364,20 +360,6 @@ def _entry_point_maker(name: str) -> Callable[..., Policy] | None:
     for point in entry_points(group=ENTRY_POINTS, name=name):
         maker: Callable[..., Policy] = point.load()
         return maker
-    return None
-
-
-def _file_maker(name: str, trust_code: bool) -> Callable[..., Policy] | None:
-    path = Path(name)
-    if path.suffix == SUFFIX:
-        return functools.partial(read_policy, path)
-    if path.suffix == SB3_SUFFIX:
-        if not trust_code:
-            raise PolicyError(
-                f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
-                "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
-            )
-        return functools.partial(StableBaselinesPolicy, path)
     return None
 
 

@@ -78,17 +78,14 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
     def _pad(
         self, active: Sequence[str], observations: ByAgent, infos: ByAgent
     ) -> tuple[ByAgent, ByAgent]:
-        padded_observations: ByAgent = {}
+        padded: ByAgent = {}
         padded_infos: ByAgent = {}
         for agent in self.possible_agents:
             is_active = agent in active
             padded_infos[agent] = {**infos.get(agent, {}), "active": int(is_active)}
-            padded_observations[agent] = (
-                observations[agent]
-                if is_active
-                else create_zero_array(self.observation_space(agent))
-            )
-        return padded_observations, padded_infos
+            space = self.observation_space(agent)
+            padded[agent] = observations[agent] if is_active else create_zero_array(space)
+        return padded, padded_infos
 
 
 class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
