@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.warehouse.packing import unpacked_at
+from swarm_logistics_env.warehouse.addresses import unpacked_at
 from swarm_logistics_env.warehouse.physics import advance
 from swarm_logistics_env.warehouse.structs import World
 

@@ -1,47 +1,21 @@
 """Compilation of the package's kernels, and the random numbers they draw.
 
-A kernel is compiled when it is first called, with all that it calls, and kept on disk.
+`numba_fence` says which way they are compiled; both ways give the same bits.
 """
 
 from __future__ import annotations
 
-import contextlib
-import functools
-import hashlib
-import importlib
-import io
 import math
-import multiprocessing
-import os
-import sys
-import time
-import warnings
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import config, types
-from numba.core.caching import IndexDataCacheFile, NullCache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
-from numba.core.compiler_lock import global_compiler_lock
 
-if TYPE_CHECKING:
-    from rich.progress import Progress
+from swarm_logistics_env.numba_fence import IS_PLAIN
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-QUIET = "SWARM_LOGISTICS_QUIET"  # environment variable of workers: nobody reads what they say
-_CHECKSUM_SIZE = 16  # bytes
-_SILENCE = 1.0  # [s] of compiling that nobody is told of
-_HERE = Path(__file__).parent
-_all_kernels: list[Any] = []
-_parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
-_config, _types = cast("tuple[Any, Any]", (config, types))  # without types
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -51,7 +25,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     that a second process starts at once; without fast-math, so that results are the same bits
     wherever they run; and with numpy's division, which needs no check for zero.
     """
-    return _compiled(function, is_inlined=False)
+    return _compile(function, is_inlined=False)
 
 
 def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -59,254 +33,26 @@ def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
     For small ones that are called in loops: every caller is larger by it.
     """
-    return _compiled(function, is_inlined=True)
+    return _compile(function, is_inlined=True)
 
 
-def _compiled(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
-    # Nobody calls a kernel from C.
-    options: dict[str, Any] = {"forceinline": is_inlined, "no_cfunc_wrapper": True}
-    compiled: Any = numba.njit(function, nogil=True, error_model="numpy", **options)
-    if not _config.DISABLE_JIT:
-        compiled.get_call_template = functools.partial(_call_template, compiled)
-        compiled.compile = functools.partial(_compile, compiled)
-        _all_kernels.append(compiled)
-    return cast("Callable[P, R]", compiled)
+def engine_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function`, which calls C or reads a world by its address, in the fast way alone.
 
-
-def _call_template(compiled: Any, args: tuple[Any, ...], named: dict[str, Any]) -> Any:
-    # A number that stands in the code is no type of its own, or each would be compiled for.
-    plain = tuple(_types.unliteral(kind) for kind in args)
-    return type(compiled).get_call_template(compiled, plain, named)
-
-
-def _compile(compiled: Any, signature: Any) -> Any:
-    """Compile a kernel for a signature, or load it: with all that it calls, if Python calls it."""
-    compile_it = functools.partial(type(compiled).compile, compiled, signature)
-    with global_compiler_lock:
-        if _Report.current is not None:
-            if signature not in compiled.overloads:
-                _part(compiled, compile_it)
-                _Report.current.tell()
-            return compile_it()
-        if signature in _parts.get(compiled, ()):
-            _parts[compiled].remove(signature)
-            del compiled.overloads[signature]  # Python cannot call what is only a part
-        if signature in compiled.overloads:
-            return compile_it()
-        _import_without_blas()
-        with _kept_on_disk(compiled), _Report():
-            return compile_it()
-
-
-@functools.cache
-def _import_without_blas() -> None:
-    """Import numba's functions of arrays, which else import scipy's BLAS first, for .15 s.
-
-    They only ask whether it is there. A kernel of somebody else that needs it imports it then.
+    The plain way leaves it to the interpreter.
     """
-    blas = "scipy.linalg.cython_blas"
-    if blas not in sys.modules:
-        sys.modules[blas] = ModuleType(blas)
-        try:
-            importlib.import_module("numba.np.arraymath")
-        finally:
-            del sys.modules[blas]
+    return function if IS_PLAIN else kernel(function)
 
 
-def _part(compiled: Any, compile_it: Callable[[], Any]) -> None:
-    """Compile what another kernel calls: LLVM is to optimise it there alone, not before as well."""
-    compiler, cache, known = compiled._compiler, compiled._cache, set(compiled.overloads)
-    compiler.pipeline_class, compiled._insert = _PartCompiler, lambda *_: None
-    compiled._cache = NullCache()
-    try:
-        compile_it()
-    finally:
-        compiler.pipeline_class, compiled._cache = Compiler, cache
-        del compiled._insert
-        _parts.setdefault(compiled, set()).update(set(compiled.overloads) - known)
+def _compile(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
+    if IS_PLAIN:
+        # Not kept on disk: numba looks at the kernel's own file alone, not at what it takes from
+        # others, so that code of older sources would run.
+        compiled = numba.njit(function, nogil=True, error_model="numpy", cache=False)
+        return cast("Callable[P, R]", compiled)
+    from swarm_logistics_env.fast_kernels import compile_fast
 
-
-class _PartCompiler(Compiler):
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)  # type: ignore[no-untyped-call]  # numba's
-        state, part = cast("tuple[Any, Any]", (self.state, _PartLibrary))
-        state.library = part(state.targetctx.codegen(), "part")
-        state.flags.no_cpython_wrapper = True
-
-
-class _PartLibrary(JITCodeLibrary):
-    """Code that is only linked into that of others: no machine code is made of it."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        library: Any = self
-        library._finalize_dynamic_globals()
-        library._verify_declare_only_symbols()
-        library._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """Return that there is no machine code."""
-        return 0
-
-    @property
-    def codegen(self) -> Any:
-        """What makes machine code: nobody keeps constants of Python there, which kernels lack."""
-        return _NoEnvironments()
-
-
-class _NoEnvironments:
-    def set_env(self, *_: object) -> None:
-        pass
-
-
-@contextlib.contextmanager
-def _kept_on_disk(compiled: Any) -> Iterator[None]:
-    """Let numba load what is compiled, or keep it, while no other process does."""
-    if not compiled.stats.cache_path:
-        try:
-            compiled.enable_caching()
-        except RuntimeError:
-            # Neither the installation nor the user's own folder can be written.
-            _warn_of_no_cache("no folder can be written")
-            yield
-            return
-        cache = compiled._cache
-        cache.save_overload = functools.partial(_save_overload, cache)
-        # numba looks at the kernel's own file alone, not at what it takes from others.
-        is_ours = Path(compiled.py_func.__code__.co_filename).is_relative_to(_HERE)
-        stamp = (_digest(), None if is_ours else cache._impl.locator.get_source_stamp())
-        cache._cache_file = _CheckedFiles(  # type: ignore[no-untyped-call]  # numba's
-            cache.cache_path, f"{cache._impl.filename_base}.checked", stamp
-        )
-    from filelock import FileLock
-
-    kept = Path(compiled.stats.cache_path)
-    with contextlib.ExitStack() as held:
-        # A file system may know no locks: then two processes may compile the same.
-        with contextlib.suppress(OSError, NotImplementedError):
-            kept.mkdir(parents=True, exist_ok=True)
-            held.enter_context(FileLock(kept / "swarm_logistics_env.lock"))
-        yield
-
-
-def _save_overload(cache: Any, signature: Any, result: Any) -> None:
-    try:
-        type(cache).save_overload(cache, signature, result)
-    except OSError as error:
-        _warn_of_no_cache(str(error.strerror or error))
-
-
-class _CheckedFiles(IndexDataCacheFile):
-    """numba's files of a kernel, with a digest at the end of each, which numba does not read.
-
-    Code that was damaged is compiled again. So is code of other sources or another signature:
-    where a full disk took the index, but not the code, an older file has its name.
-    """
-
-    is_told = False  # in this process
-
-    def save(self, key: Any, data: Any) -> None:
-        super().save(key, (self._source_stamp, key, data))  # type: ignore[no-untyped-call]
-
-    def load(self, key: Any) -> Any:
-        *belongs_to, data = super().load(key) or [None]  # type: ignore[no-untyped-call]
-        return data if belongs_to == [self._source_stamp, key] else None
-
-    @contextlib.contextmanager
-    def _open_for_write(self, filepath: str) -> Iterator[io.BytesIO]:
-        content = io.BytesIO()
-        yield content
-        with super()._open_for_write(filepath) as file:
-            file.write(content.getvalue() + _checksum(content.getvalue()))
-
-    def _load_index(self) -> Any:
-        is_sound = self._is_sound(self._index_path)
-        return super()._load_index() if is_sound else {}  # type: ignore[no-untyped-call]
-
-    def _load_data(self, name: str) -> Any:
-        is_sound = self._is_sound(self._data_path(name))  # type: ignore[no-untyped-call]
-        return super()._load_data(name) if is_sound else None  # type: ignore[no-untyped-call]
-
-    def _is_sound(self, path: str) -> bool:
-        """Return whether a file is as it was written, or none; else remove it and tell once."""
-        try:
-            content = Path(path).read_bytes()
-        except FileNotFoundError:
-            return True
-        except OSError:
-            content = b""
-        if content[-_CHECKSUM_SIZE:] == _checksum(content[:-_CHECKSUM_SIZE]):
-            return True
-        with contextlib.suppress(OSError):
-            Path(path).unlink()
-        if not _CheckedFiles.is_told:
-            _CheckedFiles.is_told = True
-            warnings.warn(f"{path}: compiled code was damaged, so it is made again", stacklevel=8)
-        return False
-
-
-def _checksum(content: bytes) -> bytes:
-    return hashlib.blake2b(content, digest_size=_CHECKSUM_SIZE).digest()
-
-
-@functools.cache
-def _digest() -> str:
-    """Return a digest of the files whose code kernels are made of."""
-    digest = hashlib.blake2b(digest_size=8)
-    for pattern in ("*.py", "motion/*.py", "policies/*.py", "train/*.py", "warehouse/*.py"):
-        for file in sorted(_HERE.glob(pattern)):
-            digest.update(file.read_bytes())
-    return digest.hexdigest()
-
-
-class _Report:
-    """Tells a person once that kernels are being compiled, and how many are, with a bar."""
-
-    current: _Report | None = None
-    is_told = False  # in this process
-    bar: Progress | None = None  # of this process, at a terminal, once a person was told
-    seconds = 0.0  # of the reports before
-
-    def __enter__(self) -> None:
-        self._start = time.monotonic()
-        _Report.current = self
-
-    def __exit__(self, *_: object) -> None:
-        _Report.current = None
-        _Report.seconds += time.monotonic() - self._start
-        if self.bar is not None:
-            self.bar.stop()
-
-    def tell(self) -> None:
-        """Tell a person who has been waiting how many kernels are compiled."""
-        seconds = self.seconds + time.monotonic() - self._start
-        is_worker = QUIET in os.environ or multiprocessing.parent_process() is not None
-        if is_worker or seconds < _SILENCE:
-            return
-        if not _Report.is_told:
-            _Report.is_told = True
-            sys.stderr.write("Compiling, which later runs reuse: up to 15 s of a free core.\n")
-            if sys.stderr.isatty():
-                from rich.console import Console
-                from rich.progress import Progress
-
-                _Report.bar = Progress(console=Console(stderr=True), transient=True)
-                _Report.bar.add_task("Compiling", total=len(_all_kernels))
-        if self.bar is not None:
-            n_done = sum(bool(each.overloads) for each in _all_kernels)
-            self.bar.update(self.bar.task_ids[0], completed=n_done)
-            self.bar.start()
-
-
-@functools.cache
-def _warn_of_no_cache(reason: str) -> None:
-    warnings.warn(
-        f"compiled code cannot be kept ({reason}), so every process compiles for itself, which "
-        "takes up to 15 seconds: set NUMBA_CACHE_DIR to a folder that can be written",
-        stacklevel=8,
-    )
+    return compile_fast(function, is_inlined=is_inlined)
 
 
 @kernel

@@ -19,7 +19,7 @@ from swarm_logistics_env.spi import REMOVED
 PACKAGE = "swarm_logistics_env"
 ROOT = Path(__file__).parents[1]
 
-FOUNDATION = {"errors", "records", "streams", "kernels", "scenario"}
+FOUNDATION = {"errors", "records", "streams", "kernels", "numba_fence", "scenario"}
 WORLD = FOUNDATION | {"warehouse", "observations"}
 RUNS = WORLD | {"motion", "policies", "episode"}
 ENVIRONMENT = WORLD | {"environment", "rendering", "swarm_logistics_v0"}
@@ -30,7 +30,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "streams": {"errors"},
     "progress_bar": set(),
-    "kernels": {"errors"},
+    "numba_fence": set(),
+    "fast_kernels": {"numba_fence"},
+    "kernels": {"fast_kernels", "numba_fence"},
     "records": {"errors", "spi"},
     "scenario": {"errors", "records", "streams"},
     "code_files": set(),

@@ -12,18 +12,18 @@ from pathlib import Path
 
 import pytest
 
-from swarm_logistics_env import kernels
+from swarm_logistics_env import fast_kernels, kernels, numba_fence
 
 # Two signatures of one kernel, so that two processes write one index.
 FIRST_CALLS = """
 import numpy as np
-from swarm_logistics_env import kernels
+from swarm_logistics_env import fast_kernels, kernels, numba_fence
 print(kernels.pair_key(np.uint64(1), 2), kernels.pair_key(np.uint64(1), np.int32(2)))
-print(sum(sum(each.stats.cache_hits.values()) for each in kernels._all_kernels))
+print(sum(sum(each.stats.cache_hits.values()) for each in fast_kernels._all_kernels))
 """
 LONG = """
-from swarm_logistics_env import kernels
-kernels._SILENCE = 0.0
+from swarm_logistics_env import fast_kernels, kernels, numba_fence
+fast_kernels._SILENCE = 0.0
 kernels.gaussian(1, 2)
 """
 
@@ -55,11 +55,11 @@ def test_a_kernel_compiles_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyP
     double = kernels.kernel(lambda number: 2.0 * number)
     half = kernels.kernel(lambda number: number / 2.0)
     monkeypatch.setattr(type(double), "enable_caching", refuse)
-    kernels._warn_of_no_cache.cache_clear()
+    fast_kernels._warn_of_no_cache.cache_clear()
     with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as told:
         assert (double(3.0), half(3.0)) == (6.0, 1.5)
     assert len(told) == 1
-    kernels._warn_of_no_cache.cache_clear()
+    fast_kernels._warn_of_no_cache.cache_clear()
 
 
 def cut(content: bytes) -> bytes:
@@ -71,8 +71,8 @@ def flip(content: bytes) -> bytes:
     return content[:place] + bytes([content[place] ^ 4]) + content[place + 1 :]
 
 
-def checked_files(folder: Path, stamp: str = "sources") -> kernels._CheckedFiles:
-    return kernels._CheckedFiles(str(folder), "kernel", stamp)  # type: ignore[no-untyped-call]
+def checked_files(folder: Path, stamp: str = "sources") -> fast_kernels._CheckedFiles:
+    return fast_kernels._CheckedFiles(str(folder), "kernel", stamp)  # type: ignore[no-untyped-call]
 
 
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
@@ -80,7 +80,7 @@ def checked_files(folder: Path, stamp: str = "sources") -> kernels._CheckedFiles
 def test_a_damaged_file_of_code_is_told_of_once_and_written_anew(
     ending: str, damage: Callable[[bytes], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(kernels._CheckedFiles, "is_told", False)
+    monkeypatch.setattr(fast_kernels._CheckedFiles, "is_told", False)
     files = checked_files(tmp_path)
     for key in ("floats", "integers"):
         files.save(key, f"code of {key}")
@@ -127,16 +127,16 @@ def test_a_kernel_compiles_where_the_disk_is_full(monkeypatch: pytest.MonkeyPatc
 
     double = kernels.kernel(lambda number: 2.0 * number)
     half = kernels.kernel(lambda number: number / 2.0)
-    monkeypatch.setattr(kernels._CheckedFiles, "save", refuse)
-    kernels._warn_of_no_cache.cache_clear()
+    monkeypatch.setattr(fast_kernels._CheckedFiles, "save", refuse)
+    fast_kernels._warn_of_no_cache.cache_clear()
     with pytest.warns(UserWarning, match=r"\(No space left on device\).*NUMBA_CACHE_DIR") as told:
         assert (double(3.0), half(3.0)) == (6.0, 1.5)
     assert len(told) == 1
-    kernels._warn_of_no_cache.cache_clear()
+    fast_kernels._warn_of_no_cache.cache_clear()
 
 
 def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -> None:
-    quiet = started(LONG, tmp_path / "worker", **{kernels.QUIET: "1"})
+    quiet = started(LONG, tmp_path / "worker", **{numba_fence.QUIET: "1"})
     told = finished(started(LONG, tmp_path))[-1]
     assert told == "Compiling, which later runs reuse: up to 15 s of a free core.\n"
     assert finished(started(LONG, tmp_path))[-1] == ""  # loaded
@@ -146,10 +146,10 @@ def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -
 def test_what_is_kept_is_used_until_a_file_of_kernels_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = shutil.copytree(kernels._HERE, tmp_path / "package")
-    monkeypatch.setattr(kernels, "_HERE", package)
-    digest = kernels._digest.__wrapped__  # which keeps no answer
-    assert digest() == kernels._digest()
+    package = shutil.copytree(fast_kernels._HERE, tmp_path / "package")
+    monkeypatch.setattr(fast_kernels, "_HERE", package)
+    digest = fast_kernels._digest.__wrapped__  # which keeps no answer
+    assert digest() == fast_kernels._digest()
     for file in package.rglob("*.py"):
         before, text = digest(), file.read_text()
         file.write_text(f"{text}N_MORE = 1\n")

@@ -107,10 +107,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from verification.interpreted import interpret_kernels
 
 np.seterr(over="ignore", divide="ignore")
-interpret_kernels()
 """
 
 CHECK_POLICIES_AND_STUDIES = """

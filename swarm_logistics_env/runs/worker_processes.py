@@ -25,7 +25,7 @@ import cloudpickle
 
 from swarm_logistics_env.code_files import current_folder_modules, search_current_folder
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, StudyError
-from swarm_logistics_env.kernels import QUIET
+from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.tasks.task import Outcome, Run
 
 Played = Generator[tuple[Run, Outcome], None, None]

@@ -25,14 +25,14 @@ from stable_baselines3.common.torch_layers import create_mlp
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from swarm_logistics_env.errors import TrainingError
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.kernels import engine_kernel, kernel
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
 from swarm_logistics_env.motion.memory import body_of, in_frame, length_of
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.train.training import Training, make_worlds
-from swarm_logistics_env.warehouse.packing import unpacked_at
+from swarm_logistics_env.warehouse.addresses import unpacked_at
 from swarm_logistics_env.warehouse.structs import NOBODY, World
 
 # Lengths are in units of 10 m; directions are in the frame of the robot's motion.
@@ -44,7 +44,7 @@ PRIVILEGED = (
 )  # fmt: skip
 
 
-@kernel
+@engine_kernel
 def fill_privileged(
     address: int, turned: NDArray[np.float64], privileged: NDArray[np.float32]
 ) -> None:

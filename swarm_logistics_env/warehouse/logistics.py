@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 
-from swarm_logistics_env.kernels import inlined_kernel, kernel
+from swarm_logistics_env.kernels import engine_kernel, inlined_kernel, kernel
 
 from .demand import ask, close_request, is_requested
 from .grid import look_around
@@ -162,7 +162,7 @@ def end_handling(world: World) -> None:
 _HOLD, _OPEN = 0.5, -0.5
 
 
-@kernel
+@engine_kernel
 def mask_below(world: World, robot: int) -> None:
     """Mask what stands below a robot that lifts."""
     items, grid, nearby = world.items, world.item_grid, world.nearby
@@ -175,7 +175,7 @@ def mask_below(world: World, robot: int) -> None:
             collide_with(world.engine, world.engine.item_shapes[item], NO_ONE)
 
 
-@kernel
+@engine_kernel
 def unmask_left(world: World) -> None:
     """Make those masked items solid that no laden robot stands above any more.
 
@@ -216,7 +216,7 @@ def carry_along(world: World) -> None:
             items.position[item, 1] = robots.position[robot, 1]
 
 
-@kernel
+@engine_kernel
 def open_grippers(world: World) -> None:
     """Put down what robots let go of.
 
@@ -237,7 +237,7 @@ def open_grippers(world: World) -> None:
             put_down(world, robot)
 
 
-@kernel
+@engine_kernel
 def put_down(world: World, robot: int) -> None:
     """Let a robot's item lie where it is, covered."""
     robots, items, engine = world.robots, world.items, world.engine
@@ -250,7 +250,7 @@ def put_down(world: World, robot: int) -> None:
     put_item(engine, item, items.position)
 
 
-@kernel
+@engine_kernel
 def take_out(world: World, robot: int) -> None:
     """Take a robot out of the arena; what it carries is put down where it is."""
     robots, engine = world.robots, world.engine
@@ -310,7 +310,7 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
     return best, best_square
 
 
-@kernel
+@engine_kernel
 def close_grippers(world: World) -> None:
     """Lift what empty robots hold on to.
 
@@ -351,7 +351,7 @@ def close_grippers(world: World) -> None:
             return
 
 
-@kernel
+@engine_kernel
 def deliver(world: World) -> tuple[int, bool]:
     """Deliver the requested items whose carriers can, the oldest request first, then the next.
 

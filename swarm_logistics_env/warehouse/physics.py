@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from pymunk._chipmunk_cffi import ffi, lib  # its functions' addresses have no public name
 from pymunk.batch import BodyFields
 
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.kernels import engine_kernel
 from swarm_logistics_env.scenario import Scenario
 
-from .packing import call_at, made_at, packed, unpacked_at
+from .addresses import call_at, made_at, unpacked_at
+from .packing import packed
 from .structs import (
     NOBODY,
     STORED,
@@ -48,7 +49,7 @@ SOLID_THING = _SOLID | _ROBOT << _MASK
 _FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 16, 80, 2
 
 
-@kernel
+@engine_kernel
 def advance(world: World) -> None:
     """Take the substeps of a control step, and read where the bodies are then and how fast.
 
@@ -69,7 +70,7 @@ def advance(world: World) -> None:
     read(engine, engine.bodies)
 
 
-@kernel
+@engine_kernel
 def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
     """Give every robot the force that changes its velocity as wanted, by `greatest` [m/s] at most.
 
@@ -90,7 +91,7 @@ def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
     )
 
 
-@kernel
+@engine_kernel
 def read(engine: Engine, batch: Batch) -> None:
     """Fill a batch with what it holds of the bodies."""
     batch.filled[0] = 0
@@ -101,7 +102,7 @@ def read(engine: Engine, batch: Batch) -> None:
     )
 
 
-@kernel
+@engine_kernel
 def put_item(engine: Engine, item: int, position: Numbers) -> None:
     """Move an item to its position, of those of all [m]; who collides with it stays as it is."""
     shape = engine.item_shapes[item]
@@ -111,7 +112,7 @@ def put_item(engine: Engine, item: int, position: Numbers) -> None:
     call_at(engine.functions.cpSpaceReindexShape, (engine.space[0], shape))
 
 
-@kernel
+@engine_kernel
 def collide_with(engine: Engine, shape: int, categories: int) -> None:
     """Give a shape a filter, of no group."""
     call_at(engine.functions.cpShapeSetFilter, (shape, (0, categories)))
@@ -123,7 +124,7 @@ _WALL = 0.5  # [m], half the thickness of a wall
 N_WALLS = 4
 
 
-@kernel
+@engine_kernel
 def build(address: int) -> None:
     """Make everything of the world at `address` and note it in its engine's arrays."""
     world = unpacked_at(World, address)
@@ -139,7 +140,7 @@ def build(address: int) -> None:
     read(engine, engine.bodies)
 
 
-@kernel
+@engine_kernel
 def build_solids(world: World, static: int) -> None:
     """Make walls and obstacles."""
     engine, parameters, obstacles = world.engine, world.parameters, world.obstacles
@@ -165,7 +166,7 @@ def build_solids(world: World, static: int) -> None:
         made_at(call.cpSpaceAddShape, (engine.space[0], shape))
 
 
-@kernel
+@engine_kernel
 def build_robots(world: World) -> None:
     """Make the robots' bodies, which no contact turns, and their shapes."""
     engine, parameters, robots = world.engine, world.parameters, world.robots
@@ -185,7 +186,7 @@ def build_robots(world: World) -> None:
         made_at(call.cpSpaceAddShape, (space, shape))
 
 
-@kernel
+@engine_kernel
 def build_items(world: World, static: int) -> None:
     """Make the items' shapes, on the static body and moved by their offset.
 
@@ -201,7 +202,7 @@ def build_items(world: World, static: int) -> None:
         engine.item_shapes[item] = shape
 
 
-@kernel
+@engine_kernel
 def free(address: int) -> None:
     """Free everything that `build` made for the engine at `address`."""
     engine = unpacked_at(Engine, address)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.kernels import engine_kernel, kernel
 
+from .addresses import unpacked_at
 from .demand import ask
 from .grid import fill
 from .logistics import (
@@ -17,20 +18,19 @@ from .logistics import (
     take_out,
     unmask_left,
 )
-from .packing import unpacked_at
 from .physics import advance
 from .radio import run_timers, send_messages
 from .sensing import sense
 from .structs import NOBODY, STORED, Commands, Sensed, World
 
 
-@kernel
+@engine_kernel
 def begin(address: int) -> None:
     """Open the first requests of the world at `address`."""
     ask(unpacked_at(World, address))
 
 
-@kernel
+@engine_kernel
 def perceive(address: int, rows: Sensed) -> None:
     """Run the timers and fill the observation rows (N, D) of the world at `address`."""
     world = unpacked_at(World, address)
@@ -44,13 +44,13 @@ def perceive(address: int, rows: Sensed) -> None:
     progress.anchoring_seconds[0] += n_anchored * world.parameters.control_period
 
 
-@kernel
+@engine_kernel
 def remove(address: int, robot: int) -> None:
     """Take a robot out of the arena of the world at `address`."""
     take_out(unpacked_at(World, address), robot)
 
 
-@kernel
+@engine_kernel
 def step(address: int, rows: Sensed) -> bool:
     """Take a control step in the world at `address` and fill the observation rows (N, D).
 
@@ -97,7 +97,7 @@ def log_command(commands: Commands) -> None:
     commands.n_logged[0] += 1
 
 
-@kernel
+@engine_kernel
 def move(world: World) -> None:
     """Turn and move the robots as commanded and as far as bodies let them."""
     drive(world)
@@ -111,7 +111,7 @@ def move(world: World) -> None:
             robots.velocity[robot, axis] = bodies[robot, 2 + axis] * is_there
 
 
-@kernel
+@engine_kernel
 def handle_items(world: World) -> tuple[int, bool]:
     """Carry along, let go, lift and deliver; returns how many, and whether there was room."""
     carry_along(world)

@@ -23,12 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import ScenarioError
-from swarm_logistics_env.kernels import inlined_kernel, kernel
+from swarm_logistics_env.kernels import engine_kernel, inlined_kernel
+from swarm_logistics_env.numba_fence import IS_PLAIN
 
 from . import stepping
+from .addresses import add, exchange, load, pointer_at, replace, unpacked_at
 from .logistics import refused_command
 from .one_thread import holding
-from .packing import add, exchange, load, pointer_at, replace, unpacked_at
 from .structs import NOBODY, Numbers, Sensed, World
 from .warehouse import Warehouse, not_finite
 
@@ -63,7 +64,9 @@ class WorldThreadPool:
     close: Callable[[], object]
 
     def __init__(self, worlds: Sequence[Warehouse], firsts: Sequence[int], n_helpers: int) -> None:
-        self._worlds, self._firsts, self._n_helpers = worlds, firsts, n_helpers
+        self._worlds, self._firsts = worlds, firsts
+        # The interpreter runs one thread at a time.
+        self._n_helpers = 0 if IS_PLAIN else n_helpers
         self.is_watched = np.zeros(len(worlds), np.int64)
         self._start()
 
@@ -168,7 +171,7 @@ def job_at(queue: int, place: int) -> int:
     return queue + 8 * (FIRST_JOB + place * JOB_LENGTH)
 
 
-@kernel
+@engine_kernel
 def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
     """Give out the jobs of a step, but none if a command is refused.
 
@@ -200,13 +203,13 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
     return NOBODY
 
 
-@kernel
+@engine_kernel
 def take_sleepers(queue: int) -> int:
     """Return how many helpers went to sleep and were not yet called."""
     return exchange(queue, ASLEEP, 0)
 
 
-@kernel
+@engine_kernel
 def run_next_job(queue: int) -> bool:
     """Step the next world, or return that none is left to take."""
     while True:
@@ -227,7 +230,7 @@ def run_next_job(queue: int) -> bool:
     return True
 
 
-@kernel
+@engine_kernel
 def next_told(queue: int, place: int, patience: int) -> int:
     """Step worlds until one, from `place` on, is done that the caller has to be told of.
 
@@ -248,7 +251,7 @@ def next_told(queue: int, place: int, patience: int) -> int:
     return place
 
 
-@kernel
+@engine_kernel
 def finish(queue: int) -> None:
     """Step all worlds that are left and wait for those that others step."""
     while run_next_job(queue):
@@ -258,7 +261,7 @@ def finish(queue: int) -> None:
             pass
 
 
-@kernel
+@engine_kernel
 def help_out(queue: int, patience: int) -> bool:
     """Work until nothing came for `patience` looks; returns whether the pool is closed."""
     looks = 0

@@ -132,6 +132,7 @@ def test_the_border_sets_right_how_far_it_is_home(memory: Memory) -> None:
         assert memory[0, column.AWAY] == pytest.approx(-0.1 * way)
 
 
+@pytest.mark.compiled
 def test_in_a_run_robots_with_fm2_find_out_and_no_healthy_one_believes_it() -> None:
     policy: Any = policies.load("ppo-robust")
     play = Play(Scenario(restock=True, duration=90.0), policy, 60_001, [Fault("FM2", 3)])
@@ -166,6 +167,7 @@ def test_an_open_field_and_an_obstacle_tell_nothing() -> None:
     assert wall_angle(bulge) == -1.0
 
 
+@pytest.mark.compiled
 def test_the_way_home_is_kept_though_the_body_turns_unnoticed() -> None:
     scenario = Scenario(
         restock=True, n_robots=10, duration=100.0, heading_drift=0.1, ranger_noise=0.03

@@ -30,6 +30,7 @@ def test_it_gets_to_drive_where_it_wants_to_and_remembers_that_it_turned(directi
     assert math.cos(memory[0, column.WALL] + heading) == pytest.approx(1.0)
 
 
+@pytest.mark.compiled
 def test_homing_delivers_with_differential_drive() -> None:
     scenario = Scenario(restock=True, drive="differential", duration=60.0)
     ours, scripted = (

@@ -41,6 +41,7 @@ def loaded(rows: NDArray[np.float32]) -> NDArray[np.float32]:
     return rows
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("name", "weaker", "times", "duration"),
     # The stock is laid in first.
@@ -93,6 +94,7 @@ def test_it_follows_the_lowest_timer_heard_until_it_knows_the_way_for_sure() -> 
     assert (commands[:, 0] > 0.9).all()
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("name", WITHOUT_STOCK)
 @pytest.mark.parametrize("mode", ["FM1", "FM2", "FM3", "FM4", "motor_dead", "removed"])
 def test_with_a_stock_it_gets_on_with_robots_that_fail(name: str, mode: str) -> None:

@@ -60,6 +60,7 @@ def plus(commands: NDArray[np.float64], x: float, y: float) -> NDArray[np.float6
     return np.asarray(summed / max(np.hypot(*summed), 1.0))
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("period", [0.02, 0.2])
 def test_the_heading_diffuses_at_its_rate_whatever_the_period(period: float) -> None:
     policy, rows = swarm(4000, period), sensing(n_robots=4000)
@@ -125,6 +126,7 @@ def test_only_where_the_heading_follows_do_pushes_turn_it_for_good(follows: bool
     assert pushed != pytest.approx(before)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("period", [0.02, 0.1])
 def test_other_items_are_dropped_at_the_drop_rate_and_the_requested_one_never(
     period: float,

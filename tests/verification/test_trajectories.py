@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from swarm_logistics_env.numba_fence import WAY
 from verification import trajectories
 from verification.trajectories import GOLDEN, digests, explained, read_record
 
@@ -38,6 +40,16 @@ def test_another_process_plays_them_as_recorded() -> None:
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout == f"all {len(GOLDEN)} golden trajectories are as recorded\n"
+
+
+@pytest.mark.skipif(
+    os.environ.get("HYPOTHESIS_PROFILE") != "nightly", reason="the plain way compiles for a minute"
+)
+def test_plain_kernels_play_them_as_recorded() -> None:
+    words = [sys.executable, "-m", "verification.trajectories"]
+    environment = {**os.environ, WAY: "plain"}
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_a_difference_is_told_with_its_step_and_its_platform(

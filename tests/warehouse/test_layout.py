@@ -60,6 +60,7 @@ def test_a_place_depends_on_its_own_number_not_on_how_many_follow(seed: int) -> 
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.compiled
 @given(seed=SEEDS)
 @settings(max_examples=30, deadline=None)
 def test_every_item_is_requested_once_and_in_an_order_keyed_by_item(seed: int) -> None:

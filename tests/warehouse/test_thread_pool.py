@@ -113,6 +113,7 @@ def test_what_is_refused_is_raised_before_any_world_has_moved() -> None:
     pool.close()
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("n_helpers", [0, 2])
 @pytest.mark.parametrize("kernel", ["submit", "take_sleepers", "next_told"])
 def test_a_pool_goes_on_after_ctrl_c(
@@ -188,6 +189,7 @@ print(rows.any())
 """
 
 
+@pytest.mark.compiled
 def test_a_program_ends_while_its_pool_is_at_work() -> None:
     command = [sys.executable, "-c", PROGRAM]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
