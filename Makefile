@@ -76,7 +76,7 @@ QUICK := tests/warehouse/test_kinematics.py tests/questions/test_plan.py tests/v
 	$(addprefix tests/test_,imports.py records.py scenario.py streams.py sizes.py)
 
 # What reaches every line of the kernels in seconds, without the compiler.
-KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py kinematics.py layout.py grid.py) \
+KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py sensor_errors.py radio.py kinematics.py layout.py grid.py) \
 	$(addprefix tests/policies/test_,swarm_dt.py routes.py homing.py) tests/motion
 
 check: $(DEV)/installed
@@ -127,6 +127,10 @@ tasks: $(TASKS)/installed
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate.py
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
+
+# A recorded run to look at: no page needs it.
+docs/media/run.html: $(DEV)/installed
+	$(DEV)/bin/swarm-logistics watch --fault FM4:3@60 --save $@ --until 150
 
 # What the pages print is held by `make test`; this runs what they do not show.
 docs-check: $(DEV)/installed

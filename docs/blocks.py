@@ -46,31 +46,34 @@ def pages() -> list[Path]:
 
 def blocks(text: str) -> list[Block]:
     """Return the blocks of a page, in order, without directives of the site."""
-    return [Block(*found) for found in _BLOCK.findall(text) if not found[0].startswith("{")]
+    matches = _BLOCK.findall(text)
+    return [Block(*match) for match in matches if not match[0].startswith("{")]
 
 
-def recorded(text: str) -> str:
+def record(text: str) -> str:
     """Run a page's blocks in a folder with `examples` alone; return it with what they printed."""
     names: dict[str, Any] = {"__name__": "page"}
     printed: str | None = None
     end = 0  # of the block before
 
-    def anew(match: re.Match[str]) -> str:
+    def with_output(match: re.Match[str]) -> str:
         nonlocal printed, end
-        block, between = Block(*match.groups()), text[end : match.start()]
+        block = Block(*match.groups())
+        between = text[end : match.start()]
         if block.language.startswith("{"):
             return match[0]
-        end, said = match.end(), printed
-        printed = None if block.language == "text" else _printed(block, names)
-        is_output = block.language == "text" and said is not None and not between.strip()
-        return f"```text\n{said}```" if is_output else match[0]
+        end = match.end()
+        output = printed
+        printed = None if block.language == "text" else _output(block, names)
+        is_output = block.language == "text" and output is not None and not between.strip()
+        return f"```text\n{output}```" if is_output else match[0]
 
-    with _folder() as folder:
+    with _working_folder() as folder:
         (folder / "examples").symlink_to(ROOT / "examples", target_is_directory=True)
-        return _BLOCK.sub(anew, text)
+        return _BLOCK.sub(with_output, text)
 
 
-def comparable(text: str) -> str:
+def normalise(text: str) -> str:
     """Return a page without what tells of the machine or of the version of the code.
 
     Digests are numbered as they appear, so that equal ones stay equal.
@@ -93,23 +96,24 @@ def commands(text: str, languages: Sequence[str] = ("console", "sh")) -> list[li
 
 
 @contextlib.contextmanager
-def _folder() -> Iterator[Path]:
+def _working_folder() -> Iterator[Path]:
     """Be in a new folder; find modules there, and forget those that came from it."""
-    known, path = set(sys.modules), list(sys.path)
+    modules = set(sys.modules)
+    path = list(sys.path)
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
-        here = Path.cwd()
-        sys.path.insert(0, str(here))
+        folder = Path.cwd()
+        sys.path.insert(0, str(folder))
         try:
-            yield here
+            yield folder
         finally:
             sys.path[:] = path
-            for module in set(sys.modules) - known:
+            for module in set(sys.modules) - modules:
                 file = getattr(sys.modules[module], "__file__", None)
-                if file is not None and Path(file).is_relative_to(here):
+                if file is not None and Path(file).is_relative_to(folder):
                     del sys.modules[module]
 
 
-def _printed(block: Block, names: dict[str, Any]) -> str | None:
+def _output(block: Block, names: dict[str, Any]) -> str | None:
     """Run a block, or write the file that it is; return what it prints, None: it runs nothing."""
     if file := _FILE.match(block.code):
         Path(file[1]).write_text(block.code, encoding="utf-8")
@@ -119,29 +123,30 @@ def _printed(block: Block, names: dict[str, Any]) -> str | None:
         return out.getvalue()
     if block.language == "console":
         lines = block.code.splitlines()
-        return "".join(_printed_by_command(line[2:]) for line in lines if line.startswith("$ "))
+        return "".join(_command_output(line[2:]) for line in lines if line.startswith("$ "))
     return None
 
 
-def _printed_by_command(line: str) -> str:
-    call, _, otherwise = line.partition(" || echo ")
+def _command_output(line: str) -> str:
+    call, _, on_failure = line.partition(" || echo ")
     call, _, pipe = call.partition(" | ")
     program, *arguments = shlex.split(call)
     assert program == "swarm-logistics", line
     if arguments[:2] == ["study", "run"] and "--engine" not in arguments:
         arguments += ["--engine", "local"]  # the same bits, without the start of processes
-    out, complaints = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(complaints):
+    out = io.StringIO()
+    errors = io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
         code = app.run(arguments)
-    printed = out.getvalue() + (complaints.getvalue() if code else "")
-    if code and not otherwise:
+    printed = out.getvalue() + (errors.getvalue() if code else "")
+    if code and not on_failure:
         raise AssertionError(f"{line}: ended with {code}: {printed}")
     if pipe:
         program, number = pipe.split()
         lines = printed.splitlines(keepends=True)
         shown = int(number[1:])
         printed = "".join({"head": lines[:shown], "tail": lines[-shown:]}[program])
-    return printed + (" ".join(shlex.split(otherwise)) + "\n" if code else "")
+    return printed + (" ".join(shlex.split(on_failure)) + "\n" if code else "")
 
 
 # What makes a command small; of an option that is given twice the last one counts.
@@ -157,7 +162,7 @@ def run_in_small(texts: Mapping[str, str]) -> None:
 
     Not run is what serves a page until somebody stops it, and what takes other numbers of seeds.
     """
-    with _folder() as folder:
+    with _working_folder() as folder:
         for path in (ROOT / "examples").glob("*.py"):
             shutil.copy(path, folder)
         for block in (block for text in texts.values() for block in blocks(text)):
@@ -183,7 +188,7 @@ if __name__ == "__main__":
         raise SystemExit
     for page in [Path(name) for name in sys.argv[1:]] or pages():
         text = page.read_text(encoding="utf-8")
-        said = recorded(text)
-        if comparable(said) != comparable(text):
-            page.write_text(said, encoding="utf-8")
+        current = record(text)
+        if normalise(current) != normalise(text):
+            page.write_text(current, encoding="utf-8")
             print(f"{page}: recorded anew")

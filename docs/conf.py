@@ -60,8 +60,8 @@ def add_contents(app: Sphinx, page: str, text: list[str]) -> None:
     """Put the list of all pages below the first one."""
     if page == "index":
         for caption, pages in CONTENTS.items():
-            listed = "\n".join(pages)
-            text[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{listed}\n```\n"
+            lines = "\n".join(pages)
+            text[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{lines}\n```\n"
 
 
 def tidy(app: Any, what: str, name: Any, obj: Any, options: Any, lines: list[str]) -> None:
@@ -75,8 +75,8 @@ def tidy(app: Any, what: str, name: Any, obj: Any, options: Any, lines: list[str
 
 def formula(display: str, translator: Any, node: Any) -> None:
     """Write a formula within a line (display "inline"), or on a line of its own ("block")."""
-    found: str = convert(node.astext(), display=display)
+    markup: str = convert(node.astext(), display=display)
     # Without these, browsers set the bars of an absolute value apart as they do a relation.
-    found = found.replace("<mo>&#x0007C;</mo>", '<mo lspace="0" rspace="0">&#x0007C;</mo>')
-    translator.body.append(f'<div class="math">{found}</div>\n' if display == "block" else found)
+    markup = markup.replace("<mo>&#x0007C;</mo>", '<mo lspace="0" rspace="0">&#x0007C;</mo>')
+    translator.body.append(f'<div class="math">{markup}</div>\n' if display == "block" else markup)
     raise SkipNode

@@ -1,22 +1,30 @@
-"""Writes the README's numbers from the tables of docs/results.md, and draws their picture.
+"""Writes the README's numbers from the CSV files in docs/results, and draws their picture.
 
-`python docs/front_page.py`; `make tables`, which records that page, calls it. Nothing is played.
+`python docs/front_page.py`; `make tables`, which writes these files, calls it. Nothing is played.
 """
 
+import csv
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from tables import ROOT, block_of, rewritten
+from tables import ROOT, with_blocks
 
-README, RESULTS = ROOT / "README.md", ROOT / "docs" / "results.md"
+from swarm_logistics_env.report import drawing, section
+from swarm_logistics_env.spi.summaries import Interval
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+README = ROOT / "README.md"
+RESULTS = ROOT / "docs" / "results"
 
 _LEARNED = "ppo-"
-_NUMBER = r"-?(?:[\d.,]+|∞)"
-_VALUE = re.compile(rf"({_NUMBER}) \[({_NUMBER}), ({_NUMBER})\]")
 _PANELS = {
     "P, N = 25": "P, N = 25\n[items in 500 s]",
     "S, N 25 -> 100": "S, scalability\nN 25 → 100",
@@ -28,35 +36,32 @@ _PANELS = {
 
 
 class Value(NamedTuple):
-    """A number of a table as it stands there, and with the limits of its 95 % interval."""
+    """An estimate of a table, and its text there: value and limits of its 95 % interval."""
 
+    interval: Interval
     text: str
-    value: float
-    low: float
-    high: float
 
 
-Row = Mapping[str, Value]  # by the column's heading, of a policy without its trainings
-Rows = Mapping[str, Row]  # by the row's label
+Rows = Mapping[str, Mapping[str, Value]]  # by the row's label, then by policy
 
 
-def rows_of(block: str) -> Rows:
-    """Return the values with intervals in the table of a block."""
-    head, _, *lines = [line.split("|")[1:-1] for line in block.splitlines() if line[:1] == "|"]
-    found: dict[str, dict[str, Value]] = {}
-    for label, *cells in lines:
-        row = found.setdefault(label.strip(), {})
-        for name, cell in zip(head[1:], cells, strict=True):
-            if told := _VALUE.match(cell.strip()):
-                numbers = (float(part.replace("∞", "inf")) for part in told.groups())
-                row[_plain(name)] = Value(told[0], *numbers)
-    return found
+def read(name: str) -> list[dict[str, str]]:
+    """Return the rows of a file of docs/results."""
+    with (RESULTS / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
-def _plain(name: str) -> str:
-    """Return a policy's name without how many trainings it stands for."""
-    bare = name.strip(" `")
-    return bare.partition(",")[0] if bare.startswith(_LEARNED) else bare
+def values(estimates: Sequence[Mapping[str, str]], study: str) -> Rows:
+    """Return the estimates of a study."""
+    rows: dict[str, dict[str, Value]] = {}
+    for line in estimates:
+        if line["study"] == study:
+            low, high = (float(line[end]) if line[end] else None for end in ("low", "high"))
+            interval = Interval(float(line["value"]), low, high)
+            thresholds = [float(line["threshold"])] if line["threshold"] else []
+            text = section.bracketed(interval, int(line["digits"]), thresholds)
+            rows.setdefault(line["row"], {})[line["policy"]] = Value(interval, text)
+    return rows
 
 
 # Which policies and which mode are told is decided here: after a change, look at the tables.
@@ -73,80 +78,80 @@ in {times[ppo-indicator].text} s, the paper's Swarm D-T in {times[swarm-dt].text
 {r[ppo-robust].text}.
 * **Four times the robots do not deliver four times as much**: from 25 to 100 S of \
 `swarm-dt-follow` is {s[swarm-dt-follow].text}, of `homing` {s[homing].text}.
-* **Of {claims[0]} claims of the paper's text** this re-implementation (constants partly fitted) \
-supports {claims[1]} and {claims[2]}; {claims[3]}, {claims[4]} cannot fail. FM1 is not reproduced.
+* **Of {n_claims} claims of the paper's text** this re-implementation (constants partly fitted) \
+supports {counts[supported]} and contradicts {counts[contradicted]} ({contradicted}); \
+{counts[open]} are open, {counts[no verdict]} cannot fail. FM1 is not reproduced.
 
-95 % intervals: {seeds[0]} seeds ({seeds[1]} for times, {seeds[2]} for slow lifting), of networks \
-over trainings too."""
-_CLAIMS = (
-    r"Of (\d+) claims .*?\ssupports\s(\d+) and (contradicts \d+ ?.*?);\s(\d+ are open);\s(\d+)"
-)
+95 % intervals: {seeds[policies]} seeds ({seeds[clearing]} for times, {seeds[leans]} for slow \
+lifting), of networks over trainings too."""
 
 
-def findings(page: str) -> str:
+def findings() -> str:
     """Return what the tables show, as a list: the numbers stand beside their intervals."""
-    names = "policies", "clearing", "leans", "paper"
-    policies, clearing, leans, paper = (block_of(page, name) for name in names)
-    rows = rows_of(policies)
-    times = {_plain(name): row["no fault"] for name, row in rows_of(clearing).items()}
-    p = rows["P, N = 25"]
-    (claims,) = re.findall(_CLAIMS, paper)
+    estimates = read("estimates")
+    policies = values(estimates, "policies")
+    times = values(estimates, "clearing")["no fault"]
+    p = policies["P, N = 25"]
+    claims = read("claims")
+    contradicted = Counter(
+        claim["subject"] for claim in claims if claim["verdict"] == "contradicted"
+    )
     return FINDINGS.format(
-        faster=times["swarm-dt"].value / times["ppo-indicator"].value,
+        faster=times["swarm-dt"].interval.value / times["ppo-indicator"].interval.value,
         times=times,
-        more=p["ppo-indicator"].value / p["swarm-dt"].value,
+        more=p["ppo-indicator"].interval.value / p["swarm-dt"].interval.value,
         p=p,
-        slow=rows_of(leans)["lifting takes 1 s"],
-        r=rows["R, FM4, m = 2"],
-        s=rows["S, N 25 -> 100"],
-        claims=claims,
-        seeds=[re.findall(r"(\d+) seeds from ", one)[0] for one in (policies, clearing, leans)],
+        slow=values(estimates, "leans")["lifting takes 1 s"],
+        r=policies["R, FM4, m = 2"],
+        s=policies["S, N 25 -> 100"],
+        n_claims=len(claims),
+        counts=Counter(claim["verdict"] for claim in claims),
+        contradicted=", ".join(f"{n} on {subject}" for subject, n in contradicted.most_common()),
+        seeds={line["study"]: line["seeds"] for line in estimates},
     )
 
 
-def speed(page: str) -> str:
-    """Return the sentence on speed, from the table of costs."""
-    costs = block_of(page, "costs")
-    (took,) = re.findall(r"^\| env\.step_arrays:[^|]*\|[^|]*\| *([^ |]+)", costs, re.MULTILINE)
-    (machine,) = re.findall(r"^On (.*), \d+ cores?, Python .*\.$", costs, re.MULTILINE)
-    return f"A step of 25 robots takes {took} µs on one core of {machine}."
+def speed() -> str:
+    """Return the sentence on speed."""
+    (cost,) = read("cost")
+    microseconds = f"{float(cost['microseconds_per_step']):,.0f}"
+    return f"A step of 25 robots takes {microseconds} µs on one core of {cost['processor']}."
 
 
 def draw(rows: Rows, path: Path) -> None:
     """Draw the forest plot: a row a policy, a panel a question; equal rows give equal bytes."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     names = list(rows["P, N = 25"])
-    places = range(len(names), 0, -1)
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams |= {"svg.hashsalt": "front page", "font.size": 9.0, "axes.linewidth": 0.6}
-        figure = Figure(figsize=(9.2, 2.7), layout="constrained")
-        panels = figure.subplots(1, len(_PANELS), sharey=True)
+
+    def draw_panels(canvas: "Figure") -> None:
+        canvas.set_size_inches(9.2, 2.7)
+        panels = canvas.subplots(1, len(_PANELS), sharey=True)
         for axes in panels[3:]:  # the modes on one scale
             axes.sharex(panels[2])
         for axes, (label, title) in zip(panels, _PANELS.items(), strict=True):
-            axes.set_title(title, fontsize=8.5, loc="left")
-            axes.axvline(0.0, color="#1b1b1b", linewidth=0.8)
-            for place, name in zip(places, names, strict=True):
-                if (one := rows[label].get(name)) is None:
-                    continue
-                is_learned = name.startswith(_LEARNED)
-                colour, marker = ("#d55e00", "s") if is_learned else ("#0072b2", "o")
-                if math.isinf(one.high - one.low):  # no limit: dotted from side to side
-                    axes.axhline(place, color=colour, linewidth=1.4, linestyle=":")
-                else:
-                    axes.plot([one.low, one.high], [place, place], color=colour, linewidth=2.2)
-                axes.plot([one.value], [place], marker, color=colour, markersize=5.5)
-            axes.set_ylim(0.4, len(names) + 0.6)
-            axes.spines[["top", "right", "left"]].set_visible(False)
+            axes.set_title(title, fontsize=8.5)
+            axes.axvline(0.0, color=drawing.INK, linewidth=0.8)
+            for height, name in enumerate(names):
+                if name in rows[label]:
+                    _mark(axes, height, rows[label][name].interval, name.startswith(_LEARNED))
+            axes.set_ylim(len(names) - 0.4, -0.6)
+            axes.spines["left"].set_visible(False)
             axes.tick_params(axis="y", length=0)
-            axes.grid(axis="y", color="#e4e6e9", linewidth=0.6)
-            axes.set_axisbelow(True)
-        panels[0].set_yticks(list(places), names)
+        panels[0].set_yticks(range(len(names)), names)
         panels[0].set_xlim(left=0.0)
-        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None})
+
+    path.write_text(drawing.images(draw_panels, 2.7)[0], encoding="utf-8")
+
+
+def _mark(axes: "Axes", height: float, interval: Interval, is_learned: bool) -> None:
+    style = 1 if is_learned else 0
+    colour = drawing.COLOURS[style]
+    value, low, high = interval
+    if low is not None and high is not None:
+        if math.isinf(high - low):  # no limit: dotted from side to side
+            axes.axhline(height, color=colour, linewidth=1.4, linestyle=":")
+        else:
+            axes.plot([low, high], [height, height], color=colour, linewidth=2.2)
+    axes.plot([value], [height], drawing.MARKERS[style], color=colour, markersize=5.5)
 
 
 def with_address(text: str, address: str) -> str:
@@ -156,21 +161,19 @@ def with_address(text: str, address: str) -> str:
     return re.sub(r"(?<!!)(\[[^]]+\]\()(?!https://)", links, text)
 
 
-def written() -> str:
+def readme_text() -> str:
     """Return the README as the tables have it, with links to the repository of [project.urls]."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     address = project.get("urls", {}).get("Repository")
-    page, readme = RESULTS.read_text(encoding="utf-8"), README.read_text(encoding="utf-8")
-    blocks = {"findings": findings(page), "speed": speed(page)}
-    text = rewritten(readme, blocks)
+    readme = README.read_text(encoding="utf-8")
+    text = with_blocks(readme, {"findings": findings(), "speed": speed()})
     return with_address(text, address.rstrip("/")) if address else text
 
 
 def main() -> None:
     """Write the README and its picture."""
-    README.write_text(written(), encoding="utf-8")
-    policies = block_of(RESULTS.read_text(encoding="utf-8"), "policies")
-    draw(rows_of(policies), ROOT / "docs" / "media" / "policies.svg")
+    README.write_text(readme_text(), encoding="utf-8")
+    draw(values(read("estimates"), "policies"), ROOT / "docs" / "media" / "policies.svg")
 
 
 if __name__ == "__main__":

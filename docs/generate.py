@@ -8,7 +8,7 @@ from typing import Any, get_args, get_origin
 
 import numpy as np
 from pydantic_core import PydanticUndefined
-from tables import ROOT, rewritten, table
+from tables import ROOT, table, with_blocks
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
 from swarm_logistics_env.cli.app import command_line
@@ -21,7 +21,7 @@ from swarm_logistics_env.questions.specification import Specification
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
 from swarm_logistics_env.train.training import Training, load_training, preset_names
-from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, Columns, Row
+from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, Columns, Judged
 
 FACTORS = ("sizes", "faults", "parameters", "ablations")
 PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")
@@ -68,12 +68,12 @@ def observation_table(scenario: Scenario) -> str:
     """Return the table of the named columns of a row."""
     rows = []
     for column in columns(scenario):
-        first, *others = np.arange(n_columns(scenario))[column.columns]
-        where = f"{first}-{others[-1]}" if others else str(first)
-        if others and (step := others[0] - first) > 1:
-            where += f", every {step}th"
+        first, *following = np.arange(n_columns(scenario))[column.columns]
+        numbers = f"{first}-{following[-1]}" if following else str(first)
+        if following and (step := following[0] - first) > 1:
+            numbers += f", every {step}th"
         between = f"[{column.low:g}, {column.high:g}]"
-        rows.append((where, f"`{column.name}`", column.unit, between, column.meaning))
+        rows.append((numbers, f"`{column.name}`", column.unit, between, column.meaning))
     return table(("columns", "name", "unit", "values", "meaning"), rows)
 
 
@@ -100,12 +100,13 @@ def reference() -> dict[str, str]:
 
 def commands(command: Any, name: str) -> Iterator[tuple[str, str, str]]:
     """Yield name, help and options of a command, or of those below it."""
-    below = getattr(command, "commands", None)
-    if below is None:
-        options = (one.opts[0] for one in command.params if one.opts[0].startswith("-"))
-        yield f"`{name}`", summary(command.help), ", ".join(f"`{one}`" for one in options)
-    for part, one in (below or {}).items():
-        yield from commands(one, f"{name} {part}")
+    subcommands = getattr(command, "commands", None)
+    if subcommands is None:
+        names = (parameter.opts[0] for parameter in command.params)
+        options = ", ".join(f"`{option}`" for option in names if option.startswith("-"))
+        yield f"`{name}`", summary(command.help), options
+    for word, subcommand in (subcommands or {}).items():
+        yield from commands(subcommand, f"{name} {word}")
 
 
 def about(study: Specification) -> str:
@@ -116,7 +117,7 @@ def about(study: Specification) -> str:
     return f"{study.seeds} seeds, {world}; tables: {tables}"
 
 
-def columns_of(columns: Columns[Row]) -> str:
+def columns_of(columns: Columns[Judged]) -> str:
     """Return the columns of a table of results with what they mean."""
     rows = [(f"`{name}`", text) for name, (*_, text) in columns.items()]
     return table(("column", "meaning"), rows)
@@ -124,22 +125,22 @@ def columns_of(columns: Columns[Row]) -> str:
 
 def sections(record: type[Record], names: Iterable[str]) -> str:
     """Return a section for each of these fields, which are records or several of one kind."""
-    told = []
+    texts = []
     for name in names:
         annotation: Any = record.model_fields[name].annotation
         kind, *_ = get_args(annotation) or [annotation]
         heading = f"[[{name}]]" if get_origin(annotation) is tuple else f"[{name}]"
-        told.append(f"### `{heading}`\n\n{summary(kind.__doc__)}\n\n{fields(kind)}")
-    return "\n\n".join(told)
+        texts.append(f"### `{heading}`\n\n{summary(kind.__doc__)}\n\n{fields(kind)}")
+    return "\n\n".join(texts)
 
 
 def fields(record: type[Record], leave_out: Container[str] = ()) -> str:
     """Return a table of a record's fields with their defaults and what its docstring says."""
-    said: dict[str, str] = {}
+    meaning: dict[str, str] = {}
     for kind in reversed(record.__mro__):
-        said |= meanings(kind)
+        meaning |= meanings(kind)
     names = [name for name in record.model_fields if name not in leave_out]
-    rows = [(f"`{name}`", default(record, name), said.get(name, "")) for name in names]
+    rows = [(f"`{name}`", default(record, name), meaning.get(name, "")) for name in names]
     return table(("field", "default", "meaning"), rows)
 
 
@@ -165,10 +166,10 @@ def meanings(kind: type) -> dict[str, str]:
     # Python 3.13 takes the indent of a docstring away by itself.
     _, _, text = inspect.cleandoc(vars(kind).get("__doc__") or "").partition("Args:\n")
     text, _, _ = text.partition("\n\n")
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     for names, meaning in re.findall(r"^ {4}([*\w, ]+): (.*(?:\n {8}.*)*)", text, re.MULTILINE):
-        found |= dict.fromkeys(names.split(", "), " ".join(meaning.split()))
-    return found
+        by_name |= dict.fromkeys(names.split(", "), " ".join(meaning.split()))
+    return by_name
 
 
 def summary(text: str | None) -> str:
@@ -179,12 +180,12 @@ def summary(text: str | None) -> str:
 PAGES = {"environment": environment, "reference": reference}
 
 
-def written(page: str) -> str:
+def page_text(page: str) -> str:
     """Return a page as the code has it."""
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
-    return rewritten(text, PAGES[page]())
+    return with_blocks(text, PAGES[page]())
 
 
 if __name__ == "__main__":
     for name in PAGES:
-        (ROOT / "docs" / f"{name}.md").write_text(written(name), encoding="utf-8")
+        (ROOT / "docs" / f"{name}.md").write_text(page_text(name), encoding="utf-8")

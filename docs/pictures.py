@@ -43,13 +43,13 @@ def scene(file: str, play: Play, seconds: float) -> None:
 
 
 def browser_view(name: str) -> None:
-    """Keep a recording of a run, and photograph it with a headless Chromium."""
+    """Photograph the recording of a run with a headless Chromium."""
     faults = [Fault("FM4", [2, 7, 9], onset=60.0), Fault("FM4", [12, 20], onset=90.0)]
     session = Session(Scenario(), seed=1, faults=faults, speed=8.0)
-    page = MEDIA / "run.html"
-    page.write_text(recorded_page(session, 150.0), encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
-        browser = Browser(Path(folder), (1280, 860))
+        page = Path(folder, "run.html")
+        page.write_text(recorded_page(session, 150.0), encoding="utf-8")
+        browser = Browser(Path(folder, "profile"), (1280, 860))
         try:
             browser.open(page.as_uri())
             browser.wait_for("latest && playhead > 0")

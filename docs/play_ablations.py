@@ -61,13 +61,13 @@ class WithoutInputs(BaseCallback):  # type: ignore[misc]  # not in the environme
 def train_one(seed: int, name: str) -> None:
     """Train one variant from one seed, or go on with it, into OUT/NAME@SEED.safetensors."""
     recipe = load_training("robust")
-    paid = {"stocking": 0.0} if name == "without-stocking" else {}
+    rewards = {"stocking": 0.0} if name == "without-stocking" else {}
     training = recipe.replace(
         name=f"{name}-{seed}",
         agent_steps=AGENT_STEPS,
         seed=seed,
         threads=1,
-        rewards=recipe.rewards | paid,
+        rewards=recipe.rewards | rewards,
         scores=recipe.scores.replace(seeds=0),
     )
     path = train(training, OUT / training.name, callbacks=[WithoutInputs(WITHOUT[name])])
@@ -90,25 +90,28 @@ def study() -> Study:
     )
 
 
-def block(found: StudyResults) -> str:
+def block(results: StudyResults) -> str:
     """Return a row for each variant: P without a fault and in every condition."""
     # Runs with robots removed, and those with further behaviour seeds, are FT's alone.
-    arms = list(dict.fromkeys(cell.arm.setting for cell in found.cells))
-    arms = [arm for arm in arms if not re.match("removed|.*behaviour seeds", str(arm))]
-    cells = {(cell.policy, cell.arm.setting): cell for cell in found.cells}
-    rows = [(one, *(section.mean_p(cells[one, arm]) for arm in arms)) for one in found.policies]
-    return f"{table(('', *arms), rows)}\n\n{seeds_from(found)}, of each training."
+    settings = dict.fromkeys(cell.arm.setting for cell in results.cells)
+    shown = [s for s in settings if not re.match("removed|.*behaviour seeds", str(s))]
+    cells = {(cell.policy, cell.arm.setting): cell for cell in results.cells}
+    rows = [
+        (policy, *(section.mean_p(cells[policy, setting]) for setting in shown))
+        for policy in results.policies
+    ]
+    return table(("", *shown), rows, f"{seeds_from(results)}, of each training.")
 
 
 def main() -> None:
     """Train what is missing, a training a core, then play all and write the table."""
     cores = len(os.sched_getaffinity(0))
-    spawned = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(cores, mp_context=spawned) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(cores, mp_context=context) as pool:
         list(pool.map(train_one, *zip(*product(range(TRAININGS), WITHOUT))))
-    ours = study()
-    ours.run(processes=cores)
-    rewrite(ROOT / "docs" / "training.md", {"ablations": block(ours.findings())})
+    ablations = study()
+    ablations.run(processes=cores)
+    rewrite(ROOT / "docs" / "training.md", {"ablations": block(ablations.findings())})
 
 
 if __name__ == "__main__":

@@ -18,29 +18,30 @@ from swarm_logistics_env.studies import Study
 
 def means(files: list[str]) -> dict[str, float]:
     """Return P of each policy, averaged over the development conditions."""
-    whole = load_preset("benchmark")
+    benchmark = load_preset("benchmark")
     tables = {
-        name: [one for one in getattr(whole, name) if one.title.startswith("Development")]
-        for name in ("faults", "parameters")
+        kind: [part for part in getattr(benchmark, kind) if part.title.startswith("Development")]
+        for kind in ("faults", "parameters")
     }
     study = Study(
         name="medians",
-        policies=[{"name": one, "label": one} for one in files],
+        policies=[{"name": file, "label": file} for file in files],
         seeds=4,
         first_seed=700_000,
-        scenario=whole.scenario,
-        out=Path("results", "medians", "-".join(Path(one).stem for one in files)),
+        scenario=benchmark.scenario,
+        out=Path("results", "medians", "-".join(Path(file).stem for file in files)),
         **tables,
     )
     study.run(processes=2)
     cells = {(cell.policy, cell.arm.case.key): cell for cell in study.findings().cells}
     by_policy = grouped(cells.values(), lambda cell: cell.policy)
-    return {one: float(np.mean([cell.mean.value for cell in by_policy[one]])) for one in files}
+    return {file: float(np.mean([cell.mean.value for cell in by_policy[file]])) for file in files}
 
 
 if __name__ == "__main__":
-    found = means(sys.argv[1:])
-    ascending = sorted(found, key=lambda one: found[one])
-    for one in ascending:
-        print(f"{one}: training seed {read_card(Path(one)).seed}, mean P {found[one]:.1f}")
+    mean_of_file = means(sys.argv[1:])
+    ascending = sorted(mean_of_file, key=mean_of_file.__getitem__)
+    for file in ascending:
+        seed = read_card(Path(file)).seed
+        print(f"{file}: training seed {seed}, mean P {mean_of_file[file]:.1f}")
     print(f"Median: {ascending[(len(ascending) - 1) // 2]}")

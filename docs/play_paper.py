@@ -6,6 +6,7 @@
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 
 from tables import table
@@ -44,16 +45,16 @@ def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
     No family of claims is divided: FT and R are asked of faults only, S, A and change of the rest.
     The third part is the other reading of FM3, the last two are the first two without drift.
     """
-    rest: dict[str, object] = {"seeds": SEEDS, "faults": ()}
+    without_faults: dict[str, object] = {"seeds": SEEDS, "faults": ()}
     faults = {"seeds": SEEDS_WHERE_SKEWED, "sizes": (), "parameters": (), "ablations": ()}
     send = [{"title": "Table II, another reading of FM3", "modes": ["FM3_send"]}]
     sizes = [int(setting.value) for setting in PAPER.performance if setting.kind == "size"]
     large = [{"values": sizes, "scenario": {"preset": "paper_scalability", **NO_DRIFT}}]
     parts = {
-        "paper": rest,
+        "paper": without_faults,
         "paper-faults": faults,
         "paper-send": {**faults, "faults": send},
-        "paper-no-drift": {**rest, "scenario": NO_DRIFT, "sizes": large, "ablations": ()},
+        "paper-no-drift": {**without_faults, "scenario": NO_DRIFT, "sizes": large, "ablations": ()},
         "paper-faults-no-drift": {**faults, "seeds": SEEDS, "scenario": NO_DRIFT},
     }
     return tuple(
@@ -65,8 +66,8 @@ def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
 def paper_block(parts: Sequence[StudyResults]) -> str:
     """Return the paper's table: P of the paper beside ours, and how well they agree."""
     with_drift, exact = _published_cells(parts[:3]), _published_cells(parts[3:])
-    found = _agreement(with_drift)
-    rows = list(_rows(with_drift.values(), found.misses))
+    as_shipped = _agreement(with_drift)
+    rows = list(_rows(with_drift.values(), as_shipped.misses))
     rows += [
         (f"without taxis, N = {c.arm.setting.value:g}", "", section.mean_p(c), "", str(c.n_seeds))
         for c in parts[0].cells
@@ -74,14 +75,14 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
     ]
     measures = (
         "reading",
-        r"mean of \|ln(ours / paper's)\|",
+        "mean of |ln(ours / paper's)|",
         "typically off by",
         "paper's values in the 95 % interval of our mean",
     )
-    nearness = [
-        ("as shipped", *_near(found)),
-        ("FM3_send in the place of FM3", *_near(_agreement(with_drift, reading="FM3_send"))),
-        ("headings that do not drift", *_near(_agreement(exact))),
+    readings = [
+        ("as shipped", *_nearness(as_shipped)),
+        ("FM3_send in the place of FM3", *_nearness(_agreement(with_drift, reading="FM3_send"))),
+        ("headings that do not drift", *_nearness(_agreement(exact))),
     ]
     return f"""\
 {_summary(parts)}
@@ -89,12 +90,12 @@ def paper_block(parts: Sequence[StudyResults]) -> str:
 {table(("", "paper's P", "ours, mean [95 %]", "ours / paper's", "seeds"), rows)}
 
 Seeds from {parts[0].plan.seeds[0]:,} on, on which nothing was fitted.
-{len(found.misses)} of the paper's values lie outside the 95 % prediction interval of one run
+{len(as_shipped.misses)} of the paper's values lie outside the 95 % prediction interval of one run
 of ours (bold).
 {section.SATURATED}: in some run every item was delivered, so this P is capped. A
 verdict that rests on it is given only where a larger P could not turn it.
 
-{table(measures, nearness)}
+{table(measures, readings)}
 
 Without drift the deliveries of all conditions of this table together change by
 {_change(_published_cells(parts[:2]), exact)}, over {SEEDS} seeds."""
@@ -104,44 +105,47 @@ def _published_cells(parts: Iterable[StudyResults]) -> Cells:
     """Return the cells with a published value in the order of the paper's tables."""
     modes = list(FAULTS)
 
-    def place(cell: Cell) -> tuple[int, int]:
+    def position(cell: Cell) -> tuple[int, int]:
         kind, name, value, _ = cell.arm.setting
         return KINDS.index(kind), modes.index(name) if kind == "fault" and value else -1
 
     cells = [cell for part in parts for cell in part.cells]
-    known = [cell for cell in cells if cell.counted or cell.arm.setting.name == "FM3_send"]
-    found: dict[Setting, Cell] = {}
-    for cell in sorted(known, key=place):
-        found.setdefault(cell.arm.setting, cell)
-    return found
+    published = [cell for cell in cells if cell.counted or cell.arm.setting.name == "FM3_send"]
+    by_setting: dict[Setting, Cell] = {}
+    for cell in sorted(published, key=position):
+        by_setting.setdefault(cell.arm.setting, cell)
+    return by_setting
 
 
 def _agreement(cells: Cells, reading: str = "FM3") -> Agreement:
-    left_out = {"FM3", "FM3_send"} - {reading}
-    return agreement("", [cell for s, cell in cells.items() if s.name not in left_out])
+    excluded = {"FM3", "FM3_send"} - {reading}
+    return agreement("", [cell for setting, cell in cells.items() if setting.name not in excluded])
 
 
-def _near(found: Agreement) -> tuple[str, str, str]:
+def _nearness(paper: Agreement) -> tuple[str, str, str]:
     """Return how near the published values are to ours."""
-    off = found.mean_log_error or 0.0
-    return f"{off:.3f}", f"{math.expm1(off):.0%}", f"{len(found.met)} of {len(found.cells)}"
+    error = paper.mean_log_error or 0.0
+    return f"{error:.3f}", f"{math.expm1(error):.0%}", f"{len(paper.met)} of {len(paper.cells)}"
 
 
 def _change(drift: Cells, exact: Cells) -> str:
     """Return the relative change of P without drift, over the cells and seeds of both."""
-    both = [one for one in exact if one in drift]
-    totals = [sum(cells[one].by_seed[:SEEDS] for one in both) for cells in (drift, exact)]
-    found = relative_change(*totals)
-    low, high = found.low or 0.0, found.high or 0.0
-    told = f"{100 * found.value:+.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
-    return f"{told}: no clear effect" if low <= 0.0 <= high else told
+    settings = [setting for setting in exact if setting in drift]
+    totals = [
+        sum(cells[setting].by_seed[:SEEDS] for setting in settings) for cells in (drift, exact)
+    ]
+    change = relative_change(*totals)
+    low = change.low or 0.0
+    high = change.high or 0.0
+    text = f"{100 * change.value:+.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
+    return f"{text}: no clear effect" if low <= 0.0 <= high else text
 
 
 def _rows(cells: Iterable[Cell], missed: Sequence[Cell]) -> Iterator[tuple[str, ...]]:
     """Yield the rows, in which the levels of a fault or a parameter stand side by side."""
     for levels in grouped(cells, lambda cell: cell.arm.setting.name).values():
-        one_each = levels[0].arm.setting.kind == "size"
-        for row in [[level] for level in levels] if one_each else [levels]:
+        is_size = levels[0].arm.setting.kind == "size"
+        for row in [[level] for level in levels] if is_size else [levels]:
             published = [f"**{c.published:g}**" if c in missed else f"{c.published:g}" for c in row]
             ratios = [f"{c.mean.value / c.published:.2f}" for c in row if c.published]
             seeds = dict.fromkeys(str(c.n_seeds) for c in row)
@@ -161,55 +165,64 @@ def _label(row: Sequence[Cell]) -> str:
 
 def sentences_block(parts: Sequence[StudyResults]) -> str:
     """Return each sentence of the paper with the verdicts on the claims that it makes."""
-    of_text, beside, other = _claims(parts)
+    of_text, without_taxis, fm3_send = _claims(parts)
     rows = [
         *sentences(PAPER, of_text),
-        *claims("(P falls without taxis)", beside),
-        *claims("(the same of FM3_send)", other),
+        *claims("(P falls without taxis)", without_taxis),
+        *claims("(the same of FM3_send)", fm3_send),
     ]
     seeds = f"FT and R: {len(parts[1].plan.seeds)} seeds, all else {len(parts[0].plan.seeds)}."
-    head = "the paper's text", "claim", "ours [95 %]", "verdict"
-    return f"{table(head, rows)}\n\n{seeds}"
+    return table(("the paper's text", "claim", "ours [95 %]", "verdict"), rows, seeds)
+
+
+def claim_rows(parts: Sequence[StudyResults]) -> Iterator[tuple[str, str, str]]:
+    """Yield what each claim of the text is on, the claim, and its verdict."""
+    of_text, _, _ = _claims(parts)
+    for test, (_, claim, *_) in zip(of_text, claims("", of_text)):
+        subject = "N" if test.after.kind == "size" else test.after.name
+        yield subject, claim, _verdict(test)
 
 
 def _summary(parts: Sequence[StudyResults]) -> str:
     """Return how many claims are supported and contradicted, and what that means."""
-    of_text, beside, other = _claims(parts)
-    counted = Counter(map(_said, of_text))
-    names = ["N" if test.after.kind == "size" else test.after.name for test in of_text]
-    of = Counter(n for n, test in zip(names, of_text) if _said(test) == "contradicted")
-    listed = ", ".join(f"{count} on {what}" for what, count in of.most_common())
-    about = f" ({listed})" if listed else ""
+    of_text, without_taxis, fm3_send = _claims(parts)
+    counts = Counter(map(_verdict, of_text))
+    contradicted = Counter(
+        subject for subject, _, verdict in claim_rows(parts) if verdict == "contradicted"
+    )
+    subjects = ", ".join(f"{count} on {subject}" for subject, count in contradicted.most_common())
+    about = f" ({subjects})" if subjects else ""
     return f"""\
 Of {len(of_text)} claims of the paper's text this re-implementation supports
-{counted["supported"]} and contradicts {counted["contradicted"]}{about};
-{counted["open"]} are open; {counted["untestable"]}, on the
+{counts["supported"]} and contradicts {counts["contradicted"]}{about};
+{counts["open"]} are open; {counts["untestable"]}, on the
 warehouse's width, are untestable: A cannot fall below 0 where a
-parameter at least doubles. {len(beside)} more, that P falls without taxis, are not in
-the text: {_counted(beside)}. Of FM3_send, the other reading of FM3: {_counted(other)}.
+parameter at least doubles. {len(without_taxis)} more, that P falls without taxis, are not in
+the text: {_counts(without_taxis)}. Of FM3_send, the other reading of FM3: {_counts(fm3_send)}.
 {PAPER.whose}"""
 
 
-def _claims(parts: Sequence[StudyResults]) -> tuple[list[Verdict], ...]:
-    """Return the verdicts on claims: of the paper's text, beside it, and with FM3_send."""
+def _claims(parts: Sequence[StudyResults]) -> tuple[list[Verdict], list[Verdict], list[Verdict]]:
+    """Return the verdicts on claims: of the paper's text, without taxis, and with FM3_send."""
     tests = [test for part in parts[:2] for test in part.verdicts if test.claim]
     of_text = [test for test in tests if test.compared.question in PAPER.claims]
-    beside = [test for test in tests if test not in of_text]
-    return of_text, beside, [test for test in parts[2].verdicts if test.claim]
+    without_taxis = [test for test in tests if test not in of_text]
+    return of_text, without_taxis, [test for test in parts[2].verdicts if test.claim]
 
 
-def _counted(tests: Iterable[Verdict]) -> str:
-    return ", ".join(f"{count} {said}" for said, count in Counter(map(_said, tests)).items())
+def _counts(tests: Iterable[Verdict]) -> str:
+    return ", ".join(f"{n} {verdict}" for verdict, n in Counter(map(_verdict, tests)).items())
 
 
-def _said(test: Verdict) -> str:
-    said = section.counted_as(test, test.on_claim.adjusted if test.on_claim else UNDEFINED)
-    return "contradicted" if said == "refuted" else said
+def _verdict(test: Verdict) -> str:
+    """Return the verdict on a claim as the page counts it."""
+    word = section.counted_as(test, test.on_claim.adjusted if test.on_claim else UNDEFINED)
+    return "contradicted" if word == "refuted" else word
 
 
 def draw_figures(parts: Sequence[StudyResults], media: Path) -> None:
     """Draw the paper's figures with its values as crosses and ours with their intervals."""
-    for figure in (one for part in parts[:2] for one in indicator_figures(part)):
+    for figure in chain.from_iterable(map(indicator_figures, parts[:2])):
         if figure.name.startswith(("S-", "FT-", "A-")):
-            drawn, _ = images(figure.draw, figure.height)
-            (media / f"paper-{figure.name}.svg").write_text(drawn, encoding="utf-8")
+            svg, _ = images(figure.draw, figure.height)
+            (media / f"paper-{figure.name}.svg").write_text(svg, encoding="utf-8")

@@ -29,25 +29,26 @@ DOCS = ROOT / "docs"
 Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and its height [inch]
 
 
-def policies_compared(found: StudyResults) -> Answer:
+def policies_compared(results: StudyResults) -> Answer:
     """Answer with all policies side by side, and the report's figure of R."""
-    figure = next(f for f in document(found).figures() if f.name.startswith("R-Two-robots"))
-    return {"answer": tables.side_by_side(found)}, figure.draw, figure.height
+    figures = document(results).figures()
+    figure = next(figure for figure in figures if figure.name.startswith("R-Two-robots"))
+    return {"answer": tables.side_by_side(results)}, figure.draw, figure.height
 
 
-def larger_swarms(found: StudyResults) -> Answer:
+def larger_swarms(results: StudyResults) -> Answer:
     """Answer with P and R against N."""
     blocks = {
-        "performance": tables.performances_by_size(found),
-        "robustness": tables.by_size(found),
+        "performance": tables.performances_by_size(results),
+        "robustness": tables.by_size(results),
     }
-    known = [test for test in found.verdicts if test.compared.indicator == "R"]
+    robustness = [test for test in results.verdicts if test.compared.indicator == "R"]
     panels = []
-    for mode, tests in grouped(known, lambda test: test.after.name).items():
+    for mode, tests in grouped(robustness, lambda test: test.after.name).items():
         points = tuple(
             Point(
                 test.compared.policy,
-                found.policies.index(test.compared.policy),
+                results.policies.index(test.compared.policy),
                 f"{test.compared.n_robots}, m = {test.after.value:g}",
                 *interval,
                 decided=test.on_threshold.adjusted in DECIDED,
@@ -68,34 +69,34 @@ def on_one_scale(canvas: "Canvas", panels: Sequence[Panel]) -> None:
         axes.set_ylim(min(lows), max(highs))
 
 
-def wear_and_repair(found: StudyResults) -> Answer:
+def wear_and_repair(results: StudyResults) -> Answer:
     """Answer with what wear costs and what a repair brings, drawn over time for FM4."""
     blocks = {
-        "wear": tables.wear(found),
-        "repair": tables.repairs(found),
-        "after": tables.after_repairs(found),
+        "wear": tables.wear(results),
+        "repair": tables.repairs(results),
+        "after": tables.after_repairs(results),
     }
     panels: dict[str, dict[str, RateCurve]] = {}
-    for test in found.verdicts:
+    for test in results.verdicts:
         if test.after.name == "FM4":
-            curves = {curve.runs: curve for curve in rate_curves(found, test.compared)}
-            whole = float(curves["no fault"].deliveries.mean())
-            drawn = panels.setdefault(f"{test.compared.policy}, 100 % are {whole:.1f} items", {})
+            curves = {curve.runs: curve for curve in rate_curves(results, test.compared)}
+            sound = float(curves["no fault"].deliveries.mean())
+            panel = panels.setdefault(f"{test.compared.policy}, 100 % are {sound:.1f} items", {})
             for runs, curve in curves.items():
-                told = test.compared.table.lower() if runs == "fault" else runs
-                numbers = (100.0 / whole * column for column in curve[2:])
-                drawn[told] = RateCurve(told, curve.seconds, *numbers)
-    shown = {title: list(curves.values()) for title, curves in panels.items()}
-    draw = partial(drawing.rates, panels=shown, onset=100.0, y_label="deliveries [%]")
+                label = test.compared.table.lower() if runs == "fault" else runs
+                percentages = (100.0 / sound * column for column in curve[2:])
+                panel[label] = RateCurve(label, curve.seconds, *percentages)
+    by_title = {title: list(panel.values()) for title, panel in panels.items()}
+    draw = partial(drawing.rates, panels=by_title, onset=100.0, y_label="deliveries [%]")
     return blocks, draw, 0.5 + 1.9 * len(panels)
 
 
-def realistic_robots(found: StudyResults) -> Answer:
+def realistic_robots(results: StudyResults) -> Answer:
     """Answer with all policies, and each beside itself in the ideal world."""
-    blocks, draw, height = policies_compared(found)
-    seeds = len(found.plan.seeds)
+    blocks, draw, height = policies_compared(results)
+    seeds = len(results.plan.seeds)
     (ideal,) = play([example(OUT, "questions/central_or_swarm", seeds=seeds)])
-    return {**blocks, "lost": tables.beside_another_world(found, ideal)}, draw, height
+    return {**blocks, "lost": tables.losses_between_worlds(results, ideal)}, draw, height
 
 
 QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
@@ -109,12 +110,12 @@ QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
 def main(names: list[str]) -> None:
     """Play the studies of these names, and rewrite their tables and figures."""
     for name in names or QUESTIONS:
-        (found,) = play([example(OUT, f"questions/{name}")])
-        blocks, draw, height = QUESTIONS[name](found)
+        (results,) = play([example(OUT, f"questions/{name}")])
+        blocks, draw, height = QUESTIONS[name](results)
         svg, _ = drawing.images(draw, height)
         (DOCS / "media" / f"{name}.svg").write_text(svg, encoding="utf-8")
-        named = {f"{name} {part}": block for part, block in blocks.items()}
-        rewrite(DOCS / "research" / "questions_of_the_field.md", named)
+        page_blocks = {f"{name} {part}": block for part, block in blocks.items()}
+        rewrite(DOCS / "research" / "questions_of_the_field.md", page_blocks)
 
 
 if __name__ == "__main__":

@@ -35,25 +35,26 @@ def lets_go(world: Warehouse, rows: Any) -> None:
 
 def only_lower(_: Warehouse, rows: Any) -> None:
     """A robot follows only a timer that is lower than its own."""
-    own = np.where(rows[:, row.TIMER_RUNS] > 0.5, rows[:, row.TIMER], np.inf)
-    rows[rows[:, row.LOWEST_TIMER + 3] >= own, row.LOWEST_TIMER] = 0.0
+    timer = np.where(rows[:, row.TIMER_RUNS] > 0.5, rows[:, row.TIMER], np.inf)
+    rows[rows[:, row.LOWEST_TIMER + 3] >= timer, row.LOWEST_TIMER] = 0.0
 
 
 def choose(pick: Callable[[Any], Any]) -> Change:
     """Of those that tell the lowest timer, the carrier follows `pick` of their distances."""
 
     def change(world: Warehouse, rows: Any) -> None:
-        state, me = world.state, world.state.carrier
-        if me < 0 or rows[me, row.LOWEST_TIMER] < 0.5:
+        state = world.state
+        carrier = state.carrier
+        if carrier < 0 or rows[carrier, row.LOWEST_TIMER] < 0.5:
             return
-        away = state.robot_position - state.robot_position[me]
-        distance = np.hypot(*away.T)
+        offsets = state.robot_position - state.robot_position[carrier]
+        distance = np.hypot(*offsets.T)
         is_heard = state.sends & (distance <= world.scenario.radio_range) & (distance > 0.0)
-        told = np.where(is_heard, state.robot_told, np.nan)
-        ties = np.flatnonzero(told == np.nanmin(told))
-        x, y = away[ties[pick(distance[ties])]]
-        seen = complex(x, y) * cmath.exp(-1j * float(state.robot_heading[me]))
-        rows[me, row.LOWEST_TIMER + 1 : row.LOWEST_TIMER + 3] = seen.real, seen.imag
+        timers = np.where(is_heard, state.robot_told, np.nan)
+        ties = np.flatnonzero(timers == np.nanmin(timers))
+        x, y = offsets[ties[pick(distance[ties])]]
+        direction = complex(x, y) * cmath.exp(-1j * float(state.robot_heading[carrier]))
+        rows[carrier, row.LOWEST_TIMER + 1 : row.LOWEST_TIMER + 3] = direction.real, direction.imag
 
     return change
 
@@ -104,13 +105,14 @@ if __name__ == "__main__":
         is_for_all = number == 0 or relay == "gossip" or change not in (None, lets_go)
         cells = [(25, 60, m + 1, p, n_seeds) for m, p in enumerate(PAPER[of])]
         cells += [(*cell[:2], 0, cell[2], -(-n_seeds // 4)) for cell in OTHERS if is_for_all]
-        shown, errors = [], []
+        means = []
+        errors = []
         with ProcessPoolExecutor(2) as pool:
             for n, n_items, m, paper, count in cells:
                 play = partial(delivered, number, n, n_items, m)
                 mean = np.mean([*pool.map(play, range(FIRST_SEED, FIRST_SEED + count))])
-                shown.append(f"{mean:.1f} ({paper})")
+                means.append(f"{mean:.1f} ({paper})")
                 errors.append(abs(math.log(mean / paper)))
         price = f"{np.mean(errors[3:]):.2f}" if is_for_all else "as shipped"
-        told = " | ".join([of, words, *shown[:3], f"{np.mean(errors[:3]):.2f}", price])
-        print(f"| {told} |", flush=True)
+        columns = [of, words, *means[:3], f"{np.mean(errors[:3]):.2f}", price]
+        print(f"| {' | '.join(columns)} |", flush=True)

@@ -1,25 +1,28 @@
 """Plays the studies behind docs/results.md and writes its tables: `python docs/play_tables.py`.
 
-From these tables follow the README's numbers and picture; `judge` gets what it ranks beside.
-What is played is kept, so that a second call plays nothing, and one after an interruption the rest.
-Costs are not measured here: their table is written from what `make benchmark` left, if it did.
+The CSV files in docs/results, from which the README's numbers and picture follow, are written with
+them, and the scores that `judge` ranks beside. What is played is kept, so that a second call plays
+nothing, and one after an interruption the remaining runs. Costs are not measured here: their table
+is written from what `make benchmark` left, if it did.
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import front_page
-from play_paper import draw_figures, paper_block, paper_studies, sentences_block
-from tables import ROOT, by_policy, example, rewrite, seeds_from, table
+import numpy as np
+from play_paper import claim_rows, draw_figures, paper_block, paper_studies, sentences_block
+from tables import ROOT, answer, by_policy, example, rewrite, seeds_from, table, write_rows
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.judging import ENTRIES
 from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.report import benchmark, drawing, section
 from swarm_logistics_env.runs.engines import usable_cores
-from swarm_logistics_env.spi.summaries import t_interval
+from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAGE = ROOT / "docs" / "results.md"
+RESULTS = ROOT / "docs" / "results"
 MEDIA = ROOT / "docs" / "media"
 OUT = ROOT / "results" / "tables"
 BENCHMARK = ROOT / "results" / "benchmark" / "benchmark.json"
@@ -39,118 +43,151 @@ PROCESSES = usable_cores()
 EXAMPLES = (
     "clearing", "ladder", "ladder_restocked", "leans", "shipped_policies", "robust_policy",
 )  # fmt: skip
+ESTIMATES = ("study", "row", "policy", "value", "low", "high", "threshold", "digits", "seeds")
+COSTS = ("microseconds_per_step", "processor")
 
 
 def play(studies: Iterable[Study]) -> list[StudyResults]:
     """Play what is missing of each study; return what the runs say, or exit if one failed."""
-    found = []
+    results = []
     for study in studies:
         tally = study.run(processes=PROCESSES)
         if tally.failed:
             raise SystemExit(f"{tally.failed} runs failed: {tally.error}")
-        found.append(study.findings())
-    return found
+        results.append(study.findings())
+    return results
 
 
 def policies_block(results: StudyResults) -> str:
     """Return P and the indicators of every policy."""
-    cells = (cell for cell in results.cells if cell.arm.setting.kind in ("size", "parameter"))
-    found = by_policy(results.policies, cells, results.verdicts, section.ratio)
-    return f"{found}\n\n{seeds_from(results)}, of each training."
+    seeds = f"{seeds_from(results)}, of each training."
+    return by_policy(
+        results.policies, varied_cells(results), results.verdicts, section.ratio, seeds
+    )
+
+
+def varied_cells(results: StudyResults) -> list[Cell]:
+    """Return the cells that vary the swarm's size or a parameter."""
+    return [cell for cell in results.cells if cell.arm.setting.kind in ("size", "parameter")]
 
 
 def robust_block(results: StudyResults) -> str:
     """Return R and FT under each failure mode, and what Holm's method makes of them."""
-    rows, told = [], dict[str, list[str]]()
-    for label, tests in grouped(results.verdicts, lambda one: one.compared.label).items():
+    rows = []
+    by_answer: dict[str, list[str]] = {}
+    for label, tests in grouped(results.verdicts, lambda test: test.compared.label).items():
         cell = results.cells_of(tests[0].compared)[tests[0].compared.changed]
         by_symbol = {test.compared.indicator: test for test in tests}
         row = [label, section.mean_p(cell)]
         for symbol in ("R", "FT"):
             test = by_symbol[symbol]
             row.append(f"{section.ratio(test)}, {section.concluded(test)}")
-            told.setdefault(test.on_property.adjusted, []).append(f"{symbol} under {label}")
+            by_answer.setdefault(answer(test), []).append(f"{symbol} under {label}")
         rows.append(row)
-    found = "; ".join(f"{words}: {section.listed(what)}" for words, what in told.items())
-    head = "", "P", "R above 0?", "FT above 0?"
-    return (
-        f"{table(head, rows)}\n\n`{results.policies[0]}`, "
-        f"{seeds_from(results, 'seeds of each')}; verdicts by Holm's method. "
-        f"{found[:1].upper()}{found[1:]}."
+    summary = "; ".join(f"{word}: {section.listed(tests)}" for word, tests in by_answer.items())
+    return table(
+        ("", "P", "R above 0?", "FT above 0?"),
+        rows,
+        f"`{results.policies[0]}`, {seeds_from(results, 'seeds of each')}; verdicts by Holm's "
+        f"method. {summary[:1].upper()}{summary[1:]}.",
     )
 
 
 def clearing_block(results: StudyResults) -> str:
     """Return the time to clear of every policy and condition: a row a policy."""
-    settings = list(dict.fromkeys(cell.arm.setting for cell in results.cells if cell.n_seeds))
-    by_place = {(cell.policy, cell.arm.setting): cell for cell in results.cells}
+    settings = dict.fromkeys(cell.arm.setting for cell in results.cells if cell.n_seeds)
+    cells = {(cell.policy, cell.arm.setting): cell for cell in results.cells}
     rows = [
-        (f"`{policy}`", *(section.time_to_clear(by_place[policy, one]) for one in settings))
+        (f"`{policy}`", *(section.time_to_clear(cells[policy, setting]) for setting in settings))
         for policy in results.policies
     ]
     limit = results.plan.cases[0].scenario.duration
-    return (
-        f"{table(('', *settings), rows)}\n\n"
+    return table(
+        ("", *settings),
+        rows,
         "Median time until all items are delivered [s], with its 95 % interval: less is better; N "
         f"is 25; {seeds_from(results)}; of several trainings the mean. "
-        f'"x of y": so many runs were not done after {limit:g} s.'
+        f'"x of y": so many runs were not done after {limit:g} s.',
     )
 
 
-def _worlds(found: StudyResults) -> dict[str, dict[str, Cell]]:
+def ablation_cells(results: StudyResults) -> dict[str, dict[str, Cell]]:
     """Return the cells of each table of ablations, by policy."""
-    titles = dict.fromkeys(one.title for one in found.plan.specification.ablations)
-    cells = found.cells
-    return {name: {c.arm.setting.name: c for c in cells if c.table == name} for name in titles}
+    titles = dict.fromkeys(ablation.title for ablation in results.plan.specification.ablations)
+    return {
+        title: {cell.arm.setting.name: cell for cell in results.cells if cell.table == title}
+        for title in titles
+    }
 
 
 def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
     """Return a row for each rung: its time to clear and P, and what it adds to the one before."""
-    times, gains, rungs = _worlds(cleared), _worlds(restocked), cleared.policies
-    kinds = "time to clear [s]", "P where items come back"
+    times = ablation_cells(cleared)
+    gains = ablation_cells(restocked)
+    rungs = cleared.policies
     rows = []
-    for rung, above in zip(rungs, ("", *rungs)):
-        before = "" if rung.startswith("ppo-") else "homing" if rung == "central" else above
+    for rung, previous in zip(rungs, ("", *rungs)):
+        if rung.startswith("ppo-"):
+            previous = ""
+        elif rung == "central":
+            previous = "homing"
         row = [f"`{rung}`"]
-        for name, cells in gains.items():
-            told = section.mean_p(cells[rung])
-            if before:
-                more = t_interval(cells[rung].by_seed - cells[before].by_seed)
-                told += f" (+{section.bracketed(more, 1)})".replace("+-", "-")
-            row += [section.time_to_clear(times[name][rung]), told]
+        for title, cells in gains.items():
+            p = section.mean_p(cells[rung])
+            if previous:
+                gain = t_interval(cells[rung].by_seed - cells[previous].by_seed)
+                sign = "" if gain.value < 0 else "+"
+                p += f" ({sign}{section.bracketed(gain, 1)})"
+            row += [section.time_to_clear(times[title][rung]), p]
         rows.append(row)
-    head = ["", *(f"{kind}, {name}" for name in times for kind in kinds)]
-    return f"{table(head, rows)}\n\n{seeds_from(cleared)}."
+    kinds = "time to clear [s]", "P where items come back"
+    head = ("", *(f"{kind}, {title}" for title in times for kind in kinds))
+    return table(head, rows, f"{seeds_from(cleared)}.")
 
 
-def leans_block(found: StudyResults) -> str:
+def leans_cells(results: StudyResults) -> dict[str, dict[str, Cell]]:
+    """Return the cells of each world, by policy."""
+    worlds = ablation_cells(results)
+    for fault in results.plan.specification.faults:
+        worlds[fault.title] = {
+            cell.policy: cell
+            for cell in results.cells
+            if cell.table == fault.title and cell.arm.setting.name in fault.modes
+        }
+    return worlds
+
+
+def leans_block(results: StudyResults) -> str:
     """Return a row for each world: P of every policy."""
-    worlds = _worlds(found)
-    for fault in found.plan.specification.faults:
-        ours = [c for c in found.cells if c.table == fault.title]
-        worlds[fault.title] = {c.policy: c for c in ours if c.arm.setting.name in fault.modes}
     rows = [
-        (name, *(_p_and_stalls(cells[one]) for one in found.policies))
-        for name, cells in worlds.items()
+        (title, *(_p_and_stalls(cells[policy]) for policy in results.policies))
+        for title, cells in leans_cells(results).items()
     ]
-    head = ["", *(f"`{one}`" for one in found.policies)]
-    return (
-        f"{table(head, rows)}\n\n"
-        f"P, items delivered in 500 s by 25 robots, with 95 % intervals; {seeds_from(found)}, of "
-        "each training."
+    return table(
+        ("", *(f"`{policy}`" for policy in results.policies)),
+        rows,
+        "P, items delivered in 500 s by 25 robots, with 95 % intervals; "
+        f"{seeds_from(results)}, of each training.",
     )
 
 
 def _p_and_stalls(cell: Cell) -> str:
     stalled = spi.share_stalled(cell.by_seed.ravel())
-    return section.mean_p(cell) + (f"; {stalled:.0%} stalled" if stalled else "")
+    p = section.mean_p(cell)
+    return f"{p}; {stalled:.0%} stalled" if stalled else p
 
 
 def draw_ladder(restocked: StudyResults, path: Path) -> None:
     """Draw P of each rung with its interval, without and with a handling time."""
-    worlds = list(enumerate(_worlds(restocked).items()))
+    worlds = list(enumerate(ablation_cells(restocked).items()))
     rows = [
-        (rung, [drawing.Point(name, style, "", *of[rung].mean) for style, (name, of) in worlds])
+        (
+            rung,
+            [
+                drawing.Point(title, style, "", *cells[rung].mean)
+                for style, (title, cells) in worlds
+            ],
+        )
         for rung in restocked.policies
     ]
 
@@ -164,7 +201,7 @@ def draw_ladder(restocked: StudyResults, path: Path) -> None:
     path.write_text(drawing.images(draw, 2.9)[0], encoding="utf-8")
 
 
-def costs_block(found: Mapping[str, Any]) -> str:
+def costs_block(costs: Mapping[str, Any]) -> str:
     """Return the table of what `make benchmark` measured: its benchmark.json."""
     rows = [
         (
@@ -173,15 +210,15 @@ def costs_block(found: Mapping[str, Any]) -> str:
             f"{row['microseconds_per_step']:,.0f}",
             f"{row['cost_to_base']:.2f} x {row['base']}" if row["base"] else "",
         )
-        for row in found["contestants"]
+        for row in costs["contestants"]
     ]
-    machine = found["machine"]
-    head = "", "agent-steps per s", "us per step", "cost per agent-step"
-    return (
-        f"{table(head, rows)}\n\n"
+    machine = costs["machine"]
+    return table(
+        ("", "agent-steps per s", "us per step", "cost per agent-step"),
+        rows,
         "Cost: less is better; the median over rounds of the ratio in each.\n"
         f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}.\n"
-        f"A second process takes its first step after {found['seconds']['first_step']:.1f} s."
+        f"A second process takes its first step after {costs['seconds']['first_step']:.1f} s.",
     )
 
 
@@ -191,34 +228,79 @@ LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "bench
 
 def benchmark_studies(out: Path) -> tuple[Study, ...]:
     """Return the benchmark's study of each policy that clears and of the learners, in folders."""
-    trained = ROOT / "results" / "interop"
-    there = [one for one in LEARNERS if (trained / f"{one}@0.safetensors").exists()]
-    shipped = [one.name for one in example(out, "clearing").specification.policies]
-    studies = []
-    for name in (*shipped, *(f"{trained / one}@all.safetensors" for one in there)):
-        folder = out / "benchmark" / section.slug(Path(name).stem)
-        studies.append(Study.preset(benchmark.STUDY, out=folder, policies=[name]))
-    return tuple(studies)
-
-
-def benchmark_block(found: Sequence[StudyResults]) -> str:
-    """Return the leaderboard and every entrant's worst cell; note the scores for `judge`."""
-    scores = {one.policies[0]: benchmark.score(one) for one in found}
-    ENTRIES.write_text(json.dumps({name: one.tolist() for name, one in scores.items()}) + "\n")
-    board = benchmark.leaderboard(scores)
-    worst = {}
-    for results in found:
-        test, share = benchmark.worst(results)
-        worst[results.policies[0]] = f"{test.compared.table}, {test.after}: {share:.0%}"
-    rows = [(f"`{name}`", *rest, worst[name]) for name, *rest in board.rows]
-    head = (*board.columns, "worst cell, share of P without it")
-    return (
-        f"{table(head, rows)}\n\n{seeds_from(found[0])}, of each training. {' '.join(board.lines)}"
+    folder = ROOT / "results" / "interop"
+    trained = [name for name in LEARNERS if (folder / f"{name}@0.safetensors").exists()]
+    names = [policy.name for policy in example(out, "clearing").specification.policies]
+    names += [f"{folder / name}@all.safetensors" for name in trained]
+    return tuple(
+        Study.preset(
+            benchmark.STUDY,
+            out=out / "benchmark" / section.slug(Path(name).stem),
+            policies=[name],
+        )
+        for name in names
     )
 
 
+def benchmark_block(studies: Sequence[StudyResults]) -> str:
+    """Return the leaderboard and every entrant's worst cell; note the scores for `judge`."""
+    scores = {results.policies[0]: benchmark.score(results) for results in studies}
+    entries = {name: score.tolist() for name, score in scores.items()}
+    ENTRIES.write_text(json.dumps(entries) + "\n")
+    board = benchmark.leaderboard(scores)
+    worst_cells = {}
+    for results in studies:
+        test, share = benchmark.worst(results)
+        worst_cells[results.policies[0]] = f"{test.compared.table}, {test.after}: {share:.0%}"
+    return table(
+        (*board.columns, "worst cell, share of P without it"),
+        [(f"`{name}`", *columns, worst_cells[name]) for name, *columns in board.rows],
+        f"{seeds_from(studies[0])}, of each training. {' '.join(board.lines)}",
+    )
+
+
+def estimate_rows(
+    policies: StudyResults, clearing: StudyResults, leans: StudyResults
+) -> Iterator[tuple[object, ...]]:
+    """Yield the numbers of three tables, with the columns ESTIMATES."""
+
+    def row(
+        study: str, label: str, policy: str, interval: Interval, digits: int, threshold: object = ""
+    ) -> tuple[object, ...]:
+        name = policy.partition(", ")[0]  # without how many trainings it stands for
+        return study, label, name, *interval, threshold, digits, n_seeds
+
+    n_seeds = len(policies.plan.seeds)
+    for cell in varied_cells(policies):
+        digits = section.digits_of(cell.mean.value)
+        yield row("policies", f"P, {cell.words}", cell.policy, cell.mean, digits)
+    for test in policies.verdicts:
+        if test.interval:
+            label = f"{test.compared.indicator}, {test.compared.label}"
+            policy, threshold = test.compared.policy, test.compared.threshold
+            yield row("policies", label, policy, test.interval, 3, threshold)
+    n_seeds = len(clearing.plan.seeds)
+    for cell in clearing.cells:
+        if cell.n_seeds:
+            yield row("clearing", str(cell.arm.setting), cell.policy, clearing_interval(cell), 0)
+    n_seeds = len(leans.plan.seeds)
+    for title, cells in leans_cells(leans).items():
+        for policy in leans.policies:
+            mean = cells[policy].mean
+            yield row("leans", title, policy, mean, section.digits_of(mean.value))
+
+
+def clearing_interval(cell: Cell) -> Interval:
+    """Return what `section.time_to_clear` prints, as numbers."""
+    times = [outcome.time_to_clear for outcome in cell.outcomes]
+    n_trainings = len(cell.arm.case.trainings)
+    if n_trainings > 1 and all(map(math.isfinite, times)):
+        return spi.mean_interval(np.reshape(times, (n_trainings, -1)))
+    return spi.median_interval(times)
+
+
 def main() -> None:
-    """Play, rewrite the page of results, then the README."""
+    """Play, rewrite the page of results and the files beside it, then the README."""
     paper = play(paper_studies(OUT, FIRST_SEED))
     draw_figures(paper, MEDIA)
     clearing, cleared, restocked, leans, policies, robust = play(
@@ -235,8 +317,15 @@ def main() -> None:
         "robust": robust_block(robust),
         "benchmark": benchmark_block(play(benchmark_studies(OUT))),
     }
+    estimates = estimate_rows(policies, clearing, leans)
+    write_rows(RESULTS / "estimates.csv", ESTIMATES, estimates)
+    write_rows(RESULTS / "claims.csv", ("subject", "claim", "verdict"), claim_rows(paper))
     if BENCHMARK.exists():
-        blocks["costs"] = costs_block(json.loads(BENCHMARK.read_text(encoding="utf-8")))
+        costs = json.loads(BENCHMARK.read_text(encoding="utf-8"))
+        blocks["costs"] = costs_block(costs)
+        (step,) = (row for row in costs["contestants"] if row["name"] == "env.step_arrays")
+        row = (step["microseconds_per_step"], costs["machine"]["processor"])
+        write_rows(RESULTS / "cost.csv", COSTS, [row])
     rewrite(PAGE, blocks)
     front_page.main()
 

@@ -1,10 +1,12 @@
-"""What the scripts share: blocks of a page between markers, and tables to put there."""
+"""What the scripts share: blocks of a page between markers, tables to put there, and CSV files."""
 
+import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env.report import section
+from swarm_logistics_env.report.write import section_markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
@@ -15,55 +17,60 @@ BLOCK = "<!-- tables: {name} -->"
 END = "<!-- end of tables -->"
 
 
-def _split(text: str, name: str) -> tuple[str, str, str]:
-    """Return what stands before, between and after the inner sides of a block's markers."""
-    before, found, rest = text.partition(BLOCK.format(name=name))
-    block, ended, after = rest.partition(END)
-    if not (found and ended):
-        raise SystemExit(f"the page has no {BLOCK.format(name=name)} followed by {END}")
-    return before + found, block.strip(), ended + after
-
-
-def block_of(text: str, name: str) -> str:
-    """Return what stands between the markers of a block."""
-    return _split(text, name)[1]
-
-
-def rewritten(text: str, blocks: Mapping[str, str]) -> str:
+def with_blocks(text: str, blocks: Mapping[str, str]) -> str:
     """Return a page with other text between the markers of each block."""
     for name, block in blocks.items():
-        before, _, after = _split(text, name)
-        text = f"{before}\n\n{block}\n\n{after}"
+        begin = BLOCK.format(name=name)
+        before, begin_marker, remainder = text.partition(begin)
+        _, end_marker, after = remainder.partition(END)
+        if not (begin_marker and end_marker):
+            raise SystemExit(f"the page has no {begin} followed by {END}")
+        text = f"{before}{begin}\n\n{block}\n\n{END}{after}"
     return text
 
 
 def rewrite(page: Path, blocks: Mapping[str, str]) -> None:
     """Write other text between the markers of each block of a page."""
-    text = rewritten(page.read_text(encoding="utf-8"), blocks)
+    text = with_blocks(page.read_text(encoding="utf-8"), blocks)
     page.write_text(text, encoding="utf-8")
 
 
-def table(head: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
-    """Return a Markdown table."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+def table(head: Sequence[object], rows: Iterable[Sequence[object]], *lines: str) -> str:
+    """Return a Markdown table as the report has it, and lines of text below."""
+    texts = tuple(tuple(map(str, row)) for row in rows)
+    return section_markdown(section.Section("", tuple(map(str, head)), texts, lines)).strip()
+
+
+def write_rows(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a CSV file."""
+    path.parent.mkdir(exist_ok=True)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(head)
+        writer.writerows(rows)
 
 
 def by_policy(
     policies: Sequence[str],
     cells: Iterable[Cell],
     tests: Iterable[Verdict],
-    told: Callable[[Verdict], str],
+    text: Callable[[Verdict], str],
+    *lines: str,
 ) -> str:
-    """Return a table of P and of indicators, as they are told, with a column for each policy."""
+    """Return a table of P and of indicators with a column for each policy, and lines below."""
     rows: dict[str, dict[str, str]] = {}
     for cell in cells:
         rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
     for test in tests:
         label = f"{test.compared.indicator}, {test.compared.label}"
-        rows.setdefault(label, {})[test.compared.policy] = told(test)
+        rows.setdefault(label, {})[test.compared.policy] = text(test)
     body = [(label, *(row.get(policy, "") for policy in policies)) for label, row in rows.items()]
-    return table(("", *(f"`{policy}`" for policy in policies)), body)
+    return table(("", *(f"`{policy}`" for policy in policies)), body, *lines)
+
+
+def answer(test: Verdict) -> str:
+    """Return the answer to what is asked, under Holm, in a word."""
+    return test.on_property.adjusted
 
 
 def seeds_from(results: StudyResults, noun: str = "seeds") -> str:

@@ -40,10 +40,10 @@ def main(generations=20, pairs=6, duration=200.0):
         ]
         gains = np.array(gains) / max(np.abs(gains).max(), 1e-9)
         logarithms = logarithms + 0.3 * (gains @ steps) / pairs
-        found = dict(zip(START, np.exp(logarithms).round(2).tolist()))
-        print(f"generation {generation}: {found}")
+        rates = dict(zip(START, np.exp(logarithms).round(2).tolist()))
+        print(f"generation {generation}: {rates}")
     print(f"return on a new seed: {episode_return(env, logarithms, seed=10_000):.1f}")
-    return found
+    return rates
 
 
 if __name__ == "__main__":

@@ -31,8 +31,8 @@ class Straight:
         commands = np.zeros((len(observations), 4))
         commands[:, 0] = np.cos(self.heading)  # forward
         commands[:, 1] = np.sin(self.heading)  # left
-        wanted = row["item_requested"].any(axis=1) | carries
-        commands[:, 3] = np.where(wanted, 1.0, -1.0)  # gripper: hold, open
+        holds = row["item_requested"].any(axis=1) | carries
+        commands[:, 3] = np.where(holds, 1.0, -1.0)  # gripper: hold, open
         return commands
 
 

@@ -60,10 +60,10 @@ def main(total_timesteps=500_000, duration=200.0, seed=0):
     model.learn(total_timesteps, callback=LogDeliveries())
     learned = Learned(model, env.obs_rms.mean, env.obs_rms.var)
     seeds = range(1000, 1003)
-    own = [run_episode(scenario, learned, one).delivered for one in seeds]
-    scripted = [run_episode(scenario, policies.load("swarm-dt"), one).delivered for one in seeds]
-    print(f"P on three new seeds: {own}; Swarm D-T's on the same: {scripted}")
-    return own, scripted
+    deliveries = [run_episode(scenario, learned, seed).delivered for seed in seeds]
+    scripted = [run_episode(scenario, policies.load("swarm-dt"), seed).delivered for seed in seeds]
+    print(f"P on three new seeds: {deliveries}; Swarm D-T's on the same: {scripted}")
+    return deliveries, scripted
 
 
 if __name__ == "__main__":

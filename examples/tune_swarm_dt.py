@@ -25,12 +25,12 @@ FAULT, M = "FM2", 2
 def performance(constants, scenario, seeds, faults=()):
     """Return P of each seed."""
 
-    def played(seed):
+    def deliveries(seed):
         policy = policies.load("swarm-dt", **constants)
         return run_episode(scenario, policy, seed, faults).delivered
 
     with ThreadPoolExecutor() as pool:
-        return list(pool.map(played, seeds))
+        return list(pool.map(deliveries, seeds))
 
 
 def worth(constants, scenario, seeds):
@@ -43,21 +43,23 @@ def worth(constants, scenario, seeds):
 def main(rounds=30, seeds=8, confirm=30, scenario=None):
     """Search, print the best constants, and return the change of P that they make."""
     scenario = scenario or Scenario(restock=True)
-    own = policies.SwarmDT().parameters
-    best = {name: getattr(own, name) for name in RANGES}
+    defaults = policies.SwarmDT().parameters
+    best = {name: getattr(defaults, name) for name in RANGES}
     highest = worth(best, scenario, range(1000, 1000 + seeds))
     for number in range(rounds):
         draw = streams.generator(number, "tune")
         step = 0.3 * 0.95**number  # share of each range
-        tried = {
+        candidate = {
             name: float(np.clip(best[name] + step * (high - low) * draw.normal(), low, high))
             for name, (low, high) in RANGES.items()
         }
-        found = worth(tried, scenario, range(1000, 1000 + seeds))
-        print(f"round {number}: {found:.1f} (best so far {highest:.1f})")
-        if found > highest:
-            best, highest = tried, found
-    before, after = (performance(made, scenario, range(confirm)) for made in ({}, best))
+        candidate_worth = worth(candidate, scenario, range(1000, 1000 + seeds))
+        print(f"round {number}: {candidate_worth:.1f} (best so far {highest:.1f})")
+        if candidate_worth > highest:
+            best = candidate
+            highest = candidate_worth
+    before = performance({}, scenario, range(confirm))
+    after = performance(best, scenario, range(confirm))
     change = spi.relative_change(before, after)
     print(best, change, sep="\n")
     return change

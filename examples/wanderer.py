@@ -13,12 +13,12 @@ class Wanderer:
     def act(self, observations):
         row = unflatten(observations, Scenario())
         carries = row["carrying"][:, 0] > 0
-        ahead = np.minimum(row["range_walls"][:, 0], row["range_robots"][:, 0])
+        clearance = np.minimum(row["range_walls"][:, 0], row["range_robots"][:, 0])
         # An unladen robot drives under items, a laden one bumps into them.
-        ahead = np.where(carries, np.minimum(ahead, row["range_items"][:, 0]), ahead)
+        clearance = np.where(carries, np.minimum(clearance, row["range_items"][:, 0]), clearance)
         commands = np.zeros((self.n_robots, 4))
-        commands[:, 0] = np.clip(ahead - 0.2, 0.1, 1.0)  # forward
-        commands[:, 2] = np.where(ahead < 0.6, 0.5, 0.0)  # turn left
-        wanted = row["item_requested"].any(axis=1) | (row["carrying_requested"][:, 0] > 0)
-        commands[:, 3] = np.where(wanted, 1.0, -1.0)  # gripper: hold, open
+        commands[:, 0] = np.clip(clearance - 0.2, 0.1, 1.0)  # forward
+        commands[:, 2] = np.where(clearance < 0.6, 0.5, 0.0)  # turn left
+        holds = row["item_requested"].any(axis=1) | (row["carrying_requested"][:, 0] > 0)
+        commands[:, 3] = np.where(holds, 1.0, -1.0)  # gripper: hold, open
         return commands

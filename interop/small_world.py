@@ -24,7 +24,7 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.motion import INPUTS, OUTPUTS
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, Network, PolicyCard
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.report.section import bracketed
 from swarm_logistics_env.train.evaluation import performances, versions
 from swarm_logistics_env.train.training import load_training
@@ -68,7 +68,7 @@ SETTINGS = Settings()
 
 
 def make_env(scenario: Scenario) -> MotionFrame:
-    """Return a world to learn in: rows of 93 inputs, 3 outputs within -1 and 1, shaped rewards."""
+    """Return a world to learn in: rows of 94 inputs, 3 outputs within -1 and 1, shaped rewards."""
     return MotionFrame(swarm_logistics_v0.parallel_env(scenario, rewards=REWARDS))
 
 
@@ -119,7 +119,7 @@ class Learning:
         minutes = round(self._seconds / 60, 2)
         self._curve.append({"agent_steps": agent_steps, "cpu_minutes": minutes, "P": float(p)})
         RESULTS.mkdir(parents=True, exist_ok=True)
-        with becoming(RESULTS / f"{self.name}.csv", SetupError) as part:
+        with atomic_write(RESULTS / f"{self.name}.csv", SetupError) as part:
             pd.DataFrame(self._curve).to_csv(part, index=False, lineterminator="\r\n")
         print(f"{self.name}: {agent_steps:,} agent-steps, {minutes} CPU minutes, P {p:.1f}")
         self._since = time.process_time()
@@ -141,7 +141,7 @@ class Learning:
             "settings": SETTINGS._asdict(),
             "versions": self._card().versions,
         }
-        with becoming(RESULTS / f"{self.name}.json", SetupError) as part:
+        with atomic_write(RESULTS / f"{self.name}.json", SetupError) as part:
             part.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
         print(f"{self.name}: P {bracketed(spi.mean_interval(p_o), 1)} on {len(SEEDS)} new seeds")
         return row

@@ -27,7 +27,7 @@ from swarm_logistics_env.verdicts.cell import Cell, same_runs
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.warehouse.faults import ROLES
 
-# Plays pairs of a fault's place in the list and the number of its run, 0, 1, ..; returns the change
+# Plays pairs of a fault's index in the list and the number of its run, 0, 1, ..; returns the change
 # of performance, P_F - P_o, of each: the lower, the worse the fault.
 Play: TypeAlias = Callable[[Sequence[tuple[int, int]]], Sequence[float]]
 Matrix: TypeAlias = NDArray[np.float64]
@@ -45,8 +45,8 @@ def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple
     """Search by Thompson sampling from a Gaussian process over the faults.
 
     Faults that are alike (in mode, role, onset, duration) are expected to cost alike, so that a run
-    of one tells of the others; the next faults are those that are worst in a draw from what is
-    believed (Thompson 1933).
+    of one tells of the others; the next faults are those that are worst in a draw from the
+    posterior (Thompson 1933).
 
     Args:
         faults: to search among.
@@ -54,21 +54,21 @@ def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple
         seed: of the search's own choices.
 
     Returns:
-        The place of the fault that is believed to be worst, and that of every run's fault.
+        The index of the fault that is believed to be worst, and that of every run's fault.
     """
     rng = generator(seed, "fault search")
     covariance = _covariance(faults)
     tried: list[int] = []
-    change: list[float] = []
+    changes: list[float] = []
 
-    def add(places: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
-        """Play one more run of each of these faults; return what all runs let one believe."""
+    def add(indices: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
+        """Play one more run of each of these faults; return the posterior after all runs."""
         pairs = []
-        for place in places.tolist():
-            pairs.append((place, tried.count(place)))
-            tried.append(place)
-        change.extend(play(pairs))
-        return _posterior(covariance, np.array(tried), np.array(change))
+        for index in indices.tolist():
+            pairs.append((index, tried.count(index)))
+            tried.append(index)
+        changes.extend(play(pairs))
+        return _posterior(covariance, np.array(tried), np.array(changes))
 
     first = max(1, round(budget * _FIRST_SHARE))
     mean, spread = add(rng.choice(len(faults), first, replace=first > len(faults)))
@@ -77,34 +77,39 @@ def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple
         root = np.linalg.cholesky(spread + 1e-9 * np.eye(len(faults)))
         draws = mean[:, None] + root @ rng.standard_normal((len(faults), size))
         mean, spread = add(draws.argmin(axis=0))
-    return min(set(tried), key=lambda place: float(mean[place])), tried
+    return min(set(tried), key=lambda index: float(mean[index])), tried
 
 
 def _covariance(faults: Sequence[Fault]) -> Matrix:
     """Return how alike the faults are expected to be, (faults, faults), 1 on the diagonal."""
 
-    def near(values: list[float]) -> Matrix:
+    def nearness(values: list[float]) -> Matrix:
         steps = np.searchsorted(np.unique(values), values)
         return np.asarray(np.exp(-0.5 * (steps[:, None] - steps) ** 2))
 
     mode, role = (np.array([str(getattr(f, name)) for f in faults]) for name in ("mode", "role"))
-    lasting = near([np.inf if fault.duration is None else fault.duration for fault in faults])
-    time = near([fault.onset for fault in faults]) * lasting
-    same: Matrix = mode[:, None] == mode
-    both: Matrix = same & (role[:, None] == role)
+    durations = [np.inf if fault.duration is None else fault.duration for fault in faults]
+    near_in_time = nearness([fault.onset for fault in faults]) * nearness(durations)
+    equal_mode: Matrix = mode[:, None] == mode
+    equal_role: Matrix = equal_mode & (role[:, None] == role)
     by_mode, by_role, by_time, by_all = _SHARES
-    return by_mode * same + by_role * both + by_time * same * time + by_all * both * time
+    return (
+        by_mode * equal_mode
+        + by_role * equal_role
+        + by_time * equal_mode * near_in_time
+        + by_all * equal_role * near_in_time
+    )
 
 
 def _posterior(
-    covariance: Matrix, tried: NDArray[np.int64], change: Matrix
+    covariance: Matrix, tried: NDArray[np.int64], changes: Matrix
 ) -> tuple[Matrix, Matrix]:
-    """Return mean (faults,) and covariance (faults, faults) of what the runs let one believe.
+    """Return mean (faults,) and covariance (faults, faults) of the changes, given the runs'.
 
     The noise is that under which the runs are likeliest; scale and mean are those of the runs.
     """
-    centre, scale = change.mean(), max(float(change.std()), 1e-6)
-    normal = (change - centre) / scale
+    centre, scale = changes.mean(), max(float(changes.std()), 1e-6)
+    normal = (changes - centre) / scale
     prior, across = covariance[np.ix_(tried, tried)], covariance[:, tried]
 
     roots = {
@@ -179,7 +184,7 @@ class Attack:
         ]
 
 
-class Found(NamedTuple):
+class WorstFault(NamedTuple):
     """A fault, how it was found, and its robustness on fresh seeds.
 
     Attributes:
@@ -203,13 +208,13 @@ class AttackResult(NamedTuple):
             that the faults may cost more than R tells.
     """
 
-    found: tuple[Found, ...]
+    found: tuple[WorstFault, ...]
     tried: int
     searched: int
     is_capped: bool
 
 
-def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
+def attack(settings: Attack, engine: Engine, out: Path) -> AttackResult:
     """Search for the worst fault, and estimate its robustness on fresh seeds.
 
     What it finds bounds the worst fault from one side: there may be worse ones. Every run is kept
@@ -220,53 +225,58 @@ def attack(asked: Attack, engine: Engine, out: Path) -> AttackResult:
         PolicyError: there is no such policy.
         StudyError: the directory cannot be used, or a run failed.
     """
-    faults = asked.faults()
-    policy = PolicySpec.of(asked.policy)
-    base = Case(policy, policy.identity(), asked.scenario, task=WAREHOUSE)
+    faults = settings.faults()
+    policy = PolicySpec.of(settings.policy)
+    base = Case(policy, policy.identity(), settings.scenario, task=WAREHOUSE)
     with Runs(out / STORE) as store:
         if damage := store.discard_damaged():
             warnings.warn(f"{damage}: what is asked is played again", stacklevel=2)
 
-        def delivered(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:
+        def count_deliveries(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:
             outcomes = _outcomes(base, engine, store, pairs)
             return np.array([outcome.delivered for outcome in outcomes], np.float64)
 
         def play(pairs: Sequence[tuple[int, int]]) -> Sequence[float]:
             """Play a fault's k-th run with seed k, beside the run without a fault."""
             seeds = [seed for _, seed in pairs]
-            sound = delivered([(None, seed) for seed in range(max(*seeds, _NAMED_SEEDS - 1) + 1)])
+            n_seeds = max(*seeds, _NAMED_SEEDS - 1) + 1
+            sound = count_deliveries([(None, seed) for seed in range(n_seeds)])
             if not sound.any():
                 raise SetupError(
                     f"{policy.title} delivers nothing without faults, so no fault can cost "
                     "anything: should be another policy, a longer duration or more robots"
                 )
-            return list(delivered([(faults[place], seed) for place, seed in pairs]) - sound[seeds])
+            failed = count_deliveries([(faults[index], seed) for index, seed in pairs])
+            return list(failed - sound[seeds])
 
-        worst, tried = search(faults, play, asked.budget, asked.seed)
-        named = [Fault(mode, asked.robots) for mode in asked.modes]
-        tries = delivered([*product(named, range(_NAMED_SEEDS))]).reshape(len(named), -1)
+        worst, tried = search(faults, play, settings.budget, settings.seed)
+        named = [Fault(mode, settings.robots) for mode in settings.modes]
+        tries = count_deliveries([*product(named, range(_NAMED_SEEDS))]).reshape(len(named), -1)
         worst_named = named[int(tries.mean(axis=1).argmin())]
-        judged = (None, faults[worst], worst_named)
+        conditions = (None, faults[worst], worst_named)
         # Seeds that neither the search can have met, nor the choice among the named modes.
-        first = max(asked.budget, _NAMED_SEEDS)
-        fresh = range(first, first + asked.fresh)
-        outcomes = iter(_outcomes(base, engine, store, [*product(judged, fresh)]))
+        first = max(settings.budget, _NAMED_SEEDS)
+        fresh = range(first, first + settings.fresh)
+        outcomes = iter(_outcomes(base, engine, store, [*product(conditions, fresh)]))
         arm = Arm(NO_FAULT, base)
-        cells = (Cell.of("", "", arm, [*islice(outcomes, len(fresh))]) for _ in judged)
-        sound, by_search, by_name = cells
-    found = (
-        Found("search", faults[worst], _robustness(asked, sound, by_search), asked.budget),
-        Found("named modes", worst_named, _robustness(asked, sound, by_name), tries.size),
+        without_fault, with_worst, with_named = [
+            Cell.of("", "", arm, [*islice(outcomes, len(fresh))]) for _ in conditions
+        ]
+    by_search = _robustness(settings, without_fault, with_worst)
+    by_name = _robustness(settings, without_fault, with_named)
+    faults_found = (
+        WorstFault("search", faults[worst], by_search, settings.budget),
+        WorstFault("named modes", worst_named, by_name, tries.size),
     )
-    return AttackResult(found, len(set(tried)), len(faults), sound.saturated)
+    return AttackResult(faults_found, len(set(tried)), len(faults), without_fault.saturated)
 
 
-def _robustness(asked: Attack, sound: Cell, failed: Cell) -> Estimate:
+def _robustness(settings: Attack, sound: Cell, failed: Cell) -> Estimate:
     return robustness(
         sound.by_seed,
         failed.by_seed,
-        n=asked.scenario.n_robots,
-        m=asked.robots,
+        n=settings.scenario.n_robots,
+        m=settings.robots,
         saturated=[name for name, runs in (("p_o", sound), ("p_f", failed)) if runs.saturated],
         identical=same_runs(sound.outcomes, failed.outcomes),
     )
@@ -281,8 +291,8 @@ def _outcomes(
         Run(replace(base, faults=() if fault is None else (fault,)), code, seed)
         for fault, seed in pairs
     ]
-    done = store.succeeded()
-    missing = {run.key: run for run in runs if run.key not in done}
+    finished = store.succeeded()
+    missing = {run.key: run for run in runs if run.key not in finished}
     for run, outcome in engine(missing.values()):
         store.add(run, outcome)
         if outcome.error is not None:

@@ -1,7 +1,9 @@
-"""Python files of the user's own: a path is that file, whatever else has its name.
+"""Python files of the user's own, by path or by a module's name.
 
-What such a file imports from its own folder is found there, and is kept apart from modules of the
-same names that others imported. The folder is never on Python's path.
+A path is that file, whatever else has its name. What such a file imports from its own folder is
+found there, and is kept apart from modules of the same names that others imported. The folder is
+never on Python's path. A module's name may also be that of a file in the folder in which a command
+runs, see `CurrentFolder`.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import threading
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib.abc import MetaPathFinder
 from importlib.machinery import (
     EXTENSION_SUFFIXES,
     SOURCE_SUFFIXES,
@@ -29,10 +32,8 @@ from importlib.machinery import (
 )
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType, FrameType, ModuleType
 from typing import Any
-
-import cloudpickle
 
 PACKAGE = Path(__file__).parent
 _lock = threading.RLock()
@@ -63,15 +64,15 @@ def file_of_module(name: str) -> Path | None:
 
     None: another kind of module, or none.
     """
-    top, *rest = name.split(".")
+    top, *submodules = name.split(".")
     try:
         spec = importlib.util.find_spec(top)
     except ValueError:  # a module that no file made
         return None
     stems = [Path(spec.origin.removesuffix(".py"))] if spec and spec.origin else []
-    if rest:
+    if submodules:
         folders = spec.submodule_search_locations if spec else None
-        stems = [Path(folder, *rest) for folder in folders or ()]
+        stems = [Path(folder, *submodules) for folder in folders or ()]
     for stem in stems:
         for path in (stem.with_suffix(".py"), stem / "__init__.py"):
             if path.is_file() and is_users_own(str(path.resolve())):
@@ -86,15 +87,15 @@ def source_files(paths: Iterable[Path]) -> dict[Path, CodeType | bytes]:
     only while a function runs is among them. What is no Python that can be compiled is bytes.
     """
     sources: dict[Path, CodeType | bytes] = {}
-    waiting = deque(paths)
-    while waiting:
-        path = waiting.popleft()
+    queue = deque(paths)
+    while queue:
+        path = queue.popleft()
         if path not in sources and path.is_file():
             sources[path] = content = path.read_bytes()
             with contextlib.suppress(SyntaxError, ValueError):  # it cannot be imported either
                 sources[path] = code = compile(content, path.name, "exec", dont_inherit=True)
                 names = {part for name in names_in(code) for part in name.split(".")}
-                waiting += (file for name, file in _neighbours(path) if name in names)
+                queue += (file for name, file in _neighbours(path) if name in names)
     return sources
 
 
@@ -134,18 +135,19 @@ def is_users_own(file: str | None) -> bool:
     path = Path(file).absolute()
     # Another environment's packages may be on the path, too.
     is_package = not {"site-packages", "dist-packages"}.isdisjoint(path.parts)
-    return not is_package and not any(path.is_relative_to(folder) for folder in _installed())
+    is_installed = any(path.is_relative_to(folder) for folder in _installed_folders())
+    return not is_package and not is_installed
 
 
 @functools.cache
 def _is_installed(name: str) -> bool:
     """Return whether Python or an installed package has a module of that name."""
-    folders = [str(folder) for folder in _installed()]
+    folders = [str(folder) for folder in _installed_folders()]
     return name in sys.stdlib_module_names or PathFinder.find_spec(name, folders) is not None
 
 
 @functools.cache
-def _installed() -> tuple[Path, ...]:
+def _installed_folders() -> tuple[Path, ...]:
     names = ("stdlib", "platstdlib", "purelib", "platlib")
     folders = [sysconfig.get_path(name) for name in names]
     return (PACKAGE, *map(Path, [*folders, *site.getsitepackages(), site.getusersitepackages()]))
@@ -176,15 +178,15 @@ class _Folder:
         self._path = path
         self._modules: dict[str, ModuleType] = {}  # by name, while nothing is imported from here
         self._depth = 0
-        self._wanted: str | None = None
-        self._changed = 0
-        self._known: set[str] = set()
+        self._top_module: str | None = None
+        self._changed_at = 0  # [ns]
+        self._module_names: set[str] = set()  # as they were then
 
     def execute(self, path: Path) -> ModuleType:
         """Return the module of a file in the folder, or in a package in it."""
         parts = [*path.relative_to(self._path).with_suffix("").parts]
         if len(parts) > 1:
-            with self._importing(parts[0]):
+            with self._enable_import(parts[0]):
                 return importlib.import_module(".".join(parts).removesuffix(".__init__"))
         # No other file has this name, and no module of Python's or of an installed package.
         stem = path.stem.replace(".", "_")
@@ -193,8 +195,10 @@ class _Folder:
         assert spec is not None
         assert spec.loader is not None
         module = sys.modules[name] = module_from_spec(spec)
-        with self._importing(None):
+        with self._enable_import(None):
             spec.loader.exec_module(module)
+        import cloudpickle  # a command that names no file starts sooner without
+
         cloudpickle.register_pickle_by_value(module)  # no other process can import it
         return module
 
@@ -209,14 +213,14 @@ class _Folder:
     ) -> ModuleType:
         """Import a module as an import statement of a module in this folder does."""
         top = (str(importer.get("__package__")) if level else name).partition(".")[0]
-        with self._importing(top if top in self._names() else None):
+        with self._enable_import(top if top in self._names() else None):
             return builtins.__import__(name, globals, locals, fromlist or (), level)
 
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Find a module of this folder, as finders on `sys.meta_path` do."""
-        if name.partition(".")[0] != self._wanted:
+        if name.partition(".")[0] != self._top_module:
             return None
         loader: Any = functools.partial(_Loader, self)
         kinds = (loader, SOURCE_SUFFIXES), (ExtensionFileLoader, EXTENSION_SUFFIXES)
@@ -228,33 +232,31 @@ class _Folder:
 
     def _names(self) -> set[str]:
         """Return the modules and packages in the folder; Python's and installed ones go first."""
-        changed = self._path.stat().st_mtime_ns
-        if changed != self._changed:
-            files = {file.stem for file in self._path.glob("*.py") if file.stem.isidentifier()}
-            files |= {file.parent.name for file in self._path.glob("*/__init__.py")}
-            self._changed, self._known = (
-                changed,
-                {name for name in files if not _is_installed(name)},
-            )
-        return self._known
+        changed_at = self._path.stat().st_mtime_ns
+        if changed_at != self._changed_at:
+            names = {file.stem for file in self._path.glob("*.py") if file.stem.isidentifier()}
+            names |= {file.parent.name for file in self._path.glob("*/__init__.py")}
+            self._module_names = {name for name in names if not _is_installed(name)}
+            self._changed_at = changed_at
+        return self._module_names
 
     @contextmanager
-    def _importing(self, wanted: str | None) -> Iterator[None]:
-        """Let `wanted` be found in this folder; None: nothing, as for an installed module."""
+    def _enable_import(self, top_module: str | None) -> Iterator[None]:
+        """Let a module be found in this folder; None: nothing, as for an installed module."""
         with _lock:
-            outer, self._wanted = self._wanted, wanted
+            outer, self._top_module = self._top_module, top_module
             self._depth += 1
             if self._depth == 1:
-                displaced = self._exchange(self._modules)
+                displaced_modules = self._exchange(self._modules)
                 sys.meta_path.insert(0, self)
             try:
                 yield
             finally:
-                self._wanted = outer
+                self._top_module = outer
                 self._depth -= 1
                 if self._depth == 0:
                     sys.meta_path.remove(self)
-                    self._modules = self._exchange(displaced)
+                    self._modules = self._exchange(displaced_modules)
 
     def _exchange(self, modules: Mapping[str, ModuleType]) -> dict[str, ModuleType]:
         """Put modules of this folder's names into Python's table; return those that were there."""
@@ -266,3 +268,84 @@ class _Folder:
         }
         sys.modules.update(modules)
         return out
+
+
+class CurrentFolder(MetaPathFinder):
+    """Finds modules of the folder in which a command runs: those that somebody named, no others.
+
+    A command may run in a folder of somebody else's files. On `sys.path`, that folder would give a
+    file of its own for each optional module that a library looks for and does not have.
+
+    Attributes:
+        allowed: modules of the top level that may be found, whoever imports them.
+        imported: those that were: they find their neighbours, also later, while a policy decides.
+        allows_all: whether every module is found.
+    """
+
+    def __init__(self) -> None:
+        self.allowed: set[str] = set()
+        self.imported: set[str] = set()
+        self.allows_all = False
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return where the module is in this folder; None: it is not, or nobody named it."""
+        if path is not None:  # a part of a package, which knows where its parts are
+            return None
+        if not (self.allows_all or name in self.allowed or _importer() in self.imported):
+            return None
+        spec = PathFinder.find_spec(name, [""])
+        if spec is not None:
+            self.imported.add(name)
+        return spec
+
+
+def _importer() -> str:
+    """Return the top-level module whose code imports now."""
+    frame: FrameType | None = sys._getframe(2)  # the caller of `find_spec`
+    module = ""
+    while frame is not None:
+        module = str(frame.f_globals.get("__name__")).partition(".")[0]
+        if module not in ("importlib", "_frozen_importlib"):
+            break
+        frame = frame.f_back
+    return module
+
+
+_current_folder = CurrentFolder()
+
+
+def search_current_folder(modules: Iterable[str] = ()) -> None:
+    """Let these modules be found in the current folder, after all installed ones.
+
+    A command does so, and the workers that it starts; a script has the path that Python gives it.
+    """
+    _current_folder.allowed.update(modules)
+    if _current_folder not in sys.meta_path:
+        sys.meta_path.append(_current_folder)
+
+
+def allow_import(module: str) -> None:
+    """Let a module that somebody named be found in the current folder, if that is searched."""
+    _current_folder.allowed.add(module.partition(".")[0])
+
+
+def current_folder_modules() -> tuple[str, ...] | None:
+    """Return the modules that were found, for a worker's `search_current_folder`.
+
+    None: the current folder is not searched.
+    """
+    if _current_folder not in sys.meta_path:
+        return None
+    return tuple(sorted(_current_folder.imported))
+
+
+@contextmanager
+def allow_all_imports() -> Iterator[None]:
+    """Let everything be found, as a file needs whose code somebody trusts."""
+    before, _current_folder.allows_all = _current_folder.allows_all, True
+    try:
+        yield
+    finally:
+        _current_folder.allows_all = before

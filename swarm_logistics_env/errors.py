@@ -76,17 +76,18 @@ def how_to_install(extra: str) -> str:
     return f"in a clone, pip install -c constraints.txt '.[{extra}]'"
 
 
-def suggest(name: str, known: Iterable[str]) -> str:
+def suggest(name: str, names: Iterable[str]) -> str:
     """Return the end of an error message about an unknown `name`.
 
-    "; did you mean 'x'?" where one of `known` is close to it; "; did you mean 'x' or 'y'?" where
-    one to eight of them contain it, whatever its case; else the list of what is known.
+    "; did you mean 'x'?" where one of `names` is close to it; "; did you mean 'x' or 'y'?" where
+    one to eight of them contain it, whatever its case; else the list of all.
     """
-    names = sorted(known)
-    meant = difflib.get_close_matches(name, names, n=1)
-    if not meant and name:
-        meant = [known for known in names if name.casefold() in known.casefold()]
-    if 1 <= len(meant) <= 8:
-        *others, last = map(repr, meant)
-        return f"; did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
-    return f"; known: {', '.join(names)}"
+    candidates = sorted(names)
+    suggestions = difflib.get_close_matches(name, candidates, n=1)
+    if not suggestions and name:
+        suggestions = [text for text in candidates if name.casefold() in text.casefold()]
+    if not 1 <= len(suggestions) <= 8:
+        return f"; known: {', '.join(candidates)}"
+    *first, last = map(repr, suggestions)
+    choice = f"{', '.join(first)} or {last}" if first else last
+    return f"; did you mean {choice}?"

@@ -46,7 +46,7 @@ def n_columns(scenario: Scenario) -> int:
 
 @dataclass(frozen=True)
 class Column:
-    """A named part of an observation row: its place, its unit and the range of its values."""
+    """A named part of an observation row: its columns, its unit and the range of its values."""
 
     name: str
     unit: str
@@ -125,4 +125,4 @@ def _run(start: int, length: int) -> slice:
 def _block(start: int, length: int, features: tuple[str, ...]) -> dict[str, slice]:
     width = len(features)
     stop = start + length * width
-    return {name: slice(start + place, stop, width) for place, name in enumerate(features)}
+    return {name: slice(start + first, stop, width) for first, name in enumerate(features)}

@@ -23,7 +23,8 @@ class ProgressBar:
 
     def __init__(self, label: str, total: int, unit: str, *, done: int = 0) -> None:
         console = Console(stderr=True, highlight=False)
-        self._unit, self._first = unit, done
+        self._unit = unit
+        self._first = done
         # It draws itself anew twice a second, also while one piece of the work takes long.
         self._bar = Progress(
             TextColumn("{task.description}", markup=False),
@@ -56,23 +57,25 @@ class ProgressBar:
         if self._bar.disable and monotonic() - self._last_line >= LINE_EVERY:
             self.say(note)
 
-    def say(self, what: str = "") -> None:
-        """Print a line: how much is done, and `what`."""
+    def say(self, note: str = "") -> None:
+        """Print a line: how much is done, and the note."""
         self._last_line = monotonic()
         (task,) = self._bar.tasks
         seconds = task.elapsed or 0.0
         count = f"{task.completed:,} of {task.total:,} {self._unit}"
-        told = [count, f"{clock(seconds)} so far"]
+        parts = [count, f"{clock(seconds)} so far"]
         gained = task.completed - self._first
         # A training ends with a whole round, so that more may be done than was to do.
         if gained and task.remaining and task.remaining > 0:
-            told.append(f"{clock(seconds * task.remaining / gained)} left")
-        line = f"{task.description}: {', '.join(filter(None, [*told, what]))}"
+            parts.append(f"{clock(seconds * task.remaining / gained)} left")
+        line = f"{task.description}: {', '.join(filter(None, [*parts, note]))}"
         self._bar.console.print(line, soft_wrap=True, markup=False)
 
 
 def clock(seconds: float) -> str:
     """Return a time as h:mm:ss, or m:ss below an hour."""
-    minutes, rest = divmod(round(seconds), 60)
+    minutes, seconds_left = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+    if hours:
+        return f"{hours}:{minutes:02d}:{seconds_left:02d}"
+    return f"{minutes}:{seconds_left:02d}"

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path]:
+def atomic_write(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path]:
     """Give the path of an empty file beside `path`, of the same ending, which takes its place.
 
     Nobody else has that file, whoever writes `path` at the same time. If the block fails, an older
@@ -43,16 +43,16 @@ def becoming(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[Path
         The `error_type`: the file cannot be written; names it and the reason.
     """
     is_plain = path.is_file() or not path.exists()
-    whole = path.resolve()  # a link stays a link
+    target = path.resolve()  # a link stays a link
     name = f".{path.stem[:40]}.{secrets.token_hex(8)}.part{path.suffix}"
-    part = whole.with_name(name) if is_plain else path
+    part = target.with_name(name) if is_plain else path
     try:
         if is_plain:  # with the usual rights, and never through a link
             os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         try:
             yield part
             if is_plain:
-                part.replace(whole)
+                part.replace(target)
         finally:
             if is_plain:
                 part.unlink(missing_ok=True)
@@ -78,7 +78,7 @@ def write_csv(path: Path, table: pd.DataFrame, error_type: type[SwarmLogisticsEr
     harmless = texts.map(
         lambda cell: inert("\n".join(re.split(r"\r\n?", cell))) if isinstance(cell, str) else cell
     )
-    with becoming(path, error_type) as part:
+    with atomic_write(path, error_type) as part:
         table.assign(**harmless).to_csv(part, index=False, lineterminator="\n")
 
 
@@ -88,7 +88,7 @@ class Record(BaseModel):
     Raises:
         The class's `error_type` (a `ValueError`), which names each bad field, its value and what
         would be right. For an unknown field it suggests the nearest known one. Text with signs that
-        steer a terminal or a page (`steers`) is refused in every field, however deep.
+        steer a terminal or a page (`has_control_signs`) is refused in every field, however deep.
     """
 
     model_config = ConfigDict(
@@ -105,10 +105,10 @@ class Record(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _of_plain_text(cls, fields: object) -> object:
-        for place, text in _texts(cls.__name__, fields):
-            if steers(text):
+        for field, text in _texts(cls.__name__, fields):
+            if has_control_signs(text):
                 raise ValueError(
-                    f"{place} = {_short(text)}: should be plain text, without control signs"
+                    f"{field} = {_short(text)}: should be plain text, without control signs"
                 )
         return fields
 
@@ -134,20 +134,20 @@ class Record(BaseModel):
 
     @classmethod
     def _sentence(cls, error: ValidationError) -> str:
-        return "; ".join(dict.fromkeys(cls._problem(dict(one)) for one in error.errors()))
+        return "; ".join(dict.fromkeys(cls._problem(dict(problem)) for problem in error.errors()))
 
     @classmethod
     def _problem(cls, problem: dict[str, Any]) -> str:
         # Parts such as "constrained-int" name a branch of a union, not a field.
         parts = [str(part) for part in problem["loc"]]
-        place = ".".join(part for part in parts if part.isidentifier() or part.isdigit())
-        field = f"{cls.__name__}.{place}" if place else cls.__name__
+        name = ".".join(part for part in parts if part.isidentifier() or part.isdigit())
+        field = f"{cls.__name__}.{name}" if name else cls.__name__
         if problem["type"] == "extra_forbidden" and len(problem["loc"]) == 1:
-            return f"{cls.__name__} has no field {place!r}{suggest(place, cls.model_fields)}"
+            return f"{cls.__name__} has no field {name!r}{suggest(name, cls.model_fields)}"
         message = _in_plain_words(problem)
         if message.startswith(f"{cls.__name__}"):
             return message
-        if not place:
+        if not name:
             return f"{field}: {message}"
         if problem["type"] == "missing":
             return f"{field} is missing"
@@ -162,12 +162,12 @@ def one_of(record: type[Record]) -> Callable[[object], object]:
 
 def each_of(record: type[Record]) -> Callable[[object, ValidationInfo], object]:
     """Return what makes a tuple of records of a list of tables."""
-    one = one_of(record)
+    make = one_of(record)
 
     def build(values: object, info: ValidationInfo) -> object:
         if isinstance(values, dict):
             raise ValueError(f"should be a list of tables: [[{info.field_name}]] in a TOML file")
-        return tuple(map(one, values)) if isinstance(values, list | tuple) else values
+        return tuple(map(make, values)) if isinstance(values, list | tuple) else values
 
     return build
 
@@ -186,7 +186,7 @@ def read_table(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> 
         text = path.read_text(encoding="utf-8-sig")  # Windows' editors put a mark first
         if "\0" in text:  # UTF-16 without its mark
             raise UnicodeError
-        found = parse(text)
+        table = parse(text)
     except OSError as error:
         raise error_type(f"cannot read the {what} {path}: {error.strerror}") from error
     except UnicodeError:
@@ -196,12 +196,12 @@ def read_table(path: Path, what: str, error_type: type[SwarmLogisticsError]) -> 
         raise error_type(f"the {what} {path} is not {kind}: {reason}") from error
     except RecursionError:
         raise error_type(f"the {what} {path} is nested too deep") from None
-    if not isinstance(found, dict):
+    if not isinstance(table, dict):
         raise error_type(f"the {what} {path} should hold a table of fields")
-    return found
+    return table
 
 
-def steers(text: str) -> bool:
+def has_control_signs(text: str) -> bool:
     """Return whether a text has signs that steer a terminal or turn the direction of writing."""
     return not text.isprintable() and any(
         unicodedata.category(sign) in ("Cc", "Cf", "Cs", "Zl", "Zp") for sign in text
@@ -210,21 +210,21 @@ def steers(text: str) -> bool:
 
 def plain(text: str) -> str:
     """Return a text as a terminal may show it: signs that steer it are written as escapes."""
-    return "".join(repr(sign)[1:-1] if steers(sign) else sign for sign in text)
+    return "".join(repr(sign)[1:-1] if has_control_signs(sign) else sign for sign in text)
 
 
-def _texts(place: str, value: object) -> Iterator[tuple[str, str]]:
-    """Yield every text in a value as JSON and TOML have it, names in tables too, and its place."""
-    waiting = [(place, value)]  # no recursion: a file may be nested deep
+def _texts(path: str, value: object) -> Iterator[tuple[str, str]]:
+    """Yield every text in a value as JSON and TOML have it, names in tables too, after its path."""
+    waiting = [(path, value)]  # no recursion: a file may be nested deep
     while waiting:
         match waiting.pop():
-            case place, str() as text:
-                yield place, text
-            case place, dict() as table:
-                waiting += [(place, name) for name in table]
-                waiting += [(f"{place}.{plain(str(name))}", table[name]) for name in table]
-            case place, list() | tuple() as values:
-                waiting += [(f"{place}.{number}", each) for number, each in enumerate(values)]
+            case path, str() as text:
+                yield path, text
+            case path, dict() as table:
+                waiting += [(path, name) for name in table]
+                waiting += [(f"{path}.{plain(str(name))}", table[name]) for name in table]
+            case path, list() | tuple() as values:
+                waiting += [(f"{path}.{number}", part) for number, part in enumerate(values)]
 
 
 # A name from a file that becomes part of a path: letters, digits, - and _, and points within.
@@ -235,8 +235,8 @@ FileName = Annotated[
 
 def file_name(text: str) -> str:
     """Return a `FileName` made of any text; other signs become hyphens."""
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:_LONGEST_NAME]
-    return plain or "unnamed"
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:_LONGEST_NAME]
+    return name or "unnamed"
 
 
 def canonical_json(value: object) -> str:

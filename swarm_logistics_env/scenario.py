@@ -224,19 +224,19 @@ class Scenario(Record):
         self._check_storage()
         self._check_requests()
         area = self.storage_width * self.warehouse_height
-        obstacles = self.n_obstacles * self.obstacle_radius**2
+        obstacle_cover = self.n_obstacles * self.obstacle_radius**2
         for count, name, radius in (
             (self.n_obstacles, "n_obstacles", self.obstacle_radius),
             (self.n_robots, "n_robots", self.robot_radius),
             (self.n_items, "n_items", self.item_radius),
         ):
-            taken = 0.0 if name == "n_obstacles" else obstacles
-            fit = int((DENSEST_COVER * area / math.pi - taken) / radius**2)
-            if count > fit:
+            cover = 0.0 if name == "n_obstacles" else obstacle_cover
+            most = int((DENSEST_COVER * area / math.pi - cover) / radius**2)
+            if count > most:
                 raise ValueError(
                     f"{name} = {count} of radius {radius} m do not fit into a storage of "
                     f"{self.storage_width:g} x {self.warehouse_height:g} m: should be at most "
-                    f"{max(fit, 0)} (discs may cover {DENSEST_COVER:.0%} of it)"
+                    f"{max(most, 0)} (discs may cover {DENSEST_COVER:.0%} of it)"
                 )
         return self
 
@@ -317,12 +317,12 @@ class Scenario(Record):
         rows = []
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
-            mark = "" if value == field.default else f" (default {_shown(field.default)})"
-            rows.append((name, f"{_shown(value)}{mark}", str(field.description)))
+            mark = "" if value == field.default else f" (default {_as_text(field.default)})"
+            rows.append((name, f"{_as_text(value)}{mark}", str(field.description)))
         return rows
 
 
-def _shown(value: object) -> str:
+def _as_text(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

@@ -24,7 +24,7 @@ from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.tasks.task import Run, Task, refuse_untrusted
 from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.results import StudyResults, judge
-from swarm_logistics_env.verdicts.until_clear import progress_of
+from swarm_logistics_env.verdicts.until_clear import latest_look
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -221,7 +221,7 @@ class Study:
         if not self.specification.until_clear:
             return [run for run in runs if run.key not in done]
         outcomes = store.outcomes(run for run in runs if run.key in done)
-        return list(progress_of(self.plan(), outcomes).next_runs)
+        return list(latest_look(self.plan(), outcomes).next_runs)
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.

@@ -48,21 +48,21 @@ def check_policy(
         CheckError: two episodes of one seed part; it names the first step.
         PolicyError: commands of the wrong shape, or not finite.
     """
-    chosen = load(policy) if isinstance(policy, str) else policy
-    asked = scenario or Scenario()
+    player = load(policy) if isinstance(policy, str) else policy
+    conditions = scenario or Scenario()
 
     def trajectory(player: Policy, seed: int) -> list[bytes]:
-        play = Play(asked, player, seed)
-        places: list[bytes] = []
-        while not play.is_over and len(places) < steps:
+        play = Play(conditions, player, seed)
+        positions: list[bytes] = []
+        while not play.is_over and len(positions) < steps:
             play.step()
-            places.append(play.world.state.robot_position.tobytes())
-        return places
+            positions.append(play.world.state.robot_position.tobytes())
+        return positions
 
-    first = trajectory(chosen, seed)
-    trajectory(chosen, seed + 1)
-    _compare(first, trajectory(chosen, seed), "after another episode: reset should forget it")
-    copy = pickle.loads(pickle.dumps(chosen))
+    first = trajectory(player, seed)
+    trajectory(player, seed + 1)
+    _compare(first, trajectory(player, seed), "after another episode: reset should forget it")
+    copy = pickle.loads(pickle.dumps(player))
     _compare(first, trajectory(copy, seed), "with a pickled copy of the policy")
 
 
@@ -81,9 +81,10 @@ def check_wrapper(
             episodes of one seed that part.
     """
     first = list(_moments(make(), policy, seed, steps))
-    pair = _moments(make(), policy, seed, steps), _moments(make(), policy, seed + 1, steps)
-    again = [one for one, _ in zip_longest(*pair)][: len(first)]
-    _compare(first, again, "beside another live world")
+    second, third = (_moments(make(), policy, s, steps) for s in (seed, seed + 1))
+    # Both worlds live at the same time; the third has another seed and is not looked at.
+    moments = [moment for moment, _ in zip_longest(second, third)][: len(first)]
+    _compare(first, moments, "beside another live world")
 
 
 def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[Moment]:
@@ -94,7 +95,7 @@ def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[
     world = env.unwrapped.warehouse
     start(player, world.scenario, seed)
     for step in range(steps):
-        yield _checked(env, step, observations)
+        yield _check_observations(env, step, observations)
         if not env.agents:
             return
         rows = world.observe()
@@ -109,19 +110,23 @@ def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[
         yield {agent: repr(reward) for agent, reward in rewards.items()}
 
 
-def _checked(env: Any, step: int, observations: Moment) -> Moment:
+def _check_observations(env: Any, step: int, observations: Moment) -> Moment:
     for agent in env.agents:
         space: Box = env.observation_space(agent)
-        seen = observations.get(agent)
-        if not isinstance(seen, np.ndarray) or not space.contains(seen):
-            raise CheckError(f"{agent}'s observation at step {step} is outside of {space}: {seen}")
+        observation = observations.get(agent)
+        if not isinstance(observation, np.ndarray) or not space.contains(observation):
+            raise CheckError(
+                f"{agent}'s observation at step {step} is outside of {space}: {observation}"
+            )
     return {agent: value.tobytes() for agent, value in observations.items()}
 
 
-def _compare(first: list[Any], second: list[Any], where: str) -> None:
-    for step, (one, other) in enumerate(zip_longest(first, second)):
-        if one != other:
-            raise CheckError(f"the same seed gives another episode {where}: they part at {step}")
+def _compare(first: list[Any], second: list[Any], situation: str) -> None:
+    for step, (moment, other) in enumerate(zip_longest(first, second)):
+        if moment != other:
+            raise CheckError(
+                f"the same seed gives another episode {situation}: they part at {step}"
+            )
 
 
 if not TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from swarm_logistics_env.questions.comparison import NO_FAULT, Setting
-from swarm_logistics_env.runs.rows import digest_of
+from swarm_logistics_env.runs.rows import row_digest
 from swarm_logistics_env.runs.store import Runs, export
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcome
@@ -30,9 +30,9 @@ def alter(store: Path, change: str, *values: Any) -> None:
     """Change a store by a statement of SQL, as if that had been written with its digests."""
     with closing(sqlite3.connect(store)) as database, database:
         database.execute(change, values)
-        database.create_function("digest_of", -1, digest_of)
-        database.execute("UPDATE runs SET digest = digest_of(key, run, failed, outcome)")
-        database.execute("UPDATE notes SET digest = digest_of(name, value)")
+        database.create_function("row_digest", -1, row_digest)
+        database.execute("UPDATE runs SET digest = row_digest(key, run, failed, outcome)")
+        database.execute("UPDATE notes SET digest = row_digest(name, value)")
 
 
 def made_old(store: Path) -> None:

@@ -29,7 +29,7 @@ EACH = pytest.mark.parametrize("name", ["../README.md", *PAGES])
 def test_generated_tables_are_current(script: Callable[[str], Any]) -> None:
     generate = script("generate")
     for page in generate.PAGES:
-        assert PAGES[f"{page}.md"] == generate.written(page), "run `python docs/generate.py`"
+        assert PAGES[f"{page}.md"] == generate.page_text(page), "run `python docs/generate.py`"
 
 
 @pytest.mark.parametrize("page", BLOCKS["pages"](), ids=lambda page: page.name)
@@ -38,13 +38,13 @@ def test_page_runs_and_prints_what_it_shows(page: Path) -> None:
     for module in re.findall(r"<!-- needs: (\w+) -->", text):
         if importlib.util.find_spec(module) is None:
             pytest.skip(f"{module} is not installed")
-    said, comparable = BLOCKS["recorded"](text), BLOCKS["comparable"]
-    assert comparable(said) == comparable(text), f"stale: run `python docs/blocks.py {page}`"
+    recorded, normalise = BLOCKS["record"](text), BLOCKS["normalise"]
+    assert normalise(recorded) == normalise(text), f"stale: run `python docs/blocks.py {page}`"
 
 
 def test_changed_output_is_noticed() -> None:
     page = "```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n"
-    assert BLOCKS["recorded"](page) == page.replace("3", "2")
+    assert BLOCKS["record"](page) == page.replace("3", "2")
 
 
 @EACH
@@ -111,16 +111,19 @@ def test_readme_says_of_results_what_their_page_says_and_its_links_can_have_an_a
     script: Callable[[str], Any], tmp_path: Path
 ) -> None:
     front = script("front_page")
-    assert front.written() == README, "stale: run `python docs/front_page.py`"
+    assert front.readme_text() == README, "stale: run `python docs/front_page.py`"
     results = PAGES["results.md"]
-    told = re.findall(r"-?[\d.]+ \[-?[\d.]+, -?[\d.]+\]", front.findings(results))
-    assert len(told) >= 6
-    assert all(number in results for number in told)
+    intervals = re.findall(r"-?[\d.]+ \[-?[\d.]+, -?[\d.]+\]", front.findings())
+    assert len(intervals) >= 6
+    assert all(interval in results for interval in intervals)
+    for study in ("policies", "clearing", "leans"):
+        rows = front.values(front.read("estimates"), study).values()
+        assert all(value.text in results for row in rows for value in row.values())
     page = front.with_address(README, "https://forge.example/swarm")
     for link in ("raw/main/docs/media/fm4.gif", "blob/main/docs/training.md"):
         assert f"https://forge.example/swarm/{link}" in page
     assert not re.search(r'(?:\]\(|src=")(?!https://)', page)
     assert "A package index does not show them" not in page
     pytest.importorskip("matplotlib", reason="needs the extra study")
-    front.draw(front.rows_of(front.block_of(results, "policies")), tmp_path / "anew.svg")
+    front.draw(front.values(front.read("estimates"), "policies"), tmp_path / "anew.svg")
     assert (tmp_path / "anew.svg").stat().st_size > 10_000

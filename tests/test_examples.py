@@ -23,27 +23,27 @@ def main(name: str, **sizes: Any) -> Any:
 
 
 def test_evolution_and_the_search_for_constants_end_with_a_change() -> None:
-    found = main("evolve_arrays", generations=1, pairs=2, duration=40.0)
-    assert set(found) == {"taxis_gain", "drop_rate"}
+    rates = main("evolve_arrays", generations=1, pairs=2, duration=40.0)
+    assert set(rates) == {"taxis_gain", "drop_rate"}
     scenario = Scenario(n_robots=10, duration=100.0, restock=True)
     assert main("tune_swarm_dt", rounds=2, seeds=2, confirm=2, scenario=scenario).n_seeds == 2
 
 
 def test_what_stable_baselines3_learns_is_a_policy(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("stable_baselines3", reason="needs the extra train")
-    own, scripted = main("ppo_swarm", total_timesteps=5_120, duration=10.0)
-    assert f"P on three new seeds: {own}" in capsys.readouterr().out
-    assert len(own) == len(scripted) == 3
+    learned, scripted = main("ppo_swarm", total_timesteps=5_120, duration=10.0)
+    assert f"P on three new seeds: {learned}" in capsys.readouterr().out
+    assert len(learned) == len(scripted) == 3
 
 
 def test_a_loop_of_ones_own_learns_on_the_frame_of_motion() -> None:
     torch = pytest.importorskip("torch", reason="needs the extra train")
     pytest.importorskip("stable_baselines3", reason="needs the extra train")
     torch.set_num_threads(1)
-    own, scripted = main("ppo_from_nothing", total_timesteps=92_160, duration=20.0, judged=2)
-    assert len(own) == len(scripted) == 2
+    learned, scripted = main("ppo_from_nothing", total_timesteps=92_160, duration=20.0, judged=2)
+    assert len(learned) == len(scripted) == 2
     assert sum(scripted) > 0
-    assert sum(own) > 0  # an untrained one delivers nothing
+    assert sum(learned) > 0  # an untrained one delivers nothing
 
 
 def test_each_robot_of_a_mixed_swarm_does_what_its_policy_does_upon_the_same_rows() -> None:

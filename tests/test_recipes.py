@@ -64,7 +64,7 @@ def presence(world: Warehouse, before: Before) -> Earned:
 @ spi/definitions.py @def scalability(
 def kept(p_o, p_f, **asked):
     terms = {"p_f": (p_f, 1.0), "p_o": (p_o, 0.0)}
-    return judge("K", terms, offset=0.0, **asked)
+    return estimate_ratio("K", terms, offset=0.0, **asked)
 @ spi/definitions.py @        Definition(
         Definition(
             symbol="K", heading="performance kept K", compares="fault", function=kept,
@@ -172,7 +172,7 @@ assert (space.low[-1], space.high[-1], *space.shape) == (0.0, 2.0, observations.
 sys.path.append(sys.argv[1])
 import generate
 
-page = generate.written("environment")
+page = generate.page_text("environment")
 assert "| `odometry_scale` | `1.0` | factor of velocities; off |" in page
 assert "| 140 | `speed` | m/s | [0, 2] | without direction |" in page
 """

@@ -10,7 +10,7 @@ import pytest
 from pydantic import Field, PositiveFloat
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
-from swarm_logistics_env.records import Record, becoming, read_table
+from swarm_logistics_env.records import Record, atomic_write, read_table
 
 
 class Lamp(Record):
@@ -75,10 +75,10 @@ WRITE = """
 import sys
 from pathlib import Path
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write
 
 for number in range(200):
-    with becoming(Path("x.csv"), PolicyError) as part:
+    with atomic_write(Path("x.csv"), PolicyError) as part:
         with part.open("w") as file:
             for _ in range(100):
                 file.write(sys.argv[1])
@@ -104,13 +104,13 @@ def test_a_file_that_is_written_goes_through_no_link_and_has_the_usual_mode(
     (tmp_path / ".x.part.csv").symlink_to(victim)
     with (
         pytest.raises(PolicyError, match=r"cannot write .*x\.csv"),
-        becoming(tmp_path / "x.csv", PolicyError) as part,
+        atomic_write(tmp_path / "x.csv", PolicyError) as part,
     ):
         part.write_text("theirs")
     monkeypatch.undo()
     before = os.umask(0o027)
     try:
-        with becoming(tmp_path / "x.csv", PolicyError) as part:
+        with atomic_write(tmp_path / "x.csv", PolicyError) as part:
             part.write_text("theirs")
     finally:
         os.umask(before)
@@ -124,7 +124,7 @@ def test_a_block_that_fails_leaves_nothing_beside_the_older_file(tmp_path: Path)
     file.write_text("older")
 
     def fail() -> None:
-        with becoming(file, PolicyError) as part:
+        with atomic_write(file, PolicyError) as part:
             assert part.suffix == ".csv"
             part.write_text("newer")
             raise KeyError

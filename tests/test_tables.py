@@ -40,7 +40,7 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     page.write_text("Before.\n\n" + "Between.\n".join(blocks) + "After.\n")
     paper: dict[str, Any] = {"name": "paper", "reference": "paper"}
     widths = {"name": "delivery_width", "values": [2.0, 1.5], "title": "Held out: narrow"}
-    rest = {**paper, "sizes": [{"values": [5, 10]}], "parameters": [widths]}
+    without_faults = {**paper, "sizes": [{"values": [5, 10]}], "parameters": [widths]}
     fault = {"faults": [{"modes": ["FM4"], "robots": [1, 2]}]}
     sizes: dict[str, Any] = {"sizes": [{"values": [5, 25]}]}
     policies = ["swarm-dt", "homing", "ppo-delivery"]
@@ -48,8 +48,13 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     few = {"n_items": 6, "duration": 100.0}
     ladder: dict[str, Any] = {"policies": policies[:2], "scenario": few}
     ladder["ablations"] = [{"policy": "swarm-dt", "title": "fast"}, slow]
-    asked: dict[str, list[dict[str, Any]]] = {
-        "paper": [rest, {**paper, **fault}, {**paper, "faults": [{"modes": ["FM3_send"]}]}, rest],
+    studies_fields: dict[str, list[dict[str, Any]]] = {
+        "paper": [
+            without_faults,
+            {**paper, **fault},
+            {**paper, "faults": [{"modes": ["FM3_send"]}]},
+            without_faults,
+        ],
         "benchmark": [{"policies": ["homing"], "parameters": [widths]}],
     }
     examples = {
@@ -66,14 +71,19 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return Study(out=out, **{**short, **fields})
 
     def studies(name: str, out: Path) -> list[Study]:
-        return [study(out / f"{name}{i}", fields) for i, fields in enumerate(asked[name])]
+        return [study(out / f"{name}{i}", fields) for i, fields in enumerate(studies_fields[name])]
 
-    for name in asked:
+    for name in studies_fields:
         monkeypatch.setattr(tables, f"{name}_studies", lambda out, *_, n=name: studies(n, out))
     monkeypatch.setattr(tables, "example", lambda out, name: study(out / name, examples[name]))
     for name in ("OUT", "BENCHMARK", "ENTRIES"):
         monkeypatch.setattr(tables, name, tmp_path / name)
-    for name, value in {"PAGE": page, "MEDIA": tmp_path, "PROCESSES": 1}.items():
+    for name, value in {
+        "PAGE": page,
+        "RESULTS": tmp_path / "csv",
+        "MEDIA": tmp_path,
+        "PROCESSES": 1,
+    }.items():
         monkeypatch.setattr(tables, name, value)
     monkeypatch.setattr(tables.front_page, "main", lambda: None)
     return page
@@ -89,15 +99,23 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     assert first.count("Between.\n") == 7
     assert "\nold\n" not in first
     assert {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")} == {"S", "FT", "A"}
+    front_page = tables.front_page
+    monkeypatch.setattr(front_page, "RESULTS", tmp_path / "csv")
+    for study in ("policies", "clearing", "leans"):
+        rows = front_page.values(front_page.read("estimates"), study)
+        assert rows
+        assert all(value.text in first for row in rows.values() for value in row.values())
+    n_supported = sum(claim["verdict"] == "supported" for claim in front_page.read("claims"))
+    assert f"this re-implementation supports\n{n_supported} and contradicts" in first
     page.write_text(first.replace("N = 5", "N = 6"))
     played, run = [], Study.run
 
-    def watched(self: Study, *args: Any, **fields: Any) -> Any:
+    def counting_run(self: Study, *args: Any, **fields: Any) -> Any:
         tally = run(self, *args, **fields)
         played.append(tally.played)
         return tally
 
-    monkeypatch.setattr(Study, "run", watched)
+    monkeypatch.setattr(Study, "run", counting_run)
     tables.main()
     assert page.read_text() == first
     assert played == [0] * 11
@@ -124,10 +142,10 @@ def test_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> No
 
 @pytest.mark.parametrize("page", [PAGE, README], ids=["results.md", "README.md"])
 def test_no_table_is_typed_by_hand(page: str) -> None:
-    rest = BLOCK.sub("", re.sub(r"```.*?```", "", page, flags=re.DOTALL))
+    prose = BLOCK.sub("", re.sub(r"```.*?```", "", page, flags=re.DOTALL))
     # `test_docs` plays what this one says.
-    rest = re.sub(r"^\| items in 200 s.*?\n\n", "", rest, flags=re.DOTALL | re.MULTILINE)
-    assert not [line for line in rest.splitlines() if line.startswith("|")]
+    prose = re.sub(r"^\| items in 200 s.*?\n\n", "", prose, flags=re.DOTALL | re.MULTILINE)
+    assert not [line for line in prose.splitlines() if line.startswith("|")]
 
 
 def test_every_question_has_its_command_and_figure_and_its_intervals_stand_in_a_table(
@@ -145,8 +163,8 @@ def test_every_question_has_its_command_and_figure_and_its_intervals_stand_in_a_
 def test_jackknife_of_a_mean_is_its_t_interval(script: Callable[[str], Any]) -> None:
     sample = np.array([3.0, 5.0, 4.0, 9.0])
     jackknife = script("question_tables").jackknife_interval
-    found = jackknife(4, lambda seeds: float(sample[seeds].mean()))
-    assert found == pytest.approx(spi.mean_interval(sample))
+    interval = jackknife(4, lambda seeds: float(sample[seeds].mean()))
+    assert interval == pytest.approx(spi.mean_interval(sample))
 
 
 @EACH
@@ -155,19 +173,22 @@ def test_page_quotes_what_was_played(
 ) -> None:
     """The same questions over two seeds of a short run, of policies that soon deliver."""
     pytest.importorskip("matplotlib", reason="needs the extra study")
-    asked, name = Study.from_file(question).specification, question.stem
-    late = any(onset for part in asked.faults for onset in part.onsets)
-    varied = ("sizes", "faults", "parameters")
-    fields = {part: [one.model_dump() for one in getattr(asked, part)] for part in varied}
+    specification = Study.from_file(question).specification
+    name = question.stem
+    late = any(onset for part in specification.faults for onset in part.onsets)
+    factors = ("sizes", "faults", "parameters")
+    fields = {
+        factor: [part.model_dump() for part in getattr(specification, factor)] for factor in factors
+    }
     # One mode each; where there is FM4, it is the one that a page may draw.
-    for one in fields["faults"]:
-        one["modes"] = ["FM4"] if "FM4" in one["modes"] else one["modes"][:1]
+    for fault in fields["faults"]:
+        fault["modes"] = ["FM4"] if "FM4" in fault["modes"] else fault["modes"][:1]
     study = Study(
         out=tmp_path / name,
         policies=["homing"] if late else ["homing", "homing-stock"],
         seeds=2,
-        scenario={**asked.scenario.model_dump(), "duration": 210.0 if late else 40.0},
-        indicators=asked.indicators,
+        scenario={**specification.scenario.model_dump(), "duration": 210.0 if late else 40.0},
+        indicators=specification.indicators,
         **fields,
     )
     for folder in ("media", ANSWERS.parent.name):
@@ -178,9 +199,10 @@ def test_page_quotes_what_was_played(
     monkeypatch.setattr(questions, "example", lambda *_, **__: study)
     monkeypatch.setattr(tables, "PROCESSES", 1)
     questions.main([name])
-    text, found = page.read_text(encoding="utf-8"), study.findings()
-    for test in found.verdicts:
+    text = page.read_text(encoding="utf-8")
+    results = study.findings()
+    for test in results.verdicts:
         assert section.ratio(test) in text, test.compared.label
-    for cell in found.cells:
+    for cell in results.cells:
         assert cell.arm.setting.kind != "size" or section.mean_p(cell) in text
     assert "<svg" in (tmp_path / "media" / f"{name}.svg").read_text(encoding="utf-8")

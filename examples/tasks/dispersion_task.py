@@ -46,20 +46,20 @@ class OwnSector:
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode; nothing here is random."""
         angles = 2 * np.pi * np.arange(n_robots) / n_robots
-        self._own = np.column_stack([np.cos(angles), np.sin(angles)])
+        self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return an action, a push (x, y), for each row."""
-        pushes = [self._decided(row, seen) for row, seen in enumerate(observations)]
+        pushes = [self._push(robot, row) for robot, row in enumerate(observations)]
         return np.array(pushes, dtype=np.float32)
 
-    def _decided(self, row: int, seen: NDArray[np.float32]) -> Any:
-        food = seen[4:].reshape(-1, 3)  # x, y, whether it was eaten
-        left = food[food[:, 2] == 0, :2]
-        if not seen.any() or not len(left):  # absent, blind, or done
+    def _push(self, robot: int, row: NDArray[np.float32]) -> Any:
+        food = row[4:].reshape(-1, 3)  # x, y, whether it was eaten
+        uneaten = food[food[:, 2] == 0, :2]
+        if not row.any() or not len(uneaten):  # absent, blind, or done
             return STILL
-        cost = np.linalg.norm(left, axis=1) - PREFERENCE * left @ self._own[row]
-        push = GAIN * left[np.argmin(cost)] - BRAKE * seen[2:4]
+        cost = np.linalg.norm(uneaten, axis=1) - PREFERENCE * uneaten @ self._directions[robot]
+        push = GAIN * uneaten[np.argmin(cost)] - BRAKE * row[2:4]
         return np.clip(push, -1.0, 1.0)
 
 

@@ -47,18 +47,20 @@ class StartsWithout(Warehouse):  # type: ignore[misc]  # RWARE is not typed
 
     def __init__(self, absent: Sequence[int], **arguments: Any) -> None:
         super().__init__(**arguments)
-        self._absent, self._whole = set(absent), self.n_agents
+        self._absent = set(absent)
+        self._n_robots = self.n_agents
         self._spaces = self.observation_space
-        kept = self._whole - len(self._absent)
-        self.observation_space = Tuple(self._spaces.spaces[:kept])
-        self.action_space = Tuple(self.action_space.spaces[:kept])
+        n_present = self._n_robots - len(self._absent)
+        self.observation_space = Tuple(self._spaces.spaces[:n_present])
+        self.action_space = Tuple(self.action_space.spaces[:n_present])
 
     def reset(self, seed: int | None = None, options: Any = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode."""
-        kept, self.observation_space = self.observation_space, self._spaces
-        self.n_agents = self._whole
+        space_of_present = self.observation_space
+        self.observation_space = self._spaces
+        self.n_agents = self._n_robots
         super().reset(seed=seed, options=options)
-        self.observation_space = kept
+        self.observation_space = space_of_present
         self.agents = [agent for row, agent in enumerate(self.agents) if row not in self._absent]
         self.n_agents = len(self.agents)
         for number, agent in enumerate(self.agents, start=1):
@@ -107,7 +109,7 @@ class Fetch:
         warehouse = env.unwrapped
         self._highways = warehouse.highways.astype(bool)
         self._goals = [(int(x), int(y)) for x, y in warehouse.goals]
-        self._ways: dict[tuple[Cell, Cell], dict[Cell, int]] = {}
+        self._distances: dict[tuple[Cell, Cell], dict[Cell, int]] = {}
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode."""
@@ -118,85 +120,94 @@ class Fetch:
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return an action for each row."""
-        return np.array([self._decided(row, seen) for row, seen in enumerate(observations)])
+        return np.array([self._action(robot, row) for robot, row in enumerate(observations)])
 
-    def _decided(self, row: int, seen: NDArray[np.float32]) -> int:
-        if not seen[3:7].any():  # absent, or blind
+    def _action(self, robot: int, row: NDArray[np.float32]) -> int:
+        if not row[3:7].any():  # absent, or blind
             return NOOP
-        here = int(seen[0]), int(seen[1])
-        cells = seen[FIRST_CELL:].reshape(3, 3, CELL_COLUMNS)  # row, column
-        if not seen[2]:
-            self._home[row], self._delivered[row] = None, False
-            return self._searched(row, here, seen, cells)
-        home = self._home[row]
+        position = int(row[0]), int(row[1])
+        cells = row[FIRST_CELL:].reshape(3, 3, CELL_COLUMNS)  # row, column
+        if not row[2]:
+            self._home[robot], self._delivered[robot] = None, False
+            return self._search(robot, position, row, cells)
+        home = self._home[robot]
         if home is None:
-            home = self._home[row] = here
-        if here in self._goals:
-            self._delivered[row] = True
-        if self._delivered[row] and here == home:
+            home = self._home[robot] = position
+        if position in self._goals:
+            self._delivered[robot] = True
+        if self._delivered[robot] and position == home:
             return TOGGLE
-        goal = home if self._delivered[row] else min(self._goals, key=lambda g: abs(g[0] - here[0]))
-        way = self._way(goal, home)
-        if here not in way:  # set down by a failure
+        goal = home
+        if not self._delivered[robot]:
+            goal = min(self._goals, key=lambda cell: abs(cell[0] - position[0]))
+        distances = self._distances_to(goal, home)
+        if position not in distances:  # set down by a failure
             return NOOP
         # The first neighbour that is nearer to the goal; at the goal there is none.
-        nearer = (cell for cell in _around(here) if way.get(cell, len(way)) < way[here])
-        return self._walked(row, here, next(nearer, here), seen, cells, set(way))
+        nearer = (
+            cell
+            for cell in _around(position)
+            if distances.get(cell, len(distances)) < distances[position]
+        )
+        target = next(nearer, position)
+        return self._walk(robot, position, target, row, cells, set(distances))
 
-    def _searched(
-        self, row: int, here: Cell, seen: NDArray[np.float32], cells: NDArray[np.float32]
+    def _search(
+        self, robot: int, position: Cell, row: NDArray[np.float32], cells: NDArray[np.float32]
     ) -> int:
         if cells[1, 1, REQUESTED]:
             return TOGGLE
-        wanted = np.argwhere(cells[:, :, REQUESTED] > 0)
-        free = [(y, x) for y, x in wanted if not cells[y, x, ROBOT]]
+        requested = np.argwhere(cells[:, :, REQUESTED] > 0)
+        free = [(y, x) for y, x in requested if not cells[y, x, ROBOT]]
         if free:
             y, x = free[0]
-            self._target[row] = here[0] + int(x) - 1, here[1] + int(y) - 1
-        target = self._target[row]
-        if target is None or target == here:
+            self._target[robot] = position[0] + int(x) - 1, position[1] + int(y) - 1
+        target = self._target[robot]
+        if target is None or target == position:
             height, width = self._highways.shape
-            place = int(self._random[row].integers(height * width))
-            target = self._target[row] = place % width, place // width
-        across, down = target[0] - here[0], target[1] - here[1]
+            index = int(self._random[robot].integers(height * width))
+            target = self._target[robot] = index % width, index // width
+        across = target[0] - position[0]
+        down = target[1] - position[1]
         step = (int(np.sign(across)), 0) if across else (0, int(np.sign(down)))
-        return self._walked(row, here, (here[0] + step[0], here[1] + step[1]), seen, cells, None)
+        neighbour = position[0] + step[0], position[1] + step[1]
+        return self._walk(robot, position, neighbour, row, cells, None)
 
-    def _walked(
+    def _walk(
         self,
-        row: int,
-        here: Cell,
-        there: Cell,
-        seen: NDArray[np.float32],
+        robot: int,
+        position: Cell,
+        target: Cell,
+        row: NDArray[np.float32],
         cells: NDArray[np.float32],
         allowed: set[Cell] | None,
     ) -> int:
         """Return the action of a step to a neighbouring cell, aside where a robot stands there."""
-        if there == here:
+        if target == position:
             return NOOP
-        if cells[there[1] - here[1] + 1, there[0] - here[0] + 1, ROBOT]:
-            if self._random[row].random() >= SIDESTEP:
+        if cells[target[1] - position[1] + 1, target[0] - position[0] + 1, ROBOT]:
+            if self._random[robot].random() >= SIDESTEP:
                 return NOOP
             height, width = self._highways.shape
-            others = [
+            free = [
                 cell
-                for cell in _around(here)
+                for cell in _around(position)
                 if (allowed is None or cell in allowed)
                 and 0 <= cell[0] < width
                 and 0 <= cell[1] < height
-                and not cells[cell[1] - here[1] + 1, cell[0] - here[0] + 1, ROBOT]
+                and not cells[cell[1] - position[1] + 1, cell[0] - position[0] + 1, ROBOT]
             ]
-            if not others:
+            if not free:
                 return NOOP
-            there = others[int(self._random[row].integers(len(others)))]
-        heading = int(np.argmax(seen[3:7]))
-        wanted = STEPS.index((there[0] - here[0], there[1] - here[1]))
-        turn = (QUARTERS[wanted] - QUARTERS[heading]) % 4
+            target = free[int(self._random[robot].integers(len(free)))]
+        heading = int(np.argmax(row[3:7]))
+        direction = STEPS.index((target[0] - position[0], target[1] - position[1]))
+        turn = (QUARTERS[direction] - QUARTERS[heading]) % 4
         return (FORWARD, RIGHT, RIGHT, LEFT)[turn]
 
-    def _way(self, goal: Cell, home: Cell) -> dict[Cell, int]:
+    def _distances_to(self, goal: Cell, home: Cell) -> dict[Cell, int]:
         """Return the steps from each cell of the aisles, and from `home`, to `goal`."""
-        if (goal, home) not in self._ways:
+        if (goal, home) not in self._distances:
             height, width = self._highways.shape
             steps, waiting = {goal: 0}, deque([goal])
             while waiting:
@@ -206,8 +217,8 @@ class Fetch:
                     if inside and (x, y) not in steps and (self._highways[y, x] or (x, y) == home):
                         steps[x, y] = steps[cell] + 1
                         waiting.append((x, y))
-            self._ways[goal, home] = steps
-        return self._ways[goal, home]
+            self._distances[goal, home] = steps
+        return self._distances[goal, home]
 
 
 def _around(cell: Cell) -> list[Cell]:

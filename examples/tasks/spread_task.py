@@ -40,7 +40,7 @@ class FixedLandmarks(Scenario):  # type: ignore[misc]  # MPE2 is not typed
     def make_world(self, N: int = 3) -> Any:
         """Return the world of N robots, absent ones left out."""
         world = super().make_world(max(N, self._landmarks))
-        self._whole = N
+        self._n_robots = N
         world.landmarks = world.landmarks[: self._landmarks]
         world.agents = [
             agent for row, agent in enumerate(world.agents[:N]) if row not in self._absent
@@ -50,13 +50,14 @@ class FixedLandmarks(Scenario):  # type: ignore[misc]  # MPE2 is not typed
     def reset_world(self, world: Any, np_random: np.random.Generator) -> None:
         """Place the landmarks and the robots; where one starts does not depend on how many are."""
         # Drawn before anything whose number of draws depends on the robots that are there.
-        marks = np_random.uniform(-1, 1, (self._landmarks, world.dim_p))
-        places = np_random.uniform(-1, 1, (self._whole, world.dim_p))
+        landmark_positions = np_random.uniform(-1, 1, (self._landmarks, world.dim_p))
+        robot_positions = np_random.uniform(-1, 1, (self._n_robots, world.dim_p))
         super().reset_world(world, np_random)
-        for place, landmark in zip(marks, world.landmarks):
-            landmark.state.p_pos = place
-        for place, agent in zip(np.delete(places, list(self._absent), axis=0), world.agents):
-            agent.state.p_pos = place
+        for position, landmark in zip(landmark_positions, world.landmarks):
+            landmark.state.p_pos = position
+        present = np.delete(robot_positions, list(self._absent), axis=0)
+        for position, agent in zip(present, world.agents):
+            agent.state.p_pos = position
 
 
 def make_env(n_robots: int, landmarks: int, absent: Sequence[int] = ()) -> Env:
@@ -75,30 +76,34 @@ class NearestLandmark:
     def configure(self, env: Env, agents: Sequence[str | None]) -> None:
         """Learn how many landmarks and robots there are."""
         self._landmarks = len(env.unwrapped.world.landmarks)
-        self._others = len(env.possible_agents) - 1
+        self._n_neighbours = len(env.possible_agents) - 1
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode; nothing here is random."""
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
         """Return an action for each row."""
-        return np.array([self._decided(seen) for seen in observations])
+        return np.array([self._action(row) for row in observations])
 
-    def _decided(self, seen: NDArray[np.float32]) -> int:
-        if not seen.any():  # absent, or blind
+    def _action(self, row: NDArray[np.float32]) -> int:
+        if not row.any():  # absent, or blind
             return STAY
-        velocity, places = seen[:2], seen[4:].reshape(-1, 2)
-        landmarks = places[: self._landmarks]
-        others = places[self._landmarks : self._landmarks + self._others]
-        mine = np.linalg.norm(landmarks, axis=1)
-        theirs = np.linalg.norm(landmarks[:, None] - others[None], axis=2).min(1, initial=np.inf)
-        free = mine <= theirs
-        goal = landmarks[np.argmin(np.where(free, mine, np.inf))] if free.any() else np.zeros(2)
-        ahead = goal - FORESIGHT * velocity
-        axis = int(np.argmax(np.abs(ahead)))
-        if abs(ahead[axis]) < NEAR_ENOUGH:
+        velocity = row[:2]
+        positions = row[4:].reshape(-1, 2)
+        landmarks = positions[: self._landmarks]
+        neighbours = positions[self._landmarks : self._landmarks + self._n_neighbours]
+        distances = np.linalg.norm(landmarks, axis=1)
+        between = np.linalg.norm(landmarks[:, None] - neighbours[None], axis=2)
+        is_free = distances <= between.min(1, initial=np.inf)
+        goal = np.zeros(2)
+        if is_free.any():
+            goal = landmarks[np.argmin(np.where(is_free, distances, np.inf))]
+        error = goal - FORESIGHT * velocity
+        axis = int(np.argmax(np.abs(error)))
+        if abs(error[axis]) < NEAR_ENOUGH:
             return STAY
-        return ((LEFT, RIGHT), (DOWN, UP))[axis][int(ahead[axis] > 0)]
+        back, forth = ((LEFT, RIGHT), (DOWN, UP))[axis]
+        return forth if error[axis] > 0 else back
 
 
 def covered(env: Any, rewards: Any, infos: Any) -> float:

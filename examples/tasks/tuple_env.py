@@ -75,13 +75,13 @@ class TupleEnv(Env):  # type: ignore[misc]  # PettingZoo's is untyped
         observations, rewards, terminated, truncated, info = self.env.step(
             tuple(actions[agent] for agent in agents)
         )
-        each = [rewards] * len(agents) if isinstance(rewards, int | float) else rewards
+        rewards_by_agent = [rewards] * len(agents) if isinstance(rewards, int | float) else rewards
         infos = self._infos(info)
         if terminated or truncated:
             self.agents = []
         return (
             dict(zip(agents, observations)),
-            {agent: float(reward) for agent, reward in zip(agents, each)},
+            {agent: float(reward) for agent, reward in zip(agents, rewards_by_agent)},
             {agent: bool(terminated) for agent in agents},
             {agent: bool(truncated) for agent in agents},
             infos,

@@ -95,7 +95,7 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         seed = checked_count("seed", self.env.next_seed if seed is None else seed, least=0)
         observations = self._rows.reset_arrays(seed, options)
         super().reset(seed=seed)
-        return self._shaped(observations), self._info()
+        return self._reshape(observations), self._info()
 
     def step(
         self, action: ArrayLike
@@ -108,14 +108,14 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             SetupError: there was no reset, or the episode is over.
         """
         state = self.env.warehouse.state
-        given = numbers_of(action, "action", self.action_space.shape or ())
-        commands = given.reshape(self._commands_shape).copy()
+        numbers = numbers_of(action, "action", self.action_space.shape or ())
+        commands = numbers.reshape(self._commands_shape).copy()
         n_present = np.count_nonzero(state.robot_present)
         commands[: state.n_robots] = mask_unreachable_commands(commands[: state.n_robots], state)
         observations, rewards, terminations, truncations = self._rows.step_arrays(commands)
         reward = float(rewards.sum() / max(n_present, 1))
         is_over, is_cut = bool(terminations.any()), bool(truncations.any())
-        return self._shaped(observations), reward, is_over, is_cut, self._info()
+        return self._reshape(observations), reward, is_over, is_cut, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture or show it; see `SwarmLogisticsEnv.render`."""
@@ -129,7 +129,7 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Release what rendering holds; harmless when called twice."""
         self.env.close()
 
-    def _shaped(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _reshape(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         return observations.reshape(self.observation_space.shape)
 
     def _info(self) -> dict[str, Any]:

@@ -117,7 +117,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._abouts: Infos = [{} for _ in range(self._worlds.n_rows)]
         n_rows = self._worlds.n_rows
         # Of each row's episode: its rewards so far, and the step that it began with.
-        self._returns, self._begun = np.zeros(n_rows, np.float32), np.zeros(n_rows, np.int64)
+        self._returns = np.zeros(n_rows, np.float32)
+        self._start_steps = np.zeros(n_rows, np.int64)
         self._n_steps = 0
         super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
         if seed is not None:
@@ -162,7 +163,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             seed, options = self._seeds[rows.start], self._options[rows.start]
             env.conditions_of(env.next_seed if seed is None else seed, options)
         observations = self._worlds.blank()
-        self._returns[:], self._begun[:] = 0.0, self._n_steps
+        self._returns[:] = 0.0
+        self._start_steps[:] = self._n_steps
         for world, rows in enumerate(self._worlds.rows):
             seed = self._seeds[rows.start]
             self._worlds.begin(world, observations, seed, self._options[rows.start])
@@ -192,12 +194,12 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._n_steps += 1
         self._returns += step.rewards
         # In the order of the worlds, so that what episodes share does not depend on the threads.
-        told = sorted(self._worlds.told)
-        for world in told:
+        worlds = sorted(self._worlds.reported)
+        for world in worlds:
             self._note(world)
         infos = list(map(dict.copy, self._abouts))
         dones = step.terminated | step.truncated
-        for world in told:
+        for world in worlds:
             if self._worlds.is_over[world] or dones[self._worlds.rows[world]].any():
                 self._end(world, step, dones, infos)
         return step.observations, step.rewards, dones, infos
@@ -257,7 +259,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         """Note what there is to say of a world's rows, until it has something to tell again."""
         env, rows = self.worlds[world], self._worlds.rows[world]
         state = env.warehouse.state
-        about = {
+        info = {
             "TimeLimit.truncated": False,
             "padding": False,
             "failed": 0,
@@ -265,12 +267,12 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             "n_robots": state.n_robots,
             **env.episode_info,
         }
-        abouts: Infos = [about] * (rows.stop - rows.start)
+        infos: Infos = [info] * (rows.stop - rows.start)
         for robot in np.flatnonzero(state.failed).tolist():
-            abouts[robot] = {**about, "failed": 1}
+            infos[robot] = {**info, "failed": 1}
         for row in np.flatnonzero(~self._worlds.present[rows]).tolist():
-            abouts[row] = {**abouts[row], "padding": True}
-        self._abouts[rows] = abouts
+            infos[row] = {**infos[row], "padding": True}
+        self._abouts[rows] = infos
 
     def _end(self, world: int, step: RowsStep, dones: NDArray[np.bool_], infos: Infos) -> None:
         """Complete the infos of rows that are done; begin the next episode if the world is over."""
@@ -284,10 +286,11 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             if not infos[row]["padding"]:
                 infos[row]["episode"] = {
                     "r": float(self._returns[row]),
-                    "l": int(self._n_steps - self._begun[row]),
+                    "l": int(self._n_steps - self._start_steps[row]),
                     "delivered": infos[row]["delivered"],
                 }
-            self._returns[row], self._begun[row] = 0.0, self._n_steps
+            self._returns[row] = 0.0
+            self._start_steps[row] = self._n_steps
         if self._worlds.is_over[world]:
             self._worlds.begin(world, step.observations)
         else:
@@ -310,9 +313,9 @@ class LogDeliveries(BaseCallback):  # type: ignore[misc]  # not in the environme
 
     def _on_rollout_end(self) -> None:
         # A VecMonitor around the worlds replaces what they say of an episode.
-        ended = [each for each in self.model.ep_info_buffer or () if "delivered" in each]
+        ended = [info for info in self.model.ep_info_buffer or () if "delivered" in info]
         if ended:
-            delivered = float(np.mean([each["delivered"] for each in ended]))
+            delivered = float(np.mean([info["delivered"] for info in ended]))
             self.logger.record("rollout/delivered_mean", delivered)
 
 

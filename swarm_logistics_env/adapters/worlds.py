@@ -65,7 +65,7 @@ class Worlds:
         self.is_over = [False] * n_worlds
         self.present = np.zeros(self.n_rows, np.bool_)
         self._n_robots = [0] * n_worlds
-        self.told: list[int] = []
+        self.reported: list[int] = []
         self._commands = np.zeros((self.n_rows, *self.command_space.shape))
         self._layers = [layers_of(env) for env in self.envs]
         # The largest worlds are stepped first, so that all threads end at about the same time.
@@ -99,14 +99,16 @@ class Worlds:
         first = self.envs[world].reset_arrays(seed, options)
         observations[rows] = 0.0
         observations[rows.start : rows.start + len(first)] = first
-        self._n_robots[world], self.is_over[world] = len(first), False
+        self._n_robots[world] = len(first)
+        self.is_over[world] = False
         self.note_present(world)
 
     def note_present(self, world: int) -> None:
         """Update which rows of a world are robots that are there."""
-        there, rows = self.envs[world].warehouse.state.robot_present, self.rows[world]
+        is_present = self.envs[world].warehouse.state.robot_present
+        rows = self.rows[world]
         self.present[rows] = False
-        self.present[rows.start : rows.start + len(there)] = there
+        self.present[rows.start : rows.start + len(is_present)] = is_present
 
     def give(self, commands: ArrayLike) -> None:
         """Take the commands (R, 4) of the next step.
@@ -117,11 +119,11 @@ class Worlds:
         """
         if not any(self._n_robots):
             raise SetupError("step before reset: call reset() first")
-        given = numbers_of(commands, "actions", self._commands.shape)
-        self._commands[:] = given
+        numbers = numbers_of(commands, "actions", self._commands.shape)
+        self._commands[:] = numbers
         if not np.isfinite(self._commands).all():
             row = np.argwhere(~np.isfinite(self._commands))[0, 0]
-            raise CommandError(f"actions[{row}] = {given[row]}: should be finite")
+            raise CommandError(f"actions[{row}] = {numbers[row]}: should be finite")
 
     def step(self) -> RowsStep:
         """Take one control period in every world, with the commands that were given."""
@@ -129,7 +131,7 @@ class Worlds:
         terminated, truncated = np.zeros((2, self.n_rows), np.bool_)
         rewards = np.zeros(self.n_rows, np.float32)
         outcome = RowsStep(self.blank(), rewards, terminated, truncated)
-        self.told = []
+        self.reported = []
         if self._shared_out:
             outcome = self._step_together(outcome)
         for world in self._alone:
@@ -146,29 +148,29 @@ class Worlds:
             env.close()
 
     def _step_together(self, outcome: RowsStep) -> RowsStep:
-        layers = [self._layers[world] for world in self._shared_out]
-        self._pool.is_watched[:] = [len(each) > 1 or each[-1].is_watched for each in layers]
-        for world, (*wrappers, _) in zip(self._shared_out, layers):
+        stacks = [self._layers[world] for world in self._shared_out]
+        self._pool.is_watched[:] = [len(stack) > 1 or stack[-1].is_watched for stack in stacks]
+        for world, (*wrappers, _) in zip(self._shared_out, stacks):
             for wrapper in wrappers:
                 robots = self._robots(world)
                 self._commands[robots] = wrapper.before_step(self._commands[robots].copy())
         # The worlds keep what they sensed, whatever the wrappers make of it.
-        changed: dict[int, NDArray[np.float32]] = {}
+        changed_rows: dict[int, NDArray[np.float32]] = {}
 
-        def arrived(place: int, sensed: NDArray[np.float32]) -> None:
-            world = self._shared_out[place]
+        def take_over(index: int, sensed: NDArray[np.float32]) -> None:
+            world = self._shared_out[index]
             *wrappers, core = self._layers[world]
             step = core.outcome(sensed)
             for wrapper in reversed(wrappers):
                 step = wrapper.after_step(step)
             if step[0] is not sensed:
-                changed[world] = step[0]
+                changed_rows[world] = step[0]
             self._take(world, step, outcome)
 
-        self._pool.step(self._commands, outcome.observations, arrived)
-        if changed:
+        self._pool.step(self._commands, outcome.observations, take_over)
+        if changed_rows:
             outcome = outcome._replace(observations=outcome.observations.copy())
-            for world, rows in changed.items():
+            for world, rows in changed_rows.items():
                 outcome.observations[self._robots(world)] = rows
         return outcome
 
@@ -178,7 +180,7 @@ class Worlds:
         outcome.rewards[robots] = rewards
         outcome.terminated[robots], outcome.truncated[robots] = terminated, truncated
         self.is_over[world] = not self.envs[world].agents
-        self.told.append(world)
+        self.reported.append(world)
 
     def _robots(self, world: int) -> slice:
         first = self.rows[world].start
@@ -206,17 +208,18 @@ def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:
             )
     if len({id(env.unwrapped) for env in worlds}) < len(worlds):
         raise SetupError("make_env gave the same environment twice: should make one each time")
-    seen = [env.observation_space("robot_0") for env in worlds]
-    commands = [env.action_space("robot_0") for env in worlds]
-    if len({(space.shape, command.shape) for space, command in zip(seen, commands)}) > 1:
+    observation_spaces = [env.observation_space("robot_0") for env in worlds]
+    command_spaces = [env.action_space("robot_0") for env in worlds]
+    row_shapes = [space.shape for space in observation_spaces]
+    command_shapes = [space.shape for space in command_spaces]
+    if len(set(zip(row_shapes, command_shapes))) > 1:
         raise SetupError(
-            f"observations {[space.shape for space in seen]} and commands "
-            f"{[command.shape for command in commands]}: should be of one length in all worlds, "
-            "so of one message_size"
+            f"observations {row_shapes} and commands {command_shapes}: should be of one length in "
+            "all worlds, so of one message_size"
         )
-    low = np.min([space.low for space in seen], axis=0)
-    high = np.max([space.high for space in seen], axis=0)
-    return Box(low, high, dtype=np.float32), commands[0]
+    low = np.min([space.low for space in observation_spaces], axis=0)
+    high = np.max([space.high for space in observation_spaces], axis=0)
+    return Box(low, high, dtype=np.float32), command_spaces[0]
 
 
 def maker(
@@ -225,7 +228,7 @@ def maker(
     n_robots: int | Sequence[int] | None,
     fields: Mapping[str, Any],
 ) -> Callable[[int], World]:
-    """Return what makes plain environments, of one size or of several in turn.
+    """Return a function that makes plain environments, of one size or of several in turn.
 
     Raises:
         SetupError: there are no sizes, or more than worlds.
@@ -239,7 +242,7 @@ def maker(
 
     def make_env(world: int) -> World:
         size = sizes[world % len(sizes)]
-        sized = {} if size is None else {"n_robots": size}
-        return SwarmLogisticsEnv(scenario, **sized, **fields)
+        size_field = {} if size is None else {"n_robots": size}
+        return SwarmLogisticsEnv(scenario, **size_field, **fields)
 
     return make_env

@@ -15,8 +15,8 @@ from typing import Annotated, Any, TypeAlias
 import typer
 from typer import Exit, Option, echo
 
+from swarm_logistics_env.code_files import search_current_folder
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
-from swarm_logistics_env.policies.current_folder import look_here
 from swarm_logistics_env.records import plain, read_table
 from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.warehouse.faults import Fault, fault_of
@@ -56,7 +56,7 @@ class Application:
 
     def run(self, arguments: list[str]) -> int:
         """Run the command with these arguments and return the exit code."""
-        look_here()  # a user's own policy lies in the folder in which the command is run
+        search_current_folder()  # a user's own policy lies in the folder that the command runs in
         typed = [*arguments, "--help"] if arguments in ([], ["study"]) else arguments
         try:
             command = command_line({*typed[:1]} & {*COMMANDS} or COMMANDS)

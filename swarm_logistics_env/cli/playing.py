@@ -13,8 +13,8 @@ from typer import Argument, Option, echo
 
 from swarm_logistics_env.episode import Play, run_episode
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.policies import called, known_policies, load
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.policies import display_name, known_policies, load
+from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.scenario import SOURCES
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import ROLES
@@ -78,7 +78,7 @@ def run_command(
         runs = []
         for name in names:
             for fault_texts, scheduled_faults in variants:
-                title = ", ".join([called(name)[-24:], *fault_texts])
+                title = ", ".join([display_name(name)[-24:], *fault_texts])
                 player = load(name, trust_code=trust_code)
                 runs.append((title, Play(scenario, player, seed, scheduled_faults)))
         _write_film(film, runs, scenario.duration if until is None else until, speed)
@@ -95,7 +95,7 @@ def run_command(
     of_all = "" if scenario.restock else f" of {scenario.n_items}"
     echo(
         f"P = {episode.delivered} items delivered{of_all} in {episode.ended_at:g} s "
-        f"by {scenario.n_robots} robots with {called(names[0])}, seed {seed}"
+        f"by {scenario.n_robots} robots with {display_name(names[0])}, seed {seed}"
     )
     if len(times):
         wait = np.diff(times, prepend=0.0).max()
@@ -142,11 +142,11 @@ def watch_command(
     if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
         raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
     scenario = scenario_of(preset, scenario_file, changes)
-    typed = {called(name): name for name in filter(None, (policy, against))}
+    typed = {display_name(name): name for name in filter(None, (policy, against))}
     session = Session(
         scenario,
-        called(policy),
-        None if against is None else called(against),
+        display_name(policy),
+        None if against is None else display_name(against),
         seed,
         faults_of(faults, scenario),
         speed,
@@ -159,7 +159,7 @@ def watch_command(
         serve(session, port, echo, show=webbrowser.open if shows else None)
         return
     page = recorded_page(session, session.scenario.duration if until is None else until)
-    with becoming(save, SetupError) as part:
+    with atomic_write(save, SetupError) as part:
         part.write_text(page, encoding="utf-8")
     echo(f"{save}: {session.state.time:g} s, {len(page) / 1e6:.2f} MB")
 

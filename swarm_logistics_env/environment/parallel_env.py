@@ -219,8 +219,9 @@ class SwarmLogisticsEnv(DictView):
         return self._rewards.pays_steadily or self.max_cycles is not None
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
-        """Return what `step_arrays` does of the step that the warehouse has just taken."""
-        world, was_present = self.warehouse, self._present
+        """Return the result of `step_arrays` for the step that the warehouse has just taken."""
+        world = self.warehouse
+        was_present = self._present
         n = len(was_present)
         terminations, truncations = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
         if not (world.is_eventful or self.is_watched):

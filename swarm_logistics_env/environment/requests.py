@@ -17,44 +17,44 @@ from swarm_logistics_env.warehouse.failure_modes import failure_mode
 from swarm_logistics_env.warehouse.faults import GRACE, checked_faults, failed_robots
 
 
-def as_array(given: ArrayLike, name: str) -> NDArray[Any]:
-    """Return `given` as an array; shape and dtype stay as they are.
+def as_array(value: ArrayLike, name: str) -> NDArray[Any]:
+    """Return `value` as an array; shape and dtype stay as they are.
 
     Args:
-        given: an array, a list, a tensor on the CPU, ...
+        value: an array, a list, a tensor on the CPU, ...
         name: the name of the value, for errors.
 
     Raises:
         CommandError: NumPy cannot read it, as a tensor of bfloat16, on a GPU or with a gradient.
     """
     try:
-        return np.asarray(given)
+        return np.asarray(value)
     except Exception as error:  # tensors raise TypeError, RuntimeError, NotImplementedError, ...
         raise CommandError(
-            f"{name} of type {type(given).__name__} cannot be read: should be numbers that "
+            f"{name} of type {type(value).__name__} cannot be read: should be numbers that "
             f"numpy.asarray takes, which says: {error}"
         ) from error
 
 
-def numbers_of(given: ArrayLike, name: str, wanted: tuple[int, ...]) -> NDArray[Any]:
-    """Return `given` as an array of numbers of that shape; see `as_array`.
+def numbers_of(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Return `value` as an array of numbers of that shape; see `as_array`.
 
     Raises:
         CommandError: it cannot be read, has another shape, or is not of real numbers.
     """
-    array = as_array(given, name)
-    if array.shape != wanted or array.dtype.kind not in "fiub":
+    array = as_array(value, name)
+    if array.shape != shape or array.dtype.kind not in "fiub":
         raise CommandError(
-            f"{name} of shape {array.shape} and type {array.dtype}: should be {wanted} numbers"
+            f"{name} of shape {array.shape} and type {array.dtype}: should be {shape} numbers"
         )
     return array
 
 
-def gathered(
+def gather_commands(
     actions: Mapping[str, ArrayLike],
     agents: Sequence[str],
     possible_agents: Sequence[str],
-    wanted: tuple[int, ...],
+    shape: tuple[int, ...],
 ) -> NDArray[np.float64]:
     """Return the commands of `agents`, in their order, as rows of one array.
 
@@ -62,7 +62,7 @@ def gathered(
         actions: agent -> command; those of other possible agents are ignored.
         agents: whose commands are wanted.
         possible_agents: who may be named in `actions`.
-        wanted: the shape of one command.
+        shape: the shape of one command.
 
     Raises:
         CommandError: no dict; a command is missing, for an unknown agent, unreadable, of the wrong
@@ -82,17 +82,17 @@ def gathered(
                 f"{len(possible_agents)} possible agents"
             )
     rows: list[Any] = [actions[agent] for agent in agents]
-    if not all(type(row) is np.ndarray and row.shape == wanted for row in rows):  # seldom
+    if not all(type(row) is np.ndarray and row.shape == shape for row in rows):  # seldom
         rows = [as_array(row, f"command of {agent!r}") for agent, row in zip(agents, rows)]
         for agent, row in zip(agents, rows):
-            if row.shape != wanted:
-                raise CommandError(f"command of {agent!r} of shape {row.shape}: should be {wanted}")
+            if row.shape != shape:
+                raise CommandError(f"command of {agent!r} of shape {row.shape}: should be {shape}")
     try:
         # To concatenate is several times as fast as an array of arrays; numbers cannot be.
-        given = np.concatenate(rows if wanted else [rows], dtype=np.float64, casting="same_kind")
+        commands = np.concatenate(rows if shape else [rows], dtype=np.float64, casting="same_kind")
     except TypeError as error:
         raise CommandError(f"commands should be numbers: {error}") from error
-    return given.reshape(len(rows), *wanted)
+    return commands.reshape(len(rows), *shape)
 
 
 OPTIONS = ("faults", "scenario")
@@ -166,11 +166,11 @@ def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -
         SetupError: they remove all at 0 s.
         FaultError: a fault names robots that are not there.
     """
-    gone = set[int]()
+    removed = set[int]()
     for fault in faults:
         if fault.onset <= GRACE and not failure_mode(fault.mode).present:
-            gone.update(failed_robots(fault, seed, n_robots).tolist())
-    if len(gone) == n_robots:
+            removed.update(failed_robots(fault, seed, n_robots).tolist())
+    if len(removed) == n_robots:
         raise SetupError(
             f"faults remove all {n_robots} robots at 0 s: should leave at least one to begin with"
         )

@@ -32,20 +32,20 @@ class RewardTerms:
             raise SetupError(
                 f'rewards = {weights!r}: should be None or a dict, as {{"delivery": 1.0}}'
             )
-        given = DEFAULT_WEIGHTS if weights is None else weights
-        for name, weight in given.items():
+        weights = DEFAULT_WEIGHTS if weights is None else weights
+        for name, weight in weights.items():
             if name not in REWARD_TERMS:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
             finite_number(f"rewards[{name!r}]", weight)
-        self._terms = [(REWARD_TERMS[name], weight) for name, weight in given.items()]
-        self.pays_steadily = not _AT_DELIVERIES.issuperset(given)
+        self._terms = [(REWARD_TERMS[name], weight) for name, weight in weights.items()]
+        self.pays_steadily = not _AT_DELIVERIES.issuperset(weights)
 
     def begin(self, world: Warehouse) -> None:
         """Store the state at the start of an episode."""
         self._before = Before(world)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
-        """Return what the step just taken earns each robot, (N,)."""
+        """Return the reward of the step just taken, (N,): one number for each robot."""
         total = np.zeros(world.state.n_robots)
         for term, weight in self._terms:
             earned = term(world, self._before)
@@ -64,8 +64,10 @@ class Before:
 
     def __init__(self, world: Warehouse) -> None:
         state = world.state
-        self.delivered, self.requested = len(state.delivery_times), state.item_requested
-        self.carriers, self.item_x = state.item_carrier.copy(), state.item_position[:, 0].copy()
+        self.delivered = len(state.delivery_times)
+        self.requested = state.item_requested
+        self.carriers = state.item_carrier.copy()
+        self.item_x = state.item_position[:, 0].copy()
         self.robot_x = state.robot_position[:, 0].copy()
 
     def keeps(self, state: WarehouseState, robots: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -85,10 +87,10 @@ def delivery(world: Warehouse, before: Before) -> Earned:
 
 def own_delivery(world: Warehouse, before: Before) -> Earned:
     """Items that the robot itself delivered in this step."""
-    new = world.state.delivered_by[before.delivered :]
-    if not new:
+    deliverers = world.state.delivered_by[before.delivered :]
+    if not deliverers:
         return None
-    return np.bincount(new, minlength=world.state.n_robots).astype(np.float64)
+    return np.bincount(deliverers, minlength=world.state.n_robots).astype(np.float64)
 
 
 def lift_requested(world: Warehouse, before: Before) -> Earned:
@@ -96,22 +98,24 @@ def lift_requested(world: Warehouse, before: Before) -> Earned:
 
     Nothing to one that cannot deliver (privileged: as `approach`).
     """
-    state, carriers = world.state, world.state.item_carrier
+    state = world.state
+    carriers = world.state.item_carrier
     items = np.flatnonzero(before.requested & state.item_requested & (carriers != before.carriers))
     if not items.size:
         return None
-    paid, delivers = np.zeros(state.n_robots), state.delivers
+    reward = np.zeros(state.n_robots)
+    delivers = state.delivers
     for item in items.tolist():
-        now, was = int(carriers[item]), int(before.carriers[item])
+        carrier, previous_carrier = int(carriers[item]), int(before.carriers[item])
         # One that was delivered and is asked for again does not lie where its carrier stands.
-        is_back = state.delivered != before.delivered and now == NOBODY
-        if is_back and (state.item_position[item] != state.robot_position[was]).any():
+        is_back = state.delivered != before.delivered and carrier == NOBODY
+        if is_back and (state.item_position[item] != state.robot_position[previous_carrier]).any():
             continue
-        if now != NOBODY and delivers[now]:
-            paid[now] += 1.0
-        if was != NOBODY and delivers[was]:
-            paid[was] -= 1.0
-    return paid
+        if carrier != NOBODY and delivers[carrier]:
+            reward[carrier] += 1.0
+        if previous_carrier != NOBODY and delivers[previous_carrier]:
+            reward[previous_carrier] -= 1.0
+    return reward
 
 
 def approach(world: Warehouse, before: Before) -> Earned:
@@ -124,10 +128,10 @@ def approach(world: Warehouse, before: Before) -> Earned:
     robots = robots[before.keeps(state, robots)]
     if not robots.size:
         return None
-    paid = np.zeros(state.n_robots)
-    paid[robots] = np.minimum(state.robot_position[robots, 0], edge)
-    paid[robots] -= np.minimum(before.robot_x[robots], edge)
-    return paid
+    reward = np.zeros(state.n_robots)
+    reward[robots] = np.minimum(state.robot_position[robots, 0], edge)
+    reward[robots] -= np.minimum(before.robot_x[robots], edge)
+    return reward
 
 
 def stocking(world: Warehouse, before: Before) -> Earned:
@@ -143,11 +147,11 @@ def stocking(world: Warehouse, before: Before) -> Earned:
     items = np.flatnonzero((carriers != NOBODY) & ~delivered)
     if not items.size:
         return None
-    nearer = np.minimum(state.item_position[items, 0], edge)
-    nearer -= np.minimum(before.item_x[items], edge)
-    paid = np.zeros(state.n_robots)
-    np.add.at(paid, carriers[items], nearer)  # who lets go of one may lift another at once
-    return paid
+    metres = np.minimum(state.item_position[items, 0], edge)
+    metres -= np.minimum(before.item_x[items], edge)
+    reward = np.zeros(state.n_robots)
+    np.add.at(reward, carriers[items], metres)  # who lets go of one may lift another at once
+    return reward
 
 
 def contact(world: Warehouse, before: Before) -> Earned:
@@ -165,12 +169,12 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
     robots = np.flatnonzero(state.carries_requested & ~state.delivers)
     if not robots.size:
         return None
-    paid = np.zeros(state.n_robots)
-    paid[robots] = world.scenario.control_period
+    reward = np.zeros(state.n_robots)
+    reward[robots] = world.scenario.control_period
     robots = robots[before.keeps(state, robots)]
-    deeper = np.maximum(state.robot_position[robots, 0], edge)
-    paid[robots] += SECONDS_A_METRE * (deeper - np.maximum(before.robot_x[robots], edge))
-    return paid
+    depth = np.maximum(state.robot_position[robots, 0], edge)
+    reward[robots] += SECONDS_A_METRE * (depth - np.maximum(before.robot_x[robots], edge))
+    return reward
 
 
 SECONDS_A_METRE = 2.0

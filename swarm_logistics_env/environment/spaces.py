@@ -18,7 +18,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.state import CARRIED, NOBODY, STORED
 
-from .requests import gathered
+from .requests import gather_commands
 
 ROBOT_FEATURES = (
     "present", "x", "y", "cos_heading", "sin_heading", "velocity_x", "velocity_y",
@@ -36,26 +36,26 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
     """
     state = world.state
     robots = np.zeros((n_robots, len(ROBOT_FEATURES)), np.float32)
-    here = robots[: state.n_robots]
-    here[:, 0] = 1.0
-    here[:, 1:3] = state.robot_position
-    here[:, 3] = np.cos(state.robot_heading)
-    here[:, 4] = np.sin(state.robot_heading)
+    robot_rows = robots[: state.n_robots]
+    robot_rows[:, 0] = 1.0
+    robot_rows[:, 1:3] = state.robot_position
+    robot_rows[:, 3] = np.cos(state.robot_heading)
+    robot_rows[:, 4] = np.sin(state.robot_heading)
     limit = world.scenario.max_speed
-    here[:, 5:7] = np.clip(state.robot_velocity, -limit, limit)
-    here[:, 7] = state.robot_item != NOBODY
-    here[:, 8] = here[:, 7] * state.carries_requested
-    here[:, 9] = np.nan_to_num(state.robot_timer, nan=world.scenario.timer_limit)
-    here[~state.robot_present] = 0.0
+    robot_rows[:, 5:7] = np.clip(state.robot_velocity, -limit, limit)
+    robot_rows[:, 7] = state.robot_item != NOBODY
+    robot_rows[:, 8] = robot_rows[:, 7] * state.carries_requested
+    robot_rows[:, 9] = np.nan_to_num(state.robot_timer, nan=world.scenario.timer_limit)
+    robot_rows[~state.robot_present] = 0.0
     items = np.zeros((n_items, len(ITEM_FEATURES)), np.float32)
-    there = items[: len(state.item_status)]
-    there[:, 0] = state.item_status == STORED
-    there[:, 1] = state.item_status == CARRIED
-    there[:, 2:4] = state.item_position * (there[:, :1] + there[:, 1:2])
-    there[:, 4] = state.item_requested
+    item_rows = items[: len(state.item_status)]
+    item_rows[:, 0] = state.item_status == STORED
+    item_rows[:, 1] = state.item_status == CARRIED
+    item_rows[:, 2:4] = state.item_position * (item_rows[:, :1] + item_rows[:, 1:2])
+    item_rows[:, 4] = state.item_requested
     width, height = world.scenario.warehouse_width, world.scenario.warehouse_height
-    for places in (here[:, 1:3], there[:, 2:4]):
-        np.clip(places, 0.0, (width, height), out=places)
+    for positions in (robot_rows[:, 1:3], item_rows[:, 2:4]):
+        np.clip(positions, 0.0, (width, height), out=positions)
     return np.concatenate([robots.ravel(), items.ravel(), [np.float32(state.time)]])
 
 
@@ -81,7 +81,8 @@ class Spaces:
         low, high = bounds(scenario)
         self.observation = Box(low, high, dtype=np.float32)
         self.action = Box(-1.0, 1.0, (4 + scenario.message_size,), dtype=np.float32)
-        self._own, self._declared = scenario, {scenario}
+        self._own = scenario
+        self._declared = {scenario}
         self.most = {name: getattr(scenario, name) for name in _BOUND_THE_STATE}
 
     def widen(self, scenario: Scenario) -> None:
@@ -225,16 +226,16 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         agents = self.agents
         if not agents:
             self.refuse_to_step()
-        wanted = self.action_space(agents[0]).shape
-        commands = gathered(actions, agents, self.possible_agents, wanted)
+        shape = self.action_space(agents[0]).shape
+        commands = gather_commands(actions, agents, self.possible_agents, shape)
         outcome: tuple[NDArray[Any], ...]
         if len(agents) == self.n_rows:
             outcome = self.step_arrays(commands)
         else:
             rows = [_row(agent) for agent in agents]
-            placed = np.zeros((self.n_rows, *wanted))
-            placed[rows] = commands
-            outcome = tuple(part[rows] for part in self.step_arrays(placed))
+            padded = np.zeros((self.n_rows, *shape))
+            padded[rows] = commands
+            outcome = tuple(part[rows] for part in self.step_arrays(padded))
         observations, rewards, terminations, truncations = outcome
         return (
             dict(zip(agents, observations, strict=True)),

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         NAMES,
         SUFFIXES,
         PolicySpec,
-        called,
+        display_name,
         known_policies,
         load,
     )
@@ -30,7 +30,7 @@ __all__ = [
     "PolicySpec",
     "SwarmDT",
     "SwarmDTParameters",
-    "called",
+    "display_name",
     "identity",
     "known_policies",
     "load",
@@ -43,7 +43,7 @@ _HOMES = {
     "files": {"read_card", "write_onnx"},
     "learned": {"PolicyCard"},
     "policy": {"Policy", "identity"},
-    "spec": {"NAMES", "SUFFIXES", "PolicySpec", "called", "known_policies", "load"},
+    "spec": {"NAMES", "SUFFIXES", "PolicySpec", "display_name", "known_policies", "load"},
     "swarm_dt": {"SwarmDT", "SwarmDTParameters"},
 }
 

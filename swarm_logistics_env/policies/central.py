@@ -44,7 +44,7 @@ class Central:
     """
 
     needs_state = True
-    laden_wait = True  # whether robots that carry an item wait for a place to wait as well
+    laden_wait = True  # whether robots that carry an item wait as well
 
     def __init__(self) -> None:
         self._scenario = Scenario()
@@ -60,7 +60,8 @@ class Central:
         self._waits_under = np.full(n_robots, NOBODY)  # the item of each robot
         self._worker = NOBODY
         self._task: tuple[int, bool] = (NOBODY, False)
-        self._best, self._best_at = np.inf, 0.0
+        self._least_distance = np.inf  # [m] to the goal of the worker's task
+        self._least_distance_at = 0.0  # [s]
         self._planned_at = -np.inf
 
     def act(
@@ -78,15 +79,15 @@ class Central:
                 f"a state of {state.n_robots} robots: reset was told {len(self._trusted_from)}"
             )
         worker = self._assign(state)
-        others = state.robot_present.copy()
+        is_idle = state.robot_present.copy()
         if worker != NOBODY:
-            others[worker] = False
-        goals = self._waiting_places(state, others)
+            is_idle[worker] = False
+        goals = self._waiting_places(state, is_idle)
         gripper = np.where(state.robot_item == NOBODY, 0.0, -1.0)  # nobody hoards
-        self._stock(state, others, goals, gripper)
+        self._stock(state, is_idle, goals, gripper)
         velocity = self._drift(state, goals, worker)
         if worker != NOBODY:
-            velocity[worker] = self._on_its_way(state, worker, others)
+            velocity[worker] = self._worker_velocity(state, worker, is_idle)
             # Of several items in reach the requested one comes first, so no other gets lifted.
             may_hold = self._task[1] or self._to_item(state) <= self._scenario.pickup_range
             gripper[worker] = 1.0 if may_hold else 0.0
@@ -95,14 +96,14 @@ class Central:
     def _stock(
         self,
         state: WarehouseState,
-        others: NDArray[np.bool_],
+        is_idle: NDArray[np.bool_],
         goals: NDArray[np.float64],
         gripper: NDArray[np.float64],
     ) -> None:
         """Change what robots without a request do: where they go [m] and what they hold."""
 
     def _waiting_places(
-        self, state: WarehouseState, others: NDArray[np.bool_]
+        self, state: WarehouseState, is_idle: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
         """Return where each robot should wait (N, 2) [m], and note under which item.
 
@@ -110,12 +111,12 @@ class Central:
         anyway. Who has no item waits at the wall.
 
         Args:
-            others: which robots have time to wait (N,).
+            is_idle: which robots have no request to work on (N,).
         """
         free = state.item_status == STORED
         if state.requested != NOBODY:
             free[state.requested] = False
-        waits = others & (self.laden_wait | (state.robot_item == NOBODY))
+        waits = is_idle & (self.laden_wait | (state.robot_item == NOBODY))
         item = self._waits_under
         item[~waits | ~free[item]] = NOBODY
         is_taken = np.zeros(len(free), np.bool_)
@@ -145,8 +146,10 @@ class Central:
         else:
             worker = self._nearest(state, item, is_trusted)
         if worker != self._worker or task != self._task:
-            self._worker, self._task = worker, task
-            self._best, self._best_at = np.inf, state.time
+            self._worker = worker
+            self._task = task
+            self._least_distance = np.inf
+            self._least_distance_at = state.time
             self._planned_at = -np.inf
         return worker
 
@@ -154,27 +157,28 @@ class Central:
         free = state.robot_present & (state.robot_item == NOBODY)
         if not free.any():
             return NOBODY
-        able = free & is_trusted if (free & is_trusted).any() else free
-        away = np.linalg.norm(state.robot_position - state.item_position[item], axis=1)
-        if self._worker != NOBODY and able[self._worker]:
-            away[self._worker] -= 0.5  # no dithering between two that are as near
-        return int(np.where(able, away, np.inf).argmin())
+        is_candidate = free & is_trusted if (free & is_trusted).any() else free
+        distance = np.linalg.norm(state.robot_position - state.item_position[item], axis=1)
+        if self._worker != NOBODY and is_candidate[self._worker]:
+            distance[self._worker] -= 0.5  # no dithering between two that are as near
+        return int(np.where(is_candidate, distance, np.inf).argmin())
 
     def _judge(self, state: WarehouseState) -> None:
         """Stop trusting a worker that gets no nearer to its goal."""
-        left = self._left(state)
-        if left < self._best - 0.05:
-            self._best, self._best_at = left, state.time
-        elif state.time > self._best_at + PATIENCE:
+        distance = self._distance_to_goal(state)
+        if distance < self._least_distance - 0.05:
+            self._least_distance = distance
+            self._least_distance_at = state.time
+        elif state.time > self._least_distance_at + PATIENCE:
             self._trusted_from[self._worker] = state.time + DISTRUST
 
-    def _left(self, state: WarehouseState) -> float:
+    def _distance_to_goal(self, state: WarehouseState) -> float:
         if not self._task[1]:
             return self._to_item(state)
         if self._planned_at < 0:
             return np.inf
         x, y = state.robot_position[self._worker].tolist()
-        return float(self._far[cell_at(self._far, x, y)]) * CELL
+        return float(self._cost_to_go[cell_at(self._cost_to_go, x, y)]) * CELL
 
     def _to_item(self, state: WarehouseState) -> float:
         """Return how far the worker is from the item of its task [m]."""
@@ -182,44 +186,47 @@ class Central:
 
     # -- where to ------------------------------------------------------------------------------
 
-    def _on_its_way(
-        self, state: WarehouseState, worker: int, others: NDArray[np.bool_]
+    def _worker_velocity(
+        self, state: WarehouseState, worker: int, is_idle: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
-        scenario, (item, carries) = self._scenario, self._task
+        scenario = self._scenario
+        item, carries = self._task
         x, y = state.robot_position[worker].tolist()
         if carries and x >= scenario.storage_width:
             return np.array([1.0, 0.0])  # the area may have become narrower
         if not carries and self._to_item(state) < 0.3:
             return self._towards(state.robot_position[worker], state.item_position[item])
         if state.time >= self._planned_at + REPLAN - 1e-6:
-            self._cost, self._far = self._ways(state, others, NOBODY if carries else item)
+            target = NOBODY if carries else item
+            self._cost, self._cost_to_go = self._costs_among(state, is_idle, target)
             self._planned_at = state.time
-        waypoint = lookahead(self._cost, self._far, x, y)
+        waypoint = lookahead(self._cost, self._cost_to_go, x, y)
         if carries and waypoint[0] >= scenario.storage_width - CELL:
             waypoint = (waypoint[0] + 1.0, waypoint[1])  # no braking at the edge
         return self._towards(state.robot_position[worker], np.array(waypoint))
 
-    def _ways(
+    def _costs_among(
         self, state: WarehouseState, robots: NDArray[np.bool_], item: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the cost of each cell and of the way from it, among `robots`.
+        """Return the cost of each cell, and of the cheapest way from it, among `robots`.
 
         Args:
             item: to which an unladen robot drives; NOBODY: a laden one drives home.
         """
-        scenario, carries = self._scenario, item == NOBODY
+        scenario = self._scenario
+        carries = item == NOBODY
         discs = [_discs(state.robot_position[robots], scenario.robot_radius, CROWDED)]
         discs += [_discs(state.obstacle_position, scenario.obstacle_radius, BLOCKED)]
         if carries:
             stored = state.item_position[state.item_status == STORED]
             discs += [_discs(stored, scenario.item_radius, BLOCKED)]
-        around = np.vstack(discs)
-        around[:, 2] += scenario.robot_radius + MARGIN
+        obstacles = np.vstack(discs)
+        obstacles[:, 2] += scenario.robot_radius + MARGIN
         cost = costmap(
             scenario.warehouse_width,
             scenario.warehouse_height,
             scenario.robot_radius,
-            around,
+            obstacles,
         )
         goal: NDArray[np.bool_] = np.zeros_like(cost, np.bool_)
         if carries:
@@ -239,14 +246,14 @@ class Central:
         """Return velocities (N, 2), in top speeds, of robots on their way to where they wait."""
         position = state.robot_position
         velocity = self._towards(position, goals)
-        between = position[:, None] - position  # from other to robot
-        away = np.linalg.norm(between, axis=2)
-        away[:, ~state.robot_present] = np.inf
-        np.fill_diagonal(away, np.inf)
-        push = np.clip(1.0 - away / PERSONAL_SPACE, 0.0, None) / np.maximum(away, 1e-6)
+        from_others = position[:, None] - position  # (robot, other, 2)
+        distance = np.linalg.norm(from_others, axis=2)
+        distance[:, ~state.robot_present] = np.inf
+        np.fill_diagonal(distance, np.inf)
+        push = np.clip(1.0 - distance / PERSONAL_SPACE, 0.0, None) / np.maximum(distance, 1e-6)
         if worker != NOBODY:
             push[:, worker] *= 3.0
-        shove = np.einsum("ij,ijk->ik", push, between)
+        shove = np.einsum("ij,ijk->ik", push, from_others)
         is_at_goal = np.linalg.norm(position - goals, axis=1) < 0.1
         # A robot that waits under an item blocks nobody whom the item does not block as well.
         shove[is_at_goal & (self._waits_under != NOBODY)] = 0.0
@@ -258,9 +265,10 @@ class Central:
     def _towards(
         self, position: NDArray[np.float64], goal: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the velocity, in top speeds, that gets there in one control step if it can."""
-        way = (goal - position) / (self._scenario.max_speed * self._scenario.control_period)
-        return np.asarray(way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1.0))
+        """Return the velocity, in top speeds, to be at the goal in one control step if it can."""
+        velocity = (goal - position) / (self._scenario.max_speed * self._scenario.control_period)
+        speed = np.linalg.norm(velocity, axis=-1, keepdims=True)
+        return np.asarray(velocity / np.maximum(speed, 1.0))
 
     def _steer(
         self,
@@ -283,22 +291,22 @@ class Central:
 def _loneliest(
     state: WarehouseState, robot: int, candidates: NDArray[np.int64], is_taken: NDArray[np.bool_]
 ) -> int:
-    """Return the candidate farthest from all that are taken, less half the way to it."""
-    places = state.item_position[candidates]
-    way = np.linalg.norm(places - state.robot_position[robot], axis=1)
+    """Return the candidate farthest from all that are taken, less half the robot's way to it."""
+    positions = state.item_position[candidates]
+    distances = np.linalg.norm(positions - state.robot_position[robot], axis=1)
     if not is_taken.any():
-        return int(candidates[way.argmin()])
-    gaps = np.linalg.norm(places[:, None] - state.item_position[is_taken], axis=2).min(axis=1)
-    return int(candidates[(gaps - 0.5 * way).argmax()])
+        return int(candidates[distances.argmin()])
+    gaps = np.linalg.norm(positions[:, None] - state.item_position[is_taken], axis=2).min(axis=1)
+    return int(candidates[(gaps - 0.5 * distances).argmax()])
 
 
 def _rank_and_file(n_robots: int, scenario: Scenario) -> NDArray[np.float64]:
-    """Return places along the wall opposite the delivery area (N, 2) [m]."""
+    """Return positions along the wall opposite the delivery area (N, 2) [m]."""
     pitch = 2 * scenario.robot_radius + 0.1
     per_file = max(int((scenario.warehouse_height - 0.1) / pitch), 1)
     file, rank = np.divmod(np.arange(n_robots), per_file)
-    places = np.stack([(file + 0.5) * pitch, (rank + 0.5) * pitch + 0.05], axis=1)
-    return np.minimum(places, [scenario.warehouse_width - pitch / 2, np.inf])
+    positions = np.stack([(file + 0.5) * pitch, (rank + 0.5) * pitch + 0.05], axis=1)
+    return np.minimum(positions, [scenario.warehouse_width - pitch / 2, np.inf])
 
 
 def _discs(centres: NDArray[np.float64], radius: float, cost: float) -> NDArray[np.float64]:

@@ -24,7 +24,7 @@ SLOT_PITCH = 0.6
 ROWS = (0.35, 0.85)  # distances of the rows of slots from the area
 SLOT_RADIUS = 0.2  # an item this near takes a slot
 SLOT_IN_SIGHT = 1.0  # from here on a robot drives straight to its slot
-THERE = 0.1
+ARRIVAL_RADIUS = 0.1
 DEPTH = 0.4  # of robots that hold items, in the area
 
 
@@ -48,14 +48,15 @@ class CentralStock(Central):
     def _stock(
         self,
         state: WarehouseState,
-        others: NDArray[np.bool_],
+        is_idle: NDArray[np.bool_],
         goals: NDArray[np.float64],
         gripper: NDArray[np.float64],
     ) -> None:
         """Let waiting robots lift items, and laden ones take theirs to a slot or hold it inside."""
-        position, edge = state.robot_position, self._scenario.storage_width
+        position = state.robot_position
+        edge = self._scenario.storage_width
         # Who carries the requested item without being trusted to deliver it lets it go.
-        laden = others & (state.robot_item != NOBODY) & (state.robot_item != state.requested)
+        laden = is_idle & (state.robot_item != NOBODY) & (state.robot_item != state.requested)
         self._slot[~laden] = NOBODY
         slots = self._slots()
         is_free = self._are_free(state, slots)
@@ -64,35 +65,36 @@ class CentralStock(Central):
 
         item = self._waits_under
         room = int(is_free.sum()) + most_held - n_held
-        for robot in np.flatnonzero(others & (item != NOBODY)).tolist():
-            place = state.item_position[item[robot]]
-            is_far = place[0] < edge - ROWS[-1] - SLOT_PITCH
-            if room > 0 and is_far and np.linalg.norm(place - position[robot]) < THERE:
+        for robot in np.flatnonzero(is_idle & (item != NOBODY)).tolist():
+            item_position = state.item_position[item[robot]]
+            is_far = item_position[0] < edge - ROWS[-1] - SLOT_PITCH
+            has_arrived = np.linalg.norm(item_position - position[robot]) < ARRIVAL_RADIUS
+            if room > 0 and is_far and has_arrived:
                 gripper[robot] = 1.0
                 room -= 1
 
         if laden.any() and state.time >= self._home_planned_at + REPLAN - 1e-6:
-            among = state.robot_present & ~laden
-            self._home_cost, self._home_far = self._ways(state, among, NOBODY)
+            unladen = state.robot_present & ~laden
+            self._home_cost, self._home_cost_to_go = self._costs_among(state, unladen, NOBODY)
             self._home_planned_at = state.time
         for robot in np.flatnonzero(laden).tolist():
             gripper[robot] = 0.0
             if self._slot[robot] == NOBODY and n_held > most_held and is_free.any():
-                away = np.linalg.norm(slots - position[robot], axis=1)
-                self._slot[robot] = np.where(is_free, away, np.inf).argmin()
+                distances = np.linalg.norm(slots - position[robot], axis=1)
+                self._slot[robot] = np.where(is_free, distances, np.inf).argmin()
                 is_free[self._slot[robot]] = False
                 n_held -= 1
-            goals[robot] = self._way_with_stock(position[robot])
+            goals[robot] = self._next_waypoint(position[robot])
             if self._slot[robot] != NOBODY:
                 slot = slots[self._slot[robot]]
-                away = np.linalg.norm(slot - position[robot])
-                if away < SLOT_IN_SIGHT:
+                distance = np.linalg.norm(slot - position[robot])
+                if distance < SLOT_IN_SIGHT:
                     goals[robot] = slot
-                if away < THERE:
+                if distance < ARRIVAL_RADIUS:
                     gripper[robot] = -1.0
 
     def _slots(self) -> NDArray[np.float64]:
-        """Return the places of the slots (S, 2) [m]; one row stands in the other's gaps."""
+        """Return the positions of the slots (S, 2) [m]; one row stands in the other's gaps."""
         along = np.arange(0.5 * SLOT_PITCH, self._scenario.warehouse_height - 0.3, SLOT_PITCH)
         x = self._scenario.storage_width - np.repeat(ROWS, len(along))
         return np.column_stack([x, np.concatenate([along, along + 0.5 * SLOT_PITCH])])
@@ -100,16 +102,16 @@ class CentralStock(Central):
     def _are_free(self, state: WarehouseState, slots: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which slots have no item and no robot on its way with one (S,)."""
         stored = state.item_position[state.item_status == STORED]
-        away = np.linalg.norm(slots[:, None] - stored, axis=2)
-        is_free: NDArray[np.bool_] = (away > SLOT_RADIUS).all(axis=1)
+        distance = np.linalg.norm(slots[:, None] - stored, axis=2)
+        is_free: NDArray[np.bool_] = (distance > SLOT_RADIUS).all(axis=1)
         is_free[self._slot[self._slot != NOBODY]] = False
         return is_free
 
-    def _way_with_stock(self, position: NDArray[np.float64]) -> tuple[float, float]:
+    def _next_waypoint(self, position: NDArray[np.float64]) -> tuple[float, float]:
         """Return where a laden robot drives next [m]."""
         edge = self._scenario.storage_width
         x, y = position.tolist()
         if x >= edge:
             return min(edge + DEPTH, self._scenario.warehouse_width), y
-        way_x, way_y = lookahead(self._home_cost, self._home_far, x, y)
-        return way_x + (DEPTH if way_x > edge - CELL else 0.0), way_y
+        next_x, next_y = lookahead(self._home_cost, self._home_cost_to_go, x, y)
+        return next_x + (DEPTH if next_x > edge - CELL else 0.0), next_y

@@ -6,23 +6,24 @@ without Python. Models that stable-baselines3 saved execute the code in them whe
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.code_files import allow_all_imports
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError, how_to_install
 from swarm_logistics_env.motion.frame import LEAD, OUTPUTS
 from swarm_logistics_env.observations import n_columns
-from swarm_logistics_env.policies.current_folder import everything_here
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.records import becoming, canonical_json
+from swarm_logistics_env.records import atomic_write, canonical_json
 from swarm_logistics_env.scenario import Scenario
 
 SUFFIX = ".safetensors"
@@ -118,7 +119,7 @@ def write_policy(path: Path, card: PolicyCard, tensors: Mapping[str, NDArray[np.
     """
     check_tensors(card.network, tensors)
     content = file_content(card.to_json(), tensors)
-    with becoming(path, PolicyError) as part:
+    with atomic_write(path, PolicyError) as part:
         part.write_bytes(content)
 
 
@@ -174,15 +175,16 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
         # Such a policy reads zeros there. Without their weights it may be given anything.
         tensors["layers.0.weight"] = tensors["layers.0.weight"].copy()
         tensors["layers.0.weight"][:, LEAD] = 0.0
-    nodes, at = [], "inputs"
+    nodes = []
+    layer_input = "inputs"
     for layer in range(len(network.hidden) + 1):
         is_last = layer == len(network.hidden)
         weight, bias = f"layers.{layer}.weight", f"layers.{layer}.bias"
         total = "outputs" if is_last else f"layers.{layer}.sum"
-        nodes.append(helper.make_node("Gemm", [at, weight, bias], [total], transB=1))
+        nodes.append(helper.make_node("Gemm", [layer_input, weight, bias], [total], transB=1))
         if not is_last:
-            at = f"layers.{layer}.out"
-            nodes.append(helper.make_node("Tanh", [total], [at]))
+            layer_input = f"layers.{layer}.out"
+            nodes.append(helper.make_node("Tanh", [total], [layer_input]))
     real = TensorProto.FLOAT
     graph = helper.make_graph(
         nodes,
@@ -196,7 +198,7 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
     about = {CARD: policy.card.to_json(), DEVIATIONS: " ".join(map(str, deviations.tolist()))}
     helper.set_model_props(model, about)
     checker.check_model(model)
-    with becoming(Path(path), PolicyError) as part:
+    with atomic_write(Path(path), PolicyError) as part:
         part.write_bytes(model.SerializeToString())
 
 
@@ -224,7 +226,7 @@ class StableBaselinesModel:
             ) from None
         try:
             self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-            with everything_here():
+            with allow_all_imports():
                 self._model: Any = PPO.load(path, device="cpu")
         except RAISED_BY_OTHERS as error:  # whatever the code in a file that is none raises
             reason = (str(error) or type(error).__name__).splitlines()[0]
@@ -255,10 +257,29 @@ class StableBaselinesPolicy(StableBaselinesModel):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        found = self._model.observation_space.shape, self._model.action_space.shape
-        wanted = (n_columns(Scenario()),), (4,)
-        if found != wanted:
+        row_shape, command_shape = (n_columns(Scenario()),), (4,)
+        shapes = self._model.observation_space.shape, self._model.action_space.shape
+        if shapes != (row_shape, command_shape):
             raise PolicyError(
-                f"{path} maps observations {found[0]} to commands {found[1]}: should map "
-                f"{wanted[0]} to {wanted[1]}"
+                f"{path} maps observations {shapes[0]} to commands {shapes[1]}: should map "
+                f"{row_shape} to {command_shape}"
             )
+
+
+def maker_of_file(name: str, trust_code: bool) -> Callable[..., Policy] | None:
+    """Return what reads the policy file of that path; None: its name is not one of a policy file.
+
+    Raises:
+        PolicyError: reading it would execute the code in it, and nobody trusts that.
+    """
+    path = Path(name)
+    if path.suffix == SUFFIX:
+        return functools.partial(read_policy, path)
+    if path.suffix == SB3_SUFFIX:
+        if not trust_code:
+            raise PolicyError(
+                f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
+                "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
+            )
+        return functools.partial(StableBaselinesPolicy, path)
+    return None

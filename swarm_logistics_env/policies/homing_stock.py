@@ -19,6 +19,7 @@ Only seeds from 400,000 to 400,045 were used.
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ from swarm_logistics_env.motion.memory import drive, length_of
 from swarm_logistics_env.policies.homing import (
     AVOID_GAIN,
     AVOID_RANGE,
+    HOLD,
+    LET_GO,
+    LIFT,
     Homing,
     away_from_neighbours,
     fetch,
@@ -54,10 +58,15 @@ STUCK = 0.4  # a robot tries a random direction until the memory's 1 has fallen 
 PULL = 0.4  # home, beside a random direction of length 1
 
 
+Home: TypeAlias = tuple[float, float, float]  # the direction, and how often it was taken lately
+Push: TypeAlias = tuple[float, float]  # away from near neighbours
+Motion: TypeAlias = tuple[float, float, float, float]  # direction (x, y), speed, gripper
+
+
 @kernel
 def decide_homing_stock(
     rows: NDArray[np.float32],
-    memory: NDArray[np.float64],
+    memories: NDArray[np.float64],
     keys: NDArray[np.uint64],
     random_headings: NDArray[np.int64],
     period: float,
@@ -65,90 +74,168 @@ def decide_homing_stock(
 ) -> None:
     """Fill the commands (N, 4) from rows (N, D), memories and the numbers of random headings."""
     for robot in range(rows.shape[0]):
-        sensed, own = rows[robot], memory[robot]
-        is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
-        # Robots change their roles at different times.
-        turns = random_headings[robot] * RANDOM_HEADING_TIME / ROLE_TIME
-        turn = int(turns + uniform(keys[robot], FIRST_ROLE))
-        role = uniform(keys[robot], FIRST_ROLE + 1 + turn)
-        holds = role < HOLDERS and own[column.CANNOT_DELIVER] < 0.5
-        forget_if_lost(own, is_inside)
-        home_x, home_y, sure = column.kept_home(own)
-        x, y = own[column.HEADING_X], own[column.HEADING_Y]
-        push_x, push_y = away_from_neighbours(sensed, AVOID_RANGE, AVOID_GAIN)
-        item = requested_item(sensed, own, False)
-        speed, gripper = 1.0, -1.0
-        stands = is_inside and sensed[row.CARRYING_REQUESTED] > 0.5  # to deliver
-        if sensed[row.CARRYING] > 0.5 and own[column.STUCK] > STUCK and not stands:
-            gripper = 0.0
+        observation, memory = rows[robot], memories[robot]
+        is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
+        carries = observation[row.CARRYING] > 0.5
+        carries_requested = observation[row.CARRYING_REQUESTED] > 0.5
+        role = role_of(keys[robot], random_headings[robot])
+        holds = role < HOLDERS and memory[column.CANNOT_DELIVER] < 0.5
+        forget_if_lost(memory, is_inside)
+        home = column.kept_home(memory)
+        push = away_from_neighbours(observation, AVOID_RANGE, AVOID_GAIN)
+        # A robot stands in the area to deliver: that is not to be stuck.
+        is_stuck = memory[column.STUCK] > STUCK and not (is_inside and carries_requested)
+        if carries and is_stuck:
             angle = random_heading(keys[robot], random_headings[robot])
-            x, y = math.cos(angle) + PULL * home_x, math.sin(angle) + PULL * home_y
-            x, y = freest_direction(sensed, own, x + push_x, y + push_y)
-        elif sensed[row.CARRYING_REQUESTED] > 0.5:
-            gripper = 1.0 if not is_inside or own[column.FAILED] < 0.5 else -1.0
-            speed = 0.0 if stands and gripper > 0.0 else 1.0
-            if not is_inside and sure > 0.0:
-                x, y = home_x, home_y
-            elif not is_inside:
-                x, y = home_direction(sensed, own, x, y)
-            x, y = freest_direction(sensed, own, x + push_x, y + push_y)
-        elif sensed[row.CARRYING] > 0.5:
-            if item >= 0:  # it lets go outside, and lifts that one
-                x, y = sensed[item + 1], sensed[item + 2]
-            elif sure == 0.0:
-                x, y = search_direction(sensed, own, x, y, is_inside)
-            elif not holds and is_gap(sensed, own, is_inside):
-                pass  # it lets go here
-            elif not holds and (is_inside or x * home_x + y * home_y < -0.3):
-                gripper = -1.0 if own[column.AWAY] > CARRIED_OFF else 0.0
-                x, y = freest_direction(sensed, own, push_x - home_x, push_y - home_y)
-            else:
-                gripper = 0.0
-                x, y = hold_direction(sensed, own, home_x, home_y, is_inside, period)
-                if is_inside:
-                    speed = min(1.0, length_of(x, y))
-                else:
-                    x, y = freest_direction(sensed, own, x + push_x, y + push_y)
+            motion = break_free(observation, memory, home, push, angle)
+        elif carries_requested:
+            motion = deliver(observation, memory, home, push, is_inside)
+        elif carries:
+            motion = carry_stock(observation, memory, home, push, is_inside, holds, period)
         else:
-            if item >= 0 and is_inside and sensed[item + 4] > 0.5:
-                item = -1  # it could not deliver it
             stocks = holds or role > HOLDERS
-            if item < 0 and stocks and sure > 0.0 and own[column.CANNOT_LIFT] <= 0.0:
-                item = item_to_stock(sensed, own, home_x, home_y, 0.0 if holds else FAR)
-            if item >= 0:
-                x, y, speed, gripper = fetch(sensed, item, push_x, push_y, period)
-            else:
-                if sure == 0.0 and sensed[row.LOWEST_TIMER] > 0.5:
-                    x, y = home_direction(sensed, own, x, y)
-                x, y = search_direction(sensed, own, x, y, is_inside)
-                x, y = x + push_x, y + push_y
-                speed = min(1.0, max(length_of(x, y), 0.3))
+            least = 0.0 if holds else FAR
+            motion = search(observation, memory, home, push, is_inside, stocks, least, period)
+        x, y, speed, gripper = motion
         drive(x, y, speed, gripper, commands[robot])
 
 
 @kernel
-def forget_if_lost(own: NDArray[np.float64], is_inside: bool) -> None:
-    """Forget the kept direction home if the distance reckoned with it cannot be."""
-    if (own[column.AWAY] > LOST) if is_inside else (own[column.AWAY] < -LOST):
-        own[column.KEPT_X], own[column.KEPT_Y], own[column.AWAY] = 0.0, 0.0, 0.0
+def role_of(key: np.uint64, random_heading_number: int) -> float:
+    """Return the number in [0, 1) that decides a robot's role at present.
+
+    Robots change their roles at different times.
+    """
+    n_roles = random_heading_number * RANDOM_HEADING_TIME / ROLE_TIME
+    role = int(n_roles + uniform(key, FIRST_ROLE))
+    return uniform(key, FIRST_ROLE + 1 + role)
 
 
 @kernel
-def is_gap(sensed: NDArray[np.float32], own: NDArray[np.float64], is_inside: bool) -> bool:
+def break_free(
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    home: Home,
+    push: Push,
+    angle: float,
+) -> Motion:
+    """Return the motion of a laden robot that is stuck: in a random direction, not from home."""
+    x, y = math.cos(angle) + PULL * home[0], math.sin(angle) + PULL * home[1]
+    x, y = freest_direction(observation, memory, x + push[0], y + push[1])
+    return x, y, 1.0, HOLD
+
+
+@kernel
+def deliver(
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    home: Home,
+    push: Push,
+    is_inside: bool,
+) -> Motion:
+    """Return the motion of a robot with the requested item: home, and to a stand inside."""
+    home_x, home_y, certainty = home
+    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    # Inside it lets go only once it takes its delivery for broken.
+    lets_go = is_inside and memory[column.FAILED] >= 0.5
+    gripper = LET_GO if lets_go else LIFT
+    speed = 0.0 if is_inside and not lets_go else 1.0
+    if not is_inside and certainty > 0.0:
+        x, y = home_x, home_y
+    elif not is_inside:
+        x, y = home_direction(observation, memory, x, y)
+    x, y = freest_direction(observation, memory, x + push[0], y + push[1])
+    return x, y, speed, gripper
+
+
+@kernel
+def carry_stock(
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    home: Home,
+    push: Push,
+    is_inside: bool,
+    holds: bool,
+    period: float,
+) -> Motion:
+    """Return the motion of a robot with an item that nobody asks for: to hold or to stock it."""
+    home_x, home_y, certainty = home
+    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    item = requested_item(observation, memory, False)
+    if item >= 0:  # it lets go outside, and lifts that one
+        return observation[item + 1], observation[item + 2], 1.0, LET_GO
+    if certainty == 0.0:
+        x, y = search_direction(observation, memory, x, y, is_inside)
+        return x, y, 1.0, LET_GO
+    if not holds and is_gap(observation, memory, is_inside):
+        return x, y, 1.0, LET_GO
+    if not holds and (is_inside or x * home_x + y * home_y < -0.3):
+        gripper = LET_GO if memory[column.AWAY] > CARRIED_OFF else HOLD
+        x, y = freest_direction(observation, memory, push[0] - home_x, push[1] - home_y)
+        return x, y, 1.0, gripper
+    x, y = hold_direction(observation, memory, home_x, home_y, is_inside, period)
+    if is_inside:
+        return x, y, min(1.0, length_of(x, y)), HOLD
+    x, y = freest_direction(observation, memory, x + push[0], y + push[1])
+    return x, y, 1.0, HOLD
+
+
+@kernel
+def search(
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    home: Home,
+    push: Push,
+    is_inside: bool,
+    stocks: bool,
+    least: float,
+    period: float,
+) -> Motion:
+    """Return the motion of an unladen robot: to an item in view, or on its search.
+
+    `stocks`: whether it lifts items that nobody asks for, if they lie farther than `least` [m] from
+    the area.
+    """
+    home_x, home_y, certainty = home
+    item = requested_item(observation, memory, False)
+    if item >= 0 and is_inside and observation[item + 4] > 0.5:
+        item = -1  # it could not deliver it
+    if item < 0 and stocks and certainty > 0.0 and memory[column.CANNOT_LIFT] <= 0.0:
+        item = item_to_stock(observation, memory, home_x, home_y, least)
+    if item >= 0:
+        return fetch(observation, item, push[0], push[1], period)
+    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    if certainty == 0.0 and observation[row.LOWEST_TIMER] > 0.5:
+        x, y = home_direction(observation, memory, x, y)
+    x, y = search_direction(observation, memory, x, y, is_inside)
+    x, y = x + push[0], y + push[1]
+    return x, y, min(1.0, max(length_of(x, y), 0.3)), LET_GO
+
+
+@kernel
+def forget_if_lost(memory: NDArray[np.float64], is_inside: bool) -> None:
+    """Forget the kept direction home if the distance reckoned with it cannot be."""
+    is_lost = memory[column.AWAY] > LOST if is_inside else memory[column.AWAY] < -LOST
+    if is_lost:
+        memory[column.KEPT_X], memory[column.KEPT_Y], memory[column.AWAY] = 0.0, 0.0, 0.0
+
+
+@kernel
+def is_gap(observation: NDArray[np.float32], memory: NDArray[np.float64], is_inside: bool) -> bool:
     """Return whether an item may be put down here for stock: in front of the area, amid no others.
 
     The nearest item comes first in a row.
     """
-    if is_inside or own[column.AWAY] >= NEAR:
+    if is_inside or memory[column.AWAY] >= NEAR:
         return False
-    x, y = sensed[row.ITEMS + 1], sensed[row.ITEMS + 2]
-    return bool(sensed[row.ITEMS] < 0.5 or length_of(x, y) > GAP)
+    x, y = observation[row.ITEMS + 1], observation[row.ITEMS + 2]
+    return bool(observation[row.ITEMS] < 0.5 or length_of(x, y) > GAP)
 
 
 @kernel
 def hold_direction(
-    sensed: NDArray[np.float32],
-    own: NDArray[np.float64],
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
     home_x: float,
     home_y: float,
     is_inside: bool,
@@ -156,28 +243,29 @@ def hold_direction(
 ) -> tuple[float, float]:
     """Return the velocity, in top speeds, to where a robot holds its item inside the area."""
     least = -1.0 if is_inside else 0.5
-    deeper = max(least, min(1.0, (own[column.AWAY] + DEPTH) / (2.0 * period)))
-    far_x, far_y = away_from_neighbours(sensed, SPREAD_RANGE, 1.0)
+    deeper = max(least, min(1.0, (memory[column.AWAY] + DEPTH) / (2.0 * period)))
+    far_x, far_y = away_from_neighbours(observation, SPREAD_RANGE, 1.0)
     aside = max(-0.7, min(0.7, SPREAD_GAIN * (home_x * far_y - home_y * far_x)))
     return deeper * home_x - aside * home_y, deeper * home_y + aside * home_x
 
 
 @kernel
 def item_to_stock(
-    sensed: NDArray[np.float32],
-    own: NDArray[np.float64],
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
     home_x: float,
     home_y: float,
     least: float,
 ) -> int:
     """Return the column of the nearest item farther than `least` [m] from the area; -1: none."""
-    for place in range(row.N_ITEMS_IN_VIEW):
-        there = row.ITEMS + row.ITEM_WIDTH * place
-        if sensed[there] < 0.5:
+    for item in range(row.N_ITEMS_IN_VIEW):
+        start = row.ITEMS + row.ITEM_WIDTH * item
+        if observation[start] < 0.5:
             break
-        away = own[column.AWAY] - sensed[there + 1] * home_x - sensed[there + 2] * home_y
-        if sensed[there + 4] < 0.5 and away > least:
-            return there
+        x, y = observation[start + 1], observation[start + 2]
+        distance = memory[column.AWAY] - x * home_x - y * home_y
+        if observation[start + 4] < 0.5 and distance > least:
+            return start
     return -1
 
 

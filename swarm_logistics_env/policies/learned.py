@@ -61,10 +61,10 @@ class Network(_Part):
 
     @field_validator("inputs", "outputs")
     @classmethod
-    def _known(cls, names: tuple[str, ...], about: ValidationInfo) -> tuple[str, ...]:
-        right = INPUTS if about.field_name == "inputs" else OUTPUTS
-        if names != right:
-            raise ValueError(f"should be the {len(right)} names that this version knows")
+    def _check_names(cls, names: tuple[str, ...], about: ValidationInfo) -> tuple[str, ...]:
+        expected = INPUTS if about.field_name == "inputs" else OUTPUTS
+        if names != expected:
+            raise ValueError(f"should be the {len(expected)} names that this version knows")
         return names
 
     @property
@@ -91,7 +91,7 @@ class Score(_Part):
 
     @field_validator("low", "high", mode="before")
     @classmethod
-    def _finite(cls, limit: Any) -> Any:
+    def _replace_infinity(cls, limit: Any) -> Any:
         return None if isinstance(limit, float) and math.isinf(limit) else limit
 
 
@@ -136,25 +136,25 @@ def hyperbolic_tangent(x: np.float32) -> np.float32:
     """
     x = min(max(x, np.float32(-7.9053111)), np.float32(7.9053111))
     x2 = x * x
-    over = np.float32(-2.76076847742355e-16)
-    over = over * x2 + np.float32(2.00018790482477e-13)
-    over = over * x2 + np.float32(-8.60467152213735e-11)
-    over = over * x2 + np.float32(5.12229709037114e-08)
-    over = over * x2 + np.float32(1.48572235717979e-05)
-    over = over * x2 + np.float32(6.37261928875436e-04)
-    over = over * x2 + np.float32(4.89352455891786e-03)
-    under = np.float32(1.19825839466702e-06)
-    under = under * x2 + np.float32(1.18534705686654e-04)
-    under = under * x2 + np.float32(2.26843463243900e-03)
-    under = under * x2 + np.float32(4.89352518554385e-03)
-    return x * over / under
+    numerator = np.float32(-2.76076847742355e-16)
+    numerator = numerator * x2 + np.float32(2.00018790482477e-13)
+    numerator = numerator * x2 + np.float32(-8.60467152213735e-11)
+    numerator = numerator * x2 + np.float32(5.12229709037114e-08)
+    numerator = numerator * x2 + np.float32(1.48572235717979e-05)
+    numerator = numerator * x2 + np.float32(6.37261928875436e-04)
+    numerator = numerator * x2 + np.float32(4.89352455891786e-03)
+    denominator = np.float32(1.19825839466702e-06)
+    denominator = denominator * x2 + np.float32(1.18534705686654e-04)
+    denominator = denominator * x2 + np.float32(2.26843463243900e-03)
+    denominator = denominator * x2 + np.float32(4.89352518554385e-03)
+    return x * numerator / denominator
 
 
 @kernel
 def add_columns(
     values: NDArray[np.float32],
     weights: NDArray[np.float32],
-    places: NDArray[np.int64],
+    indices: NDArray[np.int64],
     total: NDArray[np.float32],
 ) -> None:
     """Add to `total` (n_out,) each value (n_in,) times its n_out weights, in the order of values.
@@ -162,14 +162,14 @@ def add_columns(
     Four at a time in one pass over `total`; the sums have the bits of one after the other.
     """
     n_out, count = len(total), 0
-    for place in range(len(values)):
+    for index in range(len(values)):
         # Most inputs are zero, because most things are not in view.
-        if values[place] != np.float32(0.0):
-            places[count] = place
+        if values[index] != np.float32(0.0):
+            indices[count] = index
             count += 1
     done = 0
     while done + 4 <= count:
-        p, q, r, s = places[done], places[done + 1], places[done + 2], places[done + 3]
+        p, q, r, s = indices[done], indices[done + 1], indices[done + 2], indices[done + 3]
         a, b, c, d = values[p], values[q], values[r], values[s]
         first, second = weights[p * n_out : (p + 1) * n_out], weights[q * n_out : (q + 1) * n_out]
         third, fourth = weights[r * n_out : (r + 1) * n_out], weights[s * n_out : (s + 1) * n_out]
@@ -179,9 +179,9 @@ def add_columns(
             summed += c * third[out]
             total[out] = summed + d * fourth[out]
         done += 4
-    for index in range(done, count):
-        place = places[index]
-        value, column = values[place], weights[place * n_out : (place + 1) * n_out]
+    for number in range(done, count):
+        index = indices[number]
+        value, column = values[index], weights[index * n_out : (index + 1) * n_out]
         for out in range(n_out):
             total[out] += value * column[out]
 
@@ -196,28 +196,28 @@ def run_network(
 ) -> None:
     """Fill `outputs` (N, widths[-1]); layer l has widths[l] inputs.
 
-    Loops rather than numpy's matrix product, whose bits differ with the number of rows: here a
+    Loops rather than numpy's matrix product, whose bits differ with the number of rows: so a
     robot's command does not depend on how many others there are.
     """
     n_layers = len(widths) - 1
     widest = widths.max()
-    here, there = np.empty(widest, np.float32), np.empty(widest, np.float32)
-    places = np.empty(widest, np.int64)
+    layer_in, layer_out = np.empty(widest, np.float32), np.empty(widest, np.float32)
+    indices = np.empty(widest, np.int64)
     for row in range(inputs.shape[0]):
-        here[: widths[0]] = inputs[row]
+        layer_in[: widths[0]] = inputs[row]
         weight, bias = 0, 0
         for layer in range(n_layers):
             n_in, n_out = widths[layer], widths[layer + 1]
-            total = there[:n_out]
+            total = layer_out[:n_out]
             total[:] = biases[bias : bias + n_out]
-            add_columns(here[:n_in], weights[weight : weight + n_in * n_out], places, total)
+            add_columns(layer_in[:n_in], weights[weight : weight + n_in * n_out], indices, total)
             weight += n_in * n_out
             bias += n_out
             if layer < n_layers - 1:
-                for place in range(n_out):
-                    total[place] = hyperbolic_tangent(total[place])
-            here, there = there, here
-        outputs[row] = here[: widths[n_layers]]
+                for out in range(n_out):
+                    total[out] = hyperbolic_tangent(total[out])
+            layer_in, layer_out = layer_out, layer_in
+        outputs[row] = layer_in[: widths[n_layers]]
 
 
 STREAM = "trained policy"
@@ -295,9 +295,9 @@ def explore(
         counts: the number of decisions of each robot (N,), this one among them.
     """
     for robot in range(outputs.shape[0]):
-        for place in range(outputs.shape[1]):
-            drawn = gaussian(pair_key(keys[robot], place), counts[robot] - 1)
-            outputs[robot, place] += np.float32(deviations[place] * drawn)
+        for output in range(outputs.shape[1]):
+            noise = gaussian(pair_key(keys[robot], output), counts[robot] - 1)
+            outputs[robot, output] += np.float32(deviations[output] * noise)
 
 
 def tensor_shapes(network: Network) -> dict[str, tuple[int, ...]]:

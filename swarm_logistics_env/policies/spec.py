@@ -10,7 +10,7 @@ import json
 import operator
 import re
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
@@ -18,7 +18,7 @@ from typing import Any, Self
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
-from swarm_logistics_env.code_files import file_of_module, import_file
+from swarm_logistics_env.code_files import allow_import, file_of_module, import_file
 from swarm_logistics_env.errors import (
     RAISED_BY_OTHERS,
     PolicyError,
@@ -28,12 +28,11 @@ from swarm_logistics_env.errors import (
 from swarm_logistics_env.fingerprint import UNSTABLE, changed_files, changes
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
-from swarm_logistics_env.policies.current_folder import name_module
 from swarm_logistics_env.policies.files import (
     SB3_SUFFIX,
     SUFFIX,
     StableBaselinesModel,
-    StableBaselinesPolicy,
+    maker_of_file,
     read_card,
     read_policy,
 )
@@ -83,16 +82,18 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         PolicyError: there is no such policy, it does not take these parameters, or the name stands
             for several trainings.
     """
-    if several := trainings_of(name):
+    if trainings := trainings_of(name):
         raise PolicyError(
-            f"policy {name!r} is {len(several)} trainings: should name one of {', '.join(several)}"
+            f"policy {name!r} is {len(trainings)} trainings: should name one of "
+            f"{', '.join(trainings)}"
         )
-    make = NAMES.get(name) or _declared(name) or _filed(name, trust_code) or _imported(name)
+    make = NAMES.get(name) or _entry_point_maker(name) or maker_of_file(name, trust_code)
+    make = make or _import_maker(name)
     if make is None:
-        known = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
-        meant = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, known)
+        names = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
+        hint = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, names)
         kinds = "a name, 'my.py:Class', 'package.module:Class', or a .safetensors or .zip file"
-        raise PolicyError(f"no policy {name!r} ({kinds}){meant}")
+        raise PolicyError(f"no policy {name!r} ({kinds}){hint}")
     try:
         policy: Policy = make(**parameters)
         check_policy(policy)
@@ -142,7 +143,7 @@ class PolicySpec(Record):
                 raise ValueError(f"{name!r} is no field of a table")
             return cls(**value)
         if isinstance(value, str):
-            card_name = called(value)
+            card_name = display_name(value)
             return cls(name=value, label="" if card_name == value else card_name)
         if not hasattr(value, "act"):
             raise ValueError(
@@ -156,7 +157,7 @@ class PolicySpec(Record):
 
     @field_validator("parameters")
     @classmethod
-    def _policys_own(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
+    def _refuse_reserved_names(cls, parameters: dict[str, JsonValue]) -> dict[str, JsonValue]:
         # These are `load`'s: whether to trust code is not for a file to say.
         for name in ("name", "trust_code", "trusted"):
             if name in parameters:
@@ -164,7 +165,7 @@ class PolicySpec(Record):
         return parameters
 
     @model_serializer
-    def _written(self) -> str | dict[str, JsonValue]:
+    def _serialize(self) -> str | dict[str, JsonValue]:
         if not (self.parameters or self.label):
             return self.name
         return {"name": self.name, "parameters": self.parameters, "label": self.label}
@@ -172,8 +173,11 @@ class PolicySpec(Record):
     @property
     def title(self) -> str:
         """What people call it: its label, or its name with the parameters given."""
-        given = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
-        return self.label or called(self.name) + (f" ({given})" if given else "")
+        if self.label:
+            return self.label
+        parameters = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
+        name = display_name(self.name)
+        return f"{name} ({parameters})" if parameters else name
 
     @property
     def trainings(self) -> tuple[Self, ...]:
@@ -208,7 +212,7 @@ class PolicySpec(Record):
         """
         if self.made is None and self.name in makers:
             return self._make(makers)
-        policy = self._make(makers) if planned is None else self._as_planned(makers, planned)
+        policy = self._make(makers) if planned is None else self._make_planned(makers, planned)
         try:
             return copy.deepcopy(policy)
         except RAISED_BY_OTHERS as error:  # of code that is not ours
@@ -217,11 +221,11 @@ class PolicySpec(Record):
                 "arrays, not an environment, as each run gets a copy"
             ) from error
 
-    def _as_planned(self, makers: Makers, planned: str) -> Policy:
+    def _make_planned(self, makers: Makers, planned: str) -> Policy:
         if self.made is not None:
             # Its class may have come to this process by its content; files of it are read here.
             if files := changed_files(planned, self._identity_of(self.made)):
-                raise self._other_than_planned(f"{', '.join(files)} changed")
+                raise self._change_error(f"{', '.join(files)} changed")
             return self._make(makers)
         key = (self.name, canonical_json(self.parameters), planned)
         if key not in _planned_policies:
@@ -236,10 +240,10 @@ class PolicySpec(Record):
         """
         policy = self._make(makers)
         if change := changes(planned, self._identity_of(policy)):
-            raise self._other_than_planned(change)
+            raise self._change_error(change)
         return policy
 
-    def _other_than_planned(self, change: str) -> PolicyError:
+    def _change_error(self, change: str) -> PolicyError:
         return PolicyError(
             f"policy {self.title!r} is not what was planned: {change}; start the study anew"
         )
@@ -249,18 +253,18 @@ class PolicySpec(Record):
         if self.made is not None:
             if not makers:
                 check_policy(self.made)
-            made: Policy = self.made
-            return made
+            policy: Policy = self.made
+            return policy
         if self.name in makers:
             try:
-                made = makers[self.name](**self.parameters)
+                policy = makers[self.name](**self.parameters)
             except TypeError as error:
                 raise PolicyError(f"policy {self.name!r} cannot be made: {error}") from None
-            return made
+            return policy
         if makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         if makers and self.name.endswith(SB3_SUFFIX):
-            _filed(self.name, self.trusted)  # refuses what nobody trusts
+            maker_of_file(self.name, self.trusted)  # refuses what nobody trusts
             return StableBaselinesModel(Path(self.name))
         return load(self.name, trust_code=self.trusted, **self.parameters)
 
@@ -270,11 +274,12 @@ class PolicySpec(Record):
         Of several trainings it is a JSON list of their names and identities.
         """
         if self.trainings:
-            return canonical_json([(one.name, one.identity(makers)) for one in self.trainings])
+            identities = [(spec.name, spec.identity(makers)) for spec in self.trainings]
+            return canonical_json(identities)
         text = self._identity_of(self._make(makers))
-        if self.made is None and text != (again := self._identity_of(self._make(makers))):
+        if self.made is None and text != (second := self._identity_of(self._make(makers))):
             # What is another one each time cannot be compared with what was played before.
-            return canonical_json(json.loads(again) | {"value": UNSTABLE + uuid.uuid4().hex})
+            return canonical_json(json.loads(second) | {"value": UNSTABLE + uuid.uuid4().hex})
         return text
 
     def _identity_of(self, policy: Policy) -> str:
@@ -298,10 +303,10 @@ _planned_policies: dict[tuple[str, str, str], Policy] = {}
 def known_policies() -> Iterator[tuple[str, str, str]]:
     """Yield name, kind and a sentence of each policy of the package, then of those installed."""
     for name, make in SCRIPTED.items():
-        made = make if isinstance(make, functools.partial) else functools.partial(make)
-        about = (inspect.getdoc(made.func) or "").partition("\n\n")[0].replace("\n", " ")
-        given = "".join(f" {field} = {value}." for field, value in made.keywords.items())
-        yield name, "scripted", about + given
+        maker = make if isinstance(make, functools.partial) else functools.partial(make)
+        about = (inspect.getdoc(maker.func) or "").partition("\n\n")[0].replace("\n", " ")
+        parameters = "".join(f" {field} = {value}." for field, value in maker.keywords.items())
+        yield name, "scripted", about + parameters
     for name, path in TRAINED.items():
         yield name, "trained", read_card(path).about
     for point in entry_points(group=ENTRY_POINTS):
@@ -324,22 +329,25 @@ def trainings_of(name: str) -> tuple[str, ...]:
     if not name.endswith(f"{ALL}{suffix}"):
         return ()
     stem = name.removesuffix(f"{ALL}{suffix}")
-    known = [str(path) for path in Path(stem).parent.glob(f"*{SUFFIX}")] if suffix else NAMES
-    number = re.compile(rf"{re.escape(stem)}(@(\d+))?{re.escape(suffix)}")
-    found = sorted((int(match[2] or -1), one) for one in known if (match := number.fullmatch(one)))
-    if len(found) < 2:
+    names: Iterable[str] = NAMES
+    if suffix:
+        names = [str(path) for path in Path(stem).parent.glob(f"*{SUFFIX}")]
+    pattern = re.compile(rf"{re.escape(stem)}(@(\d+))?{re.escape(suffix)}")
+    matches = [match for text in names if (match := pattern.fullmatch(text))]
+    trainings = sorted((int(match[2] or -1), match[0]) for match in matches)
+    if len(trainings) < 2:
         raise PolicyError(
             f"policy {name!r}: should stand for two trainings or more, as {stem}@1{suffix} and "
-            f"{stem}@2{suffix}, found {len(found)}"
+            f"{stem}@2{suffix}, found {len(trainings)}"
         )
-    return tuple(one for _, one in found)
+    return tuple(training for _, training in trainings)
 
 
-def called(name: str) -> str:
-    """Return what people call the policy `name`: a trained policy's file by its card's name."""
-    if several := trainings_of(name):
+def display_name(name: str) -> str:
+    """Return how reports call the policy `name`: a trained policy's file by its card's name."""
+    if trainings := trainings_of(name):
         stem = Path(name).name.removesuffix(SUFFIX).removesuffix(ALL)
-        return f"{stem}, {len(several)} trainings"
+        return f"{stem}, {len(trainings)} trainings"
     if not name.endswith(SUFFIX) or name in NAMES:
         return name
     try:
@@ -348,24 +356,10 @@ def called(name: str) -> str:
         return name
 
 
-def _declared(name: str) -> Callable[..., Policy] | None:
+def _entry_point_maker(name: str) -> Callable[..., Policy] | None:
     for point in entry_points(group=ENTRY_POINTS, name=name):
-        made: Callable[..., Policy] = point.load()
-        return made
-    return None
-
-
-def _filed(name: str, trust_code: bool) -> Callable[..., Policy] | None:
-    path = Path(name)
-    if path.suffix == SUFFIX:
-        return functools.partial(read_policy, path)
-    if path.suffix == SB3_SUFFIX:
-        if not trust_code:
-            raise PolicyError(
-                f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
-                "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
-            )
-        return functools.partial(StableBaselinesPolicy, path)
+        maker: Callable[..., Policy] = point.load()
+        return maker
     return None
 
 
@@ -377,23 +371,23 @@ def _code_file(name: str) -> Path | None:
     return Path(module) if module.endswith(".py") else file_of_module(module)
 
 
-def _imported(name: str) -> Callable[..., Policy] | None:
+def _import_maker(name: str) -> Callable[..., Policy] | None:
     module, colon, attribute = name.rpartition(":")
     if not colon:
         return None
     if not module.endswith(".py"):
-        name_module(module)
+        allow_import(module)
     try:
         file = _code_file(name)
-        loaded = importlib.import_module(module) if file is None else import_file(file)
+        code = importlib.import_module(module) if file is None else import_file(file)
     except RAISED_BY_OTHERS as error:  # of code that is not ours, too
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
     try:
-        maker: Callable[..., Policy] = operator.attrgetter(attribute)(loaded)
+        maker: Callable[..., Policy] = operator.attrgetter(attribute)(code)
     except AttributeError:
-        meant = suggest(attribute, vars(loaded))
-        raise PolicyError(f"policy {name!r}: {module} has no {attribute}{meant}") from None
+        hint = suggest(attribute, vars(code))
+        raise PolicyError(f"policy {name!r}: {module} has no {attribute}{hint}") from None
     if not callable(maker):
         raise PolicyError(f"policy {name!r} is a {type(maker).__name__}: should be a class")
     return maker

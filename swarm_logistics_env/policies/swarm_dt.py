@@ -146,17 +146,17 @@ def decide_swarm_dt(
 ) -> None:
     """Fill each robot's command (N, 4) from its own row, its own stream and stored heading."""
     for robot in range(observations.shape[0]):
-        sensed = observations[robot]
-        carries = sensed[row.CARRYING] > 0.5
-        delivers = sensed[row.CARRYING_REQUESTED] > 0.5
+        observation = observations[robot]
+        carries = observation[row.CARRYING] > 0.5
+        delivers = observation[row.CARRYING_REQUESTED] > 0.5
 
         if math.isnan(heading[robot]):
             heading[robot] = (2.0 * uniform(keys[robot], 0) - 1.0) * math.pi
-        drawn = uniform(keys[robot], 2 * step + 1)
-        heading[robot] += constants.widest_turn * (2.0 * drawn - 1.0)
+        share = 2.0 * uniform(keys[robot], 2 * step + 1) - 1.0
+        heading[robot] += constants.widest_turn * share
         x, y = math.cos(heading[robot]), math.sin(heading[robot])
 
-        walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
+        walls = observation[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
         nearest = np.argmin(walls)
         if walls[nearest] < constants.wall_distance:
             towards = 2.0 * math.pi * nearest / row.N_BEAMS
@@ -168,15 +168,15 @@ def decide_swarm_dt(
                 heading[robot] = math.atan2(y, x)
 
         gain, reach = constants.avoidance_gain, constants.avoidance_range
-        push_x, push_y = avoid(sensed, row.NEIGHBOURS, row.N_NEIGHBOURS, gain, reach)
+        push_x, push_y = avoid(observation, row.NEIGHBOURS, row.N_NEIGHBOURS, gain, reach)
         x += push_x
         y += push_y
         if carries:
-            push_x, push_y = avoid(sensed, row.ITEMS, row.N_ITEMS_IN_VIEW, gain, reach)
+            push_x, push_y = avoid(observation, row.ITEMS, row.N_ITEMS_IN_VIEW, gain, reach)
             x += push_x
             y += push_y
-        if delivers and sensed[row.LOWEST_TIMER] > 0.5:
-            lead_x, lead_y = sensed[row.LOWEST_TIMER + 1], sensed[row.LOWEST_TIMER + 2]
+        if delivers and observation[row.LOWEST_TIMER] > 0.5:
+            lead_x, lead_y = observation[row.LOWEST_TIMER + 1], observation[row.LOWEST_TIMER + 2]
             distance = math.sqrt(lead_x * lead_x + lead_y * lead_y)
             if distance > 0.0:
                 x += constants.taxis_gain * lead_x / distance
@@ -191,12 +191,12 @@ def decide_swarm_dt(
         if constants.widest_step > 0.0:
             # It turns towards where it wants to go and drives as far as it then faces that way;
             # the stored heading is kept in the robot's frame, so it turns back by as much.
-            wanted, speed = math.atan2(y, x), math.sqrt(x * x + y * y) / norm
-            turned = min(max(wanted, -constants.widest_step), constants.widest_step)
-            commands[robot, 0] = speed * max(math.cos(wanted - turned), 0.0)
+            direction, speed = math.atan2(y, x), math.sqrt(x * x + y * y) / norm
+            turn = min(max(direction, -constants.widest_step), constants.widest_step)
+            commands[robot, 0] = speed * max(math.cos(direction - turn), 0.0)
             commands[robot, 1] = 0.0
-            commands[robot, 2] = turned / constants.widest_step
-            heading[robot] -= turned
+            commands[robot, 2] = turn / constants.widest_step
+            heading[robot] -= turn
         lets_go = (
             carries
             and not delivers
@@ -207,15 +207,15 @@ def decide_swarm_dt(
 
 @kernel
 def avoid(
-    sensed: NDArray[np.float32], first: int, count: int, gain: float, reach: float
+    observation: NDArray[np.float32], first: int, count: int, gain: float, reach: float
 ) -> tuple[float, float]:
     """Return the push away from the things in a block of (present, x, y, ..) columns."""
     push_x, push_y = 0.0, 0.0
-    for place in range(count):
-        column = first + row.ITEM_WIDTH * place  # neighbours are as wide
-        if sensed[column] < 0.5:
+    for number in range(count):
+        column = first + row.ITEM_WIDTH * number  # neighbours are as wide
+        if observation[column] < 0.5:
             break
-        x, y = sensed[column + 1], sensed[column + 2]
+        x, y = observation[column + 1], observation[column + 2]
         distance = math.sqrt(x * x + y * y)
         if distance >= reach:
             break

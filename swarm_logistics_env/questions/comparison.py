@@ -6,7 +6,13 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Unpack
 
-from swarm_logistics_env.spi.definitions import DEFINITIONS, Change, Definition, Factor, comparing
+from swarm_logistics_env.spi.definitions import (
+    DEFINITIONS,
+    Change,
+    Definition,
+    FactorKind,
+    comparing,
+)
 from swarm_logistics_env.spi.estimate import Estimate, Options
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.tasks.task import Case
@@ -17,7 +23,7 @@ CONFIDENCE = 0.95  # of intervals and verdicts, unless a look of a study makes i
 class Setting(NamedTuple):
     """One setting of a factor: a swarm size, a fault, a parameter's value, or another policy."""
 
-    kind: Factor
+    kind: FactorKind
     name: str
     value: float
     onset: float = 0.0

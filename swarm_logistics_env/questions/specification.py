@@ -25,7 +25,7 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError, suggest
-from swarm_logistics_env.policies.spec import PolicySpec, called
+from swarm_logistics_env.policies.spec import PolicySpec, display_name
 from swarm_logistics_env.records import FileName, Record, each_of, file_name, read_table
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
@@ -46,7 +46,7 @@ def _with_distinct_labels(policies: tuple[PolicySpec, ...]) -> tuple[PolicySpec,
     counts = Counter(policy.title for policy in policies)
     labelled = tuple(
         policy.replace(label=policy.name)
-        if counts[policy.label] > 1 and policy.label == called(policy.name)
+        if counts[policy.label] > 1 and policy.label == display_name(policy.name)
         else policy
         for policy in policies
     )

@@ -66,10 +66,10 @@ _BEFORE = (INK, SEARCHING, SHUFFLING, DELIVERING, TIMER, REQUESTED, LINK)
 
 def film_colours() -> list[RGB]:
     """Return the colours of pictures that may have only a few: under 128, each once."""
-    edges = [np.linspace(one, other, 6)[1:-1] for one in _BEHIND for other in _BEFORE]
+    edges = [np.linspace(behind, before, 6)[1:-1] for behind in _BEHIND for before in _BEFORE]
     smooth = np.rint(np.concatenate(edges)).astype(int).tolist()
-    found = [*COLOURS.values(), *((red, green, blue) for red, green, blue in smooth)]
-    return list(dict.fromkeys(found))
+    colours = [*COLOURS.values(), *((red, green, blue) for red, green, blue in smooth)]
+    return list(dict.fromkeys(colours))
 
 
 def mark(modes: tuple[str, ...]) -> str:
@@ -78,13 +78,13 @@ def mark(modes: tuple[str, ...]) -> str:
 
 
 def activity(state: WarehouseState, robot: int) -> str:
-    """Return what a robot does, a key of `ACTIVITIES`."""
+    """Return the activity of a robot, a key of `ACTIVITIES`."""
     if state.robot_item[robot] == NOBODY:
         return "searching"
     return "delivering" if state.carries_requested[robot] else "shuffling"
 
 
-def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
+def leader_of(state: WarehouseState, scenario: Scenario, robot: int) -> int:
     """Return the neighbour whose timer is the lowest that `robot` hears, or NOBODY.
 
     If several tell the same, it is the nearest of them.
@@ -96,8 +96,8 @@ def followed(state: WarehouseState, scenario: Scenario, robot: int) -> int:
     heard = state.robot_present & state.sends & (square <= scenario.radio_range**2)
     heard &= ~np.isnan(state.robot_told)
     heard[robot] = False
-    first = int(np.lexsort((square, state.robot_told, ~heard))[0])
-    return first if heard[first] else NOBODY
+    leader = int(np.lexsort((square, state.robot_told, ~heard))[0])
+    return leader if heard[leader] else NOBODY
 
 
 class Event(NamedTuple):

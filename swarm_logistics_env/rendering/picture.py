@@ -53,7 +53,7 @@ class Picture:
         for number in np.flatnonzero(state.item_status == STORED).tolist():
             self._stamp(sprites.item(self._item_half, False), items[number])
         for carrier in np.flatnonzero(state.carries_requested).tolist():
-            if (leader := palette.followed(state, scenario, carrier)) != NOBODY:
+            if (leader := palette.leader_of(state, scenario, carrier)) != NOBODY:
                 self._draw_arrow(robots[carrier], robots[leader])
         self._canvas.set_clip(None)
         self._draw_robots(state, robots)
@@ -67,7 +67,8 @@ class Picture:
 
     def _lay_out(self, scenario: Scenario) -> None:
         """Draw what changes with the scenario alone."""
-        self._scenario, margin = scenario, self._margin
+        self._scenario = scenario
+        margin = self._margin
         across, down = scenario.warehouse_width, scenario.warehouse_height
         self._scale = scale = self._longer_side / max(across, down)
         self.floor = Rect(0, margin, round(scale * across), round(scale * down))
@@ -108,33 +109,33 @@ class Picture:
         picture.fill(palette.DELIVERY_WORD, (*area.topleft, max(1, wall // 2), area.height))
         name = words("DELIVERY", self._text_height, palette.DELIVERY_WORD)
         name = pygame.transform.rotate(name, 90)
-        place = name.get_rect(center=area.center)
-        picture.fill(palette.DELIVERY_AREA, place.inflate(6, 12))
-        picture.blit(name, place)
+        box = name.get_rect(center=area.center)
+        picture.fill(palette.DELIVERY_AREA, box.inflate(6, 12))
+        picture.blit(name, box)
         picture.set_clip(None)
 
     def _legend(self) -> list[tuple[Surface, Point]]:
-        """Return what the colours mean, as pictures and words, each with its left end."""
+        """Return the legend of colours: pictures and words, each with its left end."""
         height = self._text_height
         radius, gap = 0.42 * height, height // 4
         pictures = {name: sprites.robot(radius, name, 0, False) for name in palette.ACTIVITIES}
         pictures["requested item"] = sprites.item(0.9 * radius, True)
         pictures["timer"] = sprites.halo(0.6 * radius, 0)
-        placed = []
+        entries = []
         x, y = self._margin, self._caption + 2 * self._line
         for name, picture in pictures.items():
             word = words(name, height)
             wide = picture.get_width() + gap
             if x + wide + word.get_width() > self.width - self._margin:
                 x, y = self._margin, y + self._line
-            placed += [(picture, (x, y)), (word, (x + wide, y))]
+            entries += [(picture, (x, y)), (word, (x + wide, y))]
             x += wide + word.get_width() + height
-        return placed
+        return entries
 
     def _pixels(self, positions: NDArray[np.float64]) -> list[Point]:
         """Return positions (K, 2) [m] as K pixels."""
-        placed = positions * (self._scale, -self._scale) + self.floor.bottomleft
-        return [(x, y) for x, y in np.rint(placed).astype(int).tolist()]
+        pixels = positions * (self._scale, -self._scale) + self.floor.bottomleft
+        return [(x, y) for x, y in np.rint(pixels).astype(int).tolist()]
 
     def _stamp(self, sprite: Surface, at: Point) -> None:
         self._canvas.blit(sprite, sprite.get_rect(center=at))
@@ -149,25 +150,27 @@ class Picture:
         steps = np.rint(np.degrees(state.robot_heading) / _HEADING_STEP).astype(int)
         headings = (_HEADING_STEP * steps % 360).tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
-            does, is_faulty = palette.activity(state, robot), bool(state.failed[robot])
-            sprite = sprites.robot(self._robot_radius, does, headings[robot], is_faulty)
+            activity = palette.activity(state, robot)
+            is_faulty = bool(state.failed[robot])
+            sprite = sprites.robot(self._robot_radius, activity, headings[robot], is_faulty)
             self._stamp(sprite, robots[robot])
 
     def _draw_arrow(self, start: Point, end: Point) -> None:
         width = max(2.0, self._robot_radius / 3.5)
         head = 4.0 + 2.5 * width
-        way = Vector2(end) - start
+        offset = Vector2(end) - start
         # The tip stops short of the robot; robots that touch leave no room for an arrow.
-        tip = way.length() - self._robot_radius - 2.0
+        tip = offset.length() - self._robot_radius - 2.0
         if tip < self._robot_radius + head:
             return
-        half, neck = width / 2, tip - head
+        half = width / 2
+        neck = tip - head
         side = [(0.0, half), (neck, half), (neck, 0.45 * head), (tip, 0.0)]
         corners = side + [(x, -y) for x, y in reversed(side)]
-        angle = Vector2(1.0, 0.0).angle_to(way)
-        turned = [Vector2(corner).rotate(angle) + start for corner in corners]
+        angle = Vector2(1.0, 0.0).angle_to(offset)
+        vertices = [Vector2(corner).rotate(angle) + start for corner in corners]
         # Whole pixels: else the smooth edges lie beside the shape.
-        shape = [(round(x), round(y)) for x, y in turned]
+        shape = [(round(x), round(y)) for x, y in vertices]
         pygame.draw.polygon(self._canvas, palette.LINK, shape)
         pygame.draw.aalines(self._canvas, palette.LINK, True, shape)
 
@@ -177,15 +180,17 @@ class Picture:
         for robot in np.flatnonzero(state.robot_present & state.failed).tolist():
             sprite = sprites.badge(palette.mark(state.failure_modes[robot]), height)
             x, y = robots[robot]
-            place = sprite.get_rect(center=(x + away, y - away))
-            self._canvas.blit(sprite, place.clamp(self._canvas.get_rect()))
+            box = sprite.get_rect(center=(x + away, y - away))
+            self._canvas.blit(sprite, box.clamp(self._canvas.get_rect()))
 
     def _write_caption(self, state: WarehouseState) -> None:
         total = "" if self._scenario.restock else f" of {self._scenario.n_items}"
         scores = f"time {state.time:.1f} s    N = {state.n_robots}    P = {state.delivered}{total}"
         counts = Counter(mode for modes in state.failure_modes for mode in modes)
-        told = [f"{palette.mark((mode,))}: {mode} ×{n}" for mode, n in counts.items()]
-        failures = f"{state.failed.sum()} failed ({', '.join(told)})" if told else "no failures"
+        entries = [f"{palette.mark((mode,))}: {mode} ×{n}" for mode, n in counts.items()]
+        failures = (
+            f"{state.failed.sum()} failed ({', '.join(entries)})" if entries else "no failures"
+        )
         for line, text in enumerate((scores, failures)):
             written = words(text, self._text_height)
             at = self._margin, self._caption + line * self._line

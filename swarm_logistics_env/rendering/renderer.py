@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError, how_to_install
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
 
@@ -193,45 +193,46 @@ def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
         SetupError: as `check_film` raises it; or there are no frames, or ffmpeg fails.
     """
     check_film(path)
-    with becoming(path, SetupError) as whole:
+    with atomic_write(path, SetupError) as partial:
         if path.suffix.lower() == ".mp4":
-            return _encode(frames, frame_rate, [*_MP4, str(whole)])
+            return _encode(frames, frame_rate, [*_MP4, str(partial)])
         with tempfile.TemporaryDirectory() as folder:
             palette = Path(folder, "palette")
             palette.write_bytes(_palette())
             side = f"{_PALETTE_SIDE}x{_PALETTE_SIDE}"
             source = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", side, "-i", str(palette)]
-            return _encode(frames, frame_rate, [*source, *_GIF, str(whole)])
+            return _encode(frames, frame_rate, [*source, *_GIF, str(partial)])
 
 
 def _palette() -> bytes:
-    colours = np.zeros((_PALETTE_SIDE**2, 4), np.uint8)
-    known = film_colours()
-    colours[: len(known), :3], colours[: len(known), 3] = known, 255
+    pixels = np.zeros((_PALETTE_SIDE**2, 4), np.uint8)
+    colours = film_colours()
+    pixels[: len(colours), :3] = colours
+    pixels[: len(colours), 3] = 255
     # The last colour is transparent and stands for what did not change.
-    return colours.tobytes()
+    return pixels.tobytes()
 
 
 def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> int:
-    coming = iter(frames)
-    first = next(coming, None)
-    if first is None:
+    frame_iterator = iter(frames)
+    first_frame = next(frame_iterator, None)
+    if first_frame is None:
         raise SetupError("a film needs at least one frame")
-    height, width, _ = first.shape
+    height, width, _ = first_frame.shape
     pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
     source = [*pixels, "-r", f"{frame_rate:g}", "-i", "-"]
     command = [_ffmpeg(), "-y", "-hide_banner", "-loglevel", "error", *source, *output]
     count = 0
     with (
-        tempfile.TemporaryFile() as said,
+        tempfile.TemporaryFile() as messages,
         subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=messages
         ) as process,
     ):
         assert process.stdin is not None
         try:
             with contextlib.suppress(BrokenPipeError):  # ffmpeg has said why it ended
-                for frame in itertools.chain([first], coming):
+                for frame in itertools.chain([first_frame], frame_iterator):
                     process.stdin.write(frame.tobytes())
                     count += 1
         except BaseException:
@@ -241,8 +242,8 @@ def _encode(frames: Iterable[Frame], frame_rate: float, output: list[str]) -> in
             with contextlib.suppress(BrokenPipeError):
                 process.stdin.close()
         if process.wait() != 0:
-            said.seek(0)
-            reason = said.read().decode(errors="replace").strip()
+            messages.seek(0)
+            reason = messages.read().decode(errors="replace").strip()
             raise SetupError(f"ffmpeg cannot write the film (exit {process.returncode}): {reason}")
     return count
 

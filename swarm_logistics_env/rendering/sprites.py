@@ -60,7 +60,7 @@ def _square(sheet: Surface, half: float, is_requested: bool) -> None:
     sheet.fill(inside, outer.inflate(-2 * width, -2 * width))
 
 
-def _shrunk(sheet: Surface) -> Surface:
+def _shrink(sheet: Surface) -> Surface:
     width, height = sheet.get_size()
     size = max(1, round(width / _LARGER)), max(1, round(height / _LARGER))
     return pygame.transform.smoothscale(sheet, size)
@@ -79,13 +79,13 @@ def robot(radius: float, activity: str, heading: int, is_faulty: bool) -> Surfac
     sheet = _sheet(nose, INK)
     corners = Vector2(nose, 0.0), Vector2(base, half_width), Vector2(base, -half_width)
     middle = Vector2(sheet.get_rect().center)
-    turned = [middle + _LARGER * corner.rotate(-heading) for corner in corners]
-    pygame.draw.polygon(sheet, INK, turned)
+    vertices = [middle + _LARGER * corner.rotate(-heading) for corner in corners]
+    pygame.draw.polygon(sheet, INK, vertices)
     _disc(sheet, INK, radius)
     _disc(sheet, ACTIVITIES[activity], radius * (0.7 if is_faulty else 0.87) - 0.4)
     if activity != "searching":
         _square(sheet, 0.45 * radius, activity == "delivering")
-    return _shrunk(sheet)
+    return _shrink(sheet)
 
 
 @lru_cache(maxsize=256)
@@ -94,10 +94,10 @@ def halo(radius: float, age: int) -> Surface:
     strength = 1.0 - age / HALOS
     reach = round(radius * (1.5 + strength))
     sheet = _sheet(reach, TIMER)
-    for place in range(reach, 0, -1):
-        fading = min(1.0, (reach - place + 1) / (reach - radius))
-        _disc(sheet, (*TIMER, round(255 * fading * (0.25 + 0.4 * strength))), place)
-    return _shrunk(sheet)
+    for ring in range(reach, 0, -1):
+        fading = min(1.0, (reach - ring + 1) / (reach - radius))
+        _disc(sheet, (*TIMER, round(255 * fading * (0.25 + 0.4 * strength))), ring)
+    return _shrink(sheet)
 
 
 @lru_cache(maxsize=256)
@@ -106,7 +106,7 @@ def item(half: float, is_requested: bool) -> Surface:
     half = math.floor(half) + 0.5
     sheet = _sheet(half, ITEM)
     _square(sheet, half, is_requested)
-    return _shrunk(sheet)
+    return _shrink(sheet)
 
 
 @lru_cache(maxsize=256)
@@ -120,7 +120,7 @@ def target(radius: float) -> Surface:
     pygame.draw.line(sheet, REQUESTED, area.midtop, area.midbottom, tick)
     _disc(sheet, REQUESTED, radius + width)
     _disc(sheet, (*REQUESTED, 0), radius)  # a hole
-    return _shrunk(sheet)
+    return _shrink(sheet)
 
 
 @lru_cache(maxsize=256)
@@ -129,10 +129,10 @@ def obstacle(radius: float) -> Surface:
     sheet = _sheet(radius, INK)
     _disc(sheet, INK, radius)
     _disc(sheet, OBSTACLE, radius - 2.0)
-    return _shrunk(sheet)
+    return _shrink(sheet)
 
 
-def _written(text: str, height: float, colour: RGB) -> Surface:
+def _render_text(text: str, height: float, colour: RGB) -> Surface:
     # A font is not kept, because a pygame.quit() elsewhere would make it unusable.
     pygame.font.init()
     return pygame.font.Font(None, round(_LARGER * height)).render(text, True, colour)
@@ -141,13 +141,13 @@ def _written(text: str, height: float, colour: RGB) -> Surface:
 @lru_cache(maxsize=512)
 def words(text: str, height: int, colour: RGB = INK) -> Surface:
     """Return a line of text of that height [px], in the font that pygame brings along."""
-    return _shrunk(_written(text, height, colour))
+    return _shrink(_render_text(text, height, colour))
 
 
 @lru_cache(maxsize=256)
 def badge(mark: str, height: int) -> Surface:
     """Return a mark in white on a black pill of that height [px]."""
-    text = _written(mark, 1.25 * height, FLOOR)
+    text = _render_text(mark, 1.25 * height, FLOOR)
     letters = text.get_bounding_rect()
     tall = _LARGER * height
     pill = Rect(_LARGER, _LARGER, max(tall, letters.width + 0.6 * tall), tall)
@@ -156,4 +156,4 @@ def badge(mark: str, height: int) -> Surface:
     pygame.draw.rect(sheet, FLOOR, sheet.get_rect(), border_radius=tall)
     pygame.draw.rect(sheet, INK, pill, border_radius=tall)
     sheet.blit(text, letters.move(Vector2(pill.center) - letters.center).topleft, letters)
-    return _shrunk(sheet)
+    return _shrink(sheet)

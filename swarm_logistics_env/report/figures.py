@@ -7,7 +7,7 @@ from functools import partial
 
 from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.questions.comparison import CONFIDENCE, Comparison
-from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, Factor
+from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorKind
 from swarm_logistics_env.verdicts.columns import VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.mid_run_faults import (
     RateCurve,
@@ -72,10 +72,10 @@ def indicator_panels(results: StudyResults) -> Iterator[tuple[str, Panel]]:
             yield _where(table, onset, swarm), _panel(results, tests, definition)
 
 
-def _by_figure(results: StudyResults) -> dict[tuple[str, Factor, float, int], list[Verdict]]:
+def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int], list[Verdict]]:
     """Return each value once, by table, kind, onset, and swarm size where robots fail."""
 
-    def place(test: Verdict) -> tuple[str, Factor, float, int]:
+    def place(test: Verdict) -> tuple[str, FactorKind, float, int]:
         after, by_fault = test.after, test.after.kind == "fault"
         return test.compared.table, after.kind, after.onset, test.compared.n_robots * by_fault
 

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError, how_to_install
-from swarm_logistics_env.records import becoming, plain, write_csv
+from swarm_logistics_env.records import atomic_write, plain, write_csv
 from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.results import StudyResults
 
@@ -51,7 +51,7 @@ def write_report(
         for figure in whole.figures():
             svg, png = images(figure.draw, figure.height)
             write_text(pictures / f"{figure.name}.svg", svg)
-            with becoming(pictures / f"{figure.name}.png", StudyError) as part:
+            with atomic_write(pictures / f"{figure.name}.png", StudyError) as part:
                 part.write_bytes(png)
             drawings[figure.name] = base64.b64encode(svg.encode()).decode()
         write_text(paths[0], markdown(whole, pictures=pictures.name))
@@ -67,7 +67,7 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         StudyError: the file cannot be written.
     """
-    with becoming(path, StudyError) as part:
+    with atomic_write(path, StudyError) as part:
         part.write_text(text, encoding="utf-8", newline="\n")
 
 

@@ -19,8 +19,8 @@ from functools import partial
 from types import ModuleType
 from typing import Self
 
+from swarm_logistics_env.code_files import current_folder_modules
 from swarm_logistics_env.errors import StudyError, how_to_install, suggest, users_line
-from swarm_logistics_env.policies.current_folder import found_here
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.tasks.task import Outcome, Run
 
@@ -241,7 +241,7 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
         while pending or waiting:
             while waiting and len(pending) < limit:
                 message = pickled(waiting[0])
-                pending[sent.remote(message, found_here())] = waiting.popleft()
+                pending[sent.remote(message, current_folder_modules())] = waiting.popleft()
             for task in ray.wait(list(pending), num_returns=1)[0]:
                 run = pending.pop(task)
                 try:

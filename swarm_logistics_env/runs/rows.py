@@ -21,7 +21,7 @@ _DESCRIBED = {
 Content: TypeAlias = tuple[str, str, int, str]  # key, run, whether it failed, outcome
 
 
-class Row(NamedTuple):
+class StoredRow(NamedTuple):
     """A row as it is in the file, where anything may be damaged."""
 
     rowid: int
@@ -44,7 +44,7 @@ class Row(NamedTuple):
         if not all(isinstance(text, str) for text in texts) or self.failed not in (0, 1):
             return False
         if self.digest is not None:
-            return bool(self.digest == digest_of(*self.content))
+            return bool(self.digest == row_digest(*self.content))
         try:
             case_of(self.run)
             return bool((outcome_of(self.outcome).error is not None) == self.failed)
@@ -52,7 +52,7 @@ class Row(NamedTuple):
             return False
 
 
-def digest_of(*values: object) -> str:
+def row_digest(*values: object) -> str:
     """Return the digest of a row's values, 64 hexadecimal digits."""
     texts = [str(value) for value in values]
     lengths = " ".join(str(len(text)) for text in texts)

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.records import becoming, canonical_json, plain, write_csv
+from swarm_logistics_env.records import atomic_write, canonical_json, plain, write_csv
 from swarm_logistics_env.tasks.task import Outcome, Run
 
-from .rows import Row, case_of, content_of, digest_of, outcome_of
+from .rows import StoredRow, case_of, content_of, outcome_of, row_digest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,7 +121,7 @@ class Runs:
         if path.exists():
             raise StudyError(f"{out} holds a study already: {verb} into a new directory")
         _make_folder(out)
-        with becoming(path, StudyError) as part, cls(part) as runs:
+        with atomic_write(path, StudyError) as part, cls(part) as runs:
             yield runs
 
     def __enter__(self) -> Self:
@@ -142,7 +142,7 @@ class Runs:
         """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
         content = content_of(run, outcome)
         with self._transaction():
-            self._execute(_ADD, (*content, outcome.wall_seconds, digest_of(*content)))
+            self._execute(_ADD, (*content, outcome.wall_seconds, row_digest(*content)))
 
     def absorb(self, other: Runs) -> None:
         """Add the runs of another store, to which `add`'s rule applies; not those damaged there.
@@ -161,7 +161,7 @@ class Runs:
                         f"{row.key} (seed {case_of(row.run)['seed']}), of the same scenario, "
                         "policy and code"
                     )
-                digest = digest_of(*row.content)
+                digest = row_digest(*row.content)
                 self._execute(_ADD, (*row.content, row.wall_seconds, digest))
 
     def damage(self) -> str | None:
@@ -220,7 +220,7 @@ class Runs:
     def note(self, name: str, value: str) -> None:
         """Note a fact about the study; an earlier one of this name is replaced."""
         with self._transaction():
-            row = (name, value, digest_of(name, value))
+            row = (name, value, row_digest(name, value))
             self._execute("INSERT OR REPLACE INTO notes VALUES (?, ?, ?)", row)
 
     def notes(self) -> dict[str, str]:
@@ -231,14 +231,16 @@ class Runs:
         """
         rows = self._execute(f"SELECT name, value, {self._digest_column} FROM notes")
         for name, value, digest in rows:
-            if digest not in (None, digest_of(name, value)):
+            if digest not in (None, row_digest(name, value)):
                 raise StudyError(
                     f"the store {self.path} is damaged: a note in it is not as it was written; its "
                     "runs can be exported (swarm-logistics study export)"
                 )
         return {name: value for name, value, _ in rows}
 
-    def _rows(self, keys: Collection[str] | None = None, *, sound: bool = True) -> Iterator[Row]:
+    def _rows(
+        self, keys: Collection[str] | None = None, *, sound: bool = True
+    ) -> Iterator[StoredRow]:
         """Yield the rows that are sound, or else those that are not.
 
         Args:
@@ -250,7 +252,7 @@ class Runs:
             f"{self._digest_column} FROM runs NOT INDEXED"
         )
         with self._explained():
-            for row in map(Row._make, self._connection.execute(statement)):
+            for row in map(StoredRow._make, self._connection.execute(statement)):
                 if (keys is None or row.key in keys) and row.is_sound == sound:
                     yield row
 
@@ -326,11 +328,11 @@ class Runs:
             self._execute(f"ALTER TABLE {table} ADD COLUMN digest TEXT NOT NULL DEFAULT ''")
         self._digest_column = "NULL"
         for row in list(self._rows()):
-            values = (digest_of(*row.content), row.rowid)
+            values = (row_digest(*row.content), row.rowid)
             self._execute("UPDATE runs SET digest = ? WHERE rowid = ?", values)
         self._digest_column = "digest"
         for name, value in self._execute("SELECT name, value FROM notes"):
-            values = (digest_of(name, value), name)
+            values = (row_digest(name, value), name)
             self._execute("UPDATE notes SET digest = ? WHERE name = ?", values)
 
     def _change_to_wal(self) -> None:

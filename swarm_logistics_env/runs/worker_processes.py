@@ -23,9 +23,9 @@ from unittest.mock import patch
 
 import cloudpickle
 
+from swarm_logistics_env.code_files import current_folder_modules, search_current_folder
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, StudyError
 from swarm_logistics_env.kernels import QUIET
-from swarm_logistics_env.policies.current_folder import found_here, look_here
 from swarm_logistics_env.tasks.task import Outcome, Run
 
 Played = Generator[tuple[Run, Outcome], None, None]
@@ -112,7 +112,7 @@ def _played(
             first = waiting.popleft()
             message = pickled(first)
             try:
-                playing[pool.submit(play_pickled, message, found_here(), watch)] = first
+                playing[pool.submit(play_pickled, message, current_folder_modules(), watch)] = first
             except BrokenProcessPool:  # a worker died between two runs
                 interrupted.append(first)
         for future in wait(playing, return_when=FIRST_COMPLETED).done:
@@ -206,12 +206,12 @@ def play_pickled(
 
     Args:
         message: the run.
-        modules: those to be found in the current folder, see `look_here`.
+        modules: those to be found in the current folder, see `search_current_folder`.
         watch: what ends the run where it takes too long.
     """
     os.environ[QUIET] = "1"
     if modules is not None:
-        look_here(modules)
+        search_current_folder(modules)
     try:
         run: Run = pickle.loads(message)
     except RAISED_BY_OTHERS:  # a policy that only the parent can import

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple, SupportsIndex, Unpack
 
 from numpy.typing import ArrayLike
 
-from .estimate import Estimate, Options, judge
+from .estimate import Estimate, Options, estimate_ratio
 from .inputs import IndicatorError, count, finite
 
 
@@ -40,7 +40,7 @@ def scalability(
             or not finite, mean P_N = 0, unequal seed sets where paired.
     """
     gain = count("n", n) / count("m", m)
-    return judge("S", {"p_nm": (p_nm, gain), "p_n": (p_n, -gain)}, **options)
+    return estimate_ratio("S", {"p_nm": (p_nm, gain), "p_n": (p_n, -gain)}, **options)
 
 
 def fault_tolerance(
@@ -72,7 +72,9 @@ def fault_tolerance(
         raise IndicatorError(f"n = {n!r}, m = {m!r}: should be given together or not at all")
     if n is not None and m is not None and count("m", m) >= count("n", n):
         raise IndicatorError(f"m = {m} of n = {n} robots: should leave a robot for P_S (m < n)")
-    return judge("FT", {"p_f": (p_f, 1.0), "p_s": (p_s, -1.0), "p_o": (p_o, 0.0)}, **options)
+    return estimate_ratio(
+        "FT", {"p_f": (p_f, 1.0), "p_s": (p_s, -1.0), "p_o": (p_o, 0.0)}, **options
+    )
 
 
 def robustness(
@@ -101,7 +103,9 @@ def robustness(
     robots, faulty = count("n", n), count("m", m)
     if faulty > robots:
         raise IndicatorError(f"m = {faulty}: should be at most n = {robots} robots")
-    return judge("R", {"p_f": (p_f, 1.0), "p_o": (p_o, -1.0)}, offset=faulty / robots, **options)
+    return estimate_ratio(
+        "R", {"p_f": (p_f, 1.0), "p_o": (p_o, -1.0)}, offset=faulty / robots, **options
+    )
 
 
 def adaptability(
@@ -127,7 +131,7 @@ def adaptability(
     if finite("x_new", x_new) == x_o:
         raise IndicatorError(f"x_new = {x_new:g} = x_o: should differ from x_o")
     gain = 1.0 / abs((x_new - x_o) / x_o)
-    return judge("A", {"p_new": (p_new, gain), "p_o": (p_o, -gain)}, offset=1.0, **options)
+    return estimate_ratio("A", {"p_new": (p_new, gain), "p_o": (p_o, -gain)}, offset=1.0, **options)
 
 
 def relative_change(p_o: ArrayLike, p_new: ArrayLike, **options: Unpack[Options]) -> Estimate:
@@ -144,10 +148,10 @@ def relative_change(p_o: ArrayLike, p_new: ArrayLike, **options: Unpack[Options]
         IndicatorError: Performance empty, negative or not finite, mean P_o = 0, unequal seed sets
             where paired.
     """
-    return judge("change", {"p_new": (p_new, 1.0), "p_o": (p_o, -1.0)}, **options)
+    return estimate_ratio("change", {"p_new": (p_new, 1.0), "p_o": (p_o, -1.0)}, **options)
 
 
-Factor = Literal["size", "fault", "parameter", "policy"]
+FactorKind = Literal["size", "fault", "parameter", "policy"]
 
 
 class Change(NamedTuple):
@@ -180,7 +184,7 @@ class Definition:
 
     symbol: str
     heading: str
-    compares: Factor
+    compares: FactorKind
     performances: Mapping[str, str]
     function: Callable[..., Estimate]
     arguments: Callable[[Change], dict[str, Any]]
@@ -272,6 +276,6 @@ DEFINITIONS: dict[str, Definition] = {
 }
 
 
-def comparing(factor: Factor) -> tuple[Definition, ...]:
+def comparing(factor: FactorKind) -> tuple[Definition, ...]:
     """Return the indicators whose conditions differ in that factor, in the order of the table."""
     return tuple(d for d in DEFINITIONS.values() if d.compares == factor)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from .estimate import DecisionWord, Estimate, judge
+from .estimate import DecisionWord, Estimate, estimate_ratio
 from .inputs import IndicatorError, between_0_and_1
 
 MARGIN = 0.1
@@ -125,7 +125,7 @@ def equivalence(
         terms = {"p_new": (p_new, 1.0), "p_s": (p_s, -1.0), "p_o": (p_o, 0.0)}
 
     def against(threshold: float) -> Estimate:
-        return judge(
+        return estimate_ratio(
             "change",
             terms,
             threshold=threshold,

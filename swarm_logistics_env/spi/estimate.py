@@ -181,7 +181,7 @@ class Options(TypedDict, total=False):
     identical: bool
 
 
-def judge(
+def estimate_ratio(
     indicator: str,
     terms: Weighted,
     *,

@@ -9,7 +9,7 @@ from typing import NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .estimate import Estimate, Options, judge
+from .estimate import Estimate, Options, estimate_ratio
 from .inputs import IndicatorError, Numbers, delivery_times, finite, numbers, performance
 
 
@@ -44,7 +44,7 @@ def resilience_index(
 
     broken, sound = after_onset("faulty", faulty), after_onset("reference", reference)
     terms = {"faulty": (broken, 1.0), "reference": (sound, 0.0)}
-    return judge("resilience", terms, **options)
+    return estimate_ratio("resilience", terms, **options)
 
 
 def repair_times(

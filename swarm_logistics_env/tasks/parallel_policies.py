@@ -81,7 +81,7 @@ def agent_actions(env: Env, agents: Sequence[str | None], actions: Sequence[Valu
     """
     if len(actions) != len(agents):
         raise PolicyError(f"{len(actions)} actions for {len(agents)} robots")
-    found: ByAgent = {}
+    by_agent: ByAgent = {}
     for row, (agent, action) in enumerate(zip(agents, actions)):
         if agent is None or agent not in env.agents:
             continue
@@ -92,8 +92,8 @@ def agent_actions(env: Env, agents: Sequence[str | None], actions: Sequence[Valu
             action = np.asarray(action, dtype=space.dtype)
         if not space.contains(action):
             raise PolicyError(f"action {action!r} of robot {row}: should be in {space}")
-        found[agent] = action
-    return found
+        by_agent[agent] = action
+    return by_agent
 
 
 # What one step adds to P: of the environment after the step, its rewards and its infos.
@@ -171,11 +171,11 @@ def performance_of(gains: list[float], references: tuple[float, float] | None) -
     total = math.fsum(gains)
     if references is None:
         return total
-    zero, one = references
-    score = (total - zero) / (one - zero)
+    low, high = references
+    score = (total - low) / (high - low)
     if score < 0:
         raise StudyError(
-            f"P: the score {total:g} is below the reference {zero:g} that counts as 0: should be "
+            f"P: the score {total:g} is below the reference {low:g} that counts as 0: should be "
             "a reference that no run falls below"
         )
     return score

@@ -65,8 +65,11 @@ class ParallelScenario(Record):
 
     def conditions(self) -> list[tuple[str, str, str]]:
         """Return name, value, and unit or meaning of each."""
-        units, other = {"n_robots": "robots", "duration": "s"}, "argument of the environment"
-        return [(n, str(value), units.get(n, other)) for n, value in self.model_dump().items()]
+        units = {"n_robots": "robots", "duration": "s"}
+        return [
+            (name, str(value), units.get(name, "argument of the environment"))
+            for name, value in self.model_dump().items()
+        ]
 
 
 class ParallelTask:
@@ -122,9 +125,13 @@ class ParallelTask:
         period: float = 1.0,
         policies: Makers = NO_MAKERS,
     ) -> None:
-        self.name, self._make_env, self._size = name, make_env, size
-        self._failures, self._gain = dict(failures), performance
-        self._references, self._period = references, period
+        self.name = name
+        self._make_env = make_env
+        self._size = size
+        self._failures = dict(failures)
+        self._gain = performance
+        self._references = references
+        self._period = period
         self._nonce = UNSTABLE + uuid.uuid4().hex
         for mode, value in failures.items():
             _check_failure(mode, value)
@@ -156,7 +163,7 @@ class ParallelTask:
             repr((self._references, self._failures, self._period, self.default)),
         ])  # fmt: skip
         if settings not in _codes:
-            with closing(self._made(self.default, ())) as env:
+            with closing(self._environment(self.default, ())) as env:
                 classes = type(env.unwrapped).__mro__
             # This package's own code is known by its sources.
             modules = {kind.__module__.partition(".")[0] for kind in classes} - {PACKAGE.name}
@@ -180,10 +187,13 @@ class ParallelTask:
             StudyError: a field is unknown or cannot be.
         """
         assert isinstance(base, ParallelScenario)
+        names = base.model_dump().keys()
         for name in fields:
-            if name not in (known := base.model_dump()):
-                raise StudyError(f"task {self.name}: no field {name!r}{suggest(name, known)}")
-        return base.replace(**{name: self._checked(name, value) for name, value in fields.items()})
+            if name not in names:
+                raise StudyError(f"task {self.name}: no field {name!r}{suggest(name, names)}")
+        return base.replace(
+            **{name: self._field_value(name, value) for name, value in fields.items()}
+        )
 
     def fault(
         self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
@@ -215,25 +225,26 @@ class ParallelTask:
         player: Value = case.policy.load(self.policies, case.identity)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
-        with closing(self._made(scenario, absent)) as env, one_thread():
+        with closing(self._environment(scenario, absent)) as env, one_thread():
             agents = agents_by_row(env, n_robots, absent)
             # Who is not there cannot fail otherwise.
-            broken = FailingRobots(env, () if absent else faults, self._failures, self._period)
+            failing_env = FailingRobots(env, () if absent else faults, self._failures, self._period)
             if hasattr(player, "configure"):
                 player.configure(env, agents)
             if hasattr(player, "reset"):
                 player.reset(n_robots, policy_seed)
             steps = max(1, round(scenario.duration / self._period))
-            (observations, _), rewards = broken.reset(seed=seed), ByAgent()
+            observations, _ = failing_env.reset(seed=seed)
+            rewards = ByAgent()
             while True:
-                for agent, seen in sorted(broken.given.items()):
-                    flat = flatten(env.observation_space(agent), seen)
+                for agent, observation in sorted(failing_env.true_observations.items()):
+                    flat = flatten(env.observation_space(agent), observation)
                     digest.update(np.asarray(flat).tobytes())
                 digest.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
                 if len(gains) == steps or not env.agents:
                     break
                 actions = player.act(observation_rows(env, agents, observations))
-                observations, rewards, _, _, infos = broken.step(
+                observations, rewards, _, _, infos = failing_env.step(
                     agent_actions(env, agents, actions)
                 )
                 gains.append(float(self._gain(env, rewards, infos)))
@@ -255,7 +266,7 @@ class ParallelTask:
             untimed=None if are_events else total,
         )
 
-    def _made(self, scenario: ParallelScenario, absent: tuple[int, ...]) -> Env:
+    def _environment(self, scenario: ParallelScenario, absent: tuple[int, ...]) -> Env:
         arguments = scenario.model_dump()
         del arguments["duration"]
         arguments[self._size] = arguments.pop("n_robots")
@@ -263,7 +274,7 @@ class ParallelTask:
             arguments[self._failures[REMOVED]] = absent
         return self._make_env(**arguments)
 
-    def _checked(self, name: str, value: object) -> object:
+    def _field_value(self, name: str, value: object) -> object:
         """Return the value of a field; one that is a number by default has to be one."""
         kind = self._numbers.get(name)
         if kind is None:
@@ -277,16 +288,18 @@ class ParallelTask:
 
 def _check_failure(mode: str, value: Value) -> None:
     """Raise StudyError unless a failure mode is known and has what it needs."""
-    holds, needed = True, ""
+    is_right = True
+    requirement = ""
     if mode not in FAILURE_MODES:
         raise StudyError(f"failures: no mode {mode!r}{suggest(mode, FAILURE_MODES)}")
     if mode == "silent":
-        holds, needed = value is not None, "the action that counts as none"
+        is_right = value is not None
+        requirement = "the action that counts as none"
     elif mode == "noisy":
-        holds = isinstance(value, int | float) and value > 0
-        needed = "a standard deviation above 0, in the observations' own units"
+        is_right = isinstance(value, int | float) and value > 0
+        requirement = "a standard deviation above 0, in the observations' own units"
     elif mode == REMOVED:
-        holds = isinstance(value, str)
-        needed = "the name of the factory's argument that takes the robots to leave out"
-    if not holds:
-        raise StudyError(f"failures[{mode!r}] = {value!r}: should be {needed}")
+        is_right = isinstance(value, str)
+        requirement = "the name of the factory's argument that takes the robots to leave out"
+    if not is_right:
+        raise StudyError(f"failures[{mode!r}] = {value!r}: should be {requirement}")

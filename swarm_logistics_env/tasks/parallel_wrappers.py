@@ -53,18 +53,18 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
         """Begin an episode; observations and infos of all possible agents."""
         observations, infos = self.env.reset(seed=seed, options=options)
         self.agents = list(self.possible_agents)
-        return self._padded(self.env.agents, observations, infos)
+        return self._pad(self.env.agents, observations, infos)
 
     def step(self, actions: ByAgent) -> tuple[ByAgent, ...]:
         """Step with the actions of the agents that are there; all possible agents are answered."""
-        there = list(self.env.agents)
+        present = list(self.env.agents)
         observations, rewards, _, truncations, infos = self.env.step(
-            {agent: action for agent, action in actions.items() if agent in there}
+            {agent: action for agent, action in actions.items() if agent in present}
         )
         is_over = not self.env.agents
         is_cut = is_over and any(truncations.values())
-        last = there if is_over else self.env.agents
-        observations, infos = self._padded(last, observations, infos)
+        active = present if is_over else self.env.agents
+        observations, infos = self._pad(active, observations, infos)
         if is_over:
             self.agents = []
         return (
@@ -75,18 +75,17 @@ class PaddedAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's i
             infos,
         )
 
-    def _padded(
-        self, there: Sequence[str], observations: ByAgent, infos: ByAgent
+    def _pad(
+        self, active: Sequence[str], observations: ByAgent, infos: ByAgent
     ) -> tuple[ByAgent, ByAgent]:
-        seen: ByAgent = {}
-        told: ByAgent = {}
+        padded: ByAgent = {}
+        padded_infos: ByAgent = {}
         for agent in self.possible_agents:
-            active = agent in there
-            told[agent] = {**infos.get(agent, {}), "active": int(active)}
-            seen[agent] = (
-                observations[agent] if active else create_zero_array(self.observation_space(agent))
-            )
-        return seen, told
+            is_active = agent in active
+            padded_infos[agent] = {**infos.get(agent, {}), "active": int(is_active)}
+            space = self.observation_space(agent)
+            padded[agent] = observations[agent] if is_active else create_zero_array(space)
+        return padded, padded_infos
 
 
 class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's is untyped
@@ -124,8 +123,8 @@ class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's
         self._next = int(np.random.default_rng().integers(2**31))
         spaces = _spaces(largest)
         for size, env in self._envs.items():
-            for agent, its_spaces in _spaces(env).items():
-                if spaces.get(agent) != its_spaces:
+            for agent, pair in _spaces(env).items():
+                if spaces.get(agent) != pair:
                     raise SetupError(
                         f"make_env({size}) has {agent}: should be, with the same spaces, among "
                         f"the agents of make_env({max(sizes)})"
@@ -137,8 +136,8 @@ class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's
         """Begin an episode; the seed also decides how many agents it has."""
         seed = self._next if seed is None else seed
         self._next = seed + 1
-        place = streams.generator(seed, "number of agents").integers(len(self._sizes))
-        self.env = self._envs[self._sizes[int(place)]]
+        index = streams.generator(seed, "number of agents").integers(len(self._sizes))
+        self.env = self._envs[self._sizes[int(index)]]
         observations, infos = self.env.reset(seed=seed, options=options)
         return observations, infos
 
@@ -203,7 +202,7 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         period: length of a step [s].
 
     Attributes:
-        given: what the environment itself let each agent observe, before any failure changed it.
+        true_observations: those of the environment itself, before any failure changed them.
 
     Raises:
         FaultError: a fault's mode is not among `failures`, or more robots fail than there are.
@@ -230,8 +229,8 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         self._seed = -1
         for fault in self._faults:
             if fault.mode == REMOVED or fault.mode not in failures:
-                known = ", ".join(sorted(set(failures) - {REMOVED}))
-                raise FaultError(f"fault mode {fault.mode!r}: should be one of {known}")
+                modes = ", ".join(sorted(set(failures) - {REMOVED}))
+                raise FaultError(f"fault mode {fault.mode!r}: should be one of {modes}")
             if fault.robots > len(self._rows):
                 raise FaultError(f"{fault.robots} robots fail of {len(self._rows)}")
 
@@ -251,20 +250,20 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
             for fault in self._faults
         ]
         observations, infos = self.env.reset(seed=seed, options=options)
-        return self._observed(observations), infos
+        return self._faulty_observations(observations), infos
 
     def step(self, actions: ByAgent) -> tuple[ByAgent, ...]:
         """Step with the actions that failing robots execute; observations as they sense them."""
-        executed = {agent: self._executed(agent, action) for agent, action in actions.items()}
-        observations, *others = self.env.step(executed)
+        executed = {agent: self._faulty_action(agent, action) for agent, action in actions.items()}
+        observations, rewards, terminations, truncations, infos = self.env.step(executed)
         self._steps += 1
-        return self._observed(observations), *others
+        return self._faulty_observations(observations), rewards, terminations, truncations, infos
 
     def _modes(self, agent: str) -> set[str]:
         time, row = self._steps * self._period, self._rows[agent]
         return {fault.mode for fault, rows in self._failing if row in rows and fault.active(time)}
 
-    def _executed(self, agent: str, action: Value) -> Value:
+    def _faulty_action(self, agent: str, action: Value) -> Value:
         modes = self._modes(agent)
         if "silent" in modes:
             action = self._failures["silent"]
@@ -273,11 +272,13 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         self._last[agent] = action
         return action
 
-    def _observed(self, observations: ByAgent) -> ByAgent:
-        self.given = observations
-        return {agent: self._sensed(agent, value) for agent, value in observations.items()}
+    def _faulty_observations(self, observations: ByAgent) -> ByAgent:
+        self.true_observations = observations
+        return {
+            agent: self._faulty_observation(agent, value) for agent, value in observations.items()
+        }
 
-    def _sensed(self, agent: str, value: Value) -> Value:
+    def _faulty_observation(self, agent: str, value: Value) -> Value:
         modes = self._modes(agent)
         if "blind" in modes:
             return create_zero_array(self.observation_space(agent))

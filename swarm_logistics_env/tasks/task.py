@@ -20,8 +20,8 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, NonNegativeFlo
 from pydantic.dataclasses import dataclass as validated
 
 from swarm_logistics_env import streams
+from swarm_logistics_env.code_files import allow_import
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, StudyError, suggest
-from swarm_logistics_env.policies.current_folder import name_module
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.records import canonical_json
 
@@ -29,7 +29,7 @@ Seconds: TypeAlias = NDArray[np.float64]
 Fields: TypeAlias = Mapping[str, object]  # of a record, by name
 
 
-def _ascending(times: Seconds) -> Seconds:
+def _check_ascending(times: Seconds) -> Seconds:
     if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
         raise ValueError("should ascend")
     return times
@@ -38,7 +38,7 @@ def _ascending(times: Seconds) -> Seconds:
 Times = Annotated[
     Seconds,
     BeforeValidator(lambda times: np.asarray(times, dtype=np.float64)),
-    AfterValidator(_ascending),
+    AfterValidator(_check_ascending),
     PlainSerializer(lambda times: times.tolist()),
 ]
 
@@ -46,7 +46,7 @@ Times = Annotated[
 _LONGEST_ERROR = 20_000  # characters
 
 
-def _storable(error: object) -> object:
+def _make_storable(error: object) -> object:
     """Return a text as files and databases hold it: no half signs, and not without end."""
     if not isinstance(error, str):
         return error
@@ -81,7 +81,7 @@ class Outcome:
     failed_robots: tuple[int, ...] = ()
     anchoring_seconds: NonNegativeFloat | None = 0.0
     digest: str | None = None
-    error: Annotated[str | None, BeforeValidator(_storable)] = None
+    error: Annotated[str | None, BeforeValidator(_make_storable)] = None
     wall_seconds: float = 0.0  # a clock may be set back
     untimed: NonNegativeFloat | None = None
 
@@ -303,39 +303,39 @@ def task_of(source: object) -> Task:
     Raises:
         StudyError: there is none.
     """
-    found = source
+    task = source
     if isinstance(source, str):
         module, colon, attribute = NAMES.get(source, source).partition(":")
         if not colon:
             raise StudyError(
                 f"no task {source!r} (a name or 'package.module:OBJECT'){suggest(source, NAMES)}"
             )
-        name_module(module)
+        allow_import(module)
         try:
-            found = getattr(importlib.import_module(module), attribute)
+            task = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError, ValueError, SystemExit) as error:
             raise StudyError(f"task {source!r} cannot be imported: {error}") from None
-    if not isinstance(found, Task):
+    if not isinstance(task, Task):
         raise StudyError(f"{source!r} is no task: should have the attributes of tasks.Task")
-    return found
+    return task
 
 
 def refuse_untrusted(
-    place: Path, task: str | None, policies: tuple[PolicySpec, ...] = (), *, trust_code: bool
+    path: Path, task: str | None, policies: tuple[PolicySpec, ...] = (), *, trust_code: bool
 ) -> None:
     """Raise StudyError if what a file names would run code when it is loaded.
 
     Args:
-        place: the file.
+        path: of the file.
         task, policies: that it names.
         trust_code: whether they may.
     """
-    said = [f"task {task!r}"] if isinstance(task, str) and ":" in task else []
-    said += [f"policy {policy.name!r}" for policy in policies if policy.runs_code]
-    if said and not trust_code:
+    names_of_code = [f"task {task!r}"] if isinstance(task, str) and ":" in task else []
+    names_of_code += [f"policy {policy.name!r}" for policy in policies if policy.runs_code]
+    if names_of_code and not trust_code:
         raise StudyError(
-            f"{place}: {said[0]} is code, which runs when it is loaded: should be a name that the "
-            "package knows, or be allowed by --trust-code (trust_code=True)"
+            f"{path}: {names_of_code[0]} is code, which runs when it is loaded: should be a name "
+            "that the package knows, or be allowed by --trust-code (trust_code=True)"
         )
 
 

@@ -29,14 +29,14 @@ from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
 from swarm_logistics_env.motion.memory import body_of, in_frame, length_of
 from swarm_logistics_env.policies.learned import STREAM
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.train.training import Training, make_worlds
 from swarm_logistics_env.warehouse.packing import unpacked_at
 from swarm_logistics_env.warehouse.structs import NOBODY, World
 
 # Lengths are in units of 10 m; directions are in the frame of the robot's motion.
-KNOWN = (
+PRIVILEGED = (
     "to_delivery", "y", "frame_cos", "frame_sin", "drift", "swarm_size",
     "lifts", "delivers",
     "requested_along", "requested_aside", "requested_distance", "requested_nearness",
@@ -45,8 +45,10 @@ KNOWN = (
 
 
 @kernel
-def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.float32]) -> None:
-    """Fill `known` (rows, len(KNOWN)); rows without a robot stay as they are.
+def fill_privileged(
+    address: int, turned: NDArray[np.float64], privileged: NDArray[np.float32]
+) -> None:
+    """Fill `privileged` (rows, len(PRIVILEGED)); rows without a robot stay as they are.
 
     Args:
         address: of the world (`Warehouse.address`).
@@ -56,7 +58,7 @@ def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.floa
     robots, able, items = world.robots, world.able, world.items
     edge, height = world.parameters.storage_width, world.parameters.warehouse_height
     for robot in range(len(robots.position)):
-        row = known[robot]
+        row = privileged[robot]
         x, y = robots.position[robot, 0], robots.position[robot, 1]
         requested = nearest_request(world, x, y)
         carrier = NOBODY if requested == NOBODY else items.carrier[requested]
@@ -71,11 +73,11 @@ def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.floa
         row[8:] = 0.0
         if requested != NOBODY:
             to_x, to_y = items.position[requested, 0] - x, items.position[requested, 1] - y
-            away = max(length_of(to_x, to_y), 1e-9)
+            distance = max(length_of(to_x, to_y), 1e-9)
             along, aside = in_frame((cos, sin), to_x, to_y)
-            row[8], row[9] = along / away, aside / away
-            row[10] = away / 10.0
-            row[11] = max(0.0, 1.0 - away / 2.0)
+            row[8], row[9] = along / distance, aside / distance
+            row[10] = distance / 10.0
+            row[11] = max(0.0, 1.0 - distance / 2.0)
         if carrier != NOBODY:
             row[12] = 1.0
             row[13] = (edge - robots.position[carrier, 0]) / 10.0
@@ -84,13 +86,14 @@ def read_known(address: int, turned: NDArray[np.float64], known: NDArray[np.floa
 
 @kernel
 def nearest_request(world: World, x: float, y: float) -> int:
-    """Return the item that is asked for and lies nearest to a place [m], or NOBODY."""
+    """Return the item that is asked for and lies nearest to (x, y) [m], or NOBODY."""
     nearest, least = NOBODY, math.inf
     for item in world.progress.requested:
         if item != NOBODY:
-            away = length_of(world.items.position[item, 0] - x, world.items.position[item, 1] - y)
-            if away < least:
-                nearest, least = item, away
+            position = world.items.position[item]
+            distance = length_of(position[0] - x, position[1] - y)
+            if distance < least:
+                nearest, least = item, distance
     return nearest
 
 
@@ -98,7 +101,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     """Turns observation rows into a network's inputs, and its outputs into commands.
 
     By the code that plays the policy afterwards, so that both see the same. What the value network
-    alone reads, `KNOWN`, stands behind these inputs.
+    alone reads, `PRIVILEGED`, stands behind these inputs.
 
     Args:
         training: whose worlds these are; every robot is a row.
@@ -113,11 +116,12 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def __init__(self, training: Training) -> None:
         worlds = make_worlds(training)
         self.frame = MotionView(training.scenario, training.network.listens)
-        self._known = np.zeros((worlds.num_envs, len(KNOWN)), np.float32)
-        self._begun, self._seed = 0, 0
+        self._privileged = np.zeros((worlds.num_envs, len(PRIVILEGED)), np.float32)
+        self._n_episodes = 0
+        self._seed = 0
         super().__init__(
             worlds,
-            Box(-np.inf, np.inf, (len(INPUTS) + len(KNOWN),), np.float32),
+            Box(-np.inf, np.inf, (len(INPUTS) + len(PRIVILEGED),), np.float32),
             Box(-1.0, 1.0, (len(OUTPUTS),), np.float32),
         )
 
@@ -133,7 +137,8 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def seed(self, seed: int | None = None) -> list[int]:
         """Fix all episodes from the next `reset` on."""
-        self._begun, self._seed = 0, seed or 0
+        self._n_episodes = 0
+        self._seed = seed or 0
         seeds: list[int] = self.venv.seed(seed)
         return seeds
 
@@ -150,14 +155,14 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def step_wait(self) -> Any:
         """Step every world."""
         observations, rewards, dones, infos = self.venv.step_wait()
-        over = np.flatnonzero(dones)
-        if over.size:
-            last = np.stack([infos[row]["terminal_observation"] for row in over.tolist()])
+        ended = np.flatnonzero(dones)
+        if ended.size:
+            last = np.stack([infos[row]["terminal_observation"] for row in ended.tolist()])
             # The value network knows of one step before: the next episode has begun already.
-            ends = np.hstack([self.frame.peek(last, over), self._known[over]])
-            for row, read in zip(over.tolist(), ends):
-                infos[row]["terminal_observation"] = read
-            self.frame.begin_rows(over, self._keys()[over], self._bodies()[over])
+            inputs = np.hstack([self.frame.peek(last, ended), self._privileged[ended]])
+            for row, terminal_inputs in zip(ended.tolist(), inputs):
+                infos[row]["terminal_observation"] = terminal_inputs
+            self.frame.begin_rows(ended, self._keys()[ended], self._bodies()[ended])
         return self._read(observations), rewards, dones, infos
 
     def _bodies(self) -> NDArray[np.float64]:
@@ -170,20 +175,23 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         inputs = self.frame.read(observations)
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
-            read_known(world.warehouse.address, self.frame.turned[rows], self._known[rows])
-        return np.hstack([inputs, self._known])
+            address, turned = world.warehouse.address, self.frame.turned[rows]
+            fill_privileged(address, turned, self._privileged[rows])
+        return np.hstack([inputs, self._privileged])
 
     def _keys(self) -> NDArray[np.uint64]:
         # Every episode of every row gets a stream of its own.
-        self._begun += 1
-        return row_keys(key(self._seed, "training episode", self._begun), STREAM, self.num_envs)
+        self._n_episodes += 1
+        return row_keys(
+            key(self._seed, "training episode", self._n_episodes), STREAM, self.num_envs
+        )
 
 
 CHECKPOINT = "checkpoint.pt"
-KEPT = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
+STATE = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
 
-# What an untrained network says whatever it reads: it drives ahead, so that it meets things. One
-# that trembles on the spot would learn very slowly that searching pays.
+# The outputs of an untrained network, whatever it reads: it drives ahead, so that it meets things.
+# One that trembles on the spot would learn very slowly that searching pays.
 FIRST_OUTPUTS = (0.8, 0.0, 0.0)
 
 
@@ -216,16 +224,16 @@ def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
     return learner
 
 
-def device_of(asked: str | None) -> str:
-    """Return the device to learn on: as asked, else the GPU where there is one.
+def device_of(name: str | None) -> str:
+    """Return the device to learn on: the named one, else the GPU where there is one.
 
     Raises:
         TrainingError: there is no such device.
     """
-    found = ["cpu", "cuda"] if torch.cuda.is_available() else ["cpu"]
-    if asked not in (None, *found):
-        raise TrainingError(f"device = {asked!r}: should be left out or one of {found} here")
-    return asked or found[-1]
+    devices = ["cpu", "cuda"] if torch.cuda.is_available() else ["cpu"]
+    if name not in (None, *devices):
+        raise TrainingError(f"device = {name!r}: should be left out or one of {devices} here")
+    return name or devices[-1]
 
 
 def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
@@ -254,7 +262,7 @@ def save_checkpoint(directory: Path, learner: PPO, log: Any) -> None:
     state = {
         "policy": learner.policy.state_dict(),
         "optimizer": learner.policy.optimizer.state_dict(),
-        **{name: getattr(learner, name) for name in KEPT},
+        **{name: getattr(learner, name) for name in STATE},
         "view": learner.env,
         "torch": torch.get_rng_state(),
         "cuda": torch.cuda.get_rng_state_all(),
@@ -264,7 +272,7 @@ def save_checkpoint(directory: Path, learner: PPO, log: Any) -> None:
     }
     content = io.BytesIO()
     torch.save(state, content)
-    with becoming(directory / CHECKPOINT, TrainingError) as part, part.open("wb") as file:
+    with atomic_write(directory / CHECKPOINT, TrainingError) as part, part.open("wb") as file:
         file.write(_head(content.getbuffer()))
         file.write(content.getbuffer())
         file.flush()
@@ -288,13 +296,13 @@ def read_checkpoint(directory: Path) -> dict[str, Any] | None:
     path = directory / CHECKPOINT
     if not path.exists():
         return None
-    way_on = "train into a new directory, or delete that file to begin anew in this one"
+    remedy = "train into a new directory, or delete that file to begin anew in this one"
     try:
         head, end, content = path.read_bytes().partition(b"\n")
         if head + end != _head(content):
             raise TrainingError(
                 f"the checkpoint {path} is damaged or of another version, as its digest tells: "
-                f"{way_on}"
+                f"{remedy}"
             )
         state: dict[str, Any] = torch.load(
             io.BytesIO(content), map_location="cpu", weights_only=False
@@ -303,7 +311,7 @@ def read_checkpoint(directory: Path) -> dict[str, Any] | None:
         raise
     except Exception as error:  # whatever unpickling what another version wrote raises
         reason = str(error).partition("\n")[0]
-        raise TrainingError(f"the checkpoint {path} cannot be read ({reason}): {way_on}") from error
+        raise TrainingError(f"the checkpoint {path} cannot be read ({reason}): {remedy}") from error
     return state
 
 
@@ -313,7 +321,7 @@ def restore(learner: PPO, state: dict[str, Any]) -> None:
     learner.set_env(state["view"], force_reset=False)
     learner.policy.load_state_dict(state["policy"])
     learner.policy.optimizer.load_state_dict(state["optimizer"])
-    for name in KEPT:
+    for name in STATE:
         setattr(learner, name, state[name])
     torch.set_rng_state(state["torch"])
     if torch.cuda.is_available():
@@ -331,7 +339,7 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
 class _TwoReaders(torch.nn.Module):
     def __init__(self, n_columns: int, widths: dict[str, list[int]]) -> None:
         super().__init__()
-        self.n_inputs = n_columns - len(KNOWN)
+        self.n_inputs = n_columns - len(PRIVILEGED)
         self.policy_net = torch.nn.Sequential(
             *create_mlp(self.n_inputs, -1, widths["pi"], torch.nn.Tanh)
         )

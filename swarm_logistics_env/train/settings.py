@@ -25,12 +25,12 @@ from swarm_logistics_env.warehouse.failure_modes import failure_mode
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 
-def _known(mode: str) -> str:
+def _check_mode(mode: str) -> str:
     failure_mode(mode)
     return mode
 
 
-Mode = Annotated[str, AfterValidator(_known)]
+Mode = Annotated[str, AfterValidator(_check_mode)]
 
 
 class Part(Record):
@@ -58,14 +58,14 @@ class Conditions(Part):
 
     @field_validator("onset")
     @classmethod
-    def _ordered(cls, onset: tuple[float, float]) -> tuple[float, float]:
+    def _check_order(cls, onset: tuple[float, float]) -> tuple[float, float]:
         if onset[0] > onset[1]:
             raise ValueError("should be the earliest time, then the latest")
         return onset
 
     @field_validator("scenario")
     @classmethod
-    def _possible(cls, fields: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    def _check_values(cls, fields: dict[str, list[Any]]) -> dict[str, list[Any]]:
         for name, values in fields.items():
             if name == "n_robots":
                 raise ValueError("swarm sizes belong in `worlds` of the training")
@@ -91,7 +91,7 @@ class WorldKind(Part):
 
     @field_validator("scenario")
     @classmethod
-    def _possible(cls, fields: dict[str, Any]) -> dict[str, Any]:
+    def _check_values(cls, fields: dict[str, Any]) -> dict[str, Any]:
         if "n_robots" in fields:
             raise ValueError("the swarm size is a field of its own, `n_robots`")
         return fields
@@ -138,7 +138,7 @@ class PPOSettings(Part):
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.
         value_hidden: widths of the value network, which is not shipped. It reads more than a robot
-            can sense, see `learner.KNOWN`.
+            can sense, see `learner.PRIVILEGED`.
     """
 
     n_steps: PositiveInt = 128
@@ -180,7 +180,7 @@ class Evaluation(Part):
     faults: dict[Mode, PositiveInt] = Field(default_factory=dict)
 
     @model_validator(mode="after")
-    def _possible(self) -> Self:
+    def _check_values(self) -> Self:
         for mode, robots in self.faults.items():
             if robots > self.n_robots:
                 raise ValueError(
@@ -207,7 +207,7 @@ class Scores(Part):
     n_robots: PositiveInt = 25
 
     @model_validator(mode="after")
-    def _some_work(self) -> Self:
+    def _leave_a_working_robot(self) -> Self:
         if self.seeds and self.modes and max(self.robots) >= self.n_robots:
             raise ValueError(
                 f"robots = {max(self.robots)}: should be less than n_robots = {self.n_robots}, "

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +21,9 @@ from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.records import becoming
+from swarm_logistics_env.records import atomic_write, read_table
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import (
-    enter,
     evaluate,
     reference_means,
     score,
@@ -39,6 +40,9 @@ from swarm_logistics_env.train.learner import (
 )
 from swarm_logistics_env.train.training import Training
 
+RECORD = "training.json"  # of how it was made
+# Fields that may change when a training goes on, because they change nothing of what was done.
+MAY_CHANGE = frozenset({"about", "threads", "scores"})
 CHECKPOINT_EVERY = 20.0  # seconds
 CURVE, PICTURE = "curve.csv", "curve.png"
 BEST = "best.safetensors"  # the policy as it was at the best evaluation
@@ -75,17 +79,52 @@ def train(
     """
     out = Path(out)
     # Everything that may be refused comes first, before anything is written.
-    if not all(isinstance(each, BaseCallback) for each in callbacks):
+    if not all(isinstance(callback, BaseCallback) for callback in callbacks):
         raise TrainingError(
             f"callbacks = {callbacks!r}: should be a list of callbacks of stable-baselines3"
         )
     device, view = device_of(device), NetworkView(training)
-    with _disk_errors_told(out), one_thread():
-        enter(out, training, command)
-        return _trained(training, out, command, device, view, callbacks)
+    with _explain_disk_errors(out), one_thread():
+        enter_directory(out, training, command)
+        return _train(training, out, command, device, view, callbacks)
 
 
-def _trained(
+def enter_directory(directory: Path, training: Training, command: str) -> None:
+    """Make the directory of a training, or enter it to go on; note when and by what.
+
+    Raises:
+        TrainingError: it cannot be written, or holds another training.
+    """
+    path = directory / RECORD
+    specification = training.model_dump(mode="json")
+    sessions: list[dict[str, Any]] = []
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TrainingError(f"cannot write to {directory}: {error.strerror}") from error
+    if path.exists():
+        record = read_table(path, "record of a training", TrainingError)
+        recorded, sessions = record.get("training", {}), record.get("sessions", [])
+        if not isinstance(recorded, dict) or not isinstance(sessions, list):
+            raise TrainingError(f"{path} is damaged: should be as it was written, or --out another")
+        differing = sorted(
+            name
+            for name, value in specification.items()
+            if name not in MAY_CHANGE and recorded.get(name) != value
+        )
+        if differing:
+            raise TrainingError(
+                f"{directory} holds a training with another {', '.join(differing)}: should be the "
+                "same to go on, or --out another directory"
+            )
+    began = datetime.now(UTC).isoformat(timespec="seconds")
+    sessions.append({"began": began, "versions": versions()})
+    with atomic_write(path, TrainingError) as part:
+        record = {"command": command, "training": specification, "sessions": sessions}
+        part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+
+
+def _train(
     training: Training,
     out: Path,
     command: str,
@@ -103,13 +142,13 @@ def _trained(
     if learner.num_timesteps < training.agent_steps:
         log.versions = versions()
         log.references = log.references or reference_means(training)
-        total, done = training.agent_steps, learner.num_timesteps
-        with ProgressBar(training.name, total, "agent-steps", done=done) as progress:
-            own = TrainingCallback(training, log, out, progress)
-            learner.learn(total - done, [own, *callbacks], reset_num_timesteps=False)
+        total, n_learned = training.agent_steps, learner.num_timesteps
+        with ProgressBar(training.name, total, "agent-steps", done=n_learned) as progress:
+            callback = TrainingCallback(training, log, out, progress)
+            learner.learn(total - n_learned, [callback, *callbacks], reset_num_timesteps=False)
     learner.env.close()
-    asked = training.evaluation
-    log.draw(out / PICTURE, f"{training.name}, N = {asked.n_robots}", asked.seeds)
+    evaluation = training.evaluation
+    log.draw(out / PICTURE, f"{training.name}, N = {evaluation.n_robots}", evaluation.seeds)
     tensors = tensors_of(learner.policy)
     card = _card(training, learner.num_timesteps, log, command)
     path = out / f"{training.name}.safetensors"
@@ -122,7 +161,7 @@ def _trained(
 
 
 @contextmanager
-def _disk_errors_told(out: Path) -> Iterator[None]:
+def _explain_disk_errors(out: Path) -> Iterator[None]:
     """Raise a TrainingError that says how to go on where the disk is full or gone."""
     try:
         yield
@@ -160,17 +199,22 @@ class TrainingLog:
 
     def sentence(self, means: Mapping[str, float]) -> str:
         """Return what was measured, each beside that of the scripted policies."""
-        told = []
+        parts = []
         for name, value in means.items():
-            beside = [f"{n} {of[name]:.4g}" for n, of in self.references.items() if name in of]
-            told.append(f"{name} = {value:.4g}" + (f" ({', '.join(beside)})" if beside else ""))
-        return ", ".join(told)
+            references = [
+                f"{policy} {measured[name]:.4g}"
+                for policy, measured in self.references.items()
+                if name in measured
+            ]
+            part = f"{name} = {value:.4g}"
+            parts.append(f"{part} ({', '.join(references)})" if references else part)
+        return ", ".join(parts)
 
     def write(self, directory: Path) -> None:
         """Write curve.csv, whole or not at all."""
         from pandas import DataFrame
 
-        with becoming(directory / CURVE, TrainingError) as part:
+        with atomic_write(directory / CURVE, TrainingError) as part:
             DataFrame(self.curve).to_csv(part, index=False, na_rep="nan")
 
     def draw(self, picture: Path, title: str, seeds: int) -> None:
@@ -188,7 +232,7 @@ class TrainingLog:
             axes.set(title=title, xlabel="million agent-steps", ylabel=y_label, ylim=(0.0, None))
 
         _, png = images(curve, 0.62 * WIDTH)
-        with becoming(picture, TrainingError) as part:
+        with atomic_write(picture, TrainingError) as part:
             part.write_bytes(png)
 
 
@@ -199,9 +243,12 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         self, training: Training, log: TrainingLog, out: Path, progress: ProgressBar
     ) -> None:
         super().__init__()
-        self._training, self._log = training, log
-        self._out, self._progress = out, progress
-        self._start, self._saved_at = time.monotonic() - log.seconds, -math.inf
+        self._training = training
+        self._log = log
+        self._out = out
+        self._progress = progress
+        self._start = time.monotonic() - log.seconds
+        self._saved_at = -math.inf
         self._cpu = time.process_time()
 
     def _on_step(self) -> bool:

@@ -82,20 +82,20 @@ class Training(Part):
 
     @field_validator("rewards")
     @classmethod
-    def _terms(cls, rewards: dict[str, float]) -> dict[str, float]:
+    def _check_terms(cls, rewards: dict[str, float]) -> dict[str, float]:
         RewardTerms(rewards)
         return rewards
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _check_consistency(self) -> Self:
         if any(scenario.message_size for _, scenario in self.each_world):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
-        played = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
-        for size in sorted(played):
+        sizes = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
+        for size in sorted(sizes):
             self.scenario.replace(n_robots=size)
         for world in self.worlds:
-            mixed = world.conditions or self.conditions
-            most = max((max(kind.robots) for kind in mixed if kind.modes), default=0)
+            kinds = world.conditions or self.conditions
+            most = max((max(kind.robots) for kind in kinds if kind.modes), default=0)
             if most > world.n_robots:
                 raise ValueError(
                     f"conditions.robots = {most}: should be at most the smallest swarm, "
@@ -129,18 +129,18 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in PRESETS.glob("*.toml"))
 
 
-def load_training(asked: str, **fields: object) -> Training:
+def load_training(source: str, **fields: object) -> Training:
     """Return a preset by its name, or the training in a TOML file, with some fields changed.
 
     Raises:
         TrainingError: there is none, it is not TOML, or a field of it is unknown or cannot be.
     """
-    path = Path(asked) if asked.endswith(".toml") else PRESETS / f"{asked}.toml"
+    path = Path(source) if source.endswith(".toml") else PRESETS / f"{source}.toml"
     if path.parent == PRESETS and path.stem not in preset_names():
-        raise TrainingError(f"no training preset {asked!r}{suggest(asked, preset_names())}")
-    given = read_table(path, "training", TrainingError)
+        raise TrainingError(f"no training preset {source!r}{suggest(source, preset_names())}")
+    fields_of_file = read_table(path, "training", TrainingError)
     try:
-        return Training(**{"name": path.stem, **given, **fields})
+        return Training(**{"name": path.stem, **fields_of_file, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise TrainingError(f"{path.name}: {error}") from error
 
@@ -159,8 +159,9 @@ def make_worlds(training: Training) -> SwarmVecEnv:
         kind, scenario = worlds[number]
         core = SwarmLogisticsEnv(scenario, rewards=training.rewards)
         env = EpisodeMix(core, kind.conditions or training.conditions)
-        asked = training.indicators
-        return env if asked is None else IndicatorReward(env, **dict(asked), own_reward=1.0)
+        if training.indicators is None:
+            return env
+        return IndicatorReward(env, **dict(training.indicators), own_reward=1.0)
 
     return SwarmVecEnv(make_env=make_env, n_worlds=len(worlds), threads=training.threads)
 
@@ -181,11 +182,11 @@ class EpisodeMix(Wrapper):
         self._kinds = tuple(kinds)
         weights = np.array([kind.weight for kind in kinds])
         self._shares = weights / weights.sum()
-        own = self.unwrapped.scenario
+        base = self.unwrapped.scenario
         for kind in kinds:
             for name, values in kind.scenario.items():
                 for value in values:
-                    self.env.declare_spaces(own.replace(**{name: value}))
+                    self.env.declare_spaces(base.replace(**{name: value}))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's conditions among them."""
@@ -193,7 +194,7 @@ class EpisodeMix(Wrapper):
             return options
         rng = generator(seed, "kind of episode")
         kind = self._kinds[int(rng.choice(len(self._kinds), p=self._shares))]
-        drawn = {
+        fields = {
             name: values[int(rng.integers(len(values)))] for name, values in kind.scenario.items()
         }
         faults = faults_among(options, self.unwrapped.faults)
@@ -201,4 +202,4 @@ class EpisodeMix(Wrapper):
             mode = kind.modes[int(rng.integers(len(kind.modes)))]
             robots = kind.robots[int(rng.integers(len(kind.robots)))]
             faults = (*faults, Fault(mode, robots, onset=float(rng.uniform(*kind.onset))))
-        return {**options, "scenario": {**drawn, **scenario_fields(options)}, "faults": faults}
+        return {**options, "scenario": {**fields, **scenario_fields(options)}, "faults": faults}

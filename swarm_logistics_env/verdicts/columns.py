@@ -13,10 +13,10 @@ from .verdict import Verdict
 if TYPE_CHECKING:
     import pandas as pd
 
-Row = TypeVar("Row")
+Judged = TypeVar("Judged")
 # Name to type, what gives the value of a row, and what it means. A number that is missing is NaN, a
 # text None.
-Columns: TypeAlias = Mapping[str, tuple[type, Callable[[Row], object], str]]
+Columns: TypeAlias = Mapping[str, tuple[type, Callable[[Judged], object], str]]
 CELL_COLUMNS: Columns[Cell] = {
     "policy": (str, lambda cell: cell.policy, "label of the policy"),
     "table": (str, lambda cell: cell.table, "heading of the report's table"),
@@ -276,7 +276,7 @@ VERDICT_COLUMNS: Columns[Verdict] = {
 }
 
 
-def frame(rows: Sequence[Row], columns: Columns[Row]) -> pd.DataFrame:
+def frame(rows: Sequence[Judged], columns: Columns[Judged]) -> pd.DataFrame:
     """Return cells or verdicts as a table with these columns, for CSV and for users."""
     import pandas as pd
 

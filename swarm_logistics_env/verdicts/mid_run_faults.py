@@ -14,7 +14,7 @@ from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Comparison
 from swarm_logistics_env.spi.inputs import Numbers
 
 from .cell import same_runs
-from .results import StudyResults, Times
+from .results import StudyResults, TimesBySeed
 
 
 class RepairCurve(NamedTuple):
@@ -120,7 +120,9 @@ def _index(
         return None
 
 
-def _repair_curve(comparison: Comparison, times: Times, reference: Times) -> RepairCurve:
+def _repair_curve(
+    comparison: Comparison, times: TimesBySeed, reference: TimesBySeed
+) -> RepairCurve:
     onset = comparison.changed.setting.onset
     end = comparison.original.case.scenario.duration
     window = window_of(comparison)

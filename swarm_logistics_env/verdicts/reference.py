@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from swarm_logistics_env.questions.comparison import NO_FAULT, Comparison, Question, Setting
-from swarm_logistics_env.spi.definitions import DEFINITIONS, Factor
+from swarm_logistics_env.spi.definitions import DEFINITIONS, FactorKind
 from swarm_logistics_env.spi.estimate import Estimate
 
 
@@ -55,7 +55,7 @@ class Reference:
         )
 
 
-def _setting(kind: Factor, name: str, value: float) -> Setting:
+def _setting(kind: FactorKind, name: str, value: float) -> Setting:
     return NO_FAULT if kind == "fault" and not value else Setting(kind, name, value)
 
 

@@ -14,10 +14,10 @@ from swarm_logistics_env.tasks.task import Outcome, Outcomes
 
 from .cell import Cell
 from .reference import PAPER, Reference
-from .until_clear import progress_of
+from .until_clear import latest_look
 from .verdict import Verdict, adjust_families, judge_comparison
 
-Times = tuple[Numbers, ...]
+TimesBySeed = tuple[Numbers, ...]
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class StudyResults:
         is_complete = len(timed) == len(outcomes) or not self.plan.paired
         return timed if is_complete else ()
 
-    def times_of(self, arm: Arm) -> Times:
+    def times_of(self, arm: Arm) -> TimesBySeed:
         """Return an arm's delivery times [s] seed by seed; none as `outcomes_of`."""
         return tuple(outcome.delivery_times for outcome in self.outcomes_of(arm))
 
@@ -98,9 +98,9 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
     is_exploratory = not declared.covers(plan)
     verdicts: Iterable[Verdict] = ()
     if specification.until_clear:
-        progress = progress_of(plan, outcomes)
-        plan = replace(plan, specification=specification.replace(seeds=progress.shared_seeds))
-        verdicts = progress.verdicts
+        look = latest_look(plan, outcomes)
+        plan = replace(plan, specification=specification.replace(seeds=look.shared_seeds))
+        verdicts = look.verdicts
     cells: dict[CellKey, Cell] = {}
     for policy, table, arm in plan.cells:
         runs = [

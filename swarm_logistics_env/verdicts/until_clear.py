@@ -30,7 +30,7 @@ MOST_SEEDS = 200
 SPENDING: spi.Spending = "linear"
 
 
-class Progress(NamedTuple):
+class LatestLook(NamedTuple):
     """The state of the comparisons of a study at its latest look.
 
     Attributes:
@@ -45,7 +45,7 @@ class Progress(NamedTuple):
     shared_seeds: int
 
 
-def progress_of(plan: Plan, outcomes: Outcomes) -> Progress:
+def latest_look(plan: Plan, outcomes: Outcomes) -> LatestLook:
     """Return the state of a plan's comparisons after these outcomes."""
     looks = _Looks(plan, outcomes)
     next_runs = looks.missing(plan.cases, looks.seeds[0])
@@ -56,7 +56,7 @@ def progress_of(plan: Plan, outcomes: Outcomes) -> Progress:
         next_runs |= family.next_runs
         verdicts |= family.verdicts()
     complete = [n_seeds for n_seeds in looks.seeds if not looks.missing(plan.cases, n_seeds)]
-    return Progress(
+    return LatestLook(
         tuple(verdicts[comparison] for comparison in plan.comparisons),
         # Seed by seed, so that a study that is stopped early has something of every question.
         tuple(sorted(next_runs.values(), key=lambda run: run.seed)),

@@ -94,11 +94,11 @@ class Fault(Record):
         intermittent: tuple[float, float] | None = None,
         role: str | None = None,
     ) -> None:
-        given = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
-        super().__init__(**given, factor=factor, intermittent=intermittent, role=role)
+        fields = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
+        super().__init__(**fields, factor=factor, intermittent=intermittent, role=role)
 
     @model_serializer(mode="wrap")
-    def _written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _serialize(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # Without a role it is written as before there were roles, so that stored runs stay known.
         written: dict[str, Any] = write(self)
         if self.role is None:
@@ -106,11 +106,11 @@ class Fault(Record):
         return written
 
     @model_validator(mode="after")
-    def _possible(self) -> Self:
-        found = failure_mode(self.mode)
-        if self.factor is not None and found.factor is None:
-            able = ", ".join(name for name, mode in FAILURE_MODES.items() if mode.factor)
-            raise ValueError(f"{self.mode} takes no factor; modes that do: {able}")
+    def _check_combination(self) -> Self:
+        own_mode = failure_mode(self.mode)
+        if self.factor is not None and own_mode.factor is None:
+            modes = ", ".join(name for name, mode in FAILURE_MODES.items() if mode.factor)
+            raise ValueError(f"{self.mode} takes no factor; modes that do: {modes}")
         for name in ("duration", "intermittent"):
             if self.mode == "removed" and getattr(self, name) is not None:
                 raise ValueError(f"a removed robot does not come back: {name} should be None")
@@ -159,16 +159,16 @@ def checked_faults(
             f'{name} = {faults!r}: should be a list of faults, as [Fault("FM1", 2)], ["FM1:2"] or '
             '[{"mode": "FM1", "robots": 2}]'
         )
-    return tuple(_read(name, fault) for fault in faults)
+    return tuple(_as_fault(name, fault) for fault in faults)
 
 
-def _read(name: str, given: FaultLike) -> Fault:
-    if isinstance(given, Fault):
-        return given
-    if isinstance(given, str):
-        return fault_of(given)
+def _as_fault(name: str, fault: FaultLike) -> Fault:
+    if isinstance(fault, Fault):
+        return fault
+    if isinstance(fault, str):
+        return fault_of(fault)
     try:
-        return Fault(**given)
+        return Fault(**fault)
     except TypeError as error:  # Python names what is unknown or missing
         raise FaultError(f"{name}: {error}; known: {', '.join(Fault.model_fields)}") from None
 
@@ -189,8 +189,8 @@ def fault_of(text: str) -> Fault:
             f"fault {text!r}: should be MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200, "
             "with ROBOTS a whole number and ONSET and DURATION in seconds"
         )
-    given: dict[str, Any] = match.groupdict()
-    return Fault(**{name: text for name, text in given.items() if text is not None})
+    parts: dict[str, Any] = match.groupdict()
+    return Fault(**{name: text for name, text in parts.items() if text is not None})
 
 
 def text_of(fault: Fault) -> str | None:
@@ -221,11 +221,13 @@ class Occurrence:
     """
 
     def __init__(self, fault: Fault, seed: int, n_robots: int) -> None:
-        self.fault, self.mode, self._seed = fault, failure_mode(fault.mode), seed
+        self.fault = fault
+        self.mode = failure_mode(fault.mode)
+        self._seed = seed
         # The times at which an intermittent fault begins, ends, begins, ..., by robot.
         self._switches: dict[int, list[float]] = {}
-        chosen = failed_robots(fault, seed, n_robots)
-        self.robots = chosen if fault.role is None else chosen[:0]
+        affected = failed_robots(fault, seed, n_robots)
+        self.robots = affected if fault.role is None else affected[:0]
 
     def choose_by_role(self, state: WarehouseState) -> None:
         """Choose the robots of a fault that strikes by role, once it holds."""
@@ -261,7 +263,7 @@ class Occurrence:
                 changes.append(self._switches[robot][n_switches])
         return min(changes)
 
-    def left(self, time: float, end: float) -> tuple[float, float]:
+    def remaining_factors(self, time: float, end: float) -> tuple[float, float]:
         """Return the factors on speed and view at `time` [s] of an episode until `end` [s]."""
         mode, fault = self.mode, self.fault
         speed, view = mode.speed, mode.view
@@ -278,8 +280,8 @@ class Occurrence:
         fault = self.fault
         switches = self._switches.setdefault(robot, [fault.onset])
         while switches[-1] <= time + GRACE:
-            about = (robot, len(switches) // _SWITCHES)
-            rng = generator(self._seed, f"intermittent {fault.mode}", *about)
+            stream = (robot, len(switches) // _SWITCHES)
+            rng = generator(self._seed, f"intermittent {fault.mode}", *stream)
             means = np.resize(fault.intermittent or (), _SWITCHES)
             switches += (switches[-1] + np.cumsum(rng.exponential(means))).tolist()
         return bisect_right(switches, time + GRACE)
@@ -325,15 +327,17 @@ def apply_faults(
     able.max_turn_rate[:] = scenario.max_turn_rate * speed
     able.ranger_range[:] = scenario.ranger_range * sensing
     able.view_range[:] = scenario.view_range * sensing
-    able.ranger_bias[:], able.radio_delay[:] = 0.0, 0
+    able.ranger_bias[:] = 0.0
+    able.radio_delay[:] = 0
     for name in LOST_AS_A_WHOLE:
         getattr(able, name)[:] = True
-    gone = np.zeros(state.n_robots, np.bool_)
+    is_removed = np.zeros(state.n_robots, np.bool_)
     modes: list[list[str]] = [[] for _ in range(state.n_robots)]
     for occurrence in occurrences:
         occurrence.choose_by_role(state)
-        mode, robots = occurrence.mode, occurrence.holds_for(state.time)
-        speed_left, view_left = occurrence.left(state.time, scenario.duration)
+        mode = occurrence.mode
+        robots = occurrence.holds_for(state.time)
+        speed_left, view_left = occurrence.remaining_factors(state.time, scenario.duration)
         able.max_speed[robots] *= speed_left
         able.max_turn_rate[robots] *= speed_left
         able.view_range[robots] *= view_left
@@ -343,9 +347,9 @@ def apply_faults(
         able.radio_delay[robots] = np.maximum(able.radio_delay[robots], delay)
         for name in LOST_AS_A_WHOLE:
             getattr(able, name)[robots] &= getattr(mode, name)
-        gone[robots] |= not mode.present
+        is_removed[robots] |= not mode.present
         for robot in robots.tolist():
             modes[robot].append(occurrence.fault.mode)
     state.failure_modes = tuple(map(tuple, modes))
     state.failed = np.array([bool(names) for names in modes])
-    return gone
+    return is_removed

@@ -26,7 +26,7 @@ def blank_grid(width: float, height: float, cell: float, n_points: int) -> Grid:
         n_rows=n_rows,
         start=np.zeros(n_columns * n_rows + 1, np.int64),
         members=np.zeros(n_points, np.int64),
-        places=np.zeros((n_points, 2)),
+        position=np.zeros((n_points, 2)),
     )
 
 
@@ -71,13 +71,13 @@ def look_through(
 
     Returns how many are listed then.
     """
-    for place in range(run[0], run[1]):
-        dx, dy = grid.places[place, 0] - centre[0], grid.places[place, 1] - centre[1]
+    for slot in range(run[0], run[1]):
+        dx, dy = grid.position[slot, 0] - centre[0], grid.position[slot, 1] - centre[1]
         square = dx * dx + dy * dy
         # Written always and counted only if near: no branch to mispredict.
-        nearby.place[n_found] = place
+        nearby.slot[n_found] = slot
         nearby.square[n_found] = square
-        n_found += int((square <= reach * reach) & (grid.members[place] != left_out))
+        n_found += int((square <= reach * reach) & (grid.members[slot] != left_out))
     return n_found
 
 
@@ -107,5 +107,5 @@ def fill(grid: Grid, position: Numbers, included: Flags) -> None:
             cell = cell_of(grid, x, y)
             start[cell] -= 1
             grid.members[start[cell]] = point
-            grid.places[start[cell], 0] = x
-            grid.places[start[cell], 1] = y
+            grid.position[start[cell], 0] = x
+            grid.position[start[cell], 1] = y

@@ -22,20 +22,20 @@ _NO_DISCS = np.zeros((0, 2))
 
 def place_obstacles(scenario: Scenario, seed: int) -> Numbers:
     """Return obstacle centres in the storage [m], shape (n_obstacles, 2)."""
-    return _strewn(
+    return _draw_centres(
         scenario, seed, "obstacles", scenario.n_obstacles, scenario.obstacle_radius, _NO_DISCS
     )
 
 
 def place_items(scenario: Scenario, seed: int, obstacles: Numbers) -> Numbers:
     """Return item centres in the storage [m], shape (n_items, 2), clear of each other."""
-    return _strewn(scenario, seed, "items", scenario.n_items, scenario.item_radius, obstacles)
+    return _draw_centres(scenario, seed, "items", scenario.n_items, scenario.item_radius, obstacles)
 
 
 def place_robots(scenario: Scenario, seed: int, obstacles: Numbers) -> tuple[Numbers, Numbers]:
     """Return start centres [m] (N, 2), clear of each other, and headings [rad] (N,)."""
     n = scenario.n_robots
-    centres = _strewn(scenario, seed, "robots", n, scenario.robot_radius, obstacles)
+    centres = _draw_centres(scenario, seed, "robots", n, scenario.robot_radius, obstacles)
     draws = np.array([uniform(key, 0) for key in row_keys(seed, "headings", n)])
     return centres, (draws * 2.0 - 1.0) * np.pi
 
@@ -60,7 +60,7 @@ def place_restocked(world: World, item: int) -> bool:
     spacing = radius + max(radius, parameters.robot_radius)
     key = pair_key(items.restock_key[0], world.progress.n_delivered[0])
     for attempt in range(_ATTEMPTS):
-        x, y = place_drawn(key, attempt, radius, high_x, high_y)
+        x, y = draw_position(key, attempt, radius, high_x, high_y)
         is_free = is_clear(x, y, world.obstacles, parameters.obstacle_radius + radius)
         for other in range(len(items.status)):
             dx, dy = items.position[other, 0] - x, items.position[other, 1] - y
@@ -77,19 +77,19 @@ def place_restocked(world: World, item: int) -> bool:
     return False
 
 
-def _strewn(
-    scenario: Scenario, seed: int, what: str, count: int, radius: float, obstacles: Numbers
+def _draw_centres(
+    scenario: Scenario, seed: int, kind: str, count: int, radius: float, obstacles: Numbers
 ) -> Numbers:
     centres = np.zeros((count, 2))
     high_x, high_y = scenario.storage_width - radius, scenario.warehouse_height - radius
     reach = scenario.obstacle_radius + radius
     for arrangement in range(_ARRANGEMENTS):
-        again = f" {arrangement}" if arrangement else ""
-        keys = row_keys(seed, f"places of {what}{again}", count)
+        suffix = f" {arrangement}" if arrangement else ""
+        keys = row_keys(seed, f"places of {kind}{suffix}", count)
         if strew(keys, centres, radius, high_x, high_y, obstacles, reach):
             return centres
     raise ScenarioError(
-        f"no room for {count} {what} of radius {radius} m: should be fewer {what}, fewer "
+        f"no room for {count} {kind} of radius {radius} m: should be fewer {kind}, fewer "
         "obstacles or a larger warehouse"
     )
 
@@ -110,7 +110,7 @@ def strew(
     """
     for disc in range(len(keys)):
         for attempt in range(_ATTEMPTS):
-            x, y = place_drawn(keys[disc], attempt, radius, high_x, high_y)
+            x, y = draw_position(keys[disc], attempt, radius, high_x, high_y)
             is_free = is_clear(x, y, centres[:disc], 2.0 * radius)
             if is_free and is_clear(x, y, obstacles, obstacle_spacing):
                 centres[disc, 0] = x
@@ -122,7 +122,7 @@ def strew(
 
 
 @inlined_kernel
-def place_drawn(
+def draw_position(
     key: np.uint64, attempt: int, low: float, high_x: float, high_y: float
 ) -> tuple[float, float]:
     """Return the place that a stream draws at an attempt, from (low, low) to (high_x, high_y)."""

@@ -25,14 +25,7 @@ from .demand import ask, close_request, is_requested
 from .grid import look_around
 from .layout import place_restocked
 from .physics import EMPTY_ROBOT, FREE_ITEM, LADEN_ROBOT, NO_ONE, collide_with, put_item
-from .structs import (
-    CARRIED,
-    DELIVERED,
-    NOBODY,
-    STORED,
-    Integers,
-    World,
-)
+from .structs import CARRIED, DELIVERED, NOBODY, STORED, Integers, World
 
 FORWARD, LEFT, TURN, GRIPPER, MESSAGE = range(5)  # columns of a command row; messages are the rest
 # Columns of `Robots.handling`, and the kinds that the first one holds.
@@ -80,16 +73,18 @@ def drive(world: World) -> None:
         left = min(max(commands[robot, LEFT], -1.0), 1.0) if parameters.is_holonomic else 0.0
         norm = math.sqrt(forward * forward + left * left)
         speed = able.max_speed[robot] / max(norm, 1.0)
-        turn, most = min(max(commands[robot, TURN], -1.0), 1.0), able.max_turn_rate[robot]
-        drift = robots.heading_drift[robot] if most > 0.0 else 0.0
-        angle = (turn * most + drift) * parameters.control_period
+        turn = min(max(commands[robot, TURN], -1.0), 1.0)
+        max_turn_rate = able.max_turn_rate[robot]
+        drift = robots.heading_drift[robot] if max_turn_rate > 0.0 else 0.0
+        angle = (turn * max_turn_rate + drift) * parameters.control_period
         heading = robots.heading[robot]
         cosine, sine = math.cos(heading + 0.5 * angle), math.sin(heading + 0.5 * angle)
         wanted_velocity[robot, 0] = speed * (forward * cosine - left * sine)
         wanted_velocity[robot, 1] = speed * (forward * sine + left * cosine)
         if angle != 0.0:
-            turned = heading + angle
-            robots.heading[robot] = turned - 2.0 * math.pi * round(turned / (2.0 * math.pi))
+            new_heading = heading + angle
+            n_turns = round(new_heading / (2.0 * math.pi))
+            robots.heading[robot] = new_heading - 2.0 * math.pi * n_turns
 
 
 @inlined_kernel
@@ -132,10 +127,11 @@ def is_being_lifted(world: World, item: int) -> bool:
     """Return whether a robot is about to lift an item."""
     if world.parameters.handling_steps == 0:
         return False
-    handling, found = world.robots.handling, False
+    handling = world.robots.handling
+    is_lifted = False
     for robot in range(len(handling)):
-        found |= handling[robot, KIND] == LIFTING and handling[robot, ITEM] == item
-    return found
+        is_lifted |= handling[robot, KIND] == LIFTING and handling[robot, ITEM] == item
+    return is_lifted
 
 
 @kernel
@@ -156,7 +152,7 @@ def item_lifted(world: World, robot: int) -> tuple[int, float]:
 
 @kernel
 def end_handling(world: World) -> None:
-    """Let robots go on whose time is over."""
+    """Make those robots idle whose handling time is over."""
     handling = world.robots.handling
     for robot in range(len(handling)):
         if handling[robot, LAST_STEP] <= world.progress.step[0]:
@@ -173,7 +169,7 @@ def mask_below(world: World, robot: int) -> None:
     x, y = world.robots.position[robot, 0], world.robots.position[robot, 1]
     n_found = look_around(grid, x, y, reach_of(world), NOBODY, nearby)
     for index in range(n_found):
-        item = grid.members[nearby.place[index]]
+        item = grid.members[nearby.slot[index]]
         if items.status[item] == STORED:
             items.covered[item] = 1
             collide_with(world.engine, world.engine.item_shapes[item], NO_ONE)
@@ -186,15 +182,15 @@ def unmask_left(world: World) -> None:
     Both grids hold where things stand now. An item that is in none yet waits for the next step.
     """
     grid, nearby = world.item_grid, world.nearby
-    for place in range(grid.start[-1]):
-        item = grid.members[place]
+    for slot in range(grid.start[-1]):
+        item = grid.members[slot]
         if world.items.covered[item] == 0:
             continue
-        x, y = grid.places[place, 0], grid.places[place, 1]
+        x, y = grid.position[slot, 0], grid.position[slot, 1]
         n_found = look_around(world.robot_grid, x, y, reach_of(world), NOBODY, nearby)
         is_below_laden = False
         for index in range(n_found):
-            robot = world.robot_grid.members[nearby.place[index]]
+            robot = world.robot_grid.members[nearby.slot[index]]
             is_below_laden |= world.robots.item[robot] != NOBODY
         if not is_below_laden:
             world.items.covered[item] = 0
@@ -273,8 +269,8 @@ def take_out(world: World, robot: int) -> None:
 @inlined_kernel
 def remember(memory: Integers, robot: int, item: int) -> None:
     """Put `item` in front of a robot's memory, which forgets its oldest."""
-    for place in range(memory.shape[1] - 1, 0, -1):
-        memory[robot, place] = memory[robot, place - 1]
+    for index in range(memory.shape[1] - 1, 0, -1):
+        memory[robot, index] = memory[robot, index - 1]
     if memory.shape[1] > 0:
         memory[robot, 0] = item
 
@@ -282,10 +278,10 @@ def remember(memory: Integers, robot: int, item: int) -> None:
 @inlined_kernel
 def is_remembered(memory: Integers, robot: int, item: int) -> bool:
     """Return whether `item` is in a robot's memory."""
-    found = False
-    for place in range(memory.shape[1]):
-        found |= memory[robot, place] == item
-    return found
+    is_in_memory = False
+    for index in range(memory.shape[1]):
+        is_in_memory |= memory[robot, index] == item
+    return is_in_memory
 
 
 @kernel
@@ -302,7 +298,7 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
     n_found = look_around(grid, x, y, world.parameters.pickup_range, NOBODY, nearby)
     best, best_square, is_best_requested = NOBODY, math.inf, False
     for index in range(n_found):
-        item, square = grid.members[nearby.place[index]], nearby.square[index]
+        item, square = grid.members[nearby.slot[index]], nearby.square[index]
         if world.items.status[item] != STORED or is_being_lifted(world, item):
             continue
         is_asked_for = is_requested(world, item)
@@ -364,11 +360,13 @@ def deliver(world: World) -> tuple[int, bool]:
     Returns how many there were, and whether all that came back found room.
     """
     robots, items, progress, engine = world.robots, world.items, world.progress, world.engine
-    n_delivered, is_room, place = 0, True, 0
-    while place < len(progress.requested) and progress.requested[place] != NOBODY:
-        item = progress.requested[place]
+    n_delivered = 0
+    is_room = True
+    index = 0
+    while index < len(progress.requested) and progress.requested[index] != NOBODY:
+        item = progress.requested[index]
         robot = items.carrier[item]
-        place += 1
+        index += 1
         if robot == NOBODY or not robots.in_delivery[robot] or not world.able.delivers[robot]:
             continue
         if not may_deliver(world, robot) or not is_done(world, robot, DELIVERING, item):
@@ -390,5 +388,5 @@ def deliver(world: World) -> tuple[int, bool]:
                 is_room = False
         close_request(world, item)
         ask(world)
-        place = 0  # what is asked for now may have waited here
+        index = 0  # what is asked for now may have waited here
     return n_delivered, is_room

@@ -22,9 +22,9 @@ def in_one_thread(method: M) -> M:
     """Let a method of what has a `lock` raise a SetupError while another thread holds that."""
 
     @functools.wraps(method)
-    def refusing(self: Any, *arguments: Any, **named: Any) -> Any:
+    def refusing(self: Any, *arguments: Any, **keywords: Any) -> Any:
         with holding([self.lock]):
-            return method(self, *arguments, **named)
+            return method(self, *arguments, **keywords)
 
     return cast("M", refusing)
 
@@ -36,15 +36,15 @@ def holding(locks: Iterable[Lock]) -> Iterator[None]:
     Raises:
         SetupError: another thread uses one of the worlds.
     """
-    held = []
+    held_locks = []
     try:
         for lock in locks:
             if not lock.acquire(blocking=False):
                 raise used_elsewhere()
-            held.append(lock)
+            held_locks.append(lock)
         yield
     finally:
-        for lock in held:
+        for lock in held_locks:
             lock.release()
 
 

@@ -112,9 +112,9 @@ def put_item(engine: Engine, item: int, position: Numbers) -> None:
 
 
 @kernel
-def collide_with(engine: Engine, shape: int, whom: int) -> None:
+def collide_with(engine: Engine, shape: int, categories: int) -> None:
     """Give a shape a filter, of no group."""
-    call_at(engine.functions.cpShapeSetFilter, (shape, (0, whom)))
+    call_at(engine.functions.cpShapeSetFilter, (shape, (0, categories)))
 
 
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
@@ -148,14 +148,17 @@ def build_solids(world: World, static: int) -> None:
     corner_x = (-_WALL, width + _WALL, width + _WALL, -_WALL)
     corner_y = (-_WALL, -_WALL, height + _WALL, height + _WALL)
     for side in range(N_WALLS):
-        one, other = side, (side + 1) % N_WALLS
-        ends = ((corner_x[one], corner_y[one]), (corner_x[other], corner_y[other]))
+        corner, next_corner = side, (side + 1) % N_WALLS
+        ends = (
+            (corner_x[corner], corner_y[corner]),
+            (corner_x[next_corner], corner_y[next_corner]),
+        )
         engine.solid_shapes[side] = made_at(
             call.cpSegmentShapeNew, (static, ends[0], ends[1], _WALL)
         )
     for obstacle in range(len(obstacles)):
-        place = (obstacles[obstacle, 0], obstacles[obstacle, 1])
-        shape = made_at(call.cpCircleShapeNew, (static, parameters.obstacle_radius, place))
+        centre = (obstacles[obstacle, 0], obstacles[obstacle, 1])
+        shape = made_at(call.cpCircleShapeNew, (static, parameters.obstacle_radius, centre))
         engine.solid_shapes[N_WALLS + obstacle] = shape
     for shape in engine.solid_shapes:
         collide_with(engine, shape, SOLID_THING)
@@ -170,13 +173,13 @@ def build_robots(world: World) -> None:
     # A batch reads and writes bodies in the order in which they were added.
     for robot in range(len(robots.item)):
         body = made_at(call.cpBodyNew, (parameters.robot_mass, math.inf))
-        place = (engine.robot_places[robot, 0], engine.robot_places[robot, 1])
-        call_at(call.cpBodySetPosition, (body, place))
+        position = (engine.robot_places[robot, 0], engine.robot_places[robot, 1])
+        call_at(call.cpBodySetPosition, (body, position))
         velocity = (robots.velocity[robot, 0], robots.velocity[robot, 1])
         call_at(call.cpBodySetVelocity, (body, velocity))
         shape = made_at(call.cpCircleShapeNew, (body, parameters.robot_radius, (0.0, 0.0)))
-        met = EMPTY_ROBOT if robots.item[robot] == NOBODY else LADEN_ROBOT
-        collide_with(engine, shape, met if robots.present[robot] else NO_ONE)
+        kind = EMPTY_ROBOT if robots.item[robot] == NOBODY else LADEN_ROBOT
+        collide_with(engine, shape, kind if robots.present[robot] else NO_ONE)
         engine.robot_bodies[robot], engine.robot_shapes[robot] = body, shape
         made_at(call.cpSpaceAddBody, (space, body))
         made_at(call.cpSpaceAddShape, (space, shape))
@@ -190,8 +193,8 @@ def build_items(world: World, static: int) -> None:
     """
     engine, items, call = world.engine, world.items, world.engine.functions
     for item in range(len(items.status)):
-        place = (items.position[item, 0], items.position[item, 1])
-        shape = made_at(call.cpCircleShapeNew, (static, world.parameters.item_radius, place))
+        centre = (items.position[item, 0], items.position[item, 1])
+        shape = made_at(call.cpCircleShapeNew, (static, world.parameters.item_radius, centre))
         is_solid = items.status[item] == STORED and items.covered[item] == 0
         collide_with(engine, shape, FREE_ITEM if is_solid else NO_ONE)
         made_at(call.cpSpaceAddShape, (engine.space[0], shape))
@@ -230,12 +233,12 @@ class Physics:
     def __init__(self, scenario: Scenario, robot_places: Numbers) -> None:
         n = scenario.n_robots
         # A batch call reads and writes every body: of N robots, and the static one.
-        self._kept = [
+        self._batches = [
             _batch(n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY),
             _batch(n + 1, 2, BodyFields.VELOCITY),
             _batch(n + 1, 2, BodyFields.FORCE),
         ]
-        bodies, velocities, forces = (batch for batch, _ in self._kept)
+        bodies, velocities, forces = (batch for batch, _ in self._batches)
         self.engine = Engine(
             functions=_FUNCTION_ADDRESSES,
             space=np.zeros(1, np.int64),
@@ -254,10 +257,10 @@ class Physics:
         """Make the bodies of the world at `address` as its arrays have them now."""
         build(address)
         # This is left out at the end of the process, which frees everything anyway.
-        finalize(self, _free, packed(self.engine), self.engine, self._kept).atexit = False
+        finalize(self, _free, packed(self.engine), self.engine, self._batches).atexit = False
 
 
-def _free(engine: NDArray[np.int64], *kept: object) -> None:
+def _free(engine: NDArray[np.int64], *batches: object) -> None:
     free(engine.ctypes.data)
 
 

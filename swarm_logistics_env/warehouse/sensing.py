@@ -1,179 +1,26 @@
 """What every robot senses, one sense after the other: the observation rows.
 
-Compiled, and over cell grids, so that the cost is linear in the number of robots.
-
-It has what a robot knows of itself and touches, and the errors of sensors: noise, rangers that
-fail, and what else turns a true row into a measured one. The rest stands in `surroundings`.
+Compiled, and over cell grids, so that the cost is linear in the number of robots. Each sense has a
+file of its own: `rangers`, `radio`, `cameras` and `touch`; `sensor_errors` makes of a true row a
+measured one. What a robot knows of itself is filled here.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, uniform
+from swarm_logistics_env.kernels import inlined_kernel, kernel
 
+from .cameras import choose, describe_items, describe_neighbours
 from .demand import is_requested
 from .grid import look_around
-from .structs import NOBODY, Parameters, Sensed, World
-from .surroundings import (
-    ITEM_SEEN,
-    ROBOT_SEEN,
-    Pose,
-    choose,
-    in_frame,
-    listen,
-    scan_discs,
-    scan_solids,
-    tell_of_items,
-    tell_of_neighbours,
-)
-
-
-@inlined_kernel
-def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
-    """Fill the end of a row: load, delivery area, timer, velocity and contact."""
-    robots, parameters = world.robots, world.parameters
-    velocity_x, velocity_y = robots.velocity[me, 0], robots.velocity[me, 1]
-    forward = velocity_x * pose.cosine + velocity_y * pose.sine
-    left = velocity_y * pose.cosine - velocity_x * pose.sine
-    limit = parameters.max_speed
-    carried, timer = robots.item[me], robots.timer[me]
-    runs = not math.isnan(timer)
-    out[row.CARRYING] = 1.0 if carried != NOBODY else 0.0
-    out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and is_requested(world, carried) else 0.0
-    out[row.IN_DELIVERY_AREA] = 1.0 if robots.in_delivery[me] else 0.0
-    out[row.TIMER_RUNS] = 1.0 if runs else 0.0
-    out[row.TIMER] = timer if runs else parameters.timer_limit
-    out[row.VELOCITY] = min(max(forward, -limit), limit)
-    out[row.VELOCITY + 1] = min(max(left, -limit), limit)
-    out[row.CONTACT] = 1.0 if robots.contact[me] else 0.0
-
-
-GAP = 0.01  # [m], gap below which two things touch
-
-
-@inlined_kernel
-def touches_solid(pose: Pose, world: World) -> bool:
-    """Return whether a robot touches a wall or an obstacle."""
-    parameters, obstacles = world.parameters, world.obstacles
-    reach = parameters.robot_radius + GAP
-    away_x = min(pose.x, parameters.warehouse_width - pose.x)
-    away_y = min(pose.y, parameters.warehouse_height - pose.y)
-    touches = min(away_x, away_y) < reach
-    limit = (reach + parameters.obstacle_radius) ** 2
-    for obstacle in range(len(obstacles)):
-        dx, dy = obstacles[obstacle, 0] - pose.x, obstacles[obstacle, 1] - pose.y
-        touches |= dx * dx + dy * dy < limit
-    return touches
-
-
-@inlined_kernel
-def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
-    """Return whether `me` touches a robot, and whether it is sound and touches one that failed."""
-    limit = (2.0 * world.parameters.robot_radius + GAP) ** 2
-    failed = world.robots.failed
-    touches = is_anchored = False
-    for index in range(n_found):
-        if world.nearby.square[index] < limit:
-            other = world.robot_grid.members[world.nearby.place[index]]
-            touches = True
-            is_anchored |= failed[other] and not failed[me]
-    return touches, is_anchored
-
-
-@inlined_kernel
-def touches_items(world: World, n_found: int) -> bool:
-    """Return whether a laden robot touches an item that is in its way."""
-    limit = (world.parameters.robot_radius + GAP + world.parameters.item_radius) ** 2
-    touches = False
-    for index in range(n_found):
-        if world.nearby.square[index] < limit:
-            item = world.item_grid.members[world.nearby.place[index]]
-            touches |= world.items.covered[item] == 0
-    return touches
-
-
-_N_RANGES = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
-# Things with a place: items, neighbours, and the teller of the lowest timer.
-_N_THINGS = row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1
-# A robot draws in a step: an error for every beam, whether each is dropped, then errors of places.
-_DROPPED, _PLACES, _DRAWS = _N_RANGES, 2 * _N_RANGES, 2 * _N_RANGES + 2 * _N_THINGS
-
-
-@inlined_kernel
-def full_range(world: World, robot: int) -> float:
-    """Return what a robot's beams read that meet nothing [m], also where its rangers are blind."""
-    own = world.able.ranger_range[robot]
-    return own if own > 0.0 else world.parameters.ranger_range
-
-
-@kernel
-def disturb(me: int, world: World, out: Sensed) -> None:
-    """Add the scenario's noise to a row and drop beams, in place.
-
-    What is measured stays within the column's range.
-    """
-    parameters = world.parameters
-    key, first = world.robots.sensor_key[me], world.progress.step[0] * _DRAWS
-    if parameters.ranger_noise > 0.0 or parameters.sensor_dropout > 0.0:
-        disturb_beams(key, first, full_range(world, me), parameters, out)
-    if parameters.position_noise > 0.0:
-        disturb_places(key, first + _PLACES, parameters, out)
-
-
-@kernel
-def disturb_beams(
-    key: np.uint64, first: int, reach: float, parameters: Parameters, out: Sensed
-) -> None:
-    """Add noise to the beams of a row, from number `first` of the stream, and drop some.
-
-    A beam that is dropped reports what one does that meets nothing within `reach` [m].
-    """
-    dropout, noise = parameters.sensor_dropout, parameters.ranger_noise
-    for beam in range(_N_RANGES):
-        if dropout > 0.0 and uniform(key, 2 * (first + _DROPPED + beam)) < dropout:
-            out[beam] = reach
-        elif noise > 0.0 and out[beam] < np.float32(reach):
-            noisy = out[beam] + noise * gaussian(key, first + beam)
-            out[beam] = min(max(noisy, 0.0), reach)
-
-
-@kernel
-def disturb_places(key: np.uint64, first: int, parameters: Parameters, out: Sensed) -> None:
-    """Add noise to the places of what is there in a row, from number `first` of the stream."""
-    far = max(parameters.view_range, parameters.radio_range)
-    for thing in range(_N_THINGS):
-        if thing < row.N_ITEMS_IN_VIEW:
-            column, limit = row.ITEMS + row.ITEM_WIDTH * thing, parameters.view_range
-        else:
-            column = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (thing - row.N_ITEMS_IN_VIEW)
-            limit = far
-        if out[column] > 0.5:
-            for axis in range(2):
-                error = parameters.position_noise * gaussian(key, first + 2 * thing + axis)
-                out[column + 1 + axis] = min(max(out[column + 1 + axis] + error, -limit), limit)
-
-
-@kernel
-def fail_rangers(me: int, world: World, out: Sensed) -> None:
-    """Make of the beams in a row what rangers that have failed report, in place."""
-    able, frozen = world.able, world.robots.frozen_beams[me]
-    bias, reach = able.ranger_bias[me], full_range(world, me)
-    if bias != 0.0:
-        for beam in range(_N_RANGES):
-            if out[beam] < np.float32(reach):
-                out[beam] = min(max(out[beam] + bias, 0.0), reach)
-    if able.rangers_refresh[me]:
-        frozen[0] = math.nan
-    elif math.isnan(frozen[0]):
-        for beam in range(_N_RANGES):
-            frozen[beam] = out[beam]
-    else:
-        for beam in range(_N_RANGES):
-            out[beam] = frozen[beam]
+from .pose import Pose, in_frame
+from .radio import listen
+from .rangers import N_RANGES, full_range, scan_discs, scan_solids
+from .sensor_errors import ITEM_SEEN, ROBOT_SEEN, disturb, fail_rangers
+from .structs import NOBODY, Sensed, World
+from .touch import GAP, touches_items, touches_robots, touches_solid
 
 
 @kernel
@@ -182,7 +29,8 @@ def sense(world: World, rows: Sensed) -> int:
 
     Returns how many robots that have not failed touch one that has.
     """
-    robots, n_anchored = world.robots, 0
+    robots = world.robots
+    n_anchored = 0
     for me in range(len(rows)):
         rows[me, :] = 0.0
         robots.contact[me] = False
@@ -194,7 +42,7 @@ def sense(world: World, rows: Sensed) -> int:
             robots.position[me, 0], robots.position[me, 1], math.cos(heading), math.sin(heading)
         )
         reach = world.able.ranger_range[me]
-        scans = rows[me, :_N_RANGES]
+        scans = rows[me, :N_RANGES]
         scans[:] = full_range(world, me)
         if reach > 0.0:
             scan = rows[me, row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
@@ -233,7 +81,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
         out[row.LOWEST_TIMER + 2] = left
         out[row.LOWEST_TIMER + 3] = timer
     n_chosen = choose(me, world, grid, n_found, ROBOT_SEEN)
-    tell_of_neighbours(pose, world, n_chosen, out)
+    describe_neighbours(pose, world, n_chosen, out)
     return is_anchored
 
 
@@ -252,4 +100,25 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     if world.robots.item[me] != NOBODY:
         world.robots.contact[me] |= touches_items(world, n_found)
     n_chosen = choose(me, world, grid, n_found, ITEM_SEEN)
-    tell_of_items(me, pose, world, n_chosen, out)
+    describe_items(me, pose, world, n_chosen, out)
+
+
+@inlined_kernel
+def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
+    """Fill the end of a row: load, delivery area, timer, velocity and contact."""
+    robots, parameters = world.robots, world.parameters
+    velocity_x, velocity_y = robots.velocity[me, 0], robots.velocity[me, 1]
+    forward = velocity_x * pose.cosine + velocity_y * pose.sine
+    left = velocity_y * pose.cosine - velocity_x * pose.sine
+    limit = parameters.max_speed
+    carried = robots.item[me]
+    timer = robots.timer[me]
+    runs = not math.isnan(timer)
+    out[row.CARRYING] = 1.0 if carried != NOBODY else 0.0
+    out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and is_requested(world, carried) else 0.0
+    out[row.IN_DELIVERY_AREA] = 1.0 if robots.in_delivery[me] else 0.0
+    out[row.TIMER_RUNS] = 1.0 if runs else 0.0
+    out[row.TIMER] = timer if runs else parameters.timer_limit
+    out[row.VELOCITY] = min(max(forward, -limit), limit)
+    out[row.VELOCITY + 1] = min(max(left, -limit), limit)
+    out[row.CONTACT] = 1.0 if robots.contact[me] else 0.0

@@ -82,7 +82,8 @@ class WarehouseState:
         for prefix, structure in (("robot_", self.robots), ("", self.able), ("item_", self.items)):
             for name, array in structure._asdict().items():
                 setattr(self, prefix + name, array)
-        self.failed, self.last_in_delivery = self.robots.failed, self.robots.last_in_delivery
+        self.failed = self.robots.failed
+        self.last_in_delivery = self.robots.last_in_delivery
         self.open_requests = self.progress.requested
         self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
         # Per robot, the failure modes that hold.
@@ -114,9 +115,9 @@ class WarehouseState:
     @property
     def item_requested(self) -> Flags:
         """Which items are asked for (I,): a request for them is open."""
-        asked = np.zeros(len(self.item_status), np.bool_)
-        asked[self.open_requests[self.open_requests != NOBODY]] = True
-        return asked
+        is_requested = np.zeros(len(self.item_status), np.bool_)
+        is_requested[self.open_requests[self.open_requests != NOBODY]] = True
+        return is_requested
 
     @property
     def carries_requested(self) -> Flags:

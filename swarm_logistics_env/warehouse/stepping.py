@@ -19,9 +19,9 @@ from .logistics import (
 )
 from .packing import unpacked_at
 from .physics import advance
+from .radio import run_timers, send_messages
 from .sensing import sense
 from .structs import NOBODY, STORED, Commands, Sensed, World
-from .surroundings import run_timers, send_messages
 
 
 @kernel

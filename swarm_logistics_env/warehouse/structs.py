@@ -142,13 +142,13 @@ class Grid(NamedTuple):
     n_rows: int  # cells along y
     start: Annotated[Integers, "cells + 1"]  # where each cell's points begin in `members`
     members: Annotated[Integers, "points"]  # point numbers, cell by cell, row by row of cells
-    places: Annotated[Numbers, "points", 2]  # [m], in the same order
+    position: Annotated[Numbers, "points", 2]  # [m], in the same order
 
 
 class Nearby(NamedTuple):
     """What stands near one robot: working space, filled anew for every robot and sense."""
 
-    place: Annotated[Integers, "nearby"]  # where it stands in `Grid.members`
+    slot: Annotated[Integers, "nearby"]  # where it stands in `Grid.members`
     square: Annotated[Numbers, "nearby"]  # [m^2] of its distance
     is_heard: Annotated[Flags, "nearby"]  # of robots, on the radio
     chosen: Annotated[Integers, "nearby"]  # numbers of robots or items that are seen or heard
@@ -156,7 +156,7 @@ class Nearby(NamedTuple):
     chosen_heard: Annotated[Flags, "nearby"]  # of robots, whether it is heard
     nearest: Annotated[Integers, "nearby"]  # indices into `chosen` of the nearest, nearest first
     is_free: Annotated[Flags, "nearby"]  # of items, by their numbers
-    scanned: Annotated[Integers, "nearby"]  # indices into `place` of what the rangers may meet
+    scanned: Annotated[Integers, "nearby"]  # indices into `slot` of what the rangers may meet
     forward: Annotated[Numbers, "nearby"]  # [m] of what is scanned, in the robot's frame
     left: Annotated[Numbers, "nearby"]  # [m]
     scanned_square: Annotated[Numbers, "nearby"]  # [m^2]

@@ -28,7 +28,7 @@ from .structs import Claims, Commands, Nearby, Parameters, Sensed, StepResult, W
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
-_NOT_KEPT = ("_physics", "_world", "_words", "_address", "_memory", "lock")
+_NOT_PICKLED = ("_physics", "_world", "_words", "_address", "_memory", "lock")
 
 
 class Warehouse:
@@ -113,7 +113,7 @@ class Warehouse:
         if not lock.acquire(False):  # as `in_one_thread`, within a tenth of a microsecond
             raise used_elsewhere()
         try:
-            self._world.commands.now[...] = self._checked(commands)
+            self._world.commands.now[...] = self._as_commands(commands)
             rows = np.empty_like(self._rows)  # what was handed out stays as it was
             self.take(rows, stepping.step(self._address, rows))
             return rows
@@ -164,7 +164,7 @@ class Warehouse:
             ScenarioError: a field is unknown, cannot change during a run, or its value cannot be.
             SetupError: the world was never reset.
         """
-        self._begun("change")
+        self._seed_of_episode("change")
         for name in fields:
             if name not in CHANGES_DURING_RUN and name in Scenario.model_fields:
                 raise ScenarioError(
@@ -183,7 +183,7 @@ class Warehouse:
             FaultError: a fault names robots that are not there.
             SetupError: the world was never reset.
         """
-        seed = self._begun("set_faults")
+        seed = self._seed_of_episode("set_faults")
         self._occurrences = _occurrences(faults, seed, self.state.n_robots)
         self._apply_faults()
         self._remember()
@@ -195,13 +195,13 @@ class Warehouse:
         Raises:
             SetupError: the world was never reset.
         """
-        self._begun("observe")
+        self._seed_of_episode("observe")
         return self._rows
 
     @property
     def faults(self) -> tuple[Fault, ...]:
         """What affects whom in this episode."""
-        return tuple(each.fault for each in self._occurrences)
+        return tuple(occurrence.fault for occurrence in self._occurrences)
 
     @property
     def numbered_faults(self) -> tuple[Fault, ...]:
@@ -210,10 +210,10 @@ class Warehouse:
         Given to `set_faults`, they change nothing.
         """
         return tuple(
-            each.fault.replace(robots=tuple(each.robots.tolist()), role=None)
-            if len(each.robots)
-            else each.fault
-            for each in self._occurrences
+            occurrence.fault.replace(robots=tuple(occurrence.robots.tolist()), role=None)
+            if len(occurrence.robots)
+            else occurrence.fault
+            for occurrence in self._occurrences
         )
 
     @property
@@ -224,7 +224,9 @@ class Warehouse:
     @property
     def struck_robots(self) -> tuple[int, ...]:
         """The robots that any fault of this episode names, ascending."""
-        return tuple(sorted({int(robot) for each in self._occurrences for robot in each.robots}))
+        return tuple(
+            sorted({int(robot) for occurrence in self._occurrences for robot in occurrence.robots})
+        )
 
     @property
     def address(self) -> int:
@@ -233,7 +235,7 @@ class Warehouse:
         Raises:
             SetupError: the world was never reset.
         """
-        self._begun("step")
+        self._seed_of_episode("step")
         return self._address
 
     @property
@@ -246,10 +248,10 @@ class Warehouse:
         """Whether the scenario's duration has passed."""
         return self.state.step >= self.scenario.n_steps
 
-    def _begun(self, asked: str) -> int:
+    def _seed_of_episode(self, caller: str) -> int:
         """Return the seed of the episode; raise SetupError if there is none."""
         if self._seed is None:
-            raise SetupError(f"{asked} before reset: call reset(seed) first")
+            raise SetupError(f"{caller} before reset: call reset(seed) first")
         return self._seed
 
     def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
@@ -267,20 +269,20 @@ class Warehouse:
         items.restock_key[0] = key(seed, "restock")
         state.open_requests[:] = NOBODY
 
-    def _checked(self, commands: ArrayLike) -> NDArray[np.float64]:
-        self._begun("step")
+    def _as_commands(self, commands: ArrayLike) -> NDArray[np.float64]:
+        self._seed_of_episode("step")
         try:
-            given = np.asarray(commands)
+            array = np.asarray(commands)
         except (TypeError, ValueError) as error:
             raise CommandError(f"commands should be an array of numbers: {error}") from None
-        if given.dtype.kind not in "fiub":  # NumPy makes numbers of texts and times, too
-            raise CommandError(f"commands should be numbers: real ones, not {given.dtype}")
+        if array.dtype.kind not in "fiub":  # NumPy makes numbers of texts and times, too
+            raise CommandError(f"commands should be numbers: real ones, not {array.dtype}")
         n, n_columns = self._command_shape
-        if given.shape == self._command_shape:
-            return given
-        if given.shape == (n, MESSAGE):
-            return np.pad(given, ((0, 0), (0, n_columns - MESSAGE)))
-        raise CommandError(f"commands of shape {given.shape}: should be {self._command_shape}")
+        if array.shape == self._command_shape:
+            return array
+        if array.shape == (n, MESSAGE):
+            return np.pad(array, ((0, 0), (0, n_columns - MESSAGE)))
+        raise CommandError(f"commands of shape {array.shape}: should be {self._command_shape}")
 
     def _make_room_to_work(self) -> None:
         scenario = self.scenario
@@ -312,8 +314,10 @@ class Warehouse:
         return log.reshape(-1, *now.shape)[: n_logged.item()]
 
     def _save(self) -> None:
-        kept = {name: value for name, value in self.__dict__.items() if name not in _NOT_KEPT}
-        self._memory = pickle.dumps(kept)
+        attributes = {
+            name: value for name, value in self.__dict__.items() if name not in _NOT_PICKLED
+        }
+        self._memory = pickle.dumps(attributes)
 
     @in_one_thread
     def __getstate__(self) -> dict[str, Any]:
@@ -337,14 +341,15 @@ class Warehouse:
         period = self.scenario.control_period
         now, next_step = state.time, (state.step + 1) * period
         change = min(
-            (each.next_change(now, next_step) for each in self._occurrences), default=math.inf
+            (occurrence.next_change(now, next_step) for occurrence in self._occurrences),
+            default=math.inf,
         )
         state.progress.is_changed[0] = True
         # The first step that ends when it has come; or none of any episode.
         is_ever = change <= LARGEST
         state.progress.pause_step[0] = math.ceil((change - GRACE) / period) if is_ever else NOBODY
-        gone = apply_faults(state, self.scenario, self._occurrences)
-        for robot in np.flatnonzero(gone & state.robot_present).tolist():
+        is_removed = apply_faults(state, self.scenario, self._occurrences)
+        for robot in np.flatnonzero(is_removed & state.robot_present).tolist():
             stepping.remove(self._address, robot)
 
     def _build(self) -> None:
@@ -379,9 +384,9 @@ class Warehouse:
         self._physics.begin(self._address)
 
 
-def not_finite(commands: NDArray[np.float64], place: int) -> CommandError:
+def not_finite(commands: NDArray[np.float64], index: int) -> CommandError:
     """Return the error about the command at that place, row by row."""
-    row, column = divmod(place, commands.shape[1])
+    row, column = divmod(index, commands.shape[1])
     return CommandError(f"commands[{row}, {column}] = {commands[row, column]}: should be finite")
 
 
@@ -389,7 +394,7 @@ def _occurrences(faults: Sequence[FaultLike], seed: int, n_robots: int) -> list[
     return [Occurrence(fault, seed, n_robots) for fault in checked_faults("faults", faults)]
 
 
-def _scenario(given: Scenario | None, otherwise: Scenario) -> Scenario:
-    if not isinstance(given, Scenario | None):
-        raise ScenarioError(f"scenario = {given!r}: should be a Scenario")
-    return otherwise if given is None else given
+def _scenario(scenario: Scenario | None, otherwise: Scenario) -> Scenario:
+    if not isinstance(scenario, Scenario | None):
+        raise ScenarioError(f"scenario = {scenario!r}: should be a Scenario")
+    return otherwise if scenario is None else scenario

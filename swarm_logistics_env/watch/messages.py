@@ -157,7 +157,7 @@ def _arena(play: Play) -> Message:
         age = int(_TIMER_STEPS * ages[robot]) if ages[robot] < 1.0 else None
         mark = palette.mark(state.failure_modes[robot])
         robots.append(
-            [palette.activity(state, robot), age, mark, palette.followed(state, scenario, robot)]
+            [palette.activity(state, robot), age, mark, palette.leader_of(state, scenario, robot)]
         )
     requested = state.item_requested
     stored = state.item_status == STORED

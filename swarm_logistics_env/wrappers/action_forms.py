@@ -78,10 +78,10 @@ class MotionFrame(Wrapper):
         Raises:
             CommandError: wrong shape, not readable or not finite; nothing has happened then.
         """
-        given = numbers_of(outputs, "outputs", (self.n_rows, len(OUTPUTS)))
-        if not np.isfinite(given).all():
-            raise CommandError(f"outputs = {given}: should be finite")
-        outcome = self.env.step_arrays(self._frame.command(given))
+        rows = numbers_of(outputs, "outputs", (self.n_rows, len(OUTPUTS)))
+        if not np.isfinite(rows).all():
+            raise CommandError(f"outputs = {rows}: should be finite")
+        outcome = self.env.step_arrays(self._frame.command(rows))
         return (self._read(outcome[0]), *outcome[1:])
 
     def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -135,11 +135,11 @@ class DiscreteActions(Wrapper):
 
     def __init__(self, env: SwarmLogisticsEnv | Wrapper) -> None:
         super().__init__(env)
-        told = env.action_space("robot_0")
-        if not isinstance(told, Box):
-            raise SetupError(f"env = {env}: its commands are {told}, should be a Box")
+        space = env.action_space("robot_0")
+        if not isinstance(space, Box):
+            raise SetupError(f"env = {env}: its commands are {space}, should be a Box")
         self._space = Discrete(len(ACTIONS))
-        self._commands = np.zeros((len(ACTIONS), *told.shape))
+        self._commands = np.zeros((len(ACTIONS), *space.shape))
         self._commands[:, :4] = list(ACTIONS.values())
 
     def action_space(self, agent: str) -> Discrete:
@@ -153,12 +153,12 @@ class DiscreteActions(Wrapper):
             CommandError: no whole numbers from 0 to 12, one for each robot.
             SetupError: there was no reset.
         """
-        given = numbers_of(commands, "actions", (self.n_rows,))
-        is_action = np.isin(given, np.arange(len(ACTIONS)))
+        numbers = numbers_of(commands, "actions", (self.n_rows,))
+        is_action = np.isin(numbers, np.arange(len(ACTIONS)))
         if not is_action.all():
             robot = int(np.argmin(is_action))
             raise CommandError(
-                f"action of robot_{robot} = {given[robot]}: should be a whole number from 0 to "
+                f"action of robot_{robot} = {numbers[robot]}: should be a whole number from 0 to "
                 f"{len(ACTIONS) - 1}"
             )
-        return super().step_arrays(self._commands[given.astype(np.intp)])
+        return super().step_arrays(self._commands[numbers.astype(np.intp)])

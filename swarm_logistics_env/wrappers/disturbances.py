@@ -16,7 +16,7 @@ from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
 
-from .wrapper import Wrapper, drawn, listed
+from .wrapper import Wrapper, as_choices, draw
 
 
 class FaultInjection(Wrapper):
@@ -74,7 +74,7 @@ class FaultInjection(Wrapper):
         super().__init__(env)
         self._fault = Fault(mode, robots, duration=duration, factor=factor)
         if not callable(onset):
-            onset = _times(onset)
+            onset = _as_times(onset)
             for time in onset:
                 self._fault.replace(onset=time)
             if len(onset) == 0:
@@ -87,18 +87,18 @@ class FaultInjection(Wrapper):
     @property
     def failed_robots(self) -> tuple[int, ...]:
         """The robots that this wrapper's faults affect in this episode, ascending."""
-        named = [fault.robots for fault in self.injected if isinstance(fault.robots, tuple)]
-        return tuple(sorted(set().union(*named)))
+        groups = [fault.robots for fault in self.injected if isinstance(fault.robots, tuple)]
+        return tuple(sorted(set().union(*groups)))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's faults added to theirs."""
         n_robots = self.env.scenario_of(seed, options).n_robots
-        faults = self._drawn(seed, n_robots)
+        faults = self._draw_faults(seed, n_robots)
         return {**options, "faults": (*faults_among(options, self.unwrapped.faults), *faults)}
 
     def begun(self, seed: int) -> None:
         """Store this episode's faults."""
-        self.injected = self._drawn(seed, self.warehouse.state.n_robots)
+        self.injected = self._draw_faults(seed, self.warehouse.state.n_robots)
 
     def declare_spaces(self, scenario: Scenario) -> None:
         """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
@@ -109,32 +109,32 @@ class FaultInjection(Wrapper):
         failed_robots(self._fault, 0, scenario.n_robots)
         self.env.declare_spaces(scenario)
 
-    def _drawn(self, seed: int, n_robots: int) -> tuple[Fault, ...]:
-        rng = generator(seed, "fault onsets", self._place())
+    def _draw_faults(self, seed: int, n_robots: int) -> tuple[Fault, ...]:
+        rng = generator(seed, "fault onsets", self._n_alike_inside())
         if callable(self._onset):
-            onsets = sorted(_times(self._onset(rng)))
+            onsets = sorted(_as_times(self._onset(rng)))
         else:
-            onsets = [drawn(self._onset, rng)]
+            onsets = [draw(self._onset, rng)]
         if isinstance(self._fault.robots, tuple):
             return tuple(self._fault.replace(onset=onset) for onset in onsets)
-        faults, before = [], set[int]()
+        faults, failed = [], set[int]()
         size = self._fault.robots
         for number, onset in enumerate(onsets, start=1):
             # The first group has to exist; later groups are drawn from the robots that are left.
-            so_many = self._fault.replace(robots=max(size, min(number * size, n_robots)))
-            chosen = set(failed_robots(so_many, seed, n_robots).tolist())
-            if more := tuple(sorted(chosen - before)):
-                faults.append(self._fault.replace(robots=more, onset=onset))
-            before = chosen
+            group = self._fault.replace(robots=max(size, min(number * size, n_robots)))
+            failing = set(failed_robots(group, seed, n_robots).tolist())
+            if new_robots := tuple(sorted(failing - failed)):
+                faults.append(self._fault.replace(robots=new_robots, onset=onset))
+            failed = failing
         return tuple(faults)
 
 
-def _times(given: ArrayLike) -> list[float]:
+def _as_times(onset: ArrayLike) -> list[float]:
     try:
-        times: list[float] = np.asarray(given, dtype=np.float64).ravel().tolist()
+        times: list[float] = np.asarray(onset, dtype=np.float64).ravel().tolist()
     except (TypeError, ValueError):
         raise FaultError(
-            f"Fault.onset = {given!r}: should be a time [s], a list of times, or a function of a "
+            f"Fault.onset = {onset!r}: should be a time [s], a list of times, or a function of a "
             "numpy Generator that returns them"
         ) from None
     return times
@@ -191,8 +191,8 @@ class ParameterChange(Wrapper):
                 f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
             )
         self.name = name
-        self._values = listed(name, values)
-        self._times = () if at is None else listed("at", at)
+        self._values = as_choices(name, values)
+        self._times = () if at is None else as_choices("at", at)
         for time in self._times:
             if not isinstance(time, int | float) or not time >= 0:
                 raise ScenarioError(f"at = {time!r}: should be a time of at least 0 s")
@@ -200,12 +200,12 @@ class ParameterChange(Wrapper):
         self.time: float | None = None
         self._is_due = False
         before = () if at is None else self.env.scenarios
-        after = self._declared(name, self._values)
+        after = self._declare(name, self._values)
         self.scenarios: tuple[Scenario, ...] = tuple(dict.fromkeys((*before, *after)))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with the parameter among them, if it holds throughout."""
-        value, time = self._drawn(seed)
+        value, time = self._draw_change(seed)
         if time is None:
             return {**options, "scenario": {self.name: value, **scenario_fields(options)}}
         # The change is tried now, because an error in mid-run would cost the run.
@@ -214,7 +214,7 @@ class ParameterChange(Wrapper):
 
     def begun(self, seed: int) -> None:
         """Store this episode's value and time."""
-        self.value, self.time = self._drawn(seed)
+        self.value, self.time = self._draw_change(seed)
         self._is_due = self.time is not None
         if not self._is_due:
             self.value = getattr(self.warehouse.scenario, self.name)
@@ -227,7 +227,7 @@ class ParameterChange(Wrapper):
                 self.warehouse.change(**{self.name: self.value})
         return commands
 
-    def _drawn(self, seed: int) -> tuple[Any, float | None]:
-        rng = generator(seed, f"change of {self.name}", self._place())
-        value = drawn(self._values, rng)
-        return value, float(drawn(self._times, rng)) if self._times else None
+    def _draw_change(self, seed: int) -> tuple[Any, float | None]:
+        rng = generator(seed, f"change of {self.name}", self._n_alike_inside())
+        value = draw(self._values, rng)
+        return value, float(draw(self._times, rng)) if self._times else None

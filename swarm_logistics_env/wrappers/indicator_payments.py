@@ -35,7 +35,8 @@ class GivenPerformances:
     def __init__(
         self, performances: Mapping[Condition, float], *, whatever_changes: bool = False
     ) -> None:
-        self._performances, self._whatever_changes = dict(performances), whatever_changes
+        self._performances = dict(performances)
+        self._whatever_changes = whatever_changes
         for condition, items in self._performances.items():
             if not isinstance(condition, Condition):
                 raise SetupError(f"references: key {condition!r} should be a Condition")
@@ -158,14 +159,14 @@ class Ratio:
     against: Condition
 
 
-def comparison(name: str, tested: Condition, own: Scenario) -> Ratio | None:
+def comparison(name: str, tested: Condition, base: Scenario) -> Ratio | None:
     """Return what the indicator compares episodes of `tested` with; None: it does not test them.
 
     Everything that the indicator does not vary is the same in its references.
 
     Args:
         name: one of `INDICATORS`, or "P".
-        own: the scenario that changes are relative to, with the N of S.
+        base: the scenario that changes are relative to, with the N of S.
 
     Raises:
         SetupError: the indicator is about such an episode, but undefined; or it is none of those.
@@ -185,29 +186,29 @@ def comparison(name: str, tested: Condition, own: Scenario) -> Ratio | None:
             )
         removed = dataclasses.replace(unbroken, n_removed=n_removed)
         return Ratio(1.0, 0.0, unbroken, removed)
-    if name == "S" and n != own.n_robots:
-        if n < own.n_robots:
+    if name == "S" and n != base.n_robots:
+        if n < base.n_robots:
             raise SetupError(
-                f"S from N = {own.n_robots} to {n} robots: should be to more (m >= 1); N is the "
+                f"S from N = {base.n_robots} to {n} robots: should be to more (m >= 1); N is the "
                 "environment's own n_robots"
             )
-        smaller = dataclasses.replace(tested, n_robots=own.n_robots)
-        return Ratio(own.n_robots / (n - own.n_robots), 0.0, smaller, smaller)
+        smaller = dataclasses.replace(tested, n_robots=base.n_robots)
+        return Ratio(base.n_robots / (n - base.n_robots), 0.0, smaller, smaller)
     if name == "A" and tested.changes:
         original = dataclasses.replace(tested, changes=())
-        return Ratio(1.0 / _relative_change(tested.changes, own), 1.0, original, original)
+        return Ratio(1.0 / _relative_change(tested.changes, base), 1.0, original, original)
     return None
 
 
 def indicator_of(
-    name: str, condition: Condition, own: Scenario, references: GivenPerformances | RunningMeans
+    name: str, condition: Condition, base: Scenario, references: GivenPerformances | RunningMeans
 ) -> Payment | None:
     """Return the indicator of episodes of that condition; None: it does not test them.
 
     Raises:
         SetupError: a reference performance is missing or 0, or the indicator is undefined.
     """
-    compared = comparison(name, condition, own)
+    compared = comparison(name, condition, base)
     if compared is None:
         return Payment(1.0) if name == "P" else None
     p_o = p_against = references.divisor(compared.reference)
@@ -218,18 +219,19 @@ def indicator_of(
     return Payment(share, compared.offset - share * p_against, performances)
 
 
-def derivative_of(name: str, condition: Condition, own: Scenario, means: RunningMeans) -> Payment:
-    """Return what an episode pays for being a reference of others: the derivative, centred.
+def derivative_of(name: str, condition: Condition, base: Scenario, means: RunningMeans) -> Payment:
+    """Return the payment of an episode as a reference of others: the derivative, centred.
 
     Summed over the conditions that have it as reference, each as often as it was played, so that
     the mean return over all episodes has the gradient of the mean indicator.
     """
-    slope, mean = 0.0, means.mean(condition)
+    slope = 0.0
+    mean = means.mean(condition)
     if mean is None:
         return Payment()
     for tested in means.conditions:
         try:
-            compared = comparison(name, tested, own)
+            compared = comparison(name, tested, base)
         except SetupError:  # it is of another environment, of another size
             continue
         if compared is not None and condition in (compared.reference, compared.against):
@@ -251,12 +253,12 @@ def _derivative(
     return -compared.scale * p_tested / p_o**2
 
 
-def _relative_change(changes: tuple[tuple[str, Any], ...], own: Scenario) -> float:
+def _relative_change(changes: tuple[tuple[str, Any], ...], base: Scenario) -> float:
     if len(changes) > 1:
         names = ", ".join(name for name, _ in changes)
         raise SetupError(f"A of changes in {names}: should be in one parameter only")
     name, x_new = changes[0]
-    x_o = getattr(own, name)
+    x_o = getattr(base, name)
     if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in (x_o, x_new)):
         raise SetupError(f"A of a change in {name}: should be in a parameter that is a number")
     if x_o == 0:

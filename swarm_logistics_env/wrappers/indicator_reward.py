@@ -124,40 +124,44 @@ class IndicatorReward(Wrapper):
         self.weights = _checked_weights(weights)
         if credit not in CREDITS:
             raise SetupError(f"credit = {credit!r}{suggest(str(credit), CREDITS)}")
-        self.credit, self.constant = credit, constant
+        self.credit = credit
+        self.constant = constant
         self.own_reward = finite_number("own_reward", own_reward)
-        self._own = self.unwrapped.scenario
-        self.condition = Condition(self._own.n_robots)
+        self._base = self.unwrapped.scenario
+        self.condition = Condition(self._base.n_robots)
         self._references: GivenPerformances | RunningMeans
         if isinstance(references, RunningMeans):
             self._references = self.measured = references
         else:
-            given = references if isinstance(references, Mapping) else {self.condition: references}
-            is_one = given is not references
-            self._references = GivenPerformances(given, whatever_changes=is_one)
+            performances = (
+                references if isinstance(references, Mapping) else {self.condition: references}
+            )
+            is_single_number = performances is not references
+            self._references = GivenPerformances(performances, whatever_changes=is_single_number)
             self.measured = RunningMeans()
-            if is_one:
+            if is_single_number:
                 self._references.divisor(self.condition)
         # Errors that can be known before the first episode are raised now.
         for scenario in self.env.scenarios:
-            self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._own)))
+            self.payments_of(Condition(scenario.n_robots, changes=changes_of(scenario, self._base)))
         self.payments: dict[str, Payment] = {}
         self._indicators: dict[str, Payment] = {}
-        self._is_over, self._delivered = False, 0
+        self._is_over = False
+        self._delivered = 0
 
     def payments_of(self, condition: Condition) -> dict[str, Payment]:
-        """Return what an episode of that condition would pay, by indicator; unweighted.
+        """Return the unweighted payments of an episode of that condition, by indicator.
 
         Raises:
             SetupError: a reference is missing or 0, or an indicator is undefined.
         """
         payments = {}
         for name in self.weights:
-            paid = indicator_of(name, condition, self._own, self._references) or Payment()
+            payment = indicator_of(name, condition, self._base, self._references) or Payment()
             if isinstance(self._references, RunningMeans):
-                slope = derivative_of(name, condition, self._own, self._references)
-                paid = Payment(paid.share + slope.share, paid.constant + slope.constant)
-            payments[name] = paid
+                slope = derivative_of(name, condition, self._base, self._references)
+                payment = Payment(payment.share + slope.share, payment.constant + slope.constant)
+            payments[name] = payment
         return payments
 
     @property
@@ -192,17 +196,18 @@ class IndicatorReward(Wrapper):
         if self._is_over:
             self.measured.add(self.condition, self._delivered)
         self._is_over = False
-        self._paid, self._delivered = Payment(), 0
+        self._paid = Payment()
+        self._delivered = 0
         self._take_condition()
 
     def after_step(self, outcome: ArrayStep) -> ArrayStep:
         """Return the result of the step with this wrapper's rewards."""
-        observations, own, terminations, truncations = outcome
+        observations, inner_rewards, terminations, truncations = outcome
         world = self.unwrapped.warehouse
         state = world.state
-        rewards = self.own_reward * own if self.own_reward else np.zeros(state.n_robots)
+        rewards = self.own_reward * inner_rewards if self.own_reward else np.zeros(state.n_robots)
         deliverers = state.delivered_by[self._delivered :]
-        if world.is_eventful and condition_of(world, self._own) != self.condition:
+        if world.is_eventful and condition_of(world, self._base) != self.condition:
             self._take_condition()
         if self._paid is not self._due or deliverers:
             self._pay(rewards, deliverers, state.robot_present | terminations)
@@ -213,28 +218,28 @@ class IndicatorReward(Wrapper):
     def _pay(
         self, rewards: NDArray[np.float64], deliverers: list[int], present: NDArray[np.bool_]
     ) -> None:
-        once = self._due.constant - self._paid.constant
+        lump_sum = self._due.constant - self._paid.constant
         # Items that were delivered before a change in mid-run were paid another share.
-        once += (self._due.share - self._paid.share) * self._delivered
+        lump_sum += (self._due.share - self._paid.share) * self._delivered
         self._paid = self._due
         if self.credit == "team":
-            rewards[present] += once + self._due.share * len(deliverers)
+            rewards[present] += lump_sum + self._due.share * len(deliverers)
             return
-        rewards[present] += once / max(int(np.count_nonzero(present)), 1)
+        rewards[present] += lump_sum / max(int(np.count_nonzero(present)), 1)
         for robot in deliverers:
             rewards[robot] += self._due.share
 
     def _take_condition(self) -> None:
-        self.condition = condition_of(self.unwrapped.warehouse, self._own)
+        self.condition = condition_of(self.unwrapped.warehouse, self._base)
         self.payments = self.payments_of(self.condition)
         self._indicators = {
             name: indicator
             for name in self.weights
-            if (indicator := indicator_of(name, self.condition, self._own, self._references))
+            if (indicator := indicator_of(name, self.condition, self._base, self._references))
         }
-        weighted = [(self.weights[name], paid) for name, paid in self.payments.items()]
-        share = sum(weight * paid.share for weight, paid in weighted)
-        constant = sum(weight * paid.constant for weight, paid in weighted)
+        weighted = [(self.weights[name], payment) for name, payment in self.payments.items()]
+        share = sum(weight * payment.share for weight, payment in weighted)
+        constant = sum(weight * payment.constant for weight, payment in weighted)
         self._due = Payment(share, constant if self.constant else 0.0)
 
 
@@ -242,9 +247,9 @@ def _checked_weights(weights: str | Mapping[str, float]) -> dict[str, float]:
     checked = {weights: 1.0} if isinstance(weights, str) else dict(weights)
     if not checked:
         raise SetupError(f"weights = {weights!r}: should name at least one indicator")
-    known = (*INDICATORS, "P")
+    names = (*INDICATORS, "P")
     for name, weight in checked.items():
-        if name not in known:
-            raise SetupError(f"no indicator {name!r} is paid{suggest(str(name), known)}")
+        if name not in names:
+            raise SetupError(f"no indicator {name!r} is paid{suggest(str(name), names)}")
         finite_number(f"weights[{name!r}]", weight)
     return checked

@@ -23,7 +23,7 @@ from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
 
-from .wrapper import Wrapper, drawn, listed
+from .wrapper import Wrapper, as_choices, draw
 
 
 class FixedAgents(Wrapper):
@@ -64,7 +64,7 @@ class FixedAgents(Wrapper):
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
         """Begin an episode and return the first observations (P, D)."""
-        observations = self._padded(super().reset_arrays(seed, options))
+        observations = self._pad(super().reset_arrays(seed, options))
         self.agents = list(self.possible_agents)
         return observations
 
@@ -79,23 +79,23 @@ class FixedAgents(Wrapper):
             CommandError: wrong shape, not readable or not finite; nothing has happened then.
             SetupError: there was no reset, or the episode is over.
         """
-        wanted = (self.n_rows, *(self.action_space("robot_0").shape or ()))
-        given = numbers_of(commands, "commands", wanted)
+        shape = (self.n_rows, *(self.action_space("robot_0").shape or ()))
+        rows = numbers_of(commands, "commands", shape)
         observations, rewards, _, truncations = super().step_arrays(
-            given[: self.warehouse.state.n_robots]
+            rows[: self.warehouse.state.n_robots]
         )
         is_over = not self.env.agents
         is_cut = is_over and bool(truncations.any())
         if is_over:
             self.agents = []
         return (
-            self._padded(observations),
-            self._padded(rewards),
+            self._pad(observations),
+            self._pad(rewards),
             np.full(self.n_rows, is_over and not is_cut),
             np.full(self.n_rows, is_cut),
         )
 
-    def _padded(self, rows: NDArray[Any]) -> NDArray[Any]:
+    def _pad(self, rows: NDArray[Any]) -> NDArray[Any]:
         padded = np.zeros((self.n_rows, *rows.shape[1:]), rows.dtype)
         padded[: len(rows)] = rows
         return padded
@@ -103,8 +103,8 @@ class FixedAgents(Wrapper):
     def _infos(self, agents: list[str]) -> Infos:
         infos = super()._infos(agents)
         present = self.warehouse.state.robot_present.tolist()
-        for place, agent in enumerate(agents):
-            infos[agent]["active"] = int(place < len(present) and present[place])
+        for row, agent in enumerate(agents):
+            infos[agent]["active"] = int(row < len(present) and present[row])
         return infos
 
 
@@ -142,20 +142,22 @@ class SwarmSize(Wrapper):
         leave: Sequence[tuple[int, float]] = (),
     ) -> None:
         super().__init__(env)
-        self._sizes = listed("n_robots", list(sizes) if isinstance(sizes, Sequence) else sizes)
+        self._sizes = as_choices("n_robots", list(sizes) if isinstance(sizes, Sequence) else sizes)
         pairs = _departures(leave)
         # The sets are nested: the first m + k robots contain the m that have left.
         in_all = np.cumsum([robots for robots, _ in pairs], dtype=np.int64).tolist()
         self._departures = tuple(
             Fault("removed", count, onset=time) for count, (_, time) in zip(in_all, pairs)
         )
-        self.scenarios: tuple[Scenario, ...] = self._declared("n_robots", self._sizes)
-        largest = max(self.unwrapped.max_robots or 0, *(each.n_robots for each in self.scenarios))
+        self.scenarios: tuple[Scenario, ...] = self._declare("n_robots", self._sizes)
+        largest = max(
+            self.unwrapped.max_robots or 0, *(scenario.n_robots for scenario in self.scenarios)
+        )
         self.unwrapped.possible_agents = agent_names(range(largest))
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's size and departures among them."""
-        size = drawn(self._sizes, generator(seed, "swarm size", self._place()))
+        size = draw(self._sizes, generator(seed, "swarm size", self._n_alike_inside()))
         faults = (*faults_among(options, self.unwrapped.faults), *self._departures)
         scenario = {"n_robots": size, **scenario_fields(options)}
         return {**options, "scenario": scenario, "faults": faults}

@@ -62,8 +62,8 @@ class Condition:
             )
 
 
-def condition_of(world: Warehouse, own: Scenario) -> Condition:
-    """Return the condition of the episode in `world`, relative to the scenario `own`.
+def condition_of(world: Warehouse, base: Scenario) -> Condition:
+    """Return the condition of the episode in `world`, relative to the scenario `base`.
 
     A fault by role that has not chosen its robots yet counts as one of robots that fail by no other
     fault.
@@ -76,36 +76,36 @@ def condition_of(world: Warehouse, own: Scenario) -> Condition:
         if fault.mode != "removed":
             modes.add(fault.mode)
         if isinstance(fault.robots, int):
-            others = [robot for robot in range(n_robots) if robot not in affected]
-            affected.update(others[: fault.robots])
+            unaffected = [robot for robot in range(n_robots) if robot not in affected]
+            affected.update(unaffected[: fault.robots])
         else:
             affected.update(fault.robots)
-    changes = changes_of(world.scenario, own)
+    changes = changes_of(world.scenario, base)
     return Condition(n_robots, tuple(sorted(modes)), len(failed), len(removed), changes)
 
 
-def changes_of(scenario: Scenario, own: Scenario) -> tuple[tuple[str, Any], ...]:
-    """Return the fields of `scenario`, but for the size, that differ from `own`, with values."""
+def changes_of(scenario: Scenario, base: Scenario) -> tuple[tuple[str, Any], ...]:
+    """Return the fields of `scenario`, but for the size, that differ from `base`, with values."""
     return tuple(
         (name, getattr(scenario, name))
-        for name in sorted(type(own).model_fields)
-        if name != "n_robots" and getattr(scenario, name) != getattr(own, name)
+        for name in sorted(type(base).model_fields)
+        if name != "n_robots" and getattr(scenario, name) != getattr(base, name)
     )
 
 
-def listed(name: str, given: Any) -> tuple[Any, ...]:
+def as_choices(name: str, value: Any) -> tuple[Any, ...]:
     """Return the values that an episode's is drawn from: those of a list or array, or the one.
 
     Raises:
         SetupError: the list is empty.
     """
-    values = list(given) if isinstance(given, list | np.ndarray) else [given]
+    values = list(value) if isinstance(value, list | np.ndarray) else [value]
     if not values:
         raise SetupError(f"{name} = []: should list at least one value")
     return tuple(value.item() if isinstance(value, np.generic) else value for value in values)
 
 
-def drawn(values: Sequence[Any], rng: np.random.Generator) -> Any:
+def draw(values: Sequence[Any], rng: np.random.Generator) -> Any:
     """Return one of the values, each equally likely."""
     return values[int(rng.integers(len(values)))]
 
@@ -210,15 +210,17 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
     def max_cycles(self, cycles: int | None) -> None:
         self.unwrapped.max_cycles = cycles
 
-    def _declared(self, name: str, values: Iterable[Any]) -> tuple[Scenario, ...]:
+    def _declare(self, name: str, values: Iterable[Any]) -> tuple[Scenario, ...]:
         """Declare the spaces of all scenarios with one of these values of a field; return them."""
-        known = self.env.scenarios
-        changed = dict.fromkeys(each.replace(**{name: value}) for each in known for value in values)
-        for scenario in changed:
+        scenarios = self.env.scenarios
+        declared = dict.fromkeys(
+            scenario.replace(**{name: value}) for scenario in scenarios for value in values
+        )
+        for scenario in declared:
             self.declare_spaces(scenario)
-        return tuple(changed)
+        return tuple(declared)
 
-    def _place(self) -> int:
+    def _n_alike_inside(self) -> int:
         """Return the number of wrappers of the same class inside; it gives each its own draws."""
         return sum(type(env) is type(self) for env in layers_of(self.env))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, swarm_logistics_v0
 from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import gathered
+from swarm_logistics_env.environment.requests import gather_commands
 from swarm_logistics_env.environment.spaces import agent_names
 from swarm_logistics_env.errors import ArgumentError, CommandError, ScenarioError, SetupError
 from swarm_logistics_env.swarm_logistics_v0 import parallel_env
@@ -123,10 +123,10 @@ def test_a_name_among_many_is_told() -> None:
     names = agent_names(range(100_000))
     actions = dict.fromkeys(names, np.zeros(4))
     with pytest.raises(CommandError, match=r"a command for 'robot_x', .* 100000 possible agents"):
-        gathered({**actions, "robot_x": np.zeros(4)}, names, names, (4,))
+        gather_commands({**actions, "robot_x": np.zeros(4)}, names, names, (4,))
     del actions["robot_99999"]
     with pytest.raises(CommandError, match="no command for 'robot_99999'"):
-        gathered(actions, names, names, (4,))
+        gather_commands(actions, names, names, (4,))
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, observations
-from swarm_logistics_env.rendering.palette import followed
+from swarm_logistics_env.rendering.palette import leader_of
 from swarm_logistics_env.warehouse.state import NOBODY
 
 
@@ -18,7 +18,7 @@ def test_follows_whom_the_robot_itself_hears() -> None:
         rows = observations.unflatten(world.step(np.tile([1.0, 0.2, 0.1, 0.0], (30, 1))), scenario)
         state = world.state
         for robot in range(30):
-            leader = followed(state, scenario, robot)
+            leader = leader_of(state, scenario, robot)
             assert (leader != NOBODY) == bool(rows["lowest_timer_present"][robot, 0])
             if leader == NOBODY:
                 continue

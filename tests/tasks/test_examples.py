@@ -37,7 +37,7 @@ def test_its_own_policy_beats_chance_and_robots_that_stay_start_where_they_would
     task: Any = task_of(study.specification.task)
     starts = []
     for absent in ((), (0, 2)):
-        env = task._made(task.default, absent)
+        env = task._environment(task.default, absent)
         observations, _ = env.reset(seed=5)
         starts.append(observation_rows(env, list(env.possible_agents), observations)[:, place])
         env.close()

@@ -14,7 +14,7 @@ import torch
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.motion.memory import BODY, HELD, body_of
-from swarm_logistics_env.train.learner import KNOWN, NetworkView, make_learner, read_known
+from swarm_logistics_env.train.learner import PRIVILEGED, NetworkView, fill_privileged, make_learner
 from swarm_logistics_env.warehouse.state import CARRIED
 
 
@@ -24,21 +24,21 @@ def test_the_critic_knows_where_the_requested_item_is() -> None:
     state = env.warehouse.state
     state.robot_position[0], state.robot_heading[0] = (4.0, 5.0), 0.5 * math.pi
     state.item_position[state.requested] = (4.0, 6.0)
-    turned, known = np.zeros(3), np.zeros((4, len(KNOWN)), np.float32)
+    turned, privileged = np.zeros(3), np.zeros((4, len(PRIVILEGED)), np.float32)
     turned[0] = 0.5 * math.pi  # so that the frame looks along -x
-    read_known(env.warehouse.address, turned, known)
-    told = dict(zip(KNOWN, known[0].tolist()))
+    fill_privileged(env.warehouse.address, turned, privileged)
+    told = dict(zip(PRIVILEGED, privileged[0].tolist()))
     expected = {
         "to_delivery": 0.4, "frame_cos": -1.0, "frame_sin": 0.0, "requested_along": 0.0,
         "requested_aside": -1.0, "requested_distance": 0.1, "is_carried": 0.0,
     }  # fmt: skip
     assert {name: told[name] for name in expected} == pytest.approx(expected, abs=1e-6)
-    assert not known[3].any()
+    assert not privileged[3].any()
 
     state.item_status[state.requested], state.item_carrier[state.requested] = CARRIED, 1
     state.robot_position[1] = (7.0, 5.0)
-    read_known(env.warehouse.address, turned, known)
-    told = dict(zip(KNOWN, known[0].tolist()))
+    fill_privileged(env.warehouse.address, turned, privileged)
+    told = dict(zip(PRIVILEGED, privileged[0].tolist()))
     assert (told["is_carried"], told["carrier_delivers"]) == (1.0, 1.0)
     assert told["carrier_to_delivery"] == pytest.approx(0.1)
 
@@ -49,12 +49,12 @@ def test_of_several_requests_the_critic_knows_the_nearest() -> None:
     state = env.warehouse.state
     state.robot_position[:], state.robot_heading[:] = [(4.0, 5.0), (1.0, 1.0)], 0.0
     state.item_position[state.open_requests] = [(7.0, 9.0), (4.0, 6.0), (1.0, 3.0)]
-    known = np.zeros((2, len(KNOWN)), np.float32)
-    read_known(env.warehouse.address, np.zeros(2), known)
-    assert known[:, KNOWN.index("requested_distance")] == pytest.approx([0.1, 0.2])
+    privileged = np.zeros((2, len(PRIVILEGED)), np.float32)
+    fill_privileged(env.warehouse.address, np.zeros(2), privileged)
+    assert privileged[:, PRIVILEGED.index("requested_distance")] == pytest.approx([0.1, 0.2])
     state.item_carrier[state.open_requests[1]] = 0
-    read_known(env.warehouse.address, np.zeros(2), known)
-    assert known[:, KNOWN.index("is_carried")].tolist() == [1.0, 0.0]
+    fill_privileged(env.warehouse.address, np.zeros(2), privileged)
+    assert privileged[:, PRIVILEGED.index("is_carried")].tolist() == [1.0, 0.0]
 
 
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:
@@ -75,7 +75,7 @@ def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None
 
 def test_the_actor_sees_nothing_of_it(small: Any) -> None:
     policy = make_learner(small(), NetworkView(small()), "cpu").policy
-    columns = torch.randn(50, len(INPUTS) + len(KNOWN))
+    columns = torch.randn(50, len(INPUTS) + len(PRIVILEGED))
     changed = columns.clone()
     changed[:, len(INPUTS) :] += 1.0
     with torch.no_grad():

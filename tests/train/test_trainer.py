@@ -28,7 +28,7 @@ from swarm_logistics_env.train import trainer
 from swarm_logistics_env.train.evaluation import versions
 from swarm_logistics_env.train.learner import (
     CHECKPOINT,
-    KNOWN,
+    PRIVILEGED,
     NetworkView,
     make_learner,
     read_checkpoint,
@@ -109,7 +109,7 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
             parameter.add_(0.3 * torch.randn_like(parameter))
     card = PolicyCard(name="x", network=training.network)
     ours = LearnedPolicy(card, tensors_of(learner.policy)).outputs_of
-    inputs = np.random.default_rng(0).normal(size=(300, len(INPUTS) + len(KNOWN)))
+    inputs = np.random.default_rng(0).normal(size=(300, len(INPUTS) + len(PRIVILEGED)))
     # What PPO takes for the most likely action.
     likely, _ = learner.predict(inputs.astype(np.float32), deterministic=True)
     said = ours(inputs[:, : len(INPUTS)].astype(np.float32))

@@ -14,7 +14,7 @@ import pytest
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.specification import Specification
-from swarm_logistics_env.records import file_name, steers
+from swarm_logistics_env.records import file_name, has_control_signs
 from swarm_logistics_env.runs.recorded import import_results
 from swarm_logistics_env.spi import IndicatorError, read_trials
 from swarm_logistics_env.studies import Study
@@ -44,7 +44,7 @@ def check_report(out: Path) -> None:
     report = (out / "report.md").read_text(encoding="utf-8")
     for active in ("<script", "<img", "](javascript", "](http", "\n# A heading"):
         assert active not in report
-    assert not steers(report.replace("\n", ""))
+    assert not has_control_signs(report.replace("\n", ""))
 
 
 @pytest.mark.parametrize("field", ["name", "task"])
@@ -61,7 +61,7 @@ def test_a_study_file_is_refused_before_anything_is_played(
         assert app.run(["study", "run", "evil.toml", "--processes", "1"]) == 2, name
         said = capsys.readouterr()
         assert field in said.err
-        assert not steers((said.out + said.err).replace("\n", "")), name
+        assert not has_control_signs((said.out + said.err).replace("\n", "")), name
         assert [path for path in tmp_path.rglob("*") if path.is_file()] == [here / "evil.toml"]
 
 
@@ -76,7 +76,7 @@ def test_labels_are_refused_or_reported() -> None:
             continue
         accepted.append(name)
     # How a report shows them is tested with the policies of trials.
-    assert accepted == [name for name in NAMES if not steers(name)]
+    assert accepted == [name for name in NAMES if not has_control_signs(name)]
 
 
 def table(column: str, names: list[str]) -> str:
@@ -117,6 +117,6 @@ def test_cells_of_trials_are_refused_or_reported(
     file.write_text(table(column, list(dict.fromkeys(kept))), encoding="utf-8", newline="")
     capsys.readouterr()
     assert app.run(["judge", str(file), "--out", str(out), "--full"]) == 0
-    assert not steers(capsys.readouterr().out.replace("\n", ""))
+    assert not has_control_signs(capsys.readouterr().out.replace("\n", ""))
     check_report(out)
     assert {path.name for path in tmp_path.iterdir()} == {"one.csv", "tried", "out"}

@@ -44,7 +44,7 @@ def follow(world: Warehouse, script: Iterable[Sequence[Command]]) -> Warehouse:
 def ascending(seed: int, purpose: str, n_rows: int) -> NDArray[np.uint64]:
     """Return keys of streams, sorted by the first number of each."""
     keys = row_keys(seed, purpose, n_rows)
-    return keys[np.argsort([uniform(one, 0) for one in keys])]
+    return keys[np.argsort([uniform(key, 0) for key in keys])]
 
 
 @pytest.fixture
@@ -57,12 +57,16 @@ def build(monkeypatch: pytest.MonkeyPatch) -> Build:
     def make(
         robots: ArrayLike, items: ArrayLike, faults: Sequence[Fault] = (), **fields: Any
     ) -> Warehouse:
-        places, item_places = (np.array(rows, float).reshape(-1, 2) for rows in (robots, items))
-        n = len(places)
-        monkeypatch.setattr(layout, "place_robots", lambda *_: (places.copy(), np.zeros(n)))
-        monkeypatch.setattr(layout, "place_items", lambda *_: item_places.copy())
+        robot_positions, item_positions = (
+            np.array(rows, float).reshape(-1, 2) for rows in (robots, items)
+        )
+        n = len(robot_positions)
+        monkeypatch.setattr(
+            layout, "place_robots", lambda *_: (robot_positions.copy(), np.zeros(n))
+        )
+        monkeypatch.setattr(layout, "place_items", lambda *_: item_positions.copy())
         monkeypatch.setattr(warehouse, "row_keys", ascending)
-        counts = {"n_robots": n, "n_items": len(item_places)}
+        counts = {"n_robots": n, "n_items": len(item_positions)}
         world = Warehouse(Scenario(**{"heading_drift": 0.0, **counts, **fields}))
         world.reset(0, faults)
         return world

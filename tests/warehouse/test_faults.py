@@ -217,8 +217,8 @@ def test_who_carries_the_requested_item_is_the_carrier_inside_of_the_delivery_ar
     robots = [(INSIDE, 5.0), (INSIDE, 5.4), (INSIDE, 9.0), (2.0, 2.0)]
     world = build(robots, [(INSIDE, 5.1), FAR], [Fault("FM4", (0,))])
     steps(world, HOLD, STAY, STAY, STAY)
-    told = roles_of(world.state).tolist()
-    assert told == ["carrier", "neighbour", "in_area", "searching"]
+    roles = roles_of(world.state).tolist()
+    assert roles == ["carrier", "neighbour", "in_area", "searching"]
 
 
 def test_robots_keep_their_speeds_and_senses_when_another_is_removed(build: Build) -> None:

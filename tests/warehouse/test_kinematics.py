@@ -33,9 +33,11 @@ def test_a_robot_drives_along_its_mean_direction_at_most_at_its_top_speed(
     world.commands.now[:] = commands
     drive(world)
     forward, left, turn = np.clip(commands[:3], -1.0, 1.0)
-    way = complex(forward, left if is_holonomic else 0.0)
-    way *= 2.0 / max(abs(way), 1.0) * cmath.exp(1j * (heading + 0.5 * turn * 6.0 * period))
-    assert wanted[0] == pytest.approx([way.real, way.imag], abs=1e-9)
+    velocity = complex(forward, left if is_holonomic else 0.0)
+    velocity *= (
+        2.0 / max(abs(velocity), 1.0) * cmath.exp(1j * (heading + 0.5 * turn * 6.0 * period))
+    )
+    assert wanted[0] == pytest.approx([velocity.real, velocity.imag], abs=1e-9)
     turned = float(robots.heading[0])
     assert abs(turned) <= math.pi + 1e-12
     assert math.remainder(turned - heading - turn * 6.0 * period, math.tau) == pytest.approx(0.0)

@@ -1,9 +1,8 @@
-"""What is sensed, against a slow and plain computation of the same, and by hand."""
+"""What is sensed, against a slow and plain computation of the same."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
-from tests.warehouse.conftest import FAR, STAY, WEST, Build, steps
 
 TOLERANCE = 2e-5  # [m]: rows are of single precision
 BEAMS = np.exp(2j * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS)
@@ -69,9 +67,9 @@ class Plain:
     def __init__(self, world: Warehouse, me: int) -> None:
         self.state, self.scenario, self.me = world.state, world.scenario, me
         self.modes = [set(modes) for modes in world.state.failure_modes]
-        there = world.state.robot_present.copy()
-        there[me] = False
-        self.others = np.flatnonzero(there)
+        is_other = world.state.robot_present.copy()
+        is_other[me] = False
+        self.others = np.flatnonzero(is_other)
         self.items = np.flatnonzero(world.state.item_status == STORED)
 
     def row(self) -> NDArray[np.float64]:
@@ -80,8 +78,8 @@ class Plain:
         blocks = (self.scans(), self.items_in_view(), self.robots_near(), self.itself())
         return np.concatenate([np.ravel(block) for block in blocks])
 
-    def seen(self, places: NDArray[np.float64]) -> NDArray[np.complex128]:
-        away = (places - self.state.robot_position[self.me]) @ np.array([1.0, 1j])
+    def seen(self, positions: NDArray[np.float64]) -> NDArray[np.complex128]:
+        away = (positions - self.state.robot_position[self.me]) @ np.array([1.0, 1j])
         return np.asarray(away * np.exp(-1j * self.state.robot_heading[self.me]))
 
     @property
@@ -92,57 +90,60 @@ class Plain:
     def scans(self) -> list[NDArray[np.float64]]:
         s, state = self.scenario, self.state
         to_obstacles = to_discs(self.seen(state.obstacle_position), s.obstacle_radius)
-        found = [
+        scans = [
             to_discs(self.seen(state.robot_position[self.others]), s.robot_radius),
             np.minimum(self.to_walls(), to_obstacles),
             to_discs(self.seen(state.item_position[self.items]), s.item_radius),
         ]
         modes = self.modes[self.me]
         shift = 99.0 * bool({"rangers_blind", "dead"} & modes) + 0.2 * ("rangers_biased" in modes)
-        return [np.minimum(each + shift, s.ranger_range) for each in found]
+        return [np.minimum(scan + shift, s.ranger_range) for scan in scans]
 
     def to_walls(self) -> NDArray[np.float64]:
         """Return how far each beam goes until it leaves the arena."""
-        way = BEAMS * np.exp(1j * self.state.robot_heading[self.me])
+        directions = BEAMS * np.exp(1j * self.state.robot_heading[self.me])
         nearest = np.full(row.N_BEAMS, np.inf)
         sides = (self.scenario.warehouse_width, self.scenario.warehouse_height)
         for at, along, side in zip(
-            self.state.robot_position[self.me], (way.real, way.imag), sides, strict=True
+            self.state.robot_position[self.me],
+            (directions.real, directions.imag),
+            sides,
+            strict=True,
         ):
             far = np.where(along > 0.0, side, 0.0) - at
             nearest = np.minimum(nearest, np.where(np.abs(along) > 1e-12, far / along, np.inf))
         return np.asarray(np.maximum(nearest, 0.0))
 
     def items_in_view(self) -> NDArray[np.float64]:
-        block, place = np.zeros((row.N_ITEMS_IN_VIEW, 5)), 0
+        block, rank = np.zeros((row.N_ITEMS_IN_VIEW, 5)), 0
         away = self.seen(self.state.item_position[self.items])
-        for at in np.argsort(abs(away))[: row.N_ITEMS_IN_VIEW]:
-            if abs(away[at]) <= self.view:
-                item = self.items[at]
+        for index in np.argsort(abs(away))[: row.N_ITEMS_IN_VIEW]:
+            if abs(away[index]) <= self.view:
+                item = self.items[index]
                 is_known = item in self.state.robot_memory[self.me]
-                asked = item == self.state.requested
-                block[place] = 1, away[at].real, away[at].imag, asked, is_known
-                place += 1
+                is_requested = item == self.state.requested
+                block[rank] = 1, away[index].real, away[index].imag, is_requested, is_known
+                rank += 1
         return block
 
     def robots_near(self) -> NDArray[np.float64]:
         """Return the neighbours, nearest first, and the teller of the lowest timer heard."""
         deaf, mute = {"FM3", "FM3_hear", "dead"}, {"FM3", "FM3_send", "dead"}
-        block, place, tellers = np.zeros((row.N_NEIGHBOURS, 5)), 0, []
+        block, rank, tellers = np.zeros((row.N_NEIGHBOURS, 5)), 0, []
         away = self.seen(self.state.robot_position[self.others])
-        for at in np.argsort(abs(away)):
-            other, x, y = self.others[at], away[at].real, away[at].imag
+        for index in np.argsort(abs(away)):
+            other, x, y = self.others[index], away[index].real, away[index].imag
             is_mute = deaf & self.modes[self.me] or mute & self.modes[other]
-            is_heard = abs(away[at]) <= self.scenario.radio_range and not is_mute
-            told = self.state.robot_told[other]
-            tells = is_heard and not math.isnan(told)
+            is_heard = abs(away[index]) <= self.scenario.radio_range and not is_mute
+            timer = self.state.robot_told[other]
+            tells = is_heard and not math.isnan(timer)
             if tells:
-                tellers.append((told, abs(away[at]), x, y))
-            if (is_heard or abs(away[at]) <= self.view) and place < row.N_NEIGHBOURS:
-                block[place] = 1, x, y, tells, told if tells else self.scenario.timer_limit
-                place += 1
-        told, _, x, y = min(tellers, default=(0.0, 0.0, 0.0, 0.0))
-        return np.array([*block.ravel(), bool(tellers), x, y, told])
+                tellers.append((timer, abs(away[index]), x, y))
+            if (is_heard or abs(away[index]) <= self.view) and rank < row.N_NEIGHBOURS:
+                block[rank] = 1, x, y, tells, timer if tells else self.scenario.timer_limit
+                rank += 1
+        timer, _, x, y = min(tellers, default=(0.0, 0.0, 0.0, 0.0))
+        return np.array([*block.ravel(), bool(tellers), x, y, timer])
 
     def itself(self) -> list[float]:
         s, state, me = self.scenario, self.state, self.me
@@ -169,8 +170,8 @@ class Plain:
             (state.item_position[solid[: len(solid) * (state.robot_item[self.me] != NOBODY)]],
              s.item_radius),
         ]  # fmt: skip
-        for places, radius in things:
-            gaps += (abs(self.seen(places)) - radius).tolist()
+        for positions, radius in things:
+            gaps += (abs(self.seen(positions)) - radius).tolist()
         return float(min(gaps)) - s.robot_radius
 
 
@@ -181,109 +182,3 @@ def to_discs(centres: NDArray[np.complex128], radius: float) -> NDArray[np.float
     met = np.where((root > 0.0) & (along > 0.0), along - np.sqrt(np.maximum(root, 0.0)), np.inf)
     met[abs(centres) <= radius] = 0.0
     return np.asarray(met.min(axis=0, initial=np.inf))
-
-
-# -- errors ---------------------------------------------------------------------------------------
-
-
-def beams(**fields: Any) -> NDArray[np.float32]:
-    scenario = Scenario(n_robots=4, n_items=3, ranger_range=1.4, sensing_mix=(1.0, 0.5), **fields)
-    return Warehouse(scenario).reset(0)[:, row.RANGE_WALLS : row.ITEMS]
-
-
-def test_a_dropped_beam_reports_how_far_the_robot_itself_can_see() -> None:
-    seen = beams(sensor_dropout=1.0)
-    assert sorted(seen[:, 0]) == pytest.approx([0.7, 0.7, 1.4, 1.4])
-    assert (seen == seen[:, :1]).all()
-
-
-def test_noise_leaves_beams_that_meet_nothing_as_they_are() -> None:
-    true, noisy = beams(), beams(ranger_noise=0.05)
-    meets_nothing = true == true.max(axis=1, keepdims=True)
-    np.testing.assert_array_equal(noisy[meets_nothing], true[meets_nothing])
-    assert (noisy[~meets_nothing] != true[~meets_nothing]).any()
-    assert (noisy <= true.max(axis=1, keepdims=True)).all()
-    assert (noisy >= 0.0).all()
-
-
-def test_what_is_missed_is_drawn_for_each_robot_thing_and_sense_alone(build: Build) -> None:
-    places = np.array([(1.0, 5.0), (1.4, 5.0), (2.0, 5.0)])
-    world = build(
-        places, [(1.2, 5.5)], radio_loss=0.5, sensor_dropout=0.5, message_size=1, view_range=2.0
-    )
-    n, far = len(places), np.abs(places[:, :1] - places[:, 0])
-    missed = []
-    for _ in range(250):
-        rows = world.step(np.hstack([np.zeros((n, 4)), np.ones((n, 1))]))
-        heard, there = np.zeros((n, n), bool), np.zeros((n, n), bool)
-        for me in range(n):
-            for place in range(n - 1):
-                at = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * place
-                if rows[me, at]:
-                    other = np.abs(far[me] - np.hypot(*rows[me, at + 1 : at + 3])).argmin()
-                    there[me, other], heard[me, other] = True, rows[me, row.MESSAGES + place]
-        items = rows[:, row.ITEMS] > 0.5
-        pairs = ~np.eye(n, dtype=bool)
-        missed.append([*heard[pairs], *items, (there & ~heard)[0, 2], (there & ~heard)[2, 0]])
-    shares = np.mean(missed, axis=0)
-    assert shares[:9] == pytest.approx(np.full(9, 0.5), abs=0.12)
-    assert shares[9:] == pytest.approx(np.full(2, 0.25), abs=0.1), "seen, though not heard"
-    series = np.array(missed)[:, :9].T
-    assert np.abs(np.corrcoef(series) - np.eye(9)).max() < 0.3
-    for lag in (1, 2):  # what is missed tells nothing of what is missed later
-        later = np.corrcoef(series[:, :-lag], series[:, lag:])[:9, 9:]
-        assert np.abs(later).max() < 0.3
-
-
-def test_every_error_is_drawn_by_itself(build: Build) -> None:
-    places = [(1.0, 1.0), (1.4, 1.0), (1.0, 1.4), (1.4, 1.4)]
-    items = [(x + 0.2, y + 0.2) for x, y in places] + [(0.6, 1.2), (1.2, 0.6)]
-    exact, noisy = (
-        build(places, items, warehouse_width=3.0, warehouse_height=2.0, delivery_width=1.0,
-              ranger_noise=noise, position_noise=noise)
-        for noise in (0.0, 0.01)
-    )  # fmt: skip
-    stay = np.zeros((len(places), 4))
-    errors = np.array([(noisy.step(stay) - exact.step(stay)).ravel() for _ in range(60)])
-    errors = errors[:, errors.std(axis=0) > 1e-4]
-    assert errors.shape[1] > 100
-    assert errors.std() == pytest.approx(0.01, rel=0.1)
-    alike = np.corrcoef(errors.T) - np.eye(errors.shape[1])
-    # The nearest teller of a timer stands in a row twice, each time with an error of its own.
-    assert np.abs(alike).max() < 0.8
-
-
-def test_gossip_ends_at_the_timers_limit_however_often_it_was_passed_on(build: Build) -> None:
-    world = build([(8.1, 5.0), (7.6, 5.0), (7.6, 5.5)], [FAR], relay="gossip", timer_limit=1.0)
-    state = world.state
-    told = []
-    for step in range(30):
-        rows = steps(world, WEST if step < 3 else STAY, STAY, STAY)
-        assert (np.isnan(state.robot_told) | (state.robot_told < 1.0)).all()
-        told.append(int((~np.isnan(state.robot_told)).sum()))
-    assert (max(told), told[-1]) == (3, 0)
-    assert not rows[:, row.LOWEST_TIMER].any()
-
-
-def test_a_late_radio_is_silent_where_the_limit_fell_below_what_it_has_to_tell(
-    build: Build,
-) -> None:
-    world = build([(8.1, 5.0), (7.0, 5.0)], [FAR], [Fault("radio_delayed", (0,))])
-    steps(world, WEST, STAY, times=3)
-    while not world.state.robot_told[0] > 1.5:
-        steps(world, STAY, STAY)
-    world.change(timer_limit=1.0)
-    rows = steps(world, STAY, STAY)
-    assert np.isnan(world.state.robot_told[0])
-    assert rows[1, row.LOWEST_TIMER] == 0.0
-
-
-def test_who_is_seen_and_not_heard_tells_neither_its_timer_nor_a_message(build: Build) -> None:
-    fields: dict[str, Any] = {"view_range": 2.0, "radio_range": 1.0, "message_size": 1}
-    world = build([(8.5, 5.0), (7.0, 5.0), (7.8, 5.0)], [FAR], **fields)
-    rows = world.step([(0.0, 0.0, 0.0, 0.0, 0.5)] * 3)
-    at = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH  # the second nearest of robot 1 is robot 0
-    assert rows[1, at : at + 2] == pytest.approx([1.0, 1.5])
-    assert rows[1, at + 3 : at + 5].tolist() == [0.0, world.scenario.timer_limit]
-    assert rows[1, row.MESSAGES : row.MESSAGES + 2].tolist() == [0.5, 0.0]
-    assert rows[2, row.MESSAGES : row.MESSAGES + 2].tolist() == [0.5, 0.5]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from swarm_logistics_env.policies.current_folder import CurrentFolder
+from swarm_logistics_env.code_files import CurrentFolder
 from tests.conftest import ROOT
 
 # What libraries look for and do without, and what is started beside a program.
@@ -64,16 +64,16 @@ def run_in(folder: Path, *commands: str) -> str:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A folder of a study, of trials and of hostile modules, each of which leaves a mark."""
-    found = tmp_path / "folder"
-    found.mkdir()
+    folder = tmp_path / "folder"
+    folder.mkdir()
     (tmp_path / "marks").mkdir()
     names = {*sys.stdlib_module_names, *packages_distributions(), *OPTIONAL.split()}
     for name in names:
         if name.isidentifier():
-            (found / f"{name}.py").write_text(WRITES.format(str(tmp_path / "marks")))
-    (found / "small.toml").write_text(STUDY)
-    (found / "trials.csv").write_text(TRIALS)
-    return found
+            (folder / f"{name}.py").write_text(WRITES.format(str(tmp_path / "marks")))
+    (folder / "small.toml").write_text(STUDY)
+    (folder / "trials.csv").write_text(TRIALS)
+    return folder
 
 
 def marks(folder: Path) -> list[str]:
@@ -165,11 +165,11 @@ def test_an_installed_module_that_was_named_finds_nothing_here(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "optional_one.py").touch()
     finder = CurrentFolder()
-    finder.named = {__name__.partition(".")[0]}
+    finder.allowed = {__name__.partition(".")[0]}
     assert finder.find_spec("optional_one", None) is None
-    finder.named = {"optional_one"}
+    finder.allowed = {"optional_one"}
     assert finder.find_spec("optional_one", None) is not None
-    assert finder.found == {"optional_one"}
+    assert finder.imported == {"optional_one"}
 
 
 def test_a_script_finds_what_python_finds(tmp_path: Path) -> None:
