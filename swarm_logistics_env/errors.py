@@ -6,7 +6,10 @@ A message names the field, the value that was given and what would be right.
 from __future__ import annotations
 
 import difflib
+import re
+import sysconfig
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class SwarmLogisticsError(ValueError):
@@ -48,6 +51,24 @@ class StudyError(SwarmLogisticsError):
 # What code that is not ours may raise: sys.exit() in a policy ends its run alone. Ctrl-C, which is
 # a KeyboardInterrupt, ends all.
 RAISED_BY_OTHERS = (Exception, SystemExit, GeneratorExit)
+
+
+_FRAME = re.compile(r'File "(.+?)", line (\d+)')  # of a traceback
+
+
+def users_line(traceback: str) -> tuple[str, str] | None:
+    """Return the file and the line of a traceback at which a user's own code failed.
+
+    That is the last one outside this package and the libraries; the last one of all where there
+    is none; None where the traceback names no file.
+    """
+    frames: list[tuple[str, str]] = _FRAME.findall(traceback)
+    libraries = (sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
+    not_by_users = (str(Path(__file__).parent), "<", *libraries)
+    users_frames = [frame for frame in frames if not frame[0].startswith(not_by_users)]
+    if users_frames:
+        return users_frames[-1]
+    return frames[-1] if frames else None
 
 
 def how_to_install(extra: str) -> str:

@@ -31,7 +31,7 @@ COMMANDS = {
     "judge": ("judging", "judge_command"),
     "attack": ("judging", "attack_command"),
     "list": ("playing", "list_command"),
-    "study": ("study_commands", "study"),
+    "study": ("study_commands", "study_app"),
 }
 
 
@@ -81,22 +81,22 @@ app = Application()
 
 def command_line(names: Iterable[str] = COMMANDS) -> Any:
     """Return the command line with these commands: click's object, which parses it."""
-    found = typer.Typer(
+    application = typer.Typer(
         name="swarm-logistics",
         help="A warehouse for robot swarms, and the measure of how they cope.",
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # Rich would read `[px]` in a help text as a style
     )
-    found.callback()(_options)
+    application.callback()(_options)
     for name in names:
         module, attribute = COMMANDS[name]
         command = getattr(import_module(f"{__package__}.{module}"), attribute)
         if isinstance(command, typer.Typer):
-            found.add_typer(command)
+            application.add_typer(command)
         else:
-            found.command(name)(command)
-    return typer.main.get_command(found)
+            application.command(name)(command)
+    return typer.main.get_command(application)
 
 
 def _print_version(wanted: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -13,31 +14,26 @@ from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, PolicySpec
-from swarm_logistics_env.questions.plan import Origin
 from swarm_logistics_env.questions.specification import FIRST_LOOK
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.section import bracketed, fixed, percent, slug
 from swarm_logistics_env.report.write import write_report
-from swarm_logistics_env.runs.engines import engine_named
-from swarm_logistics_env.runs.notes import StoredStudy
-from swarm_logistics_env.runs.recorded import import_results, origin_of
-from swarm_logistics_env.runs.store import FILE_NAME
-from swarm_logistics_env.spi import read_trials
+from swarm_logistics_env.runs.engines import Engine, Tally, engine_named
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
-from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.warehouse.faults import text_of
 
 from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustOption, scenario_of
+from .judge_trials import judge_trials
 from .study_commands import (
     ClearingOption,
     FullOption,
     LimitOption,
     ProcessesOption,
     run_study,
+    say_what_a_pilot_shows,
     study_of,
-    tell_what_a_pilot_shows,
     until_cleared,
 )
 from .terminal import say, say_what_was_played, show, show_report, show_table
@@ -51,7 +47,7 @@ JUDGE_SEEDS = 60  # of a policy that is judged
 
 def judge_command(
     context: typer.Context,
-    asked: Annotated[
+    policy_or_trials: Annotated[
         str,
         Argument(
             metavar="TRIALS.csv|POLICY",
@@ -76,7 +72,7 @@ def judge_command(
         float | None, Option(help="Play for so long; the same command goes on.")
     ] = None,
     clearing: ClearingOption = False,
-    plays_benchmark: Annotated[
+    as_benchmark: Annotated[
         bool,
         Option(
             "--benchmark",
@@ -120,120 +116,126 @@ def judge_command(
 
     A policy is played in a warehouse in which delivered items come back, so that P has no cap.
     """
-    of_trials = {
+    trials_options = {
         "--column": columns, "--ignore": ignore, "--duration": duration, "--decimal": decimal,
         "--setup": setup,
     }  # fmt: skip
-    of_policy = {
-        "--seeds": seeds,
-        "--minutes": minutes,
-        "--clearing": clearing,
-        "--benchmark": plays_benchmark,
-        "--run-limit": run_limit,
-    }
-    is_policy = names_policy(asked)
-    for option, given in (of_trials if is_policy else of_policy).items():
-        if given:
-            kind = "a policy" if is_policy else "a file of trials"
-            raise StudyError(f"{option} is not for {kind}, and {asked!r} is one")
-    if plays_benchmark and (seeds or clearing):
+    policy_options = {
+        "--seeds": seeds, "--minutes": minutes, "--clearing": clearing,
+        "--benchmark": as_benchmark, "--run-limit": run_limit,
+    }  # fmt: skip
+    if not names_policy(policy_or_trials):
+        _refuse(policy_options, policy_or_trials, "a file of trials")
+        judge_trials(
+            policy_or_trials,
+            out,
+            columns=columns,
+            ignore=ignore,
+            duration=duration,
+            decimal=decimal,
+            setup=setup,
+            full=full,
+        )
+        return
+    _refuse(trials_options, policy_or_trials, "a policy")
+    if as_benchmark and (seeds or clearing):
         option = "--seeds" if seeds else "--clearing"
         raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
-    if is_policy:
-        policy = PolicySpec.of(asked).replace(trusted=trust_code)
-        for one in policy.trainings or (policy,):
-            one.load()  # what is wrong with it is said before anything is written
-        name = "local" if processes == 1 else "process"
-        engine = engine_named(name, processes, run_limit=run_limit)
-        if plays_benchmark:
-            place = out or Path("results", "benchmark", slug(policy.title))
-            study = study_of(benchmark.STUDY, place, None, [asked], trust_code)
-        else:
-            place = out or Path("results", "judged", slug(policy.title) + "-clearing" * clearing)
-            most = seeds or JUDGE_SEEDS
-            looks = until_clear and most > FIRST_LOOK
-            study = study_of(STUDY, place, most, [asked], trust_code, until_clear=looks)
-        if clearing:
-            until_cleared(study)
-        say(f"{study.plan()}, kept in {place}")
-        echo()
-        tell_what_a_pilot_shows(study)
-        tally = run_study(study, engine, minutes=minutes)
-        results = study.findings()
-        if plays_benchmark and not (tally.left or tally.failed):
-            _show_benchmark(results, place)
-        else:
-            show_report(results, place, full=full, is_finished=not tally.left)
-        if tally.left and not tally.gave_up:
-            why = f"Stopped after {minutes:g} min, {tally.left} runs are left"
-            say(f"{why}; the same command goes on:", str(context.obj))
-        # Several trainings and untrusted code need options that this command does not repeat.
-        elif not (tally.left or plays_benchmark or policy.trainings or trust_code) and any(
-            v.on_property.adjusted == "open" for v in results.verdicts
-        ):
-            more = max(JUDGE_SEEDS, 2 * most)
-            say(
-                "What is open needs more seeds, from the start:",
-                f"swarm-logistics judge {quote(asked)}{' --clearing' * clearing} --seeds {more} "
-                f"--out {quote(f'{place}-{more}')}",
-            )
-        say_what_was_played(tally)
-        raise Exit(1 if tally.failed else 0)
-
-    stated = _pairs("--setup", setup)
-    trials = read_trials(
-        asked,
-        columns=_pairs("--column", columns),
-        ignore=ignore or (),
-        duration=duration,
-        decimal=decimal,
+    engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
+    tally = judge_policy(
+        policy_or_trials,
+        out,
+        most_seeds=seeds or JUDGE_SEEDS,
+        until_clear=until_clear,
+        minutes=minutes,
+        clearing=clearing,
+        as_benchmark=as_benchmark,
+        engine=engine,
+        full=full,
+        trust_code=trust_code,
+        command=str(context.obj),
     )
-    origin = origin_of(trials, stated)
-    usual = Path("results", "judged", Path(asked).stem)
-    directory = out or _free(usual, origin)
-    if not _holds(directory, origin):
-        import_results(trials, directory, stated)
-    if directory not in (out, usual):
-        echo(f"{usual} holds an earlier judgement, so this one is in {directory}")
-    echo("\n".join([f"{len(trials.rows)} runs in {asked}", *origin.notes, ""]))
-    show_report(Study.stored(directory).findings(), directory, full=full)
+    raise Exit(1 if tally.failed else 0)
 
 
-def _holds(directory: Path, origin: Origin) -> bool:
-    """Return whether a directory holds the study of these trials already."""
-    try:
-        return StoredStudy.existing(directory).imported == origin
-    except StudyError:  # none, or none that reads
-        return False
+def _refuse(options: Mapping[str, object], policy_or_trials: str, kind: str) -> None:
+    """Raise a StudyError if an option is given that is not for what is judged."""
+    for option, value in options.items():
+        if value:
+            raise StudyError(f"{option} is not for {kind}, and {policy_or_trials!r} is one")
 
 
-def _free(directory: Path, origin: Origin) -> Path:
-    """Return a directory that holds no other study: that one, or one with a number."""
-    number, free = 1, directory
-    while (free / FILE_NAME).exists() and not _holds(free, origin):
-        number += 1
-        free = directory.with_name(f"{directory.name}-{number}")
-    return free
+def judge_policy(
+    policy_text: str,
+    out: Path | None,
+    *,
+    most_seeds: int,
+    until_clear: bool,
+    minutes: float | None,
+    clearing: bool,
+    as_benchmark: bool,
+    engine: Engine,
+    full: bool,
+    trust_code: bool,
+    command: str,
+) -> Tally:
+    """Play a study of a policy, print the answer and write the report.
+
+    Args:
+        policy_text: the policy as it was typed.
+        out: directory of the study; None: results/judged/NAME or results/benchmark/NAME.
+        command: the command line, which goes on where it was stopped.
+    """
+    policy = PolicySpec.of(policy_text).replace(trusted=trust_code)
+    for training in policy.trainings or (policy,):
+        training.load()  # what is wrong with it is said before anything is written
+    if as_benchmark:
+        directory = out or Path("results", "benchmark", slug(policy.title))
+        study = study_of(benchmark.STUDY, directory, None, [policy_text], trust_code)
+    else:
+        ending = "-clearing" if clearing else ""
+        directory = out or Path("results", "judged", slug(policy.title) + ending)
+        looks = until_clear and most_seeds > FIRST_LOOK
+        study = study_of(STUDY, directory, most_seeds, [policy_text], trust_code, until_clear=looks)
+    if clearing:
+        until_cleared(study)
+    say(f"{study.plan()}, kept in {directory}")
+    echo()
+    say_what_a_pilot_shows(study)
+    tally = run_study(study, engine, minutes=minutes)
+    results = study.findings()
+    if as_benchmark and not (tally.left or tally.failed):
+        _show_benchmark(results, directory)
+    else:
+        show_report(results, directory, full=full, is_finished=not tally.left)
+    is_open = any(verdict.on_property.adjusted == "open" for verdict in results.verdicts)
+    if tally.left and not tally.gave_up:
+        reason = f"Stopped after {minutes:g} min, {tally.left} runs are left"
+        say(f"{reason}; the same command goes on:", command)
+    # Several trainings and untrusted code need options that the suggested command does not have.
+    elif is_open and not (tally.left or as_benchmark or policy.trainings or trust_code):
+        _suggest_more_seeds(policy_text, directory, max(JUDGE_SEEDS, 2 * most_seeds), clearing)
+    say_what_was_played(tally)
+    return tally
 
 
-def _pairs(option: str, texts: Repeated) -> dict[str, str]:
-    pairs = {}
-    for text in texts or []:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not (name and equals and value):
-            raise StudyError(f"{option} {text}: should be NAME=VALUE")
-        pairs[name] = value
-    return pairs
+def _suggest_more_seeds(policy_text: str, directory: Path, seeds: int, clearing: bool) -> None:
+    option = " --clearing" if clearing else ""
+    say(
+        "What is open needs more seeds, from the start:",
+        f"swarm-logistics judge {quote(policy_text)}{option} --seeds {seeds} "
+        f"--out {quote(f'{directory}-{seeds}')}",
+    )
 
 
-def names_policy(asked: str) -> bool:
+def names_policy(policy_or_trials: str) -> bool:
     """Return whether the argument of `judge` is a policy, not a file of trials."""
-    suffix = Path(asked).suffix
+    suffix = Path(policy_or_trials).suffix
     if suffix in (*SUFFIXES, ".py"):
         return True
-    if Path(asked).is_file() or suffix.lower() in (".csv", ".tsv", ".txt"):
+    if Path(policy_or_trials).is_file() or suffix.lower() in (".csv", ".tsv", ".txt"):
         return False
-    return ":" in asked or not suffix
+    return ":" in policy_or_trials or not suffix
 
 
 # Scores of the shipped policies in the benchmark; `docs/play_tables.py` writes it.
@@ -243,7 +245,7 @@ ENTRIES = Path(__file__).parents[1] / "report" / "benchmark_entries.json"
 def _show_benchmark(results: StudyResults, out: Path) -> None:
     """Print the table of a policy in the benchmark and its place, and write the report."""
     show(benchmark.table(results))
-    entries = {name: np.array(one) for name, one in json.loads(ENTRIES.read_text()).items()}
+    entries = {name: np.array(scores) for name, scores in json.loads(ENTRIES.read_text()).items()}
     entries[results.policies[0]] = benchmark.score(results)
     show(benchmark.leaderboard(entries))
     echo(f"Report: {write_report(results, out, document(results))[0]}")
@@ -274,7 +276,7 @@ def attack_command(
     """
     from swarm_logistics_env.attack import MODES, Attack, attack
 
-    asked = Attack(
+    search = Attack(
         policy=policy,
         scenario=scenario_of(preset, file, changes),
         robots=robots,
@@ -284,21 +286,29 @@ def attack_command(
         seed=seed,
     )
     engine = engine_named("local" if processes == 1 else "process", processes)
-    place = out or Path("results") / f"attack-{Path(policy).stem}"
+    directory = out or Path("results") / f"attack-{Path(policy).stem}"
     try:
-        found = attack(asked, engine, place)
+        result = attack(search, engine, directory)
     except KeyboardInterrupt:
-        echo(f"\nStopped. What is finished is kept in {place}; the same command goes on.", err=True)
+        echo(
+            f"\nStopped. What is finished is kept in {directory}; the same command goes on.",
+            err=True,
+        )
         raise Exit(130) from None
-    _show_attack(found, policy, robots, fresh)
+    _show_attack(result, policy, robots, fresh)
 
 
 def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
     rows = [
-        (found.by, str(text_of(found.fault)), bracketed(found.robustness, 3), str(found.runs))
-        for found in result.found
+        (
+            candidate.by,
+            str(text_of(candidate.fault)),
+            bracketed(candidate.robustness, 3),
+            str(candidate.runs),
+        )
+        for candidate in result.found
     ]
-    worst = min(result.found, key=lambda found: found.robustness.value)
+    worst = min(result.found, key=lambda candidate: candidate.robustness.value)
     capped = (
         "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
         "shown. --set restock=true has no cap."

@@ -70,17 +70,17 @@ def run_command(
     scheduled = faults_of(faults, scenario)
     names = policies or ["swarm-dt"]
     if film is not None:
-        each = [(faults or [], scheduled)]
+        variants = [(faults or [], scheduled)]
         if twin:
             if not scheduled:
                 raise SetupError("--twin: shows a run without its faults: --fault should be given")
-            each.insert(0, (["no fault"], []))
+            variants.insert(0, (["no fault"], []))
         runs = []
         for name in names:
-            for words, those in each:
-                title = ", ".join([display_name(name)[-24:], *words])
+            for fault_texts, scheduled_faults in variants:
+                title = ", ".join([display_name(name)[-24:], *fault_texts])
                 player = load(name, trust_code=trust_code)
-                runs.append((title, Play(scenario, player, seed, those)))
+                runs.append((title, Play(scenario, player, seed, scheduled_faults)))
         _write_film(film, runs, scenario.duration if until is None else until, speed)
         return
     if twin or until is not None or len(names) > 1:
@@ -92,9 +92,9 @@ def run_command(
     episode = run_episode(scenario, player, seed, scheduled)
     wall = time.perf_counter() - start
     times = episode.delivery_times
-    of = "" if scenario.restock else f" of {scenario.n_items}"
+    of_all = "" if scenario.restock else f" of {scenario.n_items}"
     echo(
-        f"P = {episode.delivered} items delivered{of} in {episode.ended_at:g} s "
+        f"P = {episode.delivered} items delivered{of_all} in {episode.ended_at:g} s "
         f"by {scenario.n_robots} robots with {display_name(names[0])}, seed {seed}"
     )
     if len(times):
@@ -142,7 +142,7 @@ def watch_command(
     if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
         raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
     scenario = scenario_of(preset, scenario_file, changes)
-    given = {display_name(name): name for name in filter(None, (policy, against))}
+    typed = {display_name(name): name for name in filter(None, (policy, against))}
     session = Session(
         scenario,
         display_name(policy),
@@ -150,7 +150,7 @@ def watch_command(
         seed,
         faults_of(faults, scenario),
         speed,
-        lambda name: load(given.get(name, name), trust_code=trust_code),
+        lambda name: load(typed.get(name, name), trust_code=trust_code),
     )
     if save is None:
         from swarm_logistics_env.watch.server import serve  # needs aiohttp
@@ -212,9 +212,9 @@ def list_command(
     from .terminal import show_table
 
     if what == "scenario":
-        chosen = scenario_of(preset, scenario_file, changes)
+        scenario = scenario_of(preset, scenario_file, changes)
         if as_json:
-            echo(chosen.to_json())
+            echo(scenario.to_json())
             return
         marks = (
             "fitted: chosen to bring the paper's tables closest. chosen: without a source. "
@@ -222,29 +222,32 @@ def list_command(
         )
         sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
         columns = ("condition", "value", "unit, meaning; source")
-        show_table(f"Preset {preset}", columns, chosen.conditions(), marks, sources)
+        show_table(f"Preset {preset}", columns, scenario.conditions(), marks, sources)
     elif what == "policies":
         line = "Your own is package.module:Class, or the path of a file that `train` wrote."
         show_table("Policies", ("name", "kind", "about"), known_policies(), line)
     elif what == "trainings":
         from swarm_logistics_env.train.training import load_training, preset_names
 
-        presets = [(name, load_training(name)) for name in preset_names()]
-        trained = ((name, f"{one.agent_steps / 1e6:g}", one.about) for name, one in presets)
-        show_table("Trainings", ("name", "million agent-steps", "about"), trained)
+        trainings = [(name, load_training(name)) for name in preset_names()]
+        rows = [
+            (name, f"{training.agent_steps / 1e6:g}", training.about)
+            for name, training in trainings
+        ]
+        show_table("Trainings", ("name", "million agent-steps", "about"), rows)
     elif what == "faults":
-        rows = ((name, mode.description) for name, mode in FAILURE_MODES.items())
+        descriptions = [(name, mode.description) for name, mode in FAILURE_MODES.items()]
         line = (
             "As --fault takes one: MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM4:2@200: two "
             "robots (one if not given) from 200 s on (0 s), in any role, for good. Roles: "
             f"{', '.join(ROLES)}"
         )
-        show_table("Failure modes", ("mode", "what it does to a robot"), rows, line)
+        show_table("Failure modes", ("mode", "what it does to a robot"), descriptions, line)
     else:
-        found = []
+        studies = []
         for name in PRESETS:
             plan = Study.preset(name).plan()
             tables = "; ".join(dict.fromkeys(table for _, table, _ in plan.cells))
-            found.append((name, str(len(plan.seeds)), str(len(plan.runs)), tables))
+            studies.append((name, str(len(plan.seeds)), str(len(plan.runs)), tables))
         line = "swarm-logistics study plan NAME prints its conditions; study run NAME plays it."
-        show_table("Studies", ("name", "seeds", "runs", "tables"), found, line)
+        show_table("Studies", ("name", "seeds", "runs", "tables"), studies, line)

@@ -63,12 +63,12 @@ ClearingOption = Annotated[
     ),
 ]
 
-study = typer.Typer(name="study", help="Judge a swarm by its indicators.")
+study_app = typer.Typer(name="study", help="Judge a swarm by its indicators.")
 
 
-@study.command("run")
+@study_app.command("run")
 def run_command(
-    asked: StudyArgument,
+    study_name: StudyArgument,
     out: Annotated[
         Path | None, Option(help="Directory of its store and report; results/NAME if not given.")
     ] = None,
@@ -113,36 +113,31 @@ def run_command(
     if until_clear and seeds is None:
         seeds = MOST_SEEDS
     looks = until_clear or None
-    chosen = study_of(
-        asked, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
+    study = study_of(
+        study_name, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
     )
     if clearing:
-        until_cleared(chosen)
+        until_cleared(study)
     if restock:
-        task, scenario = chosen.specification.played, chosen.specification.scenario
-        restocked = task.vary(scenario, {"restock": True})
-        chosen.specification = chosen.specification.replace(scenario=restocked)
-    ending = "-clearing" * clearing + "-restock" * restock
-    # The study of a policy of one's own stands beside that of the preset.
-    whose = "-".join(policy.title for policy in chosen.specification.policies)
-    ending += f"-{slug(whose)[:40]}" if policies else ""
-    out = out or Path("results", chosen.specification.name + ending)
-    chosen.out = out / part.directory if part else out
+        specification = study.specification
+        scenario = specification.played.vary(specification.scenario, {"restock": True})
+        study.specification = specification.replace(scenario=scenario)
+    out = out or _default_directory(study, clearing, restock, has_own_policies=bool(policies))
+    study.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address, run_limit)
-    say(str(chosen.plan()))
+    say(str(study.plan()))
     echo()
-    if chosen.is_exploratory():
+    if study.is_exploratory():
         say(
             "This study declared other seeds before its first run: every verdict is exploratory. "
             "For verdicts that stand, run a new study on fresh seeds: --first-seed and --out.\n"
         )
     if policies:
-        tell_what_a_pilot_shows(chosen)
-    tally = run_study(chosen, player, part)
+        say_what_a_pilot_shows(study)
+    tally = run_study(study, player, part)
     if part is None:
-        results = chosen.findings()
-        show_report(results, chosen.out, full=full)
+        show_report(study.findings(), study.out, full=full)
     else:
         say(
             f"When all {part.count} shards are done:",
@@ -153,34 +148,49 @@ def run_command(
     raise Exit(1 if tally.failed else 0)
 
 
-def tell_what_a_pilot_shows(asked: Study) -> None:
+def _default_directory(
+    study: Study, clearing: bool, restock: bool, *, has_own_policies: bool
+) -> Path:
+    """Return results/NAME; what the options change in a preset gets a directory of its own."""
+    parts = [study.specification.name]
+    if clearing:
+        parts.append("clearing")
+    if restock:
+        parts.append("restock")
+    if has_own_policies:
+        titles = "-".join(policy.title for policy in study.specification.policies)
+        parts.append(slug(titles)[:40])
+    return Path("results", "-".join(parts))
+
+
+def say_what_a_pilot_shows(study: Study) -> None:
     """Say which policies deliver everything or nothing in the base scenario at the first seed."""
-    plan = asked.plan()
-    sound = [case for case in plan.cases if not case.faults]
-    base = [case for case in sound if case.scenario == plan.specification.scenario]
-    whole = {case.policy.title: case for case in reversed(base or sound)}
-    if not any(getattr(case.scenario, "n_items", None) for case in whole.values()):
+    plan = study.plan()
+    sound_cases = [case for case in plan.cases if not case.faults]
+    base_cases = [case for case in sound_cases if case.scenario == plan.specification.scenario]
+    case_by_title = {case.policy.title: case for case in reversed(base_cases or sound_cases)}
+    if not any(getattr(case.scenario, "n_items", None) for case in case_by_title.values()):
         return
-    for title, case in whole.items():
-        first = [Run(one, plan.code, plan.seeds[0]).play() for one in case.trainings]
-        if any(outcome.capped for outcome in first):
+    for title, case in case_by_title.items():
+        outcomes = [Run(training, plan.code, plan.seeds[0]).play() for training in case.trainings]
+        if any(outcome.capped for outcome in outcomes):
             say(
                 f"{title} delivers every item before the end, so that P is capped and most "
                 "verdicts will be open. Nothing is capped where items come back, or where P is the "
                 "rate until all are delivered: add --restock or --clearing"
             )
-        elif errors := [outcome.error for outcome in first if outcome.error]:
-            why = plain(errors[0].strip().splitlines()[-1])
-            if "of shape" in why:  # it will be so in every run
-                raise StudyError(f"{title} fails in a first run: {why.partition(': ')[2]}")
-            say(f"{title} fails in a first run: {why}. Ctrl-C stops; finished runs are kept.")
-        elif not any(outcome.delivered for outcome in first):
+        elif errors := [outcome.error for outcome in outcomes if outcome.error]:
+            reason = plain(errors[0].strip().splitlines()[-1])
+            if "of shape" in reason:  # every run will fail so
+                raise StudyError(f"{title} fails in a first run: {reason.partition(': ')[2]}")
+            say(f"{title} fails in a first run: {reason}. Ctrl-C stops; finished runs are kept.")
+        elif not any(outcome.delivered for outcome in outcomes):
             say(f"{title} delivers nothing in a first run. Ctrl-C stops; finished runs are kept.")
 
 
-@study.command("plan")
+@study_app.command("plan")
 def plan_command(
-    asked: Annotated[
+    study_name: Annotated[
         str,
         Argument(metavar="FILE|PRESET|DIR", help="A study; or the directory of one that was run."),
     ],
@@ -194,12 +204,13 @@ def plan_command(
     trust_code: TrustOption = False,
 ) -> None:
     """Print the conditions and count the runs. Of a study that was run: the seeds it needs."""
-    if Path(asked).is_dir():
+    if Path(study_name).is_dir():
         if policies:
             raise StudyError("--policy: a study that was run has its own policies")
-        show_power(asked, Study.stored(asked, trust_code=trust_code).findings(), effect)
+        results = Study.stored(study_name, trust_code=trust_code).findings()
+        show_power(study_name, results, effect)
         return
-    plan = study_of(asked, None, seeds, policies, trust_code, first_seed=first_seed).plan()
+    plan = study_of(study_name, None, seeds, policies, trust_code, first_seed=first_seed).plan()
     uses: dict[str, list[str]] = {}
     for _, table, arm in plan.cells:
         uses.setdefault(arm.case.key, []).append(f"{table} ({arm.setting})")
@@ -211,7 +222,7 @@ def plan_command(
     echo(plan)
 
 
-@study.command("report")
+@study_app.command("report")
 def report_command(
     directory: DirectoryArgument, full: FullOption = False, trust_code: TrustOption = False
 ) -> None:
@@ -222,7 +233,7 @@ def report_command(
     show_report(stored.findings(), directory, full=full)
 
 
-@study.command("compare")
+@study_app.command("compare")
 def compare_command(
     old: Annotated[Path, Argument(metavar="OLD", help="Directory of the study to compare with.")],
     new: Annotated[Path, Argument(metavar="NEW", help="Directory of the study that is judged.")],
@@ -247,31 +258,39 @@ def compare_command(
     failed = False
     # Without a gate the change is shown, and nothing fails.
     for gate in gates or [Gate.parse("change < 0")]:
-        said = answers(gate, before, after)
-        fails = bool(gates) and any(answer.fails for answer in said)
+        gate_answers = answers(gate, before, after)
+        fails = bool(gates) and any(answer.fails for answer in gate_answers)
         failed |= fails
         result = "fails" if fails else "passes"
         title = f"Gate {result} (fails if {gate.text})" if gates else "Change of P"
-        _show_answers(title, said, left_out if gate.subject == "change" else ())
+        _show_answers(title, gate_answers, left_out if gate.subject == "change" else ())
     raise Exit(1 if failed else 0)
 
 
-def _show_answers(title: str, found: tuple[GateAnswer, ...], left_out: tuple[str, ...]) -> None:
-    rows, levels = [], {CONFIDENCE}
-    for answer in found:
-        estimate, value, says = answer.estimate, NOTHING, answer.problem or ""
+def _show_answers(
+    title: str, gate_answers: tuple[GateAnswer, ...], left_out: tuple[str, ...]
+) -> None:
+    rows = []
+    levels = {CONFIDENCE}
+    for answer in gate_answers:
+        estimate = answer.estimate
+        value = NOTHING
+        verdict = answer.problem or ""
         if answer.exact is not None:
-            value, says = f"{answer.exact:.3f}", "exact: the runs of both studies are the same"
+            value = f"{answer.exact:.3f}"
+            verdict = "exact: the runs of both studies are the same"
         if estimate is not None:
-            value, levels = bracketed(estimate, 3), {estimate.confidence}
-            says = f"above {estimate.threshold:g}: {answer.verdict}"
+            value = bracketed(estimate, 3)
+            levels = {estimate.confidence}
+            verdict = f"above {estimate.threshold:g}: {answer.verdict}"
             if estimate.untestable:
-                says = f"untestable: cannot be below {estimate.threshold:g}"
-        rows.append((answer.name, value, says))
-    show_table(title, ("", f"value [{percent(*levels)}]", "verdict under Holm"), rows, *left_out)
+                verdict = f"untestable: cannot be below {estimate.threshold:g}"
+        rows.append((answer.name, value, verdict))
+    columns = ("", f"value [{percent(*levels)}]", "verdict under Holm")
+    show_table(title, columns, rows, *left_out)
 
 
-@study.command("merge")
+@study_app.command("merge")
 def merge_command(
     directories: Annotated[list[Path], Argument(help="Directories of shards of a study.")],
     out: Annotated[Path, Option(help="Directory of the merged study.")],
@@ -285,7 +304,7 @@ def merge_command(
     echo(f"Its report: swarm-logistics study report {shlex.quote(str(out))}")
 
 
-@study.command("export")
+@study_app.command("export")
 def export_command(
     directory: DirectoryArgument, to: Annotated[Path, Option(help="File to write, .csv.")]
 ) -> None:
@@ -303,7 +322,7 @@ def export_command(
 
 
 def study_of(
-    asked: str,
+    study_name: str,
     out: Path | None,
     seeds: int | None,
     policies: Repeated,
@@ -315,11 +334,11 @@ def study_of(
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
-    given = {"seeds": seeds, **fields}
-    fields = {name: value for name, value in given.items() if value is not None}
+    options = {"seeds": seeds, **fields}
+    fields = {name: value for name, value in options.items() if value is not None}
     if policies:
-        named = [PolicySpec.of(name) for name in policies]
-        fields["policies"] = tuple(policy.replace(trusted=trust_code) for policy in named)
+        policy_specs = [PolicySpec.of(name) for name in policies]
+        fields["policies"] = tuple(policy.replace(trusted=trust_code) for policy in policy_specs)
         for name in policies:
             # What is typed names a class on purpose; a file may look like any other.
             if name.endswith(SB3_SUFFIX) and not trust_code:
@@ -327,12 +346,12 @@ def study_of(
                     f"--policy {name}: reading a model of stable-baselines3 executes the code in "
                     "it: should be allowed by --trust-code"
                 )
-    if asked.endswith(".toml") or Path(asked).is_file():
-        return Study.from_file(asked, out=out, trust_code=trust_code, **fields)
-    return Study.preset(asked, out=out, **fields)
+    if study_name.endswith(".toml") or Path(study_name).is_file():
+        return Study.from_file(study_name, out=out, trust_code=trust_code, **fields)
+    return Study.preset(study_name, out=out, **fields)
 
 
-def until_cleared(asked: Study) -> None:
+def until_cleared(study: Study) -> None:
     """Let P be the rate at which the items of a study's warehouse are cleared.
 
     Raises:
@@ -340,29 +359,31 @@ def until_cleared(asked: Study) -> None:
     """
     from swarm_logistics_env.tasks.task import DEFAULT, task_of
 
-    given, task = asked.specification, task_of("clearing")
-    if given.task != DEFAULT:
-        raise StudyError(f"--clearing: should be for the task {DEFAULT!r}, not {given.task!r}")
-    times = {"restock": False, "duration": task.default.duration}
-    scenario = task.vary(given.scenario, times)
+    specification = study.specification
+    if specification.task != DEFAULT:
+        task_name = specification.task
+        raise StudyError(f"--clearing: should be for the task {DEFAULT!r}, not {task_name!r}")
+    task = task_of("clearing")
+    changes = {"restock": False, "duration": task.default.duration}
+    scenario = task.vary(specification.scenario, changes)
     # What is published is of another P.
-    asked.specification = given.replace(task="clearing", scenario=scenario, reference=None)
+    study.specification = specification.replace(task="clearing", scenario=scenario, reference=None)
 
 
 def run_study(
-    asked: Study, engine: Engine, shard: Shard | None = None, minutes: float | None = None
+    study: Study, engine: Engine, shard: Shard | None = None, minutes: float | None = None
 ) -> Tally:
     """Run a study; Ctrl-C ends the command and says how to go on."""
     try:
-        return asked.run(engine, shard=shard, minutes=minutes)
+        return study.run(engine, shard=shard, minutes=minutes)
     except KeyboardInterrupt:
-        done, total = asked.finished(shard)
-        left = f"the other {total - done}"
-        if asked.specification.until_clear:
-            left += ", and with what later looks need"
+        n_finished, n_runs = study.finished(shard)
+        missing = f"the other {n_runs - n_finished}"
+        if study.specification.until_clear:
+            missing += ", and with what later looks need"
         echo(
-            f"\nStopped. {done} of {total} runs are finished and kept in {asked.out}; the same "
-            f"command goes on with {left}.",
+            f"\nStopped. {n_finished} of {n_runs} runs are finished and kept in {study.out}; the "
+            f"same command goes on with {missing}.",
             err=True,
         )
         raise Exit(130) from None

@@ -67,66 +67,79 @@ def show_report(results: StudyResults, out: Path, *, full: bool, is_finished: bo
         full: print every table, and a line a question.
         is_finished: whether all is played; else no sentence is for a paper.
     """
-    whole = document(results)
-    for section in whole.summary if full else ():
-        show(section)
-    # Printed first: what was found is told even where no file can be written.
+    report = document(results)
+    if full:
+        for section in report.summary:
+            show(section)
+    # Printed first: the answer is shown even where no file can be written.
     console = Console()
     width = console.width if console.is_terminal else _PLAIN_WIDTH
-    found, most = (answer(results, most=None), None) if full else (whole.answer, MOST_LINES)
-    echo("\n".join(map(plain, digest(found, width, most).split("\n"))))
-    echo(f"Report: {write_report(results, out, whole)[0]}")
+    if full:
+        text = digest(answer(results, most=None), width, None)
+    else:
+        text = digest(report.answer, width, MOST_LINES)
+    echo("\n".join(map(plain, text.split("\n"))))
+    echo(f"Report: {write_report(results, out, report)[0]}")
     if advice := how_to_get_figures():
         echo(advice)
     else:
         echo(f"Figure: {out / 'figures' / 'answer.svg'}")
         echo(f"Tables: {out / 'tables.tex'}")
-    if is_finished and any(test.estimate for test in results.verdicts):
+    if is_finished and any(verdict.estimate for verdict in results.verdicts):
         say(f"For a paper: {plain(in_a_sentence(results))}")
 
 
-def show_power(asked: str, results: StudyResults, effect: float | None) -> None:
+def show_power(study_name: str, results: StudyResults, effect: float | None) -> None:
     """Print the seeds that each comparison of a study needs for an effect, given or published."""
-    n_seeds, margin = len(results.plan.seeds), results.plan.specification.margin
+    n_seeds = len(results.plan.seeds)
+    margin = results.plan.specification.margin
     runs = "seeds" if results.plan.paired else "trials a condition"
     columns = (
         "policy", "verdict on", "assumed effect", f"{runs} for {POWER:.0%} power",
         f"distance that {n_seeds} {runs} find", f"{runs} for equivalent at {margin:.0%}",
     )  # fmt: skip
-    hint = f"For another effect: swarm-logistics study plan {quote(asked)} --effect 0.2"
-    rows = [_power(test, test.published if effect is None else effect) for test in results.verdicts]
+    hint = f"For another effect: swarm-logistics study plan {quote(study_name)} --effect 0.2"
+    rows = [
+        _power(verdict, verdict.published if effect is None else effect)
+        for verdict in results.verdicts
+    ]
     level = levels(results.verdicts)
     lines = (hint,) if results.damage is None else (f"{results.damage}.", hint)
     show_table(f"Power, from {n_seeds} {runs}, of verdicts at {level}", columns, rows, *lines)
 
 
-def _power(test: Verdict, effect: float | None) -> Texts:
+def _power(verdict: Verdict, effect: float | None) -> Texts:
     # Only the spread is taken from the runs, never the effect that they happened to show.
-    compared, estimate, same = test.compared, test.estimate, test.equivalence
-    seeds = test.problem or "no effect is named"
+    comparison = verdict.compared
+    estimate = verdict.estimate
+    equivalence = verdict.equivalence
+    seeds = verdict.problem or "no effect is named"
     if estimate is not None and effect is not None:
         seeds = spi.no_plan_because(estimate, effect) or str(
             spi.seeds_for_power(estimate, effect, POWER)
         )
+    seeds_for_equivalence = NOTHING
+    if equivalence is not None:
+        seeds_for_equivalence = number(spi.seeds_for_equivalence(equivalence, POWER), 0)
     return (
-        compared.policy,
-        f"{compared.indicator} > {compared.threshold:.3g}, {compared.label}",
+        comparison.policy,
+        f"{comparison.indicator} > {comparison.threshold:.3g}, {comparison.label}",
         number(effect),
         seeds,
-        number(test.detectable),
-        NOTHING if same is None else number(spi.seeds_for_equivalence(same, POWER), 0),
+        number(verdict.detectable),
+        seeds_for_equivalence,
     )
 
 
 def say_what_was_played(tally: Tally) -> None:
     """Print how many runs were played, in which time, what failed, and where it was given up."""
     rate = f", {tally.played / tally.seconds:.2f} episodes/s" if tally.played else ""
-    why = f", the first with {plain(tally.error)}" if tally.error else ""
+    first_error = f", the first with {plain(tally.error)}" if tally.error else ""
     for change in tally.changes:
         say(f"Runs that were stored before do not count: {change}.")
     say(
         f"{tally.played} runs played in {tally.seconds:.1f} s{rate}; {tally.kept} were kept from "
-        f"before; {tally.failed} failed{why}"
+        f"before; {tally.failed} failed{first_error}"
     )
     if tally.gave_up:
         say(

@@ -35,8 +35,8 @@ def train_command(
     ] = None,
 ) -> None:
     """Train a policy; the same command goes on where it was stopped."""
-    changed = {"seed": seed, "agent_steps": steps}
-    fields = {name: value for name, value in changed.items() if value is not None}
+    options = {"seed": seed, "agent_steps": steps}
+    fields = {name: value for name, value in options.items() if value is not None}
     training = load_training(preset, **fields)
     try:
         import_module("tensorboard")  # missed before anything is written

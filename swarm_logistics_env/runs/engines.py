@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 import sys
-import sysconfig
 import threading
 import time
 import traceback
@@ -17,12 +16,11 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from types import ModuleType
 from typing import Self
 
 from swarm_logistics_env.code_files import current_folder_modules
-from swarm_logistics_env.errors import StudyError, how_to_install, suggest
+from swarm_logistics_env.errors import StudyError, how_to_install, suggest, users_line
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.tasks.task import Outcome, Run
 
@@ -31,14 +29,6 @@ from .worker_processes import Played, in_processes, pickled, play_pickled
 
 Engine = Callable[[Iterable[Run]], Played]
 NAMES = ("local", "process", "ray")
-
-
-# Lines of a traceback, and the beginnings of files that are not a user's own.
-_FRAME = re.compile(r'File "(.+?)", line (\d+)')
-_NOT_OWN = (
-    str(Path(__file__).parents[1]), "<",
-    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -108,9 +98,8 @@ class Tally:
     @property
     def place(self) -> str:
         """File and line at which it did, outside this package and the libraries if possible."""
-        frames = _FRAME.findall(self.traceback or "")
-        users = [frame for frame in frames if not frame[0].startswith(_NOT_OWN)]
-        return ":".join([*frames, *users][-1]) if frames else "no file"
+        line = users_line(self.traceback or "")
+        return "no file" if line is None else ":".join(line)
 
 
 def play(

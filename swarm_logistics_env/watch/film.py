@@ -66,11 +66,11 @@ class Film:
         self._period = speed / frame_rate
         self._pictures = [Picture(take.play.world.scenario, size) for take in takes]
         self._text_height = max(13, round(size / 26))
-        self._head = 2 * round(1.5 * self._text_height)
-        self._tall = max(picture.height for picture in self._pictures)
+        self._head_height = 2 * round(1.5 * self._text_height)
+        self._picture_height = max(picture.height for picture in self._pictures)
         self._width = sum(picture.width for picture in self._pictures)
-        self._n_last = round(LAST_FRAME * frame_rate)
-        self.n_frames = math.ceil(self._until / self._period) + 1 + self._n_last
+        self._n_last_frames = round(LAST_FRAME * frame_rate)
+        self.n_frames = math.ceil(self._until / self._period) + 1 + self._n_last_frames
 
     def frames(self) -> Iterator[Pixels]:
         """Play the runs and return their pictures: (H, W, 3), red, green, blue, even sides.
@@ -78,7 +78,7 @@ class Film:
         Raises:
             PolicyError: a policy returned commands of the wrong shape, or not finite.
         """
-        for count in range(self.n_frames - self._n_last):
+        for count in range(self.n_frames - self._n_last_frames):
             time = min(count * self._period, self._until)
             for take in self._takes:
                 while not take.play.is_over and take.play.world.state.time < time - 5e-7:
@@ -87,22 +87,24 @@ class Film:
             yield frame
             if all(take.play.is_over for take in self._takes):
                 break
-        for _ in range(self._n_last):
+        for _ in range(self._n_last_frames):
             yield frame
 
     def _draw(self) -> Pixels:
-        canvas = new_canvas(self._width, self._head + self._tall)
+        canvas = new_canvas(self._width, self._head_height + self._picture_height)
         canvas.fill(SURROUNDINGS)
         x = 0
         for take, picture in zip(self._takes, self._pictures):
             world = take.play.world
-            room = pygame.Rect(x, 0, picture.width, self._head).inflate(-self._text_height, 0)
+            heading = pygame.Rect(x, 0, picture.width, self._head_height).inflate(
+                -self._text_height, 0
+            )
             # Large, so that it can be read where the film is small.
             count = words(str(world.state.delivered), round(2.4 * self._text_height))
-            canvas.blit(count, count.get_rect(midright=room.midright))
+            canvas.blit(count, count.get_rect(midright=heading.midright))
             name = words(take.name, self._text_height + 4)
-            room.width -= count.get_width()
-            canvas.blit(name, name.get_rect(midleft=room.midleft), (0, 0, *room.size))
-            canvas.blit(picture.draw(world.state, world.scenario), (x, self._head))
+            heading.width -= count.get_width()
+            canvas.blit(name, name.get_rect(midleft=heading.midleft), (0, 0, *heading.size))
+            canvas.blit(picture.draw(world.state, world.scenario), (x, self._head_height))
             x += picture.width
         return to_array(canvas)

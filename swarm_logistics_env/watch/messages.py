@@ -27,8 +27,8 @@ from .session import SPEEDS, Session
 
 Message: TypeAlias = dict[str, Any]
 
-_TOLD = ("seed", "speed", "paused", "mode", "note", "failure", "policy", "against")
-_SHAPE = (
+_SESSION_FIELDS = ("seed", "speed", "paused", "mode", "note", "failure", "policy", "against")
+_SCENARIO_FIELDS = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius",
 )  # fmt: skip
@@ -60,18 +60,18 @@ def frame(session: Session) -> Message:
     of the limit or None, mark, robot it follows] of each), `items` (x, y of each that is stored),
     `requested` ([x, y, carrier] of each that is asked for) and `deliveries` (their times).
     """
-    frame: Message = {
-        **{name: getattr(session, name) for name in _TOLD},
+    message: Message = {
+        **{name: getattr(session, name) for name in _SESSION_FIELDS},
         "time": round(session.state.time, 3),
         "over": session.is_over,
-        "scenario": {name: getattr(session.scenario, name) for name in _SHAPE},
+        "scenario": {name: getattr(session.scenario, name) for name in _SCENARIO_FIELDS},
         "obstacles": _millimetres(session.state.obstacle_position),
         "events": [[round(e.time, 1), e.robot, e.label] for e in session.events],
         "selected": _selected(session),
     }
     for number, play in enumerate((session.run, session.beside)):
-        frame |= {f"{name}{number}": value for name, value in _arena(play).items()}
-    return frame
+        message |= {f"{name}{number}": value for name, value in _arena(play).items()}
+    return message
 
 
 def changes(before: Message, after: Message) -> Message:
@@ -122,8 +122,8 @@ def obey(session: Session, text: str) -> None:
         _checked(act)(session, **arguments)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise SetupError(f"order {where}: {first['msg']}") from None
+        argument = ".".join(str(part) for part in first["loc"])
+        raise SetupError(f"order {argument}: {first['msg']}") from None
 
 
 def rehearse(session: Session) -> None:
@@ -142,7 +142,8 @@ def rehearse(session: Session) -> None:
 
 
 def _arena(play: Play) -> Message:
-    state, scenario = play.world.state, play.world.scenario
+    state = play.world.state
+    scenario = play.world.scenario
     poses: list[int | None] = []
     robots: list[list[Any] | None] = []
     positions = _millimetres(state.robot_position)
@@ -158,13 +159,17 @@ def _arena(play: Play) -> Message:
         robots.append(
             [palette.activity(state, robot), age, mark, palette.leader_of(state, scenario, robot)]
         )
-    asked, stored = state.item_requested, state.item_status == STORED
-    places, carriers = _millimetres(state.item_position[asked]), state.item_carrier[asked].tolist()
+    requested = state.item_requested
+    stored = state.item_status == STORED
+    requested_positions = _millimetres(state.item_position[requested])
+    carriers = state.item_carrier[requested].tolist()
     return {
         "poses": poses,
         "robots": robots,
-        "items": _millimetres(state.item_position[stored & ~asked]),
-        "requested": [[*place, carrier] for place, carrier in zip(places, carriers)],
+        "items": _millimetres(state.item_position[stored & ~requested]),
+        "requested": [
+            [*position, carrier] for position, carrier in zip(requested_positions, carriers)
+        ],
         "deliveries": [round(time, 1) for time in state.delivery_times],
     }
 
@@ -174,8 +179,8 @@ def _selected(session: Session) -> Message | None:
     if robot is None:
         return None
     state = session.state
-    seen = unflatten(session.run.world.observe()[robot], session.scenario)
-    beams = np.min([seen[f"range_{what}"] for what in ("robots", "walls", "items")], axis=0)
+    observation = unflatten(session.run.world.observe()[robot], session.scenario)
+    beams = np.min([observation[f"range_{kind}"] for kind in ("robots", "walls", "items")], axis=0)
     return {
         "robot": robot,
         "activity": palette.activity(state, robot),
@@ -185,15 +190,19 @@ def _selected(session: Session) -> Message | None:
         "view": round(float(state.view_range[robot]), 3),
         # Adding 0.0 turns a negative zero into zero.
         "row": [
-            (part.name, part.unit, [round(value, 2) + 0.0 for value in seen[part.name].tolist()])
-            for part in columns(session.scenario)
+            (
+                column.name,
+                column.unit,
+                [round(value, 2) + 0.0 for value in observation[column.name].tolist()],
+            )
+            for column in columns(session.scenario)
         ],
     }
 
 
-def _millimetres(places: NDArray[np.float64]) -> list[list[int]]:
-    whole: list[list[int]] = np.rint(1000.0 * places).astype(int).tolist()
-    return whole
+def _millimetres(positions: NDArray[np.float64]) -> list[list[int]]:
+    rounded: list[list[int]] = np.rint(1000.0 * positions).astype(int).tolist()
+    return rounded
 
 
 _SPACING = 0.5  # [s] between frames; the page draws what lies between
@@ -220,11 +229,11 @@ class Recording:
         time = session.state.time
         if self._last and time < self._last["time"] + _SPACING - 1e-9 and not session.is_over:
             return
-        now = {**frame(session), "selected": None, "note": "", "paused": False}
-        message = changes(self._last, now)
+        present = {**frame(session), "selected": None, "note": "", "paused": False}
+        message = changes(self._last, present)
         if message:
             self._messages.append(encode(message))
-        self._last = now
+        self._last = present
 
     def page(self) -> str:
         """Return the recording as an HTML page that loads nothing."""

@@ -100,20 +100,21 @@ class _Page:
 
     def __init__(self, socket: web.WebSocketResponse, transport: asyncio.Transport) -> None:
         self._socket, self._transport = socket, transport
-        self._known: Message = {}
+        self._sent_frame: Message = {}
         self._sending: asyncio.Task[None] | None = None
-        self._since = 0.0
+        self._sent_at = 0.0
 
-    def tell(self, now: Message) -> None:
+    def tell(self, current_frame: Message) -> None:
         """Send what has changed, unless the page still takes what changed before."""
-        moment = time.monotonic()
+        now = time.monotonic()
         if self._sending is not None and not self._sending.done():
-            if moment > self._since + _PATIENCE:
+            if now > self._sent_at + _PATIENCE:
                 self._transport.abort()
             return
-        message = changes(self._known, now)
+        message = changes(self._sent_frame, current_frame)
         if message:
-            self._known, self._since = now, moment
+            self._sent_frame = current_frame
+            self._sent_at = now
             self._sending = asyncio.create_task(self._send(encode(message)))
 
     async def _send(self, text: str) -> None:
@@ -164,8 +165,9 @@ class WatchServer:
             )
         except OSError as error:
             await self._runner.cleanup()
-            told = f"{error.strerror}; --port 0 takes any that is free"
-            raise SetupError(f"port = {self.port}: {told}") from None
+            raise SetupError(
+                f"port = {self.port}: {error.strerror}; --port 0 takes any that is free"
+            ) from None
         self.port = self._listening.sockets[0].getsockname()[1]
         rehearse(self.session)
         self.address = f"http://{LOOPBACK}:{self.port}/{self.token}/"
@@ -184,9 +186,9 @@ class WatchServer:
                 elapsed, before = now - before, now
                 if self._pages:
                     self.session.play(elapsed, _FRAME_PERIOD, self.recording.note)
-                    message = frame(self.session)
+                    current_frame = frame(self.session)
                     for page in self._pages:
-                        page.tell(message)
+                        page.tell(current_frame)
         finally:
             if self._listening is not None:
                 self._listening.close()
@@ -233,10 +235,10 @@ class WatchServer:
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
-        own = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0]) is not None
+        is_to_this_machine = len(hosts) == 1 and _OWN_HOST.fullmatch(hosts[0]) is not None
         token = request.rel_url.raw_path.removeprefix("/").partition("/")[0]
-        known = hmac.compare_digest(token.encode(), self.token.encode())
-        if not (own and known and origins in ([], [f"http://{hosts[0]}"])):
+        has_token = hmac.compare_digest(token.encode(), self.token.encode())
+        if not (is_to_this_machine and has_token and origins in ([], [f"http://{hosts[0]}"])):
             text = "Open the address that swarm-logistics watch printed, on its machine.\n"
             raise web.HTTPForbidden(text=text)
         return await handler(request)
@@ -244,8 +246,8 @@ class WatchServer:
 
 def _is_own_error(record: logging.LogRecord) -> bool:
     """Return whether an error is ours: no request that is no HTTP, no page that was closed."""
-    others = HttpProcessingError | ConnectionError
-    return not (record.exc_info and isinstance(record.exc_info[1], others))
+    of_network = HttpProcessingError | ConnectionError
+    return not (record.exc_info and isinstance(record.exc_info[1], of_network))
 
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, suggest
+from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, suggest, users_line
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
@@ -20,7 +20,6 @@ from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES, failure_m
 from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults
 from swarm_logistics_env.warehouse.state import WarehouseState
 
-_PACKAGE = Path(__file__).parents[1]
 _LONGEST_REASON = 500  # characters
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 
@@ -67,10 +66,12 @@ class Session:
         speed: float = 1.0,
         load: Callable[[str], policies.Policy] = policies.load,
     ) -> None:
-        self.load, self._planned = load, checked_faults("faults", faults)
-        named = filter(None, (policy, against))
-        self.choices = tuple(dict.fromkeys([*named, *policies.NAMES]))
-        self.paused, self.mode = False, "FM4"
+        self.load = load
+        self._planned_faults = checked_faults("faults", faults)
+        chosen = filter(None, (policy, against))
+        self.choices = tuple(dict.fromkeys([*chosen, *policies.NAMES]))
+        self.paused = False
+        self.mode = "FM4"
         self.set_speed(speed)
         self.selected: int | None = None
         self.note = self.failure = ""
@@ -132,8 +133,8 @@ class Session:
     def set_speed(self, speed: float) -> None:
         """Play that many times as fast as real time, one of `SPEEDS`."""
         if speed not in SPEEDS:
-            known = ", ".join(f"{known:g}" for known in SPEEDS)
-            raise SetupError(f"speed = {speed:g}: should be one of {known}")
+            allowed = ", ".join(f"{allowed:g}" for allowed in SPEEDS)
+            raise SetupError(f"speed = {speed:g}: should be one of {allowed}")
         self.speed = speed
 
     def compare(self, policy: str, against: str | None = None) -> None:
@@ -169,20 +170,20 @@ class Session:
 
     def break_robot(self) -> None:
         """Let the selected robot fail from now on in the chosen mode."""
-        robot = self._meant()
+        robot = self._robot_to_change()
         if self.mode in self.state.failure_modes[robot]:
             self.note = f"robot {robot} already fails in mode {self.mode}"
             return
         now = round(self.state.time, 9)
         fault = Fault(self.mode, [robot], onset=now)
         self._change_faults(lambda faults: [*faults, fault])
-        self._look_after_selection()
+        self._deselect_absent_robot()
         self.events.append(Event(self.state.time, robot, self.mode))
         self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
 
     def repair_robot(self) -> None:
         """End all failures of the selected robot."""
-        robot = self._meant()
+        robot = self._robot_to_change()
         state = self.state
         if not state.failed[robot]:
             self.note = f"robot {robot} is sound"
@@ -192,8 +193,8 @@ class Session:
             for fault in faults:
                 if not (fault.is_active(state.time) and isinstance(fault.robots, tuple)):
                     yield fault
-                elif others := tuple(other for other in fault.robots if other != robot):
-                    yield fault.replace(robots=others)
+                elif still_faulty := tuple(faulty for faulty in fault.robots if faulty != robot):
+                    yield fault.replace(robots=still_faulty)
 
         self._change_faults(lambda faults: [*without_robot(faults)])
         self.events.append(Event(self.state.time, robot, None))
@@ -223,25 +224,30 @@ class Session:
         self.note = f"delivery area {width:g} m wide"
 
     def _begin(self, scenario: Scenario, seed: int, policy: str, against: str | None) -> None:
-        faults = self._planned
+        faults = self._planned_faults
         run = Play(scenario, self.load(policy), seed, faults)
-        other, others_faults = (policy, ()) if against is None else (against, faults)
-        self.beside = Play(scenario, self.load(other), seed, others_faults)
-        self.run, self.seed, self._due = run, seed, 0.0
-        self.policy, self.against = policy, against
+        if against is None:
+            self.beside = Play(scenario, self.load(policy), seed)
+        else:
+            self.beside = Play(scenario, self.load(against), seed, faults)
+        self.run = run
+        self.seed = seed
+        self._due = 0.0
+        self.policy = policy
+        self.against = against
         self.events: list[Event] = []
-        self._untold = [*faults]
-        self._tell_of_faults()
-        self._look_after_selection()
+        self._unannounced_faults = [*faults]
+        self._announce_faults()
+        self._deselect_absent_robot()
 
     def _begin_again(self, scenario: Scenario, seed: int, policy: str, against: str | None) -> None:
-        with _policy_errors_explained():
+        with _explain_policy_errors():
             self._begin(scenario, seed, policy, against)
         self.failure = ""
 
     def _try_to_advance(self) -> None:
         try:
-            with _policy_errors_explained():
+            with _explain_policy_errors():
                 self.advance()
         except SwarmLogisticsError as error:
             self.failure = str(error)
@@ -250,31 +256,31 @@ class Session:
         """Take one control period in both runs."""
         self.run.step()
         self.beside.step()
-        self._tell_of_faults()
-        self._look_after_selection()
+        self._announce_faults()
+        self._deselect_absent_robot()
 
-    def _tell_of_faults(self) -> None:
-        """Note whom the faults strike: those by role have chosen only once they hold."""
-        if not self._untold:
+    def _announce_faults(self) -> None:
+        """Note which robots the faults strike; faults by role choose theirs at the onset."""
+        if not self._unannounced_faults:
             return
         world = self.run.world
         for fault, numbered in zip(world.faults, world.numbered_faults):
-            if fault in self._untold and isinstance(numbered.robots, tuple):
-                self._untold.remove(fault)
-                self.events += [Event(fault.onset, one, fault.mode) for one in numbered.robots]
+            if fault in self._unannounced_faults and isinstance(numbered.robots, tuple):
+                self._unannounced_faults.remove(fault)
+                self.events += [Event(fault.onset, robot, fault.mode) for robot in numbered.robots]
 
-    def _change_faults(self, changed: Callable[[Sequence[Fault]], Sequence[Fault]]) -> None:
+    def _change_faults(self, change: Callable[[Sequence[Fault]], Sequence[Fault]]) -> None:
         # The faults name their robots, so that each robot can be repaired by itself.
-        self.run.world.set_faults(changed(self.run.world.numbered_faults))
+        self.run.world.set_faults(change(self.run.world.numbered_faults))
         if self.against is not None and not self.beside.is_over:
-            self.beside.world.set_faults(changed(self.beside.world.numbered_faults))
+            self.beside.world.set_faults(change(self.beside.world.numbered_faults))
 
-    def _look_after_selection(self) -> None:
+    def _deselect_absent_robot(self) -> None:
         robot, present = self.selected, self.state.robot_present
         if robot is not None and not (robot < len(present) and present[robot]):
             self.selected = None
 
-    def _meant(self) -> int:
+    def _robot_to_change(self) -> int:
         if self.selected is None:
             raise SetupError("robot: none is selected, click one first")
         if self.run.is_over:
@@ -283,7 +289,7 @@ class Session:
 
 
 @contextmanager
-def _policy_errors_explained() -> Iterator[None]:
+def _explain_policy_errors() -> Iterator[None]:
     """Let whatever a policy raises be a SetupError that says what and where; log the traceback."""
     try:
         yield
@@ -295,10 +301,10 @@ def _policy_errors_explained() -> Iterator[None]:
                 raise
             error = raised.__cause__
         logging.getLogger(__name__).warning("A policy has failed.", exc_info=error)
-        what = plain(traceback.format_exception_only(error)[-1].strip())
-        frames = traceback.extract_tb(error.__traceback__)
-        foreign = [at for at in frames if not Path(at.filename).is_relative_to(_PACKAGE)]
+        reason = plain(traceback.format_exception_only(error)[-1].strip())[:_LONGEST_REASON]
         # The policy's own line, not that of a library that it calls.
-        own = [at for at in foreign if at.filename == foreign[0].filename] or frames
-        place = f"{plain(Path(own[-1].filename).name)} line {own[-1].lineno}"
-        raise SetupError(f"{what[:_LONGEST_REASON]}, {place}") from error
+        line = users_line("".join(traceback.format_tb(error.__traceback__)))
+        if line is None:
+            raise SetupError(reason) from error
+        file, number = line
+        raise SetupError(f"{reason}, {plain(Path(file).name)} line {number}") from error

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from swarm_logistics_env.cli import judging
+from swarm_logistics_env.cli import judge_trials
 from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.studies import Study
 from tests.cli.conftest import Command
@@ -77,7 +77,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
 ) -> None:
     words = f"{TRIALS} {place}"
     with monkeypatch.context() as patched:
-        patched.setattr(judging, "show_report", lambda *_, **__: 1 / 0)
+        patched.setattr(judge_trials, "show_report", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             command(words)
     first = command(words)
