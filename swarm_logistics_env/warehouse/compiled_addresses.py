@@ -46,17 +46,17 @@ def _calling(kind: Any) -> Callable[..., int]:
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         where, packed = values
-        given: list[Any] = []
+        arguments_of_c: list[Any] = []
         passed = cgutils.unpack_tuple(builder, packed)
         for argument, value in zip(signature.args[1], passed, strict=True):
             if not isinstance(argument, types.BaseTuple):
-                given.append(value)
+                arguments_of_c.append(value)
             elif _BY_REFERENCE:
-                given.append(cgutils.alloca_once_value(builder, value))
+                arguments_of_c.append(cgutils.alloca_once_value(builder, value))
             else:
-                given += cgutils.unpack_tuple(builder, value)
-        function = ir.FunctionType(returned, [value.type for value in given])
-        answer = builder.call(builder.inttoptr(where, function.as_pointer()), given)
+                arguments_of_c += cgutils.unpack_tuple(builder, value)
+        function = ir.FunctionType(returned, [value.type for value in arguments_of_c])
+        answer = builder.call(builder.inttoptr(where, function.as_pointer()), arguments_of_c)
         return context.get_dummy_value() if is_void else answer
 
     return _generated(typed)
@@ -81,13 +81,13 @@ def pointer_at(typing_context: Any, address: types.Type) -> Any:
 _IN_ORDER = "seq_cst"  # all threads see all changes in one order
 
 
-def _word_of(builder: Any, address: Any, place: Any) -> Any:
-    return builder.gep(builder.inttoptr(address, _WORD.as_pointer()), [place])
+def _word_of(builder: Any, address: Any, index: Any) -> Any:
+    return builder.gep(builder.inttoptr(address, _WORD.as_pointer()), [index])
 
 
 @_generated
-def load(typing_context: Any, address: types.Type, place: types.Type) -> Any:
-    """Return a word, by its place in those at `address`."""
+def load(typing_context: Any, address: types.Type, index: types.Type) -> Any:
+    """Return a word, by its index in those at `address`."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         return builder.load_atomic(_word_of(builder, *values), _IN_ORDER, _BYTES)
@@ -96,32 +96,32 @@ def load(typing_context: Any, address: types.Type, place: types.Type) -> Any:
 
 
 def _changed_by(operation: str) -> Callable[..., int]:
-    def typed(typing_context: Any, address: types.Type, place: types.Type, by: types.Type) -> Any:
+    def typed(typing_context: Any, address: types.Type, index: types.Type, by: types.Type) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            *where, given = values
-            return builder.atomic_rmw(operation, _word_of(builder, *where), given, _IN_ORDER)
+            *where, value = values
+            return builder.atomic_rmw(operation, _word_of(builder, *where), value, _IN_ORDER)
 
         return types.int64(types.int64, types.int64, types.int64), generate
 
     return _generated(typed)
 
 
-# Both take an address, the place of a word there, and an integer, which is stored in it or added
+# Both take an address, the index of a word there, and an integer, which is stored in it or added
 # to it; they return the old value.
 exchange, add = _changed_by("xchg"), _changed_by("add")
 
 
 @_generated
 def replace(
-    typing_context: Any, address: types.Type, place: types.Type, old: types.Type, new: types.Type
+    typing_context: Any, address: types.Type, index: types.Type, old: types.Type, new: types.Type
 ) -> Any:
     """Put `new` into a word, by its place, if `old` is there; returns whether it was."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         *where, was, becomes = values
         word = _word_of(builder, *where)
-        found = builder.cmpxchg(word, was, becomes, _IN_ORDER, _IN_ORDER)
-        return builder.extract_value(found, 1)
+        exchanged = builder.cmpxchg(word, was, becomes, _IN_ORDER, _IN_ORDER)
+        return builder.extract_value(exchanged, 1)
 
     return types.boolean(*[types.int64] * 4), generate
 
@@ -148,21 +148,21 @@ class _Fields(AttributeTemplate):
     key = StructureAt
 
     def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]  # not typed
-        found = _places(kind.structure).get(name)
-        return None if found is None else found[0]
+        field = _places(kind.structure).get(name)
+        return None if field is None else field[0]
 
 
 @cast("Callable[..., Callable[[type[S], int], S]]", intrinsic)
 def unpacked_at(typing_context: Any, structure: Any, address: types.Type) -> Any:
     """Return the structure whose words `packed` has put at `address`."""
-    found = StructureAt(structure.instance_class)
-    return found(structure, types.int64), lambda context, builder, signature, values: values[1]
+    kind = StructureAt(structure.instance_class)
+    return kind(structure, types.int64), lambda context, builder, signature, values: values[1]
 
 
 @cast("Any", lower_getattr_generic)(StructureAt)  # type: ignore[untyped-decorator]  # numba's
 def _field(context: Any, builder: Any, kind: StructureAt, address: Any, name: str) -> Any:
-    found, before = _places(kind.structure)[name]
-    if isinstance(found, StructureAt):
+    field, before = _places(kind.structure)[name]
+    if isinstance(field, StructureAt):
         return builder.add(address, ir.Constant(_WORD, _BYTES * before))
     places = itertools.count(before)
 
@@ -172,7 +172,7 @@ def _field(context: Any, builder: Any, kind: StructureAt, address: Any, name: st
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
 
-    return _loaded(context, builder, found, word)
+    return _loaded(context, builder, field, word)
 
 
 @functools.cache

@@ -83,7 +83,7 @@ class WorldThreadPool:
         # and so that no Ctrl-C finds them half compiled.
         submit(self._address, np.zeros((0, 0)), np.zeros((0, 0), np.float32))
         help_out(self._address, 0)
-        next_told(self._address, 0, 0)
+        find_next_done(self._address, 0, 0)
         finish(self._address)
         take_sleepers(self._address)
         queue[N_JOBS] = n_worlds
@@ -101,7 +101,7 @@ class WorldThreadPool:
         Args:
             commands: (R, C) of all.
             rows: (R, D) for the observations of all.
-            arrived: called with the place of each world whose step was eventful or that is
+            arrived: called with the index of each world whose step was eventful or that is
                 watched, in their order and in the caller's thread, and with its observations, a
                 part of `rows`, while others may be under way.
 
@@ -119,38 +119,38 @@ class WorldThreadPool:
         if self._process != os.getpid():
             self._start()
         self._jobs[:, WORLD] = [world.address for world in self._worlds]
-        place, n_worlds = 0, len(self._worlds)
+        index, n_worlds = 0, len(self._worlds)
         try:
             # One call for all, and one that ends what is left: Ctrl-C comes between calls.
             refused = submit(self._address, commands, rows)
             if refused != NOBODY:
-                place = n_worlds
+                index = n_worlds
                 raise not_finite(commands, refused)
             for _ in range(take_sleepers(self._address)):
                 self._wake.put(None)
-            while place < n_worlds:
-                told = next_told(self._address, place, _PATIENCE)
-                if told == _NOT_YET:
+            while index < n_worlds:
+                next_done = find_next_done(self._address, index, _PATIENCE)
+                if next_done == _NOT_YET:
                     time.sleep(0)  # a thread that works may be waiting for this one's core
                     continue
-                while place < told:
-                    place += 1
-                    self._take(place - 1, rows)
-                if told < n_worlds:
-                    place += 1
-                    arrived(told, self._take(told, rows))
+                while index < next_done:
+                    index += 1
+                    self._take(index - 1, rows)
+                if next_done < n_worlds:
+                    index += 1
+                    arrived(next_done, self._take(next_done, rows))
         finally:
-            if place < n_worlds:
+            if index < n_worlds:
                 finish(self._address)
-            for left in range(place, n_worlds):
+            for left in range(index, n_worlds):
                 # One is raised already.
                 with contextlib.suppress(ScenarioError):
                     self._take(left, rows)
 
-    def _take(self, place: int, rows: Sensed) -> Sensed:
-        world, first = self._worlds[place], self._firsts[place]
+    def _take(self, index: int, rows: Sensed) -> Sensed:
+        world, first = self._worlds[index], self._firsts[index]
         sensed = rows[first : first + world.scenario.n_robots]
-        world.take(sensed, bool(self._jobs[place, IS_EVENTFUL]))
+        world.take(sensed, bool(self._jobs[index, IS_EVENTFUL]))
         return sensed
 
 
@@ -166,9 +166,9 @@ def _close(queue: NDArray[np.int64], wake: SimpleQueue[None], n_helpers: int) ->
 
 
 @inlined_kernel
-def job_at(queue: int, place: int) -> int:
+def job_at(queue: int, index: int) -> int:
     """Return the address of a job."""
-    return queue + 8 * (FIRST_JOB + place * JOB_LENGTH)
+    return queue + 8 * (FIRST_JOB + index * JOB_LENGTH)
 
 
 @engine_kernel
@@ -181,11 +181,11 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
         rows: (R, D) for the observations of all.
 
     Returns:
-        The place, row by row, of the first command that is not finite; NOBODY if all are.
+        The index, row by row, of the first command that is not finite; NOBODY if all are.
     """
     n_jobs = load(queue, N_JOBS)
-    for place in range(n_jobs):
-        job = job_at(queue, place)
+    for index in range(n_jobs):
+        job = job_at(queue, index)
         world, first = unpacked_at(World, load(job, WORLD)), load(job, FIRST_ROW)
         now = world.commands.now
         for robot in range(len(now)):
@@ -195,8 +195,8 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
         world.outcome.refused[0] = NOBODY
         if refused != NOBODY:
             return int(first * commands.shape[1] + refused)
-    for place in range(n_jobs):
-        exchange(job_at(queue, place), IS_DONE, 0)
+    for index in range(n_jobs):
+        exchange(job_at(queue, index), IS_DONE, 0)
     exchange(queue, ROWS, rows.ctypes.data)
     exchange(queue, ROW_COLUMNS, rows.shape[1])
     add(queue, GIVEN, n_jobs)
@@ -222,8 +222,8 @@ def run_next_job(queue: int) -> bool:
     address, first = load(job, WORLD), load(job, FIRST_ROW)
     n_robots = len(unpacked_at(World, address).robots.item)
     n_columns = load(queue, ROW_COLUMNS)
-    own = load(queue, ROWS) + 4 * first * n_columns
-    rows = carray(pointer_at(own), (n_robots, n_columns), np.float32)
+    first_row = load(queue, ROWS) + 4 * first * n_columns
+    rows = carray(pointer_at(first_row), (n_robots, n_columns), np.float32)
     is_eventful = stepping.step(address, rows)
     exchange(job, IS_EVENTFUL, int(is_eventful))
     exchange(job, IS_DONE, 1)
@@ -231,24 +231,24 @@ def run_next_job(queue: int) -> bool:
 
 
 @engine_kernel
-def next_told(queue: int, place: int, patience: int) -> int:
-    """Step worlds until one, from `place` on, is done that the caller has to be told of.
+def find_next_done(queue: int, index: int, patience: int) -> int:
+    """Step worlds until one, from `index` on, is done that the caller has to be told of.
 
-    Returns its place; the number of worlds if all are done and none is; _NOT_YET if others still
+    Returns its index; the number of worlds if all are done and none is; _NOT_YET if others still
     step it after `patience` looks.
     """
     n_jobs, looks = load(queue, N_JOBS), 0
-    while place < n_jobs:
-        job = job_at(queue, place)
+    while index < n_jobs:
+        job = job_at(queue, index)
         if load(job, IS_DONE) != 0:
             if load(job, IS_EVENTFUL) != 0 or load(job, IS_WATCHED) != 0:
-                return place
-            place += 1
+                return index
+            index += 1
         elif not run_next_job(queue):
             looks += 1
             if looks > patience:
                 return _NOT_YET
-    return place
+    return index
 
 
 @engine_kernel
@@ -256,8 +256,8 @@ def finish(queue: int) -> None:
     """Step all worlds that are left and wait for those that others step."""
     while run_next_job(queue):
         pass
-    for place in range(load(queue, N_JOBS)):
-        while load(job_at(queue, place), IS_DONE) == 0:
+    for index in range(load(queue, N_JOBS)):
+        while load(job_at(queue, index), IS_DONE) == 0:
             pass
 
 

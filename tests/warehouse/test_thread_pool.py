@@ -115,7 +115,7 @@ def test_what_is_refused_is_raised_before_any_world_has_moved() -> None:
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("n_helpers", [0, 2])
-@pytest.mark.parametrize("kernel", ["submit", "take_sleepers", "next_told"])
+@pytest.mark.parametrize("kernel", ["submit", "take_sleepers", "find_next_done"])
 def test_a_pool_goes_on_after_ctrl_c(
     n_helpers: int, kernel: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
