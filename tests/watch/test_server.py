@@ -287,12 +287,12 @@ def test_a_policy_that_fails_is_told_to_the_page_and_the_server_stays(
 COLD = """
 import asyncio, json, sys
 import aiohttp
-from swarm_logistics_env import FAILURE_MODES, Scenario, kernels
+from swarm_logistics_env import FAILURE_MODES, Scenario, fast_kernels
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.server import WatchServer
 
 def compiled():
-    return {str(one): len(one.overloads) for one in kernels._all_kernels}
+    return {str(one): len(one.overloads) for one in fast_kernels._all_kernels}
 
 async def use():
     policies = sys.argv[1:]
