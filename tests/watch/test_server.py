@@ -395,7 +395,9 @@ def test_a_page_that_reads_nothing_is_dropped_and_holds_up_no_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(server, "_PATIENCE", 0.5)
-    monkeypatch.setattr(server, "frame_message", lambda session: {"long": f"{time.time()}" * 20_000})
+    monkeypatch.setattr(
+        server, "frame_message", lambda session: {"long": f"{time.time()}" * 20_000}
+    )
     served = Served()
     slow = silent(served, PAGE)
     try:
