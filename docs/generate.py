@@ -14,7 +14,7 @@ from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
 from swarm_logistics_env.cli.app import command_line
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
-from swarm_logistics_env.environment.spaces import ITEM_FEATURES, ROBOT_FEATURES
+from swarm_logistics_env.environment.spaces import ITEM_COLUMNS, ROBOT_FEATURES
 from swarm_logistics_env.observations import columns, n_columns
 from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.questions.specification import Specification
@@ -48,7 +48,7 @@ def environment() -> dict[str, str]:
     modes = [(f"`{name}`", mode.description) for name, mode in FAILURE_MODES.items()]
     wrapped = [(f"`{name}`", summary(getattr(wrappers, name).__doc__)) for name in wrappers.__all__]
     sources = ", ".join(f"[{name}]({address})" for name, address in SOURCES.items())
-    state = [("robot", ", ".join(ROBOT_FEATURES)), ("item", ", ".join(ITEM_FEATURES))]
+    state = [("robot", ", ".join(ROBOT_FEATURES)), ("item", ", ".join(ITEM_COLUMNS))]
     return {
         "shapes": table(("of 25 robots", "shape"), shapes),
         "observations": observation_table(scenario),

@@ -11,7 +11,7 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Binary, Bounded, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from swarm_logistics_env.adapters.worlds import World, Worlds
+from swarm_logistics_env.adapters.worlds import TrainingWorld, Worlds
 
 GROUP = "robots"
 ENDS = ("done", "terminated", "truncated")
@@ -25,7 +25,7 @@ class TorchRLWorlds(EnvBase):  # type: ignore[misc]  # TorchRL is not in the gat
     observes zeros and earns nothing until its world ends. `seeds` are those of each first episode.
     """
 
-    def __init__(self, make: Callable[[], World], seeds: Sequence[int]) -> None:
+    def __init__(self, make: Callable[[], TrainingWorld], seeds: Sequence[int]) -> None:
         self.worlds = Worlds(lambda _: make(), len(seeds), threads=1)
         self.group_map = {GROUP: list(self.worlds.envs[0].possible_agents)}
         self._seeds: list[int | None] = list(seeds)

@@ -29,7 +29,7 @@ from swarm_logistics_env.warehouse.faults import ROLES
 
 # Plays pairs of a fault's index in the list and the number of its run, 0, 1, ..; returns the change
 # of performance, P_F - P_o, of each: the lower, the worse the fault.
-Play: TypeAlias = Callable[[Sequence[tuple[int, int]]], Sequence[float]]
+PlayRuns: TypeAlias = Callable[[Sequence[tuple[int, int]]], Sequence[float]]
 Matrix: TypeAlias = NDArray[np.float64]
 
 # Of the budget: faults at random, so that the model has something to learn from.
@@ -41,7 +41,9 @@ _SHARES = (0.4, 0.2, 0.2, 0.2)
 _NOISES = (0.1, 0.3, 1.0, 3.0)  # candidates for the variance between seeds over that between faults
 
 
-def search(faults: Sequence[Fault], play: Play, budget: int, seed: int) -> tuple[int, list[int]]:
+def search(
+    faults: Sequence[Fault], play: PlayRuns, budget: int, seed: int
+) -> tuple[int, list[int]]:
     """Search by Thompson sampling from a Gaussian process over the faults.
 
     Faults that are alike (in mode, role, onset, duration) are expected to cost alike, so that a run

@@ -208,8 +208,12 @@ class _CheckedFiles(IndexDataCacheFile):
             file.write(content.getvalue() + _checksum(content.getvalue()))
 
     def _load_index(self) -> Any:
-        is_sound = self._is_sound(self._index_path)
-        return super()._load_index() if is_sound else {}  # type: ignore[no-untyped-call]
+        if not self._is_sound(self._index_path):
+            return {}
+        try:
+            return super()._load_index()  # type: ignore[no-untyped-call]
+        except (AttributeError, ImportError):  # of another version, which had other structures
+            return {}
 
     def _load_data(self, name: str) -> Any:
         is_sound = self._is_sound(self._data_path(name))  # type: ignore[no-untyped-call]

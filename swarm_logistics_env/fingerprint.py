@@ -20,7 +20,8 @@ from swarm_logistics_env.code_files import PACKAGE, is_users_own, names_in, sour
 
 # What decides an episode. The other files hold messages, validation, statistics and pictures.
 EPISODE_CODE = (
-    "episode.py", "kernels.py", "observations.py", "scenario.py", "streams.py",
+    "episode.py", "fast_kernels.py", "kernels.py", "numba_fence.py", "observations.py",
+    "scenario.py", "streams.py",
     "motion/*.py", "policies/*.py", "warehouse/*.py",
 )  # fmt: skip
 UNSTABLE = "unstable "  # begins the fingerprint of a value that is another one each time

@@ -96,6 +96,23 @@ def test_a_damaged_file_of_code_is_told_of_once_and_written_anew(
     assert len(told) == 1
 
 
+def test_code_of_a_version_that_had_other_structures_is_compiled_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Gone(str):
+        """A structure that a later version has no more."""
+
+    files = checked_files(tmp_path)
+    module = sys.modules[__name__]
+    Gone.__qualname__ = "Gone"  # so that a pickle finds it in the module
+    monkeypatch.setattr(module, "Gone", Gone, raising=False)
+    files.save(Gone("floats"), "code")
+    monkeypatch.delattr(module, "Gone")
+    assert files.load("floats") is None
+    files.save("floats", "code made again")
+    assert files.load("floats") == "code made again"
+
+
 @pytest.mark.parametrize("before", ["older sources", "sources"])
 def test_an_older_file_is_not_run_where_there_was_room_for_the_index_alone(
     before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

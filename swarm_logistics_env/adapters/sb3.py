@@ -17,7 +17,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.wrappers.wrapper import layers_of
 
-from .worlds import RowsStep, World, Worlds, maker
+from .worlds import RowsStep, TrainingWorld, Worlds, maker
 
 try:
     from stable_baselines3.common.callbacks import BaseCallback
@@ -98,7 +98,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         n_worlds: int = 8,
         threads: int = 1,
         n_robots: int | Sequence[int] | None = None,
-        make_env: Callable[[int], World] | None = None,
+        make_env: Callable[[int], TrainingWorld] | None = None,
         seed: int | None = None,
         **fields: Any,
     ) -> None:
@@ -213,7 +213,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     ) -> None:
         """Set an attribute of the worlds of these rows, on the wrapper that has it."""
 
-        def set_it(env: World) -> None:
+        def set_it(env: TrainingWorld) -> None:
             layers = layers_of(env)
             holders = (e for e in layers if attr_name in vars(e) or hasattr(type(e), attr_name))
             setattr(next(holders, env), attr_name, value)
@@ -249,7 +249,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._worlds.close()
 
     def _of_rows(
-        self, answer: Callable[[World], Any], indices: int | Iterable[int] | None
+        self, answer: Callable[[TrainingWorld], Any], indices: int | Iterable[int] | None
     ) -> list[Any]:
         worlds = self._worlds.world_of[list(self._get_indices(indices))].tolist()
         answers = {world: answer(self.worlds[world]) for world in dict.fromkeys(worlds)}

@@ -17,7 +17,7 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 from swarm_logistics_env.wrappers.wrapper import Wrapper, layers_of
 
-World: TypeAlias = SwarmLogisticsEnv | Wrapper
+TrainingWorld: TypeAlias = SwarmLogisticsEnv | Wrapper
 
 
 class RowsStep(NamedTuple):
@@ -54,7 +54,9 @@ class Worlds:
         SetupError: no environments, one twice, or rows or commands that differ in length.
     """
 
-    def __init__(self, make_env: Callable[[int], World], n_worlds: int, threads: int) -> None:
+    def __init__(
+        self, make_env: Callable[[int], TrainingWorld], n_worlds: int, threads: int
+    ) -> None:
         self.envs = [make_env(world) for world in range(n_worlds)]
         self.observation_space, self.command_space = _spaces(self.envs)
         sizes = [len(env.possible_agents) for env in self.envs]
@@ -200,7 +202,7 @@ def _can_be_shared_out(layers: list[Any]) -> bool:
     return type(core) is SwarmLogisticsEnv and is_plain
 
 
-def _spaces(worlds: Sequence[World]) -> tuple[Box, Box]:
+def _spaces(worlds: Sequence[TrainingWorld]) -> tuple[Box, Box]:
     for env in worlds:
         if not hasattr(env, "reset_arrays"):
             raise SetupError(
@@ -227,7 +229,7 @@ def maker(
     n_worlds: int,
     n_robots: int | Sequence[int] | None,
     fields: Mapping[str, Any],
-) -> Callable[[int], World]:
+) -> Callable[[int], TrainingWorld]:
     """Return a function that makes plain environments, of one size or of several in turn.
 
     Raises:
@@ -240,7 +242,7 @@ def maker(
             "worlds to have them"
         )
 
-    def make_env(world: int) -> World:
+    def make_env(world: int) -> TrainingWorld:
         size = sizes[world % len(sizes)]
         size_field = {} if size is None else {"n_robots": size}
         return SwarmLogisticsEnv(scenario, **size_field, **fields)

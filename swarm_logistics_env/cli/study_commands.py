@@ -21,7 +21,7 @@ from swarm_logistics_env.runs.store import Runs, export
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Run
 from swarm_logistics_env.verdicts.gate import SUBJECTS, Gate, GateAnswer, answers, match
-from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS
+from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 
 from .app import Repeated, TrustOption
 from .terminal import say, say_what_was_played, show_power, show_report, show_table
@@ -111,7 +111,7 @@ def run_command(
     """Play what is missing, print the answer, write the report."""
     part = Shard.parse(shard) if shard else None
     if until_clear and seeds is None:
-        seeds = MOST_SEEDS
+        seeds = MOST_SEEDS_UNTIL_CLEAR
     looks = until_clear or None
     study = study_of(
         study_name, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks

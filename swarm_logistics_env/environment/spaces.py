@@ -24,7 +24,7 @@ ROBOT_FEATURES = (
     "present", "x", "y", "cos_heading", "sin_heading", "velocity_x", "velocity_y",
     "carrying", "carrying_requested", "timer",
 )  # fmt: skip
-ITEM_FEATURES = ("stored", "carried", "x", "y", "requested")
+ITEM_COLUMNS = ("stored", "carried", "x", "y", "requested")
 
 
 def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.float32]:
@@ -47,7 +47,7 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
     robot_rows[:, 8] = robot_rows[:, 7] * state.carries_requested
     robot_rows[:, 9] = np.nan_to_num(state.robot_timer, nan=world.scenario.timer_limit)
     robot_rows[~state.robot_present] = 0.0
-    items = np.zeros((n_items, len(ITEM_FEATURES)), np.float32)
+    items = np.zeros((n_items, len(ITEM_COLUMNS)), np.float32)
     item_rows = items[: len(state.item_status)]
     item_rows[:, 0] = state.item_status == STORED
     item_rows[:, 1] = state.item_status == CARRIED
@@ -109,7 +109,7 @@ class Spaces:
         n_items, width, height, speed, limit, duration = self.most.values()
         robot_low = [0, 0, 0, -1, -1, -speed, -speed, 0, 0, 0]
         robot_high = [1, width, height, 1, 1, speed, speed, 1, 1, limit]
-        low = [*(robot_low * n_robots), *([0] * len(ITEM_FEATURES) * n_items), 0]
+        low = [*(robot_low * n_robots), *([0] * len(ITEM_COLUMNS) * n_items), 0]
         high = [*(robot_high * n_robots), *([1, 1, width, height, 1] * n_items), duration + 1.0]
         return Box(np.array(low, np.float32), np.array(high, np.float32))
 
@@ -148,7 +148,7 @@ class Spaces:
 
 
 Observations = dict[str, NDArray[np.float32]]
-Infos = dict[str, dict[str, float]]
+InfosByRobot = dict[str, dict[str, float]]
 ArrayStep = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
 
 
@@ -194,7 +194,7 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observations, Infos]:
+    ) -> tuple[Observations, InfosByRobot]:
         """Begin an episode; see `reset_arrays`. Returns observations and infos by agent.
 
         Each agent has a dict of infos of its own. It contains numbers, with the same keys at
@@ -207,7 +207,7 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
 
     def step(
         self, actions: Mapping[str, ArrayLike]
-    ) -> tuple[Observations, dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+    ) -> tuple[Observations, dict[str, float], dict[str, bool], dict[str, bool], InfosByRobot]:
         """Take one control period; see `step_arrays`.
 
         Args:
@@ -250,7 +250,7 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         when = "after the end of the episode" if self.is_begun else "before reset"
         raise SetupError(f"step {when}: call reset(seed) first")
 
-    def _infos(self, agents: list[str]) -> Infos:
+    def _infos(self, agents: list[str]) -> InfosByRobot:
         # Robots do not sense who failed; infos are for those who train or evaluate them.
         sound = {"failed": 0, **self.episode_info}
         infos = {agent: sound.copy() for agent in agents}

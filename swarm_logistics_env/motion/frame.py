@@ -17,7 +17,7 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
 from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.memory import in_frame, length_of
+from swarm_logistics_env.motion.memory import length_of, to_frame
 from swarm_logistics_env.scenario import Scenario
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
@@ -125,10 +125,10 @@ class MotionView:
         rows: slice | NDArray[np.int64],
         turned: NDArray[np.float64],
     ) -> NDArray[np.float32]:
-        column.remember(observations, self._period, memory)
+        column.remember_observation(observations, self._period, memory)
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
         headings = self.random_headings()[rows]
-        read_rows(observations, memory, self.keys[rows], headings, inputs, turned)
+        read_observations(observations, memory, self.keys[rows], headings, inputs, turned)
         if not self._listens:
             inputs[:, LEAD] = 0.0
         return inputs
@@ -157,7 +157,7 @@ class MotionView:
 
 
 @kernel
-def read_rows(
+def read_observations(
     rows: NDArray[np.float32],
     memories: NDArray[np.float64],
     keys: NDArray[np.uint64],
@@ -196,7 +196,7 @@ def put(
     y: float,
 ) -> None:
     """Fill two inputs, from column `along` on, with a vector in the frame, times `scale`."""
-    vector = in_frame(frame, x, y)
+    vector = to_frame(frame, x, y)
     read[along], read[along + 1] = scale * vector[0], scale * vector[1]
 
 
@@ -234,7 +234,7 @@ def read_items(
         if sensed[item] > 0.5 and sensed[item + 3] > 0.5:
             x, y = float(sensed[item + 1]), float(sensed[item + 2])
             distance = max(length_of(x, y), 1e-9)
-            along, aside = in_frame(frame, x, y)
+            along, aside = to_frame(frame, x, y)
             read[INPUT.requested_present] = 1.0
             read[INPUT.requested_along] = along / distance
             read[INPUT.requested_aside] = aside / distance
@@ -345,6 +345,6 @@ def turn_outputs(outputs: NDArray[np.float64], turned: float, command: NDArray[n
     """Fill the command (4,) of outputs (3,): along, aside, gripper; clipped, no turn."""
     along, aside = min(max(outputs[0], -1.0), 1.0), min(max(outputs[1], -1.0), 1.0)
     longer = max(length_of(along, aside), 1.0)
-    x, y = in_frame((math.cos(turned), -math.sin(turned)), along, aside)
+    x, y = to_frame((math.cos(turned), -math.sin(turned)), along, aside)
     command[0], command[1], command[2] = x / longer, y / longer, 0.0
     command[3] = min(max(outputs[2], -1.0), 1.0)

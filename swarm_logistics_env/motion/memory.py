@@ -111,7 +111,9 @@ def face_anywhere(keys: NDArray[np.uint64], memories: NDArray[np.float64]) -> No
 
 
 @kernel
-def remember(rows: NDArray[np.float32], period: float, memories: NDArray[np.float64]) -> None:
+def remember_observation(
+    rows: NDArray[np.float32], period: float, memories: NDArray[np.float64]
+) -> None:
     """Take what the rows (N, D) tell into the memories, once a control period [s]."""
     for robot in range(rows.shape[0]):
         sensed, memory = rows[robot], memories[robot]
@@ -139,7 +141,7 @@ def remember(rows: NDArray[np.float32], period: float, memories: NDArray[np.floa
             inwards = 1.0 if is_inside else -1.0
             memory[HOME_X] += inwards * x / speed
             memory[HOME_Y] += inwards * y / speed
-            along, aside = in_frame((math.cos(memory[WALL]), math.sin(memory[WALL])), x, y)
+            along, aside = to_frame((math.cos(memory[WALL]), math.sin(memory[WALL])), x, y)
             memory[KEPT_X] += inwards / speed * along
             memory[KEPT_Y] += inwards / speed * aside
             memory[AWAY] = 0.0
@@ -156,7 +158,7 @@ def length_of(x: float, y: float) -> float:
 
 
 @inlined_kernel
-def in_frame(frame: tuple[float, float], x: float, y: float) -> tuple[float, float]:
+def to_frame(frame: tuple[float, float], x: float, y: float) -> tuple[float, float]:
     """Return a vector in a frame that is turned by an angle of that cosine and sine."""
     cos, sin = frame
     return cos * x + sin * y, cos * y - sin * x
@@ -317,7 +319,7 @@ def turn_back(turn: float, memory: NDArray[np.float64]) -> None:
     """Turn the directions in one memory by -turn [rad], as the body turns by `turn`."""
     frame = math.cos(turn), math.sin(turn)
     for column in (HEADING_X, HOME_X):
-        memory[column], memory[column + 1] = in_frame(frame, memory[column], memory[column + 1])
+        memory[column], memory[column + 1] = to_frame(frame, memory[column], memory[column + 1])
     memory[WALL] -= turn
 
 
@@ -349,11 +351,13 @@ def clear_the_way(
             sensed[requested + 1] ** 2 + sensed[requested + 2] ** 2 > _OUT_OF_REACH**2
         )
         gripper = 1.0 if alone and away < _IN_REACH else -1.0
-    drive(x, y, speed, gripper, command)
+    set_velocity(x, y, speed, gripper, command)
 
 
 @kernel
-def drive(x: float, y: float, speed: float, gripper: float, command: NDArray[np.float64]) -> None:
+def set_velocity(
+    x: float, y: float, speed: float, gripper: float, command: NDArray[np.float64]
+) -> None:
     """Fill one robot's command (4,): `speed` in the direction (x, y), of any length; no turn."""
     length = max(length_of(x, y), 1e-9)
     command[0], command[1] = speed * x / length, speed * y / length

@@ -27,7 +27,7 @@ from swarm_logistics_env.policies.routes import (
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
-MARGIN = 0.03  # [m] kept from what a laden robot must not touch
+CLEARANCE = 0.03  # [m] kept from what a laden robot must not touch
 REPLAN = 0.3  # [s]
 PATIENCE = 2.0  # [s] without getting nearer, until another robot is sent
 DISTRUST = 30.0  # [s]
@@ -221,7 +221,7 @@ class Central:
             stored = state.item_position[state.item_status == STORED]
             discs += [_discs(stored, scenario.item_radius, BLOCKED)]
         obstacles = np.vstack(discs)
-        obstacles[:, 2] += scenario.robot_radius + MARGIN
+        obstacles[:, 2] += scenario.robot_radius + CLEARANCE
         cost = costmap(
             scenario.warehouse_width,
             scenario.warehouse_height,

@@ -25,7 +25,7 @@ ROWS = (0.35, 0.85)  # distances of the rows of slots from the area
 SLOT_RADIUS = 0.2  # an item this near takes a slot
 SLOT_IN_SIGHT = 1.0  # from here on a robot drives straight to its slot
 ARRIVAL_RADIUS = 0.1
-DEPTH = 0.4  # of robots that hold items, in the area
+HOLDING_DEPTH = 0.4  # of robots that hold items, in the area
 
 
 class CentralStock(Central):
@@ -112,6 +112,6 @@ class CentralStock(Central):
         edge = self._scenario.storage_width
         x, y = position.tolist()
         if x >= edge:
-            return min(edge + DEPTH, self._scenario.warehouse_width), y
+            return min(edge + HOLDING_DEPTH, self._scenario.warehouse_width), y
         next_x, next_y = lookahead(self._home_cost, self._home_cost_to_go, x, y)
-        return next_x + (DEPTH if next_x > edge - CELL else 0.0), next_y
+        return next_x + (HOLDING_DEPTH if next_x > edge - CELL else 0.0), next_y

@@ -23,7 +23,7 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import MotionView, random_heading
-from swarm_logistics_env.motion.memory import drive, length_of
+from swarm_logistics_env.motion.memory import length_of, set_velocity
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -77,7 +77,7 @@ def decide_homing(
                 x, y = search_direction(observation, memory, x, y, is_inside)
                 x, y = x + push_x, y + push_y
                 speed = min(1.0, max(length_of(x, y), 0.3))
-        drive(x, y, speed, gripper, commands[robot])
+        set_velocity(x, y, speed, gripper, commands[robot])
 
 
 @kernel

@@ -28,7 +28,7 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, random_heading
-from swarm_logistics_env.motion.memory import drive, length_of
+from swarm_logistics_env.motion.memory import length_of, set_velocity
 from swarm_logistics_env.policies.homing import (
     AVOID_GAIN,
     AVOID_RANGE,
@@ -50,7 +50,7 @@ HOLDERS = 0.6  # the share of robots that hold; the others stock
 FIRST_ROLE = 2_000_003  # number in the robot's stream
 NEAR, FAR = 0.8, 1.2  # items are put down nearer than the one, lifted farther than the other
 CARRIED_OFF = 1.0  # where an item is put down for which there is no gap
-GAP = 0.6  # between the centres of items, so that laden robots get through
+ITEM_SPACING = 0.6  # between the centres of items, so that laden robots get through
 DEPTH = 0.3  # of robots that hold items inside
 SPREAD_GAIN, SPREAD_RANGE = 0.3, 1.5  # along the border, away from neighbours
 LOST = 0.8  # that a reckoned distance may be wrong
@@ -89,15 +89,15 @@ def decide_homing_stock(
             angle = random_heading(keys[robot], random_headings[robot])
             motion = break_free(observation, memory, home, push, angle)
         elif carries_requested:
-            motion = deliver(observation, memory, home, push, is_inside)
+            motion = drive_home(observation, memory, home, push, is_inside)
         elif carries:
             motion = carry_stock(observation, memory, home, push, is_inside, holds, period)
         else:
             stocks = holds or role > HOLDERS
             least = 0.0 if holds else FAR
-            motion = search(observation, memory, home, push, is_inside, stocks, least, period)
+            motion = search_items(observation, memory, home, push, is_inside, stocks, least, period)
         x, y, speed, gripper = motion
-        drive(x, y, speed, gripper, commands[robot])
+        set_velocity(x, y, speed, gripper, commands[robot])
 
 
 @kernel
@@ -126,7 +126,7 @@ def break_free(
 
 
 @kernel
-def deliver(
+def drive_home(
     observation: NDArray[np.float32],
     memory: NDArray[np.float64],
     home: Home,
@@ -181,7 +181,7 @@ def carry_stock(
 
 
 @kernel
-def search(
+def search_items(
     observation: NDArray[np.float32],
     memory: NDArray[np.float64],
     home: Home,
@@ -229,7 +229,7 @@ def is_gap(observation: NDArray[np.float32], memory: NDArray[np.float64], is_ins
     if is_inside or memory[column.AWAY] >= NEAR:
         return False
     x, y = observation[row.ITEMS + 1], observation[row.ITEMS + 2]
-    return bool(observation[row.ITEMS] < 0.5 or length_of(x, y) > GAP)
+    return bool(observation[row.ITEMS] < 0.5 or length_of(x, y) > ITEM_SPACING)
 
 
 @kernel

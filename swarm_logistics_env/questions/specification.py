@@ -31,7 +31,7 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.tasks.task import DEFAULT, Task, TaskScenario, refuse_untrusted, task_of
 
-Fields = dict[str, JsonValue]
+FieldTable = dict[str, JsonValue]
 BOTH = "+"  # between failure modes that the same robots have at once
 # More than anybody plays: a slip of a digit is refused before it fills the memory with runs.
 MOST_SEEDS = 100_000
@@ -76,7 +76,7 @@ class Factor(Record):
     error_type = StudyError
 
     title: str = ""
-    scenario: Fields = Field(default_factory=dict)
+    scenario: FieldTable = Field(default_factory=dict)
 
 
 def _ascending(values: tuple[int, ...]) -> tuple[int, ...]:
@@ -123,7 +123,7 @@ class Faults(Factor):
     role: str | None = None
 
     @property
-    def manner(self) -> Fields:
+    def manner(self) -> FieldTable:
         """The fields of a fault that say how it fails and whom it strikes, as far as given."""
         return self.model_dump(include={"factor", "intermittent", "role"}, exclude_none=True)
 

@@ -30,7 +30,7 @@ OBSTACLE: RGB = (110, 110, 110)
 SEARCHING: RGB = (86, 180, 233)  # sky blue
 SHUFFLING: RGB = (0, 114, 178)  # blue
 DELIVERING: RGB = (240, 228, 66)  # yellow
-TIMER: RGB = (0, 158, 115)  # bluish green
+TIMER_COLOUR: RGB = (0, 158, 115)  # bluish green
 REQUESTED: RGB = (213, 94, 0)  # vermillion
 LINK: RGB = (158, 67, 117)  # reddish purple, darkened: thin things need contrast
 BEAM: RGB = (230, 159, 0)  # orange
@@ -39,14 +39,14 @@ ITEM_EDGE: RGB = (120, 120, 120)
 TRAIL: RGB = (150, 150, 150)
 
 # All of them by name, for films and for the page in the browser.
-COLOURS: dict[str, RGB] = {
+ROBOT_COLOURS: dict[str, RGB] = {
     name: colour for name, colour in dict(globals()).items() if isinstance(colour, tuple)
 }
 ACTIVITIES = {"searching": SEARCHING, "shuffling": SHUFFLING, "delivering": DELIVERING}
 
 # The same for a page on a dark screen: what lies behind is dark, what moves keeps its hue.
 DARK_COLOURS: dict[str, RGB] = {
-    **COLOURS, "INK": (236, 236, 236), "SURROUNDINGS": (22, 24, 27), "FLOOR": (34, 37, 41),
+    **ROBOT_COLOURS, "INK": (236, 236, 236), "SURROUNDINGS": (22, 24, 27), "FLOOR": (34, 37, 41),
     "FLOOR_LINE": (46, 50, 55), "DELIVERY_AREA": (28, 54, 47), "DELIVERY_HATCH": (40, 74, 64),
     "DELIVERY_WORD": (128, 170, 156), "OBSTACLE": (120, 124, 130), "SHUFFLING": (38, 134, 204),
     "LINK": (214, 120, 172), "ITEM": (96, 101, 108), "ITEM_EDGE": (160, 164, 170),
@@ -61,14 +61,14 @@ MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}
 
 # What lies behind, and what stands before it; smooth edges between the two take four steps.
 _BEHIND = (FLOOR, DELIVERY_AREA, INK)
-_BEFORE = (INK, SEARCHING, SHUFFLING, DELIVERING, TIMER, REQUESTED, LINK)
+_BEFORE = (INK, SEARCHING, SHUFFLING, DELIVERING, TIMER_COLOUR, REQUESTED, LINK)
 
 
 def film_colours() -> list[RGB]:
     """Return the colours of pictures that may have only a few: under 128, each once."""
     edges = [np.linspace(behind, before, 6)[1:-1] for behind in _BEHIND for before in _BEFORE]
     smooth = np.rint(np.concatenate(edges)).astype(int).tolist()
-    colours = [*COLOURS.values(), *((red, green, blue) for red, green, blue in smooth)]
+    colours = [*ROBOT_COLOURS.values(), *((red, green, blue) for red, green, blue in smooth)]
     return list(dict.fromkeys(colours))
 
 

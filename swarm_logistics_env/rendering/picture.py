@@ -16,7 +16,7 @@ from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 from . import palette, sprites
 from .sprites import new_canvas, words
 
-Point = tuple[int, int]  # [px]
+PixelPoint = tuple[int, int]  # [px]
 
 _HEADING_STEP = 3  # [degrees] between headings that are told apart
 # The widest scores there may be, so that a picture's size does not change with what happens.
@@ -114,7 +114,7 @@ class Picture:
         picture.blit(name, box)
         picture.set_clip(None)
 
-    def _legend(self) -> list[tuple[Surface, Point]]:
+    def _legend(self) -> list[tuple[Surface, PixelPoint]]:
         """Return the legend of colours: pictures and words, each with its left end."""
         height = self._text_height
         radius, gap = 0.42 * height, height // 4
@@ -132,21 +132,21 @@ class Picture:
             x += wide + word.get_width() + height
         return entries
 
-    def _pixels(self, positions: NDArray[np.float64]) -> list[Point]:
+    def _pixels(self, positions: NDArray[np.float64]) -> list[PixelPoint]:
         """Return positions (K, 2) [m] as K pixels."""
         pixels = positions * (self._scale, -self._scale) + self.floor.bottomleft
         return [(x, y) for x, y in np.rint(pixels).astype(int).tolist()]
 
-    def _stamp(self, sprite: Surface, at: Point) -> None:
+    def _stamp(self, sprite: Surface, at: PixelPoint) -> None:
         self._canvas.blit(sprite, sprite.get_rect(center=at))
 
-    def _draw_halos(self, state: WarehouseState, robots: list[Point]) -> None:
+    def _draw_halos(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
         age = state.robot_timer / self._scenario.timer_limit
         for robot in np.flatnonzero(state.robot_present & (age < 1.0)).tolist():
             sprite = sprites.halo(self._robot_radius, int(age[robot] * sprites.HALOS))
             self._stamp(sprite, robots[robot])
 
-    def _draw_robots(self, state: WarehouseState, robots: list[Point]) -> None:
+    def _draw_robots(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
         steps = np.rint(np.degrees(state.robot_heading) / _HEADING_STEP).astype(int)
         headings = (_HEADING_STEP * steps % 360).tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
@@ -155,7 +155,7 @@ class Picture:
             sprite = sprites.robot(self._robot_radius, activity, headings[robot], is_faulty)
             self._stamp(sprite, robots[robot])
 
-    def _draw_arrow(self, start: Point, end: Point) -> None:
+    def _draw_arrow(self, start: PixelPoint, end: PixelPoint) -> None:
         width = max(2.0, self._robot_radius / 3.5)
         head = 4.0 + 2.5 * width
         offset = Vector2(end) - start
@@ -174,7 +174,7 @@ class Picture:
         pygame.draw.polygon(self._canvas, palette.LINK, shape)
         pygame.draw.aalines(self._canvas, palette.LINK, True, shape)
 
-    def _draw_badges(self, state: WarehouseState, robots: list[Point]) -> None:
+    def _draw_badges(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
         height = max(11, round(1.2 * self._robot_radius))
         away = round(0.8 * self._robot_radius + 0.3 * height)
         for robot in np.flatnonzero(state.robot_present & state.failed).tolist():

@@ -157,7 +157,7 @@ def _open_display() -> None:
 
 
 Frame = NDArray[np.uint8]  # (H, W, 3), both even
-SUFFIXES = (".mp4", ".gif")
+FILM_SUFFIXES = (".mp4", ".gif")
 
 # Neither date nor the encoder's name is written, so that the same frames give the same bytes.
 _EXACT = ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1"]
@@ -174,8 +174,8 @@ def check_film(path: Path) -> None:
         SetupError: the name ends otherwise than in .mp4 or .gif, the folder cannot be written to,
             or imageio-ffmpeg is not installed.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise SetupError(f"{path}: should end in {' or '.join(SUFFIXES)}")
+    if path.suffix.lower() not in FILM_SUFFIXES:
+        raise SetupError(f"{path}: should end in {' or '.join(FILM_SUFFIXES)}")
     if path.is_dir() or not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
         raise SetupError(f"{path}: should be a file in a folder that can be written to")
     _ffmpeg()

@@ -28,7 +28,7 @@ from .store import Runs
 from .worker_processes import Played, in_processes, pickled, play_pickled
 
 Engine = Callable[[Iterable[Run]], Played]
-NAMES = ("local", "process", "ray")
+ENGINES = ("local", "process", "ray")
 
 
 @dataclass(frozen=True)
@@ -179,8 +179,8 @@ def engine_named(
     Raises:
         StudyError: there is no such engine, or it has no use for one of the arguments.
     """
-    if name not in NAMES:
-        raise StudyError(f"no engine {name!r}{suggest(name, NAMES)}")
+    if name not in ENGINES:
+        raise StudyError(f"no engine {name!r}{suggest(name, ENGINES)}")
     if address is not None and name != "ray":
         raise StudyError(f"engine {name}: only ray has an address")
     if run_limit is not None and name != "process":

@@ -17,7 +17,7 @@ from swarm_logistics_env.questions.declaration import Declaration
 from swarm_logistics_env.questions.plan import Origin, Plan
 from swarm_logistics_env.questions.specification import Specification
 from swarm_logistics_env.records import file_name
-from swarm_logistics_env.spi.trials import NO_FAULT, REPEATED, Trial, Trials
+from swarm_logistics_env.spi.trials import NO_FAULT_WORD, REPEATED, Trial, Trials
 from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
@@ -83,7 +83,7 @@ def _conditions(trials: Trials) -> dict[tuple[object, ...], list[Trial]]:
 
 def _without_removed(trials: Trials) -> Iterator[str]:
     """Yield why FT is not asked, where robots failed and none were taken away."""
-    faults = {row.fault for row in trials.rows} - {NO_FAULT, REPEATED}
+    faults = {row.fault for row in trials.rows} - {NO_FAULT_WORD, REPEATED}
     if faults and RECORDED.removed not in faults:
         yield (
             f"No FT: it needs trials without the robots, fault = {RECORDED.removed}; R is asked."
@@ -146,7 +146,7 @@ def _tables(trials: Sequence[Trial]) -> Iterator[tuple[str, _Varied]]:
         The heading in the report, and the rows with what each has of that thing.
     """
     for (_, table), rows in grouped(trials, lambda row: (row.policy, row.table)).items():
-        plain = [row for row in rows if row.fault == NO_FAULT]
+        plain = [row for row in rows if row.fault == NO_FAULT_WORD]
         sized = [row for row in plain if row.n_robots is not None]
         of = f"{table}: " if table else ""
         yield from _split(f"{of}Scalability", sized, lambda row: row.parameters, _sizes)
@@ -187,7 +187,7 @@ def _faults(group: Sequence[Trial]) -> _Varied:
     broken = next((row for row in group if row.faulty), None)
     if broken is None:
         return []
-    if not any(row.fault == NO_FAULT for row in group):
+    if not any(row.fault == NO_FAULT_WORD for row in group):
         raise StudyError(
             f"line {broken.line}: has the fault {broken.fault!r}, but no row without one (fault "
             "none) of the same robots and parameters: R and FT are relative to it"

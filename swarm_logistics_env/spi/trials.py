@@ -12,13 +12,13 @@ import numpy as np
 from .inputs import IndicatorError, Numbers
 from .trials_table import Row, read_rows
 
-NO_FAULT = "none"
-REMOVED = "removed"
+NO_FAULT_WORD = "none"
+REMOVED_WORD = "removed"
 REPEATED = "other behaviour"  # no fault, a second time: what chance alone makes of a pair
 _FAULT_NAMES = {
-    "": NO_FAULT,
-    NO_FAULT: NO_FAULT,
-    REMOVED: REMOVED,
+    "": NO_FAULT_WORD,
+    NO_FAULT_WORD: NO_FAULT_WORD,
+    REMOVED_WORD: REMOVED_WORD,
     REPEATED: REPEATED,
     "none again": REPEATED,
 }
@@ -171,7 +171,9 @@ def _check_columns(path: Path, row: Row, faults: Iterable[str]) -> None:
     lacking = {}
     if not {"performance", "time"} & row.names.keys():
         lacking["performance"] = "column 'performance', or time, for one delivery a row"
-    fails = any(_FAULT_NAMES.get(fault.lower()) not in (NO_FAULT, REPEATED) for fault in faults)
+    fails = any(
+        _FAULT_NAMES.get(fault.lower()) not in (NO_FAULT_WORD, REPEATED) for fault in faults
+    )
     if fails and "faulty" not in row.names:
         lacking["faulty"] = "column 'faulty', for how many robots fail"
     if lacking:
@@ -189,7 +191,7 @@ def _trial(
     n_robots = row.whole_or_none("n_robots", 1)
     fault, faulty = row.text("fault"), row.whole_or_none("faulty", 0) or 0
     fault = _FAULT_NAMES.get(fault.lower(), spelled[fault.casefold()])
-    is_fault = fault not in (NO_FAULT, REPEATED)
+    is_fault = fault not in (NO_FAULT_WORD, REPEATED)
     onset = row.number_or_none("onset") or 0.0
     if row.text("duration"):
         duration = row.number("duration", 0.0)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from .inputs import IndicatorError
 
 # What a column is, and the words that name it in files; small letters, "_" for all that is none.
-NAMES: dict[str, tuple[str, ...]] = {
+COLUMN_NAMES: dict[str, tuple[str, ...]] = {
     "performance": ("p", "delivered", "items", "score"),
     "n_robots": ("robots", "n", "swarm_size"),
     "fault": ("failure", "mode"),
@@ -27,7 +27,7 @@ NAMES: dict[str, tuple[str, ...]] = {
     "duration": ("length",),
     "table": (),
 }
-_MEANING = {word: column for column, words in NAMES.items() for word in (column, *words)}
+_MEANING = {word: column for column, words in COLUMN_NAMES.items() for word in (column, *words)}
 _TEXTS = ("fault", "policy", "trial", "table")  # columns that hold no numbers
 _ROBOT = re.compile(r"(robot|agent|drone|bot)(_?(id|no|nr|num|number|name|index|label))?|id_robot")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -67,7 +67,7 @@ class Row(NamedTuple):
 
     def _name(self, column: str) -> str | None:
         """Return the name of a column in the file; None: it is not there, or left out."""
-        return self.names.get(column) if column in NAMES else column
+        return self.names.get(column) if column in COLUMN_NAMES else column
 
     def number(
         self, column: str, least: float = -math.inf, *, must_be_whole: bool = False
@@ -86,7 +86,7 @@ class Row(NamedTuple):
             should += " without a sign between thousands"
             if self.decimal == ",":
                 should += "; --decimal . where decimals have a point"
-        elif column not in NAMES:
+        elif column not in COLUMN_NAMES:
             should += f", as every column that varies is a parameter; else --ignore {column!r}"
         raise self.error(column, should)
 
@@ -324,7 +324,7 @@ def _columns(
             of_robots.append(name)
             continue
         meaning = _MEANING.get(word)
-        if meaning is None or (meaning in chosen and name not in NAMES):
+        if meaning is None or (meaning in chosen and name not in COLUMN_NAMES):
             close = difflib.get_close_matches(word, _MEANING, n=1, cutoff=0.75)
             if close and meaning is None and len(word) > 3:
                 raise IndicatorError(

@@ -31,8 +31,8 @@ from .parallel_policies import (
     performance_of,
 )
 from .parallel_wrappers import (
-    FAILURE_MODES,
-    REMOVED,
+    PARALLEL_FAILURE_MODES,
+    REMOVED_MODE,
     ByAgent,
     Env,
     FailingRobots,
@@ -138,9 +138,9 @@ class ParallelTask:
         if references is not None and references[0] == references[1]:
             raise StudyError(f"references = {references}: should be two different scores")
         self.policies: Makers = {"random": RandomActions, **policies}
-        self.removed = REMOVED if REMOVED in failures else None
+        self.removed = REMOVED_MODE if REMOVED_MODE in failures else None
         self.performance = in_words(performance, references)
-        self.failure_modes = {mode: FAILURE_MODES[mode] for mode in failures}
+        self.failure_modes = {mode: PARALLEL_FAILURE_MODES[mode] for mode in failures}
         self._numbers = {
             name: type(value)
             for name, value in parameters.items()
@@ -207,7 +207,7 @@ class ParallelTask:
             raise FaultError(
                 f"task {self.name}: no failure mode {mode!r}{suggest(mode, self._failures)}"
             )
-        if mode == REMOVED and (onset or duration is not None):
+        if mode == REMOVED_MODE and (onset or duration is not None):
             raise FaultError(
                 f"task {self.name}: robots are removed from the start, not from {onset:g} s on, so "
                 'FT is not defined here: should be asked for R alone, indicators = ["R"]'
@@ -221,7 +221,7 @@ class ParallelTask:
         faults = [fault for fault in case.faults if isinstance(fault, RobotFault)]
         # The sets of one seed are nested: the largest holds them all.
         failed = failing_rows(seed, n_robots, max((fault.robots for fault in faults), default=0))
-        absent = failed if any(fault.mode == REMOVED for fault in faults) else ()
+        absent = failed if any(fault.mode == REMOVED_MODE for fault in faults) else ()
         player: Value = case.policy.load(self.policies, case.identity)
         digest = hashlib.blake2b(digest_size=16)
         gains: list[float] = []
@@ -271,7 +271,7 @@ class ParallelTask:
         del arguments["duration"]
         arguments[self._size] = arguments.pop("n_robots")
         if absent:
-            arguments[self._failures[REMOVED]] = absent
+            arguments[self._failures[REMOVED_MODE]] = absent
         return self._make_env(**arguments)
 
     def _field_value(self, name: str, value: object) -> object:
@@ -290,15 +290,15 @@ def _check_failure(mode: str, value: Value) -> None:
     """Raise StudyError unless a failure mode is known and has what it needs."""
     is_right = True
     requirement = ""
-    if mode not in FAILURE_MODES:
-        raise StudyError(f"failures: no mode {mode!r}{suggest(mode, FAILURE_MODES)}")
+    if mode not in PARALLEL_FAILURE_MODES:
+        raise StudyError(f"failures: no mode {mode!r}{suggest(mode, PARALLEL_FAILURE_MODES)}")
     if mode == "silent":
         is_right = value is not None
         requirement = "the action that counts as none"
     elif mode == "noisy":
         is_right = isinstance(value, int | float) and value > 0
         requirement = "a standard deviation above 0, in the observations' own units"
-    elif mode == REMOVED:
+    elif mode == REMOVED_MODE:
         is_right = isinstance(value, str)
         requirement = "the name of the factory's argument that takes the robots to leave out"
     if not is_right:

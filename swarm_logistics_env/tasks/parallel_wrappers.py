@@ -152,14 +152,14 @@ def _spaces(env: Env) -> dict[str, tuple[Space[Value], Space[Value]]]:
     return {a: (env.observation_space(a), env.action_space(a)) for a in env.possible_agents}
 
 
-GRACE = 5e-7  # [s]; times are products of steps and periods, which need not be round numbers
-REMOVED = "removed"
-FAILURE_MODES = {
+TIME_GRACE = 5e-7  # [s]; times are products of steps and periods, which need not be round numbers
+REMOVED_MODE = "removed"
+PARALLEL_FAILURE_MODES = {
     "silent": "its actions are replaced by the task's no-op",
     "frozen": "repeats the last action from before its failure, or its first one",
     "blind": "observes zeros",
     "noisy": "observes with Gaussian noise added, of the task's standard deviation",
-    REMOVED: "is not there, from the start",
+    REMOVED_MODE: "is not there, from the start",
 }
 
 
@@ -182,7 +182,7 @@ class RobotFault(Record):
 
     def active(self, time: float) -> bool:
         """Return whether the robots fail at a time [s]."""
-        return self.onset - GRACE <= time < self.onset + (self.duration or np.inf) - GRACE
+        return self.onset - TIME_GRACE <= time < self.onset + (self.duration or np.inf) - TIME_GRACE
 
 
 def failing_rows(seed: int, n_robots: int, n_failing: int) -> tuple[int, ...]:
@@ -228,8 +228,8 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         self._rows = {agent: row for row, agent in enumerate(env.possible_agents)}
         self._seed = -1
         for fault in self._faults:
-            if fault.mode == REMOVED or fault.mode not in failures:
-                modes = ", ".join(sorted(set(failures) - {REMOVED}))
+            if fault.mode == REMOVED_MODE or fault.mode not in failures:
+                modes = ", ".join(sorted(set(failures) - {REMOVED_MODE}))
                 raise FaultError(f"fault mode {fault.mode!r}: should be one of {modes}")
             if fault.robots > len(self._rows):
                 raise FaultError(f"{fault.robots} robots fail of {len(self._rows)}")

@@ -290,7 +290,7 @@ def digest_of(*parts: str) -> str:
 
 
 DEFAULT = "warehouse"
-NAMES = {
+TASKS = {
     DEFAULT: "swarm_logistics_env.tasks.warehouse_task:WAREHOUSE",
     "clearing": "swarm_logistics_env.tasks.warehouse_task:CLEARING",
     "recorded trials": "swarm_logistics_env.tasks.warehouse_task:RECORDED",
@@ -305,10 +305,10 @@ def task_of(source: object) -> Task:
     """
     task = source
     if isinstance(source, str):
-        module, colon, attribute = NAMES.get(source, source).partition(":")
+        module, colon, attribute = TASKS.get(source, source).partition(":")
         if not colon:
             raise StudyError(
-                f"no task {source!r} (a name or 'package.module:OBJECT'){suggest(source, NAMES)}"
+                f"no task {source!r} (a name or 'package.module:OBJECT'){suggest(source, TASKS)}"
             )
         allow_import(module)
         try:

@@ -92,7 +92,7 @@ def performances(
     return delivered.reshape(len(kinds), len(seeds))
 
 
-def score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
+def evaluate_score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
     """Return what `training.scores` asks for; the study lies in `out`, and goes on where it was.
 
     Raises:

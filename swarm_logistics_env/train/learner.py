@@ -27,7 +27,7 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.kernels import engine_kernel, kernel
 from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
-from swarm_logistics_env.motion.memory import body_of, in_frame, length_of
+from swarm_logistics_env.motion.memory import body_of, length_of, to_frame
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.streams import key, row_keys
@@ -74,7 +74,7 @@ def fill_privileged(
         if requested != NOBODY:
             to_x, to_y = items.position[requested, 0] - x, items.position[requested, 1] - y
             distance = max(length_of(to_x, to_y), 1e-9)
-            along, aside = in_frame((cos, sin), to_x, to_y)
+            along, aside = to_frame((cos, sin), to_x, to_y)
             row[8], row[9] = along / distance, aside / distance
             row[10] = distance / 10.0
             row[11] = max(0.0, 1.0 - distance / 2.0)

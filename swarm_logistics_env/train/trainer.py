@@ -25,8 +25,8 @@ from swarm_logistics_env.records import atomic_write, read_table
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import (
     evaluate,
+    evaluate_score,
     reference_means,
-    score,
     versions,
 )
 from swarm_logistics_env.train.learner import (
@@ -154,7 +154,7 @@ def _train(
     path = out / f"{training.name}.safetensors"
     # The file is written before the scores are measured, which takes minutes.
     write_policy(path, card, tensors)
-    scores = score(LearnedPolicy(card, tensors), training, out / "scores")
+    scores = evaluate_score(LearnedPolicy(card, tensors), training, out / "scores")
     if scores:
         write_policy(path, card.replace(scores=scores, scored_with=versions()), tensors)
     return path

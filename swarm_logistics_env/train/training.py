@@ -32,7 +32,7 @@ from swarm_logistics_env.wrappers import IndicatorReward, Wrapper
 if TYPE_CHECKING:
     from swarm_logistics_env.adapters import SwarmVecEnv
 
-PRESETS = Path(__file__).parent / "presets"
+PRESETS_FOLDER = Path(__file__).parent / "presets"
 
 # stable-baselines3 shuffles with numpy's global generator, which takes seeds of 32 bits.
 Seed = Annotated[int, Field(ge=0, lt=2**32)]
@@ -126,7 +126,7 @@ class Training(Part):
 
 def preset_names() -> list[str]:
     """Return the names of the trainings that come with the package."""
-    return sorted(path.stem for path in PRESETS.glob("*.toml"))
+    return sorted(path.stem for path in PRESETS_FOLDER.glob("*.toml"))
 
 
 def load_training(source: str, **fields: object) -> Training:
@@ -135,8 +135,8 @@ def load_training(source: str, **fields: object) -> Training:
     Raises:
         TrainingError: there is none, it is not TOML, or a field of it is unknown or cannot be.
     """
-    path = Path(source) if source.endswith(".toml") else PRESETS / f"{source}.toml"
-    if path.parent == PRESETS and path.stem not in preset_names():
+    path = Path(source) if source.endswith(".toml") else PRESETS_FOLDER / f"{source}.toml"
+    if path.parent == PRESETS_FOLDER and path.stem not in preset_names():
         raise TrainingError(f"no training preset {source!r}{suggest(source, preset_names())}")
     fields_of_file = read_table(path, "training", TrainingError)
     try:

@@ -26,7 +26,7 @@ from swarm_logistics_env.tasks.task import Case, Outcomes, Run
 from .cell import Cell
 from .verdict import Decision, Verdict, judge_comparison
 
-MOST_SEEDS = 200
+MOST_SEEDS_UNTIL_CLEAR = 200
 SPENDING: spi.Spending = "linear"
 
 

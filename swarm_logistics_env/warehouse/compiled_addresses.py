@@ -86,7 +86,7 @@ def _word_of(builder: Any, address: Any, index: Any) -> Any:
 
 
 @_generated
-def load(typing_context: Any, address: types.Type, index: types.Type) -> Any:
+def load_word(typing_context: Any, address: types.Type, index: types.Type) -> Any:
     """Return a word, by its index in those at `address`."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:

@@ -46,7 +46,7 @@ ROLES: tuple[str, ...] = get_args(Role)
 GRACE = 5e-7  # [s]; times are sums of control periods
 _SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
 
-Seconds = Annotated[float, Field(ge=0.01)]
+Duration = Annotated[float, Field(ge=0.01)]
 
 
 class Fault(Record):
@@ -81,7 +81,7 @@ class Fault(Record):
     onset: Annotated[float, Field(ge=0)] = 0.0
     duration: PositiveFloat | None = None
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
-    intermittent: tuple[Seconds, Seconds] | None = None
+    intermittent: tuple[Duration, Duration] | None = None
     role: Role | None = None
 
     def __init__(

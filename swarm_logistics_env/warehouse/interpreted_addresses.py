@@ -56,15 +56,15 @@ def unpacked_at(structure: type[S], address: int) -> S:
     def read(kind: Any) -> Any:
         if isinstance(kind, tuple):
             dtype, dimensions = kind
-            start = load(next(words))
-            shape = tuple(load(next(words)) for _ in dimensions)
+            start = load_word(next(words))
+            shape = tuple(load_word(next(words)) for _ in dimensions)
             size = int(np.prod(shape)) * dtype.itemsize
             memory = (ctypes.c_char * size).from_address(start)
             return np.frombuffer(memory, dtype).reshape(shape)
         if kind is float:
             return ctypes.c_double.from_address(next(words)).value
         if kind in (int, bool):
-            return kind(load(next(words)))
+            return kind(load_word(next(words)))
         return kind(*map(read, field_kinds(kind).values()))
 
     value: S = read(structure)
@@ -75,7 +75,7 @@ def _word_at(address: int, index: int = 0) -> ctypes.c_int64:
     return ctypes.c_int64.from_address(int(address) + 8 * int(index))
 
 
-def load(address: int, index: int = 0) -> int:
+def load_word(address: int, index: int = 0) -> int:
     """Return a word, by its index in those at `address`."""
     return _word_at(address, index).value
 

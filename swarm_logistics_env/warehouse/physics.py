@@ -27,7 +27,7 @@ from .structs import (
     NOBODY,
     STORED,
     Batch,
-    Engine,
+    EngineArrays,
     Functions,
     Numbers,
     World,
@@ -71,7 +71,7 @@ def advance(world: World) -> None:
 
 
 @engine_kernel
-def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
+def push(engine: EngineArrays, greatest: float, mass_per_period: float) -> None:
     """Give every robot the force that changes its velocity as wanted, by `greatest` [m/s] at most.
 
     `mass_per_period` [kg/s] makes a force of a change of velocity.
@@ -92,7 +92,7 @@ def push(engine: Engine, greatest: float, mass_per_period: float) -> None:
 
 
 @engine_kernel
-def read(engine: Engine, batch: Batch) -> None:
+def read(engine: EngineArrays, batch: Batch) -> None:
     """Fill a batch with what it holds of the bodies."""
     batch.filled[0] = 0
     call = engine.functions
@@ -103,7 +103,7 @@ def read(engine: Engine, batch: Batch) -> None:
 
 
 @engine_kernel
-def put_item(engine: Engine, item: int, position: Numbers) -> None:
+def put_item(engine: EngineArrays, item: int, position: Numbers) -> None:
     """Move an item to its position, of those of all [m]; who collides with it stays as it is."""
     shape = engine.item_shapes[item]
     call_at(
@@ -113,7 +113,7 @@ def put_item(engine: Engine, item: int, position: Numbers) -> None:
 
 
 @engine_kernel
-def collide_with(engine: Engine, shape: int, categories: int) -> None:
+def collide_with(engine: EngineArrays, shape: int, categories: int) -> None:
     """Give a shape a filter, of no group."""
     call_at(engine.functions.cpShapeSetFilter, (shape, (0, categories)))
 
@@ -205,7 +205,7 @@ def build_items(world: World, static: int) -> None:
 @engine_kernel
 def free(address: int) -> None:
     """Free everything that `build` made for the engine at `address`."""
-    engine = unpacked_at(Engine, address)
+    engine = unpacked_at(EngineArrays, address)
     call = engine.functions
     call_at(call.cpSpaceFree, (engine.space[0],))
     for shapes in (engine.robot_shapes, engine.item_shapes, engine.solid_shapes):
@@ -240,7 +240,7 @@ class Physics:
             _batch(n + 1, 2, BodyFields.FORCE),
         ]
         bodies, velocities, forces = (batch for batch, _ in self._batches)
-        self.engine = Engine(
+        self.engine = EngineArrays(
             functions=_FUNCTION_ADDRESSES,
             space=np.zeros(1, np.int64),
             robot_places=robot_places,

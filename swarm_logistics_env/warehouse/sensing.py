@@ -20,7 +20,7 @@ from .radio import listen
 from .rangers import N_RANGES, full_range, scan_discs, scan_solids
 from .sensor_errors import ITEM_SEEN, ROBOT_SEEN, disturb, fail_rangers
 from .structs import NOBODY, Sensed, World
-from .touch import GAP, touches_items, touches_robots, touches_solid
+from .touch import TOUCHING_GAP, touches_items, touches_robots, touches_solid
 
 
 @kernel
@@ -65,7 +65,9 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     robots, able, parameters = world.robots, world.able, world.parameters
     grid, nearby, radius = world.robot_grid, world.nearby, world.parameters.robot_radius
     ranger_range, view_range = able.ranger_range[me], able.view_range[me]
-    reach = max(ranger_range + radius, view_range, parameters.radio_range, 2.0 * radius + GAP)
+    reach = max(
+        ranger_range + radius, view_range, parameters.radio_range, 2.0 * radius + TOUCHING_GAP
+    )
     n_found = look_around(grid, pose.x, pose.y, reach, me, nearby)
     touches, is_anchored = touches_robots(me, world, n_found)
     robots.contact[me] |= touches
@@ -91,7 +93,7 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     parameters, grid, nearby = world.parameters, world.item_grid, world.nearby
     radius = parameters.item_radius
     ranger_range, view_range = world.able.ranger_range[me], world.able.view_range[me]
-    touch = parameters.robot_radius + GAP + radius
+    touch = parameters.robot_radius + TOUCHING_GAP + radius
     reach = max(ranger_range + radius, view_range, touch)
     n_found = look_around(grid, pose.x, pose.y, reach, NOBODY, nearby)
     if ranger_range > 0.0:

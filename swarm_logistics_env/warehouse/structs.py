@@ -207,7 +207,7 @@ class Batch(NamedTuple):
     numbers: Annotated[Numbers, "bodies", "columns"]
 
 
-class Engine(NamedTuple):
+class EngineArrays(NamedTuple):
     """The engine's things of one world, by their addresses, and what it reads and writes."""
 
     functions: Functions
@@ -255,7 +255,7 @@ class World(NamedTuple):
     item_grid: Grid
     nearby: Nearby
     claims: Claims
-    engine: Engine
+    engine: EngineArrays
 
 
 def lengths_of(scenario: Scenario) -> dict[str, int]:

@@ -27,7 +27,7 @@ from swarm_logistics_env.kernels import engine_kernel, inlined_kernel
 from swarm_logistics_env.numba_fence import IS_PLAIN
 
 from . import stepping
-from .addresses import add, exchange, load, pointer_at, replace, unpacked_at
+from .addresses import add, exchange, load_word, pointer_at, replace, unpacked_at
 from .logistics import refused_command
 from .one_thread import holding
 from .structs import NOBODY, Numbers, Sensed, World
@@ -183,10 +183,10 @@ def submit(queue: int, commands: Numbers, rows: Sensed) -> int:
     Returns:
         The index, row by row, of the first command that is not finite; NOBODY if all are.
     """
-    n_jobs = load(queue, N_JOBS)
+    n_jobs = load_word(queue, N_JOBS)
     for index in range(n_jobs):
         job = job_at(queue, index)
-        world, first = unpacked_at(World, load(job, WORLD)), load(job, FIRST_ROW)
+        world, first = unpacked_at(World, load_word(job, WORLD)), load_word(job, FIRST_ROW)
         now = world.commands.now
         for robot in range(len(now)):
             for column in range(now.shape[1]):
@@ -213,16 +213,16 @@ def take_sleepers(queue: int) -> int:
 def run_next_job(queue: int) -> bool:
     """Step the next world, or return that none is left to take."""
     while True:
-        taken = load(queue, TAKEN)
-        if taken >= load(queue, GIVEN):
+        taken = load_word(queue, TAKEN)
+        if taken >= load_word(queue, GIVEN):
             return False
         if replace(queue, TAKEN, taken, taken + 1):
             break
-    job = job_at(queue, taken % load(queue, N_JOBS))
-    address, first = load(job, WORLD), load(job, FIRST_ROW)
+    job = job_at(queue, taken % load_word(queue, N_JOBS))
+    address, first = load_word(job, WORLD), load_word(job, FIRST_ROW)
     n_robots = len(unpacked_at(World, address).robots.item)
-    n_columns = load(queue, ROW_COLUMNS)
-    first_row = load(queue, ROWS) + 4 * first * n_columns
+    n_columns = load_word(queue, ROW_COLUMNS)
+    first_row = load_word(queue, ROWS) + 4 * first * n_columns
     rows = carray(pointer_at(first_row), (n_robots, n_columns), np.float32)
     is_eventful = stepping.step(address, rows)
     exchange(job, IS_EVENTFUL, int(is_eventful))
@@ -237,11 +237,11 @@ def find_next_done(queue: int, index: int, patience: int) -> int:
     Returns its index; the number of worlds if all are done and none is; _NOT_YET if others still
     step it after `patience` looks.
     """
-    n_jobs, looks = load(queue, N_JOBS), 0
+    n_jobs, looks = load_word(queue, N_JOBS), 0
     while index < n_jobs:
         job = job_at(queue, index)
-        if load(job, IS_DONE) != 0:
-            if load(job, IS_EVENTFUL) != 0 or load(job, IS_WATCHED) != 0:
+        if load_word(job, IS_DONE) != 0:
+            if load_word(job, IS_EVENTFUL) != 0 or load_word(job, IS_WATCHED) != 0:
                 return index
             index += 1
         elif not run_next_job(queue):
@@ -256,8 +256,8 @@ def finish(queue: int) -> None:
     """Step all worlds that are left and wait for those that others step."""
     while run_next_job(queue):
         pass
-    for index in range(load(queue, N_JOBS)):
-        while load(job_at(queue, index), IS_DONE) == 0:
+    for index in range(load_word(queue, N_JOBS)):
+        while load_word(job_at(queue, index), IS_DONE) == 0:
             pass
 
 
@@ -266,7 +266,7 @@ def help_out(queue: int, patience: int) -> bool:
     """Work until nothing came for `patience` looks; returns whether the pool is closed."""
     looks = 0
     while looks < patience:
-        if load(queue, IS_CLOSED) != 0:
+        if load_word(queue, IS_CLOSED) != 0:
             return True
         looks = 0 if run_next_job(queue) else looks + 1
     # Asleep first, then one more look: whoever gave before it must be seen, whoever gives
@@ -274,4 +274,4 @@ def help_out(queue: int, patience: int) -> bool:
     add(queue, ASLEEP, 1)
     while run_next_job(queue):
         pass
-    return load(queue, IS_CLOSED) != 0
+    return load_word(queue, IS_CLOSED) != 0

@@ -7,14 +7,14 @@ from swarm_logistics_env.kernels import inlined_kernel
 from .pose import Pose
 from .structs import World
 
-GAP = 0.01  # [m], gap below which two things touch
+TOUCHING_GAP = 0.01  # [m], gap below which two things touch
 
 
 @inlined_kernel
 def touches_solid(pose: Pose, world: World) -> bool:
     """Return whether a robot touches a wall or an obstacle."""
     parameters, obstacles = world.parameters, world.obstacles
-    reach = parameters.robot_radius + GAP
+    reach = parameters.robot_radius + TOUCHING_GAP
     away_x = min(pose.x, parameters.warehouse_width - pose.x)
     away_y = min(pose.y, parameters.warehouse_height - pose.y)
     touches = min(away_x, away_y) < reach
@@ -28,7 +28,7 @@ def touches_solid(pose: Pose, world: World) -> bool:
 @inlined_kernel
 def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
     """Return whether `me` touches a robot, and whether it is sound and touches one that failed."""
-    limit = (2.0 * world.parameters.robot_radius + GAP) ** 2
+    limit = (2.0 * world.parameters.robot_radius + TOUCHING_GAP) ** 2
     failed = world.robots.failed
     touches = is_anchored = False
     for index in range(n_found):
@@ -42,7 +42,7 @@ def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
 @inlined_kernel
 def touches_items(world: World, n_found: int) -> bool:
     """Return whether a laden robot touches an item that is in its way."""
-    limit = (world.parameters.robot_radius + GAP + world.parameters.item_radius) ** 2
+    limit = (world.parameters.robot_radius + TOUCHING_GAP + world.parameters.item_radius) ** 2
     touches = False
     for index in range(n_found):
         if world.nearby.square[index] < limit:

@@ -40,7 +40,7 @@ def fixed_data(session: Session) -> Message:
     return {
         "colours": {
             theme: {name: f"#{bytes(colour).hex()}" for name, colour in colours.items()}
-            for theme, colours in (("light", palette.COLOURS), ("dark", palette.DARK_COLOURS))
+            for theme, colours in (("light", palette.ROBOT_COLOURS), ("dark", palette.DARK_COLOURS))
         },
         "curves": palette.RUN_NAMES,
         "modes": [
@@ -52,7 +52,7 @@ def fixed_data(session: Session) -> Message:
     }
 
 
-def frame(session: Session) -> Message:
+def frame_message(session: Session) -> Message:
     """Return what is true now. Lengths in mm, times in s, angles in mrad; x right, y up.
 
     For each of the two runs, with its number 0 or 1 behind the name: `poses` (3 N numbers: x, y,
@@ -74,7 +74,7 @@ def frame(session: Session) -> Message:
     return message
 
 
-def changes(before: Message, after: Message) -> Message:
+def changes_since(before: Message, after: Message) -> Message:
     """Return the entries of `after` that are not the same in `before`."""
     return {name: value for name, value in after.items() if before.get(name, ...) != value}
 
@@ -138,7 +138,7 @@ def rehearse(session: Session) -> None:
             copy.select(0)
             copy.break_robot()
             copy.step()
-            frame(copy)
+            frame_message(copy)
 
 
 def _arena(play: Play) -> Message:
@@ -229,8 +229,8 @@ class Recording:
         time = session.state.time
         if self._last and time < self._last["time"] + _SPACING - 1e-9 and not session.is_over:
             return
-        present = {**frame(session), "selected": None, "note": "", "paused": False}
-        message = changes(self._last, present)
+        present = {**frame_message(session), "selected": None, "note": "", "paused": False}
+        message = changes_since(self._last, present)
         if message:
             self._messages.append(encode(message))
         self._last = present

@@ -22,10 +22,10 @@ from .messages import (
     FILES,
     Message,
     Recording,
-    changes,
+    changes_since,
     encode,
     fixed_data,
-    frame,
+    frame_message,
     obey,
     rehearse,
     text_of_file,
@@ -111,7 +111,7 @@ class _Page:
             if now > self._sent_at + _PATIENCE:
                 self._transport.abort()
             return
-        message = changes(self._sent_frame, current_frame)
+        message = changes_since(self._sent_frame, current_frame)
         if message:
             self._sent_frame = current_frame
             self._sent_at = now
@@ -186,7 +186,7 @@ class WatchServer:
                 elapsed, before = now - before, now
                 if self._pages:
                     self.session.play(elapsed, _FRAME_PERIOD, self.recording.note)
-                    current_frame = frame(self.session)
+                    current_frame = frame_message(self.session)
                     for page in self._pages:
                         page.tell(current_frame)
         finally:

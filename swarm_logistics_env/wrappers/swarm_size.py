@@ -16,7 +16,7 @@ from swarm_logistics_env.environment.requests import (
     numbers_of,
     scenario_fields,
 )
-from swarm_logistics_env.environment.spaces import ArrayStep, Infos, agent_names
+from swarm_logistics_env.environment.spaces import ArrayStep, InfosByRobot, agent_names
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
@@ -100,7 +100,7 @@ class FixedAgents(Wrapper):
         padded[: len(rows)] = rows
         return padded
 
-    def _infos(self, agents: list[str]) -> Infos:
+    def _infos(self, agents: list[str]) -> InfosByRobot:
         infos = super()._infos(agents)
         present = self.warehouse.state.robot_present.tolist()
         for row, agent in enumerate(agents):

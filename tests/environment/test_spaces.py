@@ -8,7 +8,7 @@ import pytest
 from swarm_logistics_env import observations as row
 from swarm_logistics_env import policies
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.spaces import ITEM_FEATURES, ROBOT_FEATURES
+from swarm_logistics_env.environment.spaces import ITEM_COLUMNS, ROBOT_FEATURES
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.warehouse.state import CARRIED, NOBODY, STORED
 
@@ -26,7 +26,7 @@ def test_the_state_tells_what_the_world_holds_and_zeros_of_what_is_gone(n_reques
     while env.agents:
         told = env.state()
         robots = dict(zip(ROBOT_FEATURES, told[:n_shown].reshape(12, -1).T))
-        items = dict(zip(ITEM_FEATURES, told[n_shown:-1].reshape(14, -1).T))
+        items = dict(zip(ITEM_COLUMNS, told[n_shown:-1].reshape(14, -1).T))
         present = world.robot_present
         assert robots["present"].tolist() == present.tolist()
         assert not told[:n_shown].reshape(12, -1)[~present].any()

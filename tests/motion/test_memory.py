@@ -38,14 +38,14 @@ def memory() -> Memory:
 def go_on(memory: Memory, rows: Any, seconds: float) -> None:
     """Command nothing new for a while."""
     for _ in range(round(seconds / 0.1)):
-        column.remember(rows, 0.1, memory)
+        column.remember_observation(rows, 0.1, memory)
 
 
 def hold(memory: Memory, rows: Any, times: int, gripper: float = 1.0) -> None:
     """Hold on to what is in view, and learn what came of it."""
     for _ in range(times):
         column.note_command(rows[0], np.array([0.0, 0.0, 0.0, gripper]), memory[0])
-        column.remember(rows, 0.1, memory)
+        column.remember_observation(rows, 0.1, memory)
 
 
 @pytest.mark.parametrize("handling_time", [0.0, 1.5])
@@ -85,12 +85,12 @@ def test_a_robot_that_holds_on_in_vain_takes_its_gripper_for_broken_and_tries_ag
 def test_a_lift_or_a_delivery_shows_that_the_robot_can(memory: Memory) -> None:
     hold(memory, sensed(item_at=0.1), 12)
     assert memory[0, column.CANNOT_LIFT] > 0.0
-    column.remember(sensed(row.CARRYING), 0.1, memory)
+    column.remember_observation(sensed(row.CARRYING), 0.1, memory)
     assert memory[0, column.CANNOT_LIFT] == 0.0
     hold(memory, sensed(item_at=0.1), 9)
     assert memory[0, column.CANNOT_LIFT] == 0.0, "what it held in vain before the lift is forgotten"
     hold(memory, LADEN_INSIDE, 15, gripper=0.0)
-    column.remember(sensed(row.IN_DELIVERY_AREA), 0.1, memory)
+    column.remember_observation(sensed(row.IN_DELIVERY_AREA), 0.1, memory)
     assert memory[0, column.CANNOT_DELIVER] == memory[0, column.DELIVERING] == 0.0
 
 
@@ -118,7 +118,7 @@ def test_a_robot_that_lifts_stands_so_that_its_memory_does_not_turn(
 def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(memory: Memory, rows: Any) -> None:
     hold(memory, rows, 20)
     hold(memory, LADEN, 1)
-    column.remember(sensed(item_at=0.1), 0.1, memory)  # it delivered, and holds on
+    column.remember_observation(sensed(item_at=0.1), 0.1, memory)  # it delivered, and holds on
     hold(memory, sensed(item_at=0.1), 9)
     assert memory[0, column.CANNOT_LIFT] == 0.0
 
@@ -128,7 +128,7 @@ def test_the_border_sets_right_how_far_it_is_home(memory: Memory) -> None:
     for way in (1.0, -1.0, 1.0):  # in, out and in again, at 1 m/s
         rows = sensed()
         rows[0, row.VELOCITY], rows[0, row.IN_DELIVERY_AREA] = way, way > 0.0
-        column.remember(rows, 0.1, memory)
+        column.remember_observation(rows, 0.1, memory)
         assert memory[0, column.AWAY] == pytest.approx(-0.1 * way)
 
 

@@ -287,12 +287,12 @@ def test_a_policy_that_fails_is_told_to_the_page_and_the_server_stays(
 COLD = """
 import asyncio, json, sys
 import aiohttp
-from swarm_logistics_env import FAILURE_MODES, Scenario, kernels
+from swarm_logistics_env import FAILURE_MODES, Scenario, fast_kernels
 from swarm_logistics_env.watch import Session
 from swarm_logistics_env.watch.server import WatchServer
 
 def compiled():
-    return {str(one): len(one.overloads) for one in kernels._all_kernels}
+    return {str(one): len(one.overloads) for one in fast_kernels._all_kernels}
 
 async def use():
     policies = sys.argv[1:]
@@ -395,7 +395,9 @@ def test_a_page_that_reads_nothing_is_dropped_and_holds_up_no_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(server, "_PATIENCE", 0.5)
-    monkeypatch.setattr(server, "frame", lambda session: {"long": f"{time.time()}" * 20_000})
+    monkeypatch.setattr(
+        server, "frame_message", lambda session: {"long": f"{time.time()}" * 20_000}
+    )
     served = Served()
     slow = silent(served, PAGE)
     try:

@@ -14,7 +14,7 @@ from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, observations, po
 from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.warehouse.state import NOBODY, STORED
 from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.messages import Recording, frame
+from swarm_logistics_env.watch.messages import Recording, frame_message
 
 SMALL = Scenario(n_robots=8, n_items=10, duration=20.0, warehouse_width=5, warehouse_height=5)
 
@@ -61,7 +61,7 @@ def test_robot_breaks_and_is_repaired(mode: str) -> None:
     session.play(2.0)
     session.choose_mode(mode)
     session.toggle_robot(3)
-    state, shown = session.run.world.state, frame(session)
+    state, shown = session.run.world.state, frame_message(session)
     assert state.failure_modes[3] == (mode,)
     assert not session.beside.world.state.failed.any()
     assert [(one.time, one.robot, one.mode) for one in session.events] == [(state.time, 3, mode)]
@@ -196,7 +196,7 @@ def test_what_the_selected_robot_senses_is_shown() -> None:
     session.play(3.0)
     for robot in range(8):
         session.select(robot)
-        shown = frame(session)["selected"]
+        shown = frame_message(session)["selected"]
         parts = observations.unflatten(session.run.world.observe()[robot], scenario)
         assert [name for name, _, _ in shown["row"]] == list(parts)
         for name, _, values in shown["row"]:
@@ -280,7 +280,7 @@ def test_a_policy_that_fails_stops_its_episode_alone_and_says_where(
     session.play(5.0)
     assert said in session.failure
     assert len(session.failure) < 600
-    assert frame(session)["failure"] == session.failure
+    assert frame_message(session)["failure"] == session.failure
     time = session.state.time
     session.play(5.0)
     session.step()
@@ -325,7 +325,7 @@ def test_every_request_is_told_with_its_carrier() -> None:
     n_carriers = 0
     while not session.is_over:
         session.advance()
-        state, shown = session.state, frame(session)
+        state, shown = session.state, frame_message(session)
         asked = sorted(set(state.open_requests.tolist()))  # one may be asked for twice
         places = np.rint(1000 * state.item_position[asked]).astype(int).tolist()
         carriers = state.item_carrier[asked].tolist()
