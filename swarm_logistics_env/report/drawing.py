@@ -9,7 +9,7 @@ import contextlib
 import io
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from swarm_logistics_env.verdicts.mid_run_faults import RateCurve
-from swarm_logistics_env.verdicts.verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,19 +49,42 @@ DOTS_PER_INCH = 200
 
 def images(draw: Draw, height: float) -> tuple[str, bytes]:
     """Return a drawing of the given height [inch] as SVG and as PNG; equal ones as equal bytes."""
-    mpl = _matplotlib()
-    from matplotlib.figure import Figure as NewCanvas
+    png = io.BytesIO()
+    with _style():
+        canvas = _canvas(draw, height)
+        svg = _svg(canvas)
+        canvas.set_layout_engine("none")  # the same layout, which takes long to find
+        canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return svg, png.getvalue()
 
-    svg, png = io.StringIO(), io.BytesIO()
+
+def svg_image(draw: Draw, height: float) -> str:
+    """Return a drawing of the given height [inch] as SVG alone."""
+    with _style():
+        return _svg(_canvas(draw, height))
+
+
+@contextlib.contextmanager
+def _style() -> Iterator[None]:
+    mpl = _matplotlib()
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
-        canvas = NewCanvas(figsize=(WIDTH, height), layout="constrained")
-        draw(canvas)
-        canvas.savefig(svg, format="svg", metadata=_NO_METADATA)
-        canvas.set_layout_engine("none")  # the same layout, which takes long to find
-        canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
-    return svg.getvalue(), png.getvalue()
+        yield
+
+
+def _canvas(draw: Draw, height: float) -> Canvas:
+    from matplotlib.figure import Figure as NewCanvas
+
+    canvas = NewCanvas(figsize=(WIDTH, height), layout="constrained")
+    draw(canvas)
+    return canvas
+
+
+def _svg(canvas: Canvas) -> str:
+    svg = io.StringIO()
+    canvas.savefig(svg, format="svg", metadata=_NO_METADATA)
+    return svg.getvalue()
 
 
 def _matplotlib() -> ModuleType:
@@ -93,6 +115,9 @@ class Point(NamedTuple):
         published: a cross beside it; None: none.
         decided: whether it is filled.
         saturated: whether it is marked.
+        link: id of its marks in the SVG: what a click on them shows in the page, "question-7" or
+            "condition-3"; empty: nothing.
+        runs: single runs, drawn as dots, seed by seed; None: missing.
     """
 
     series: str
@@ -104,22 +129,19 @@ class Point(NamedTuple):
     published: float | None = None
     decided: bool = False
     saturated: bool = False
+    link: str = ""
+    runs: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes: series over shared categories, and thresholds.
-
-    Attributes:
-        verdicts: those that the points show, in their order; empty: they show something else.
-    """
+    """One pair of axes: series over shared categories, and thresholds."""
 
     title: str
     y_label: str
     points: tuple[Point, ...]
     thresholds: tuple[float, ...]
     x_label: str
-    verdicts: tuple[Verdict, ...] = ()
 
 
 def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
@@ -141,7 +163,9 @@ def _panel(axes: Axes, panel: Panel) -> None:
         index = styles.index(point.style)
         x = categories.index(point.category) + spread * ((index + 0.5) / len(styles) - 0.5)
         if point.published is not None:  # beside the mark, which would hide it
-            axes.plot(x + 0.1, point.published, "x", color=INK, zorder=4)
+            gid = f"published-{point.link}" if point.link else None
+            axes.plot(x + 0.1, point.published, "x", color=INK, zorder=4, gid=gid)
+        _dots(axes, x, 0.4 * spread / len(styles), point)
         _mark(axes, x, point)
         if point.value is not None and point.saturated:
             axes.annotate("†", (x, point.value), (-9, 3), textcoords="offset points", fontsize=9)
@@ -149,12 +173,15 @@ def _panel(axes: Axes, panel: Panel) -> None:
     if sum(len(category) + 2 for category in categories) > 80:
         axes.tick_params(axis="x", rotation=40)
     axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=_limits(panel.points))
+    if not panel.thresholds:  # P is never below 0
+        axes.set_ylim(bottom=0.0)
     axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
 
 
 def _limits(points: Sequence[Point]) -> tuple[float, float]:
     """Return axis limits: 0, all values, and intervals up to twice the values' span beyond."""
     values = [0.0, *(x for p in points for x in (p.value, p.published) if x is not None)]
+    values += [p for point in points for p in point.runs if p is not None]
     ends = [*values, *(x for p in points for x in (p.low, p.high) if x is not None)]
     reach = max(2.0 * (max(values) - min(values)), 1.0)
     low = max(min(ends), min(values) - reach)
@@ -163,8 +190,30 @@ def _limits(points: Sequence[Point]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _mark(axes: Axes, at: float, point: Point, *, level: bool = False) -> None:
-    """Draw a value, if there is one, with its interval, upright or level."""
+_GOLDEN = 0.618034  # spreads any number of dots evenly
+
+
+def _dots(axes: Axes, x: float, reach: float, point: Point) -> None:
+    """Draw single runs as dots beside each other, at the same places at every drawing."""
+    runs = {seed: p for seed, p in enumerate(point.runs) if p is not None}
+    if runs:
+        axes.scatter(
+            [x + reach * (2.0 * (seed * _GOLDEN % 1.0) - 1.0) for seed in runs],
+            list(runs.values()),
+            s=9.0,
+            color=COLOURS[point.style % len(COLOURS)],
+            alpha=0.45,
+            linewidths=0.0,
+            gid="-".join([point.link, "seeds", *map(str, runs)]) if point.link else None,
+        )
+
+
+def _mark(axes: Axes, at: float, point: Point, *, level: bool = False, n_beside: int = 1) -> None:
+    """Draw a value, if there is one, with its interval, upright or level.
+
+    Args:
+        n_beside: how many marks share the row: many of them are small.
+    """
     value, low, high = point.value, point.low, point.high
     if value is None:
         return
@@ -174,7 +223,8 @@ def _mark(axes: Axes, at: float, point: Point, *, level: bool = False) -> None:
     if low is not None and high is not None:
         # An infinite end is drawn far outside.
         error = np.clip([[value - low], [high - value]], 0.0, 1e3)
-    axes.errorbar(
+    shrink = min(1.0, 4.0 / n_beside)
+    line, caps, bars = axes.errorbar(
         value if level else at,
         at if level else value,
         xerr=error if level else None,
@@ -182,8 +232,12 @@ def _mark(axes: Axes, at: float, point: Point, *, level: bool = False) -> None:
         fmt="o" if level else MARKERS[style],
         color=colour,
         markerfacecolor=colour if point.decided else PAPER,
+        markersize=5.0 * shrink,
+        capsize=3.0 * shrink,
         label=point.series,
     )
+    for artist in (line, *caps, *bars):
+        artist.set_gid(point.link or None)
 
 
 def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
@@ -197,10 +251,14 @@ def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
     for row, (_, points) in enumerate(rows):
         for index, point in enumerate(points):
             height = row + 0.6 * ((index + 0.5) / len(points) - 0.5)
-            _mark(axes, height, point, level=True)
+            _mark(axes, height, point, level=True, n_beside=len(points))
             if point.published:
-                axes.vlines(point.published, row - 0.4, row + 0.4, color=INK, linewidth=0.8)
-    axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
+                threshold = axes.vlines(
+                    point.published, row - 0.4, row + 0.4, color=INK, linewidth=0.8
+                )
+                threshold.set_gid(point.link or None)
+    axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1, gid="zero")
+    axes.patch.set_gid("frame")
     axes.set_yticks(range(len(rows)), [label for label, _ in rows])
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 
 from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.questions.comparison import CONFIDENCE, Comparison
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorKind
+from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.columns import VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.mid_run_faults import (
     RateCurve,
@@ -31,10 +33,10 @@ _COLUMNS = [
 
 def forest_figure(results: StudyResults, answer: Answer) -> Figure:
     """Return the lines of the answer as a forest of intervals."""
-    points = (
+    points = [
         [_point(results, verdict, "", verdict.compared.threshold) for verdict in line.verdicts]
         for line in answer.lines
-    )
+    ]
     rows = list(zip(answer.questions, points))
     verdicts = answer.verdicts
     return Figure(
@@ -58,21 +60,52 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
             f"{policies}, {_condition(table, onset, swarm)}: {_caption(definitions)} "
             f"{seeds_text(results).capitalize()}. {_marks(verdicts)}{crosses}.{_capped(verdicts)}"
         )
-        panels = [_panel(results, verdicts, definition) for definition in definitions]
+        panels = tuple(_panel(results, verdicts, definition) for definition in definitions)
         yield Figure(
             slug(*symbols, table, f"{onset:g}s" if onset else ""),
             caption,
             frame(verdicts, VERDICT_COLUMNS)[_COLUMNS],
             0.5 + 2.5 * len(panels),
             partial(drawing.intervals, panels=panels),
+            title=f"{' and '.join(symbols)}: {_condition(table, onset, swarm)}",
+            panels=panels,
+            level=levels(verdicts),
         )
 
 
-def indicator_panels(results: StudyResults) -> Iterator[tuple[str, Panel]]:
-    """Yield the panels of `indicator_figures`, each with what it is about."""
-    for (table, _, onset, swarm), verdicts in _by_figure(results).items():
-        for definition in _definitions(verdicts):
-            yield _condition(table, onset, swarm), _panel(results, verdicts, definition)
+def performance_panels(
+    cells: Iterable[Cell], policies: Sequence[str], runs: Mapping[str, Sequence[float | None]]
+) -> Iterator[tuple[str, Panel]]:
+    """Yield P of every policy in the conditions of each table, with its runs; and the table.
+
+    Args:
+        policies: in the order of their colours.
+        runs: P seed by seed of every condition, by the key of its case.
+    """
+    conditions = list(runs)
+    shown = [cell for cell in cells if cell.arm.setting.kind != "policy"]
+    for table, of_table in grouped(shown, lambda cell: cell.table).items():
+        points = tuple(
+            Point(
+                cell.policy,
+                policies.index(cell.policy),
+                # "N = 10" stands there as "10", "FM1, m = 2" as "FM1 2".
+                re.sub(r"^\w+ = |, m =", "", cell.words),
+                *cell.mean,
+                # The published values stand beside the first policy.
+                cell.published if cell.policy == policies[0] else None,
+                decided=True,
+                saturated=cell.saturated,
+                link=f"condition-{conditions.index(cell.arm.case.key)}",
+                runs=tuple(runs[cell.arm.case.key]),
+            )
+            for cell in of_table
+            if cell.n_seeds
+        )
+        setting = of_table[0].arm.setting
+        x_label = X_LABELS.get(setting.kind, setting.name)
+        if points:
+            yield table, Panel("", "performance P", points, (), x_label)
 
 
 def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int], list[Verdict]]:
@@ -123,7 +156,7 @@ def _panel(results: StudyResults, verdicts: Sequence[Verdict], definition: Defin
     thresholds = [verdict.compared.threshold for verdict in of_indicator]
     shown = tuple(dict.fromkeys([0.0, *definition.adjectives, *thresholds]))
     x_label = f"{after.name}, x_o → x_new" if after.kind == "parameter" else X_LABELS[after.kind]
-    return Panel("", definition.heading, points, shown, x_label, tuple(of_indicator))
+    return Panel("", definition.heading, points, shown, x_label)
 
 
 X_LABELS = {
@@ -158,6 +191,7 @@ def _point(
         published,
         decided=verdict.on_threshold.adjusted in DECIDED,
         saturated=verdict.saturated,
+        link=f"question-{results.verdicts.index(verdict)}",
     )
 
 

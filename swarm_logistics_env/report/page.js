@@ -3,14 +3,6 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const repeat = data.paired ? "seed" : "trial";
 const at = (id) => document.getElementById(id);
-const MARKS = [
-  (x, y) => `M${x - 4},${y}a4,4 0 1,0 8,0a4,4 0 1,0 -8,0`,
-  (x, y) => `M${x - 3.6},${y - 3.6}h7.2v7.2h-7.2z`,
-  (x, y) => `M${x},${y - 5}l4.6,8.4h-9.2z`,
-  (x, y) => `M${x},${y - 5}l5,5l-5,5l-5,-5z`,
-  (x, y) => `M${x},${y + 5}l4.6,-8.4h-9.2z`,
-  (x, y) => `M${x - 1.7},${y - 5}h3.4v3.3h3.3v3.4h-3.3v3.3h-3.4v-3.3h-3.3v-3.4h3.3z`,
-];
 const colour = (place) => `var(--p${place % 6})`;
 const escaped = (text) => String(text).replace(/[&<>"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
 const tidy = (x) => String(Number(x.toPrecision(6)));
@@ -44,81 +36,20 @@ function put(place, width, height, drawn, name) {
 
 const known = (values) => values.filter((value) => value !== null && value !== undefined);
 
-// The comparison: every policy over the same categories, on one axis; P also seed by seed
+// The comparison: one drawing of several, each dot of which is a run
 
-function dotsOf(point) {
-  return point.condition === undefined ? [] : data.conditions[point.condition].p;
+function showView() {
+  document.querySelectorAll("#comparison .view").forEach((view, i) => { view.hidden = i !== at("views").selectedIndex; });
 }
 
-function rangeOf(view) {
-  const values = known(view.points.flatMap((point) => [point.value, point.published]));
-  if (!view.thresholds.length) {
-    const all = known(view.points.flatMap((point) => [point.value, point.high, ...dotsOf(point)]));
-    return [0, Math.max(...all.filter((x) => x < 1e8), 1) * 1.04];
+function titleDots() {
+  for (const dot of document.querySelectorAll("#comparison .dot")) {
+    const { condition } = dot.closest("[data-condition]").dataset, { seed } = dot.dataset;
+    const mark = dot.closest(".view").querySelector(`[data-condition="${condition}"] > title`).textContent;
+    const title = document.createElementNS(dot.namespaceURI, "title");
+    title.textContent = `${mark.slice(0, mark.lastIndexOf(": "))}, ${repeat} ${data.seeds[seed] ?? seed}: ${tidy(data.conditions[condition].p[seed])}`;
+    dot.append(title);
   }
-  let low = Math.min(...values, 0), high = Math.max(...values, 0);
-  const reach = Math.max(high - low, 0.5);
-  const ends = known(view.points.flatMap((point) => [point.low, point.high]));
-  low = Math.max(low - reach, Math.min(low, ...ends));
-  high = Math.min(high + reach, Math.max(high, ...ends));
-  const margin = 0.06 * (high - low);
-  return [low - margin, high + margin];
-}
-
-function drawComparison() {
-  const view = data.views[at("views").value], place = at("comparison");
-  const width = Math.max(300, place.clientWidth);
-  const [low, high] = rangeOf(view);
-  const n = view.categories.length, left = 46, right = width - 6, top = 22;
-  const step = (right - left) / n;
-  const longest = Math.max(...view.categories.map((name) => name.length)) * 6.6;
-  const turned = longest > step - 4;
-  const base = width > 560 ? Math.min(500, Math.max(330, innerHeight - 360)) : 205;
-  const bottom = base - (turned ? Math.min(78, 16 + longest * 0.72) : 24);
-  const box = { left, right, top, bottom, low, high };
-  let [drawn, y] = axes(box, view.y);
-  for (const threshold of view.thresholds) {
-    if (threshold > low && threshold < high) {
-      drawn += `<line class="threshold" x1="${left}" x2="${right}" y1="${y(threshold)}" y2="${y(threshold)}"/>`;
-    }
-  }
-  view.categories.forEach((name, i) => {
-    const x = left + (i + 0.5) * step;
-    drawn += turned
-      ? `<text transform="translate(${x + 4},${bottom + 14}) rotate(-45)" text-anchor="end">${escaped(name)}</text>`
-      : `<text x="${x}" y="${bottom + 18}" text-anchor="middle">${escaped(name)}</text>`;
-  });
-  const shown = data.policies.filter((policy) => view.points.some((point) => point.policy === policy));
-  const spread = Math.min(step * 0.8, 26 * shown.length);
-  const inside = (value) => Math.min(high, Math.max(low, value));
-  for (const point of view.points) {
-    const i = shown.indexOf(point.policy), c = data.policies.indexOf(point.policy);
-    const x = left + (point.at + 0.5) * step + spread * ((i + 0.5) / shown.length - 0.5);
-    const room = Math.min(9, spread / shown.length / 2.6);
-    const target = point.question === undefined ? `data-condition="${point.condition}"` : `data-question="${point.question}"`;
-    dotsOf(point).forEach((value, k) => {
-      if (value === null || value < low || value > high) return;
-      // Spread out by the golden ratio: beside each other, and the same at every drawing.
-      const shift = room * (((k * 0.618034) % 1) * 2 - 1);
-      drawn += `<circle class="dot" cx="${x + shift}" cy="${y(value)}" r="2.6" fill="${colour(c)}" ${target} data-seed="${k}"><title>${escaped(point.policy)}, ${escaped(view.categories[point.at])}, ${repeat} ${data.seeds[k] ?? k}: ${tidy(value)}</title></circle>`;
-    });
-    if (point.value === null) continue;
-    if (point.low !== null && point.high !== null) {
-      drawn += `<line x1="${x}" x2="${x}" y1="${y(inside(point.low))}" y2="${y(inside(point.high))}" stroke="${colour(c)}" stroke-width="2"/>`;
-    }
-    const interval = point.low === null ? "" : ` [${tidy(point.low)}, ${tidy(point.high)}]`;
-    drawn += `<path d="${MARKS[c % 6](x, y(inside(point.value)))}" fill="${colour(c)}" stroke="var(--paper)" ${target}><title>${escaped(point.policy)}, ${escaped(view.categories[point.at])}: ${tidy(point.value)}${interval}</title></path>`;
-  }
-  const crosses = view.points.filter((point) => point.published !== null && point.policy === shown[0]);
-  for (const point of crosses) {
-    const x = left + (point.at + 0.5) * step, level = y(inside(point.published));
-    drawn += `<path d="M${x - 4},${level - 4}l8,8m0,-8l-8,8" stroke="var(--ink)" stroke-width="1.6"><title>published: ${point.published}</title></path>`;
-  }
-  put(place, width, base, drawn, view.name);
-  at("policies").innerHTML = shown.map((policy) => {
-    const c = data.policies.indexOf(policy);
-    return `<span><svg width="12" height="12" viewBox="-6 -6 12 12" style="display:inline"><path d="${MARKS[c % 6](0, 0)}" fill="${colour(c)}"/></svg> ${escaped(policy)}</span>`;
-  }).join("") + `<span>bar: ${escaped(view.level)} interval</span>${view.thresholds.length ? "" : `<span>dot: one ${repeat}, click it</span>`}` + (crosses.length ? "<span>×: published</span>" : "");
 }
 
 // One question: paired slopes, delivery curves, and one run
@@ -135,7 +66,7 @@ function choose(question, seed) {
 
 function chooseCondition(condition, seed) {
   // A question about this condition, of the table that is shown, has something to compare it with.
-  const here = data.views[at("views").value].name.slice("P: ".length);
+  const here = at("views").selectedOptions[0].textContent.slice("P: ".length);
   const about = [(one) => one.arms[1][2] === condition, (one) => one.arms.some((arm) => arm[2] === condition)];
   const found = about.flatMap((fits) => [
     data.questions.findIndex((one) => one.table === here && fits(one)), data.questions.findIndex(fits)]);
@@ -238,7 +169,7 @@ function sort(head) {
 document.addEventListener("click", (event) => {
   const one = event.target.closest("[data-question], [data-condition], [data-seed], .sortable thead th");
   if (!one) return;
-  const { question, condition, seed } = one.dataset;
+  const { question, seed } = one.dataset, condition = one.closest("[data-condition]")?.dataset.condition;
   if (one.matches("th")) sort(one);
   else if (question !== undefined || condition !== undefined) {
     if (question !== undefined) choose(Number(question), seed && Number(seed));
@@ -250,21 +181,12 @@ document.addEventListener("click", (event) => {
   }
 });
 
-function options(select, names) {
-  select.innerHTML = names.map((name, i) => `<option value="${i}">${escaped(name)}</option>`).join("");
-  select.hidden = names.length < 2;
-}
-
-options(at("views"), data.views.map((view) => view.name));
-at("views").addEventListener("change", drawComparison);
-drawComparison();
+at("views").addEventListener("change", showView);
+showView();
+titleDots();
 choose(0);
-function draw() {
-  drawComparison();
-  showQuestion();
-}
 let width = innerWidth;
-addEventListener("resize", () => { if (innerWidth !== width) { width = innerWidth; draw(); } });
+addEventListener("resize", () => { if (innerWidth !== width) { width = innerWidth; showQuestion(); } });
 // On paper nothing can be unfolded: the warnings belong to the answer.
 addEventListener("beforeprint", () => { for (const one of document.querySelectorAll(".warnings")) one.open = true; });
 // A link to a folded chapter unfolds it.

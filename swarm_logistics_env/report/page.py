@@ -1,54 +1,146 @@
-"""What the script of the HTML page draws: points, seeds, delivery curves and runs."""
+"""What the HTML page shows beyond the report: drawings to choose from, and what a click shows."""
 
 from __future__ import annotations
 
 import json
-import re
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from functools import partial
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.questions.comparison import Arm
+from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.tasks.task import DEFAULT, Outcome
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
 from swarm_logistics_env.warehouse.faults import Fault, text_of
 
+from . import drawing
 from .answer import Answer
-from .figures import X_LABELS, indicator_panels
-from .section import P_LEVEL, levels, sentence
+from .document import Document
+from .drawing import Panel
+from .figures import performance_panels
+from .inline_svg import forest_rows, inline
+from .section import P_LEVEL, bracketed, digits_of, sentence
 
 Json: TypeAlias = dict[str, JsonValue]
+# Name, drawing, what it shows, and what its marks mean.
+Chart: TypeAlias = tuple[str, str, Sequence[Panel], tuple[str, ...]]
+_HEIGHT = 2.9  # inch, of a drawing of P
 _MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
 
 
-def axis(answer: Answer) -> tuple[float, float]:
-    """Return the ends of the axis that all intervals of the first screen share."""
-    values = [0.0, *(verdict.value for verdict in answer.verdicts if verdict.value is not None)]
-    # An interval that is much wider than the values lie apart leaves the axis.
-    span = max(max(values) - min(values), 0.5)
-    return min(values) - span, max(values) + span
+class View(NamedTuple):
+    """A drawing that the page's reader may choose to see.
+
+    Attributes:
+        name: what it shows.
+        svg: the drawing, as a part of the page.
+        legend: what its marks mean.
+    """
+
+    name: str
+    svg: str
+    legend: tuple[str, ...]
+
+
+def views(results: StudyResults, report: Document, drawings: Mapping[str, str]) -> Iterator[View]:
+    """Yield P of every policy in the conditions of each table, then the figures of indicators.
+
+    Args:
+        drawings: SVG of every figure of the report, by name.
+    """
+    charts = [*_performance_charts(results), *_indicator_charts(report, drawings)]
+    for number, (name, svg, panels, legend) in enumerate(charts):
+        has_published = any(
+            point.published is not None for panel in panels for point in panel.points
+        )
+        if has_published:
+            legend = (*legend, "×: published")
+        yield View(name, inline(svg, f"v{number}", _titles(panels)), legend)
+
+
+def _performance_charts(results: StudyResults) -> Iterator[Chart]:
+    runs = {key: _p_by_seed(results, arm) for key, arm in _arms(results).items()}
+    repeat = "seed" if results.plan.paired else "trial"
+    legend = (f"bar: {P_LEVEL} interval", f"dot: one {repeat}, click it")
+    for table, panel in performance_panels(results.cells, results.policies, runs):
+        svg = drawing.svg_image(partial(drawing.intervals, panels=[panel]), _HEIGHT)
+        yield f"P: {table}", svg, [panel], legend
+
+
+def _indicator_charts(report: Document, drawings: Mapping[str, str]) -> Iterator[Chart]:
+    for figure in report.figures():
+        if figure.panels:
+            legend = (f"bar: {figure.level} interval",)
+            yield figure.title, drawings[figure.name], figure.panels, legend
+
+
+def _titles(panels: Sequence[Panel]) -> dict[str, str]:
+    """Return what each mark shows in words, by its id."""
+    titles = {}
+    for panel in panels:
+        for point in panel.points:
+            if point.value is not None:
+                digits = 3 if panel.thresholds else digits_of(point.value)
+                interval = Interval(point.value, point.low, point.high)
+                text = bracketed(interval, digits, panel.thresholds)
+                titles[point.link] = f"{point.series}, {point.category}: {text}"
+            if point.published is not None:
+                titles[f"published-{point.link}"] = f"published: {point.published:g}"
+    return titles
+
+
+def forest(answer: Answer, svg: str) -> list[str]:
+    """Return the intervals of each line of the answer as a part of the page.
+
+    Args:
+        svg: the forest of all lines.
+    """
+    links = [
+        [
+            (f"question-{number}", verdict.conclusion)
+            for number, verdict in zip(line.numbers, line.verdicts)
+        ]
+        for line in answer.lines
+    ]
+    return forest_rows(svg, links)
 
 
 def page_data(results: StudyResults) -> Json:
     """Return all that the page's script needs, as JSON holds it."""
-    arms = {arm.case.key: arm for _, _, arm in results.plan.cells}
+    arms = _arms(results)
     indices = {key: index for index, key in enumerate(arms)}
     return {
-        "policies": [*results.policies],
         # A script rounds larger numbers.
         "seeds": [seed if seed < 2**53 else str(seed) for seed in results.plan.seeds],
         "paired": results.plan.paired,
         "conditions": list(_conditions(results, list(arms.values()))),
         "questions": [_question(results, verdict, indices) for verdict in results.verdicts],
-        "views": [*_performance_views(results, indices), *_indicator_views(results)],
     }
+
+
+def _arms(results: StudyResults) -> dict[str, Arm]:
+    """Return the conditions of a study, each once, by the key of its case."""
+    return {arm.case.key: arm for _, _, arm in results.plan.cells}
+
+
+def _trainings(arm: Arm) -> list[Arm]:
+    return [replace(arm, case=case) for case in arm.case.trainings]
+
+
+def _p_by_seed(results: StudyResults, arm: Arm) -> list[float | None]:
+    """Return mean P over the trainings, seed by seed; None: a run failed, or is missing."""
+    trainings = _trainings(arm)
+    return [
+        _mean_p([results.outcome(training, seed) for training in trainings])
+        for seed in results.plan.seeds
+    ]
 
 
 def _conditions(results: StudyResults, arms: Sequence[Arm]) -> Iterator[Json]:
@@ -56,25 +148,21 @@ def _conditions(results: StudyResults, arms: Sequence[Arm]) -> Iterator[Json]:
     share = min(1.0, _MOST_TIMES / max(1, n_deliveries))
     n_curves = max(1, int(share * len(results.plan.seeds)))
     for arm in arms:
-        trainings = [replace(arm, case=case) for case in arm.case.trainings]
-        at_seed = [
-            [results.outcome(training, seed) for training in trainings]
-            for seed in results.plan.seeds
-        ]
-        first_training = [outcomes[0] for outcomes in at_seed[:n_curves]]
+        first_training = _trainings(arm)[0]
+        outcomes = [results.outcome(first_training, seed) for seed in results.plan.seeds]
         yield {
             "name": f"{arm.case.policy.title}, {arm.setting}",
             "end": float(arm.case.scenario.duration),
-            "p": [_mean_p(outcomes) for outcomes in at_seed],
+            "p": [*_p_by_seed(results, arm)],
             # Deliveries in whole seconds, each as the time since the one before; of the first
             # training, where there are several.
             "curves": [
                 None
                 if outcome is None or outcome.untimed is not None
                 else _steps(outcome.delivery_times)
-                for outcome in first_training
+                for outcome in outcomes[:n_curves]
             ],
-            "command": watch_command(trainings[0]),
+            "command": watch_command(first_training),
         }
 
 
@@ -122,64 +210,3 @@ def _question(results: StudyResults, verdict: Verdict, indices: dict[str, int]) 
             for name, arm in comparison.arguments.items()
         ],
     }
-
-
-def _performance_views(results: StudyResults, indices: dict[str, int]) -> Iterator[Json]:
-    """Yield P of every policy in the conditions of each table, on one axis."""
-    shown = [cell for cell in results.cells if cell.arm.setting.kind != "policy"]
-    for table, cells in grouped(shown, lambda cell: cell.table).items():
-        categories = list(dict.fromkeys(cell.words for cell in cells))
-        setting = cells[0].arm.setting
-        yield {
-            "name": f"P: {table}",
-            "y": f"performance P over {X_LABELS.get(setting.kind, setting.name)}",
-            "level": P_LEVEL,
-            "thresholds": [],
-            # "N = 10" stands there as "10", "FM1, m = 2" as "FM1 2".
-            "categories": [re.sub(r"^\w+ = |, m =", "", category) for category in categories],
-            "points": [
-                {
-                    "policy": cell.policy,
-                    "at": categories.index(cell.words),
-                    **_limits(*cell.mean),
-                    "published": _number(cell.published),
-                    "condition": indices[cell.arm.case.key],
-                }
-                for cell in cells
-                if cell.n_seeds
-            ],
-        }
-
-
-def _indicator_views(results: StudyResults) -> Iterator[Json]:
-    """Yield every pair of axes of the figures."""
-    numbers = {verdict.compared: number for number, verdict in enumerate(results.verdicts)}
-    for condition, panel in indicator_panels(results):
-        categories = list(dict.fromkeys(point.category for point in panel.points))
-        yield {
-            "name": f"{panel.verdicts[0].compared.indicator}: {condition}",
-            "y": f"{panel.y_label} over {panel.x_label}",
-            "level": levels(panel.verdicts),
-            "thresholds": [float(threshold) for threshold in panel.thresholds],
-            "categories": [*categories],
-            "points": [
-                {
-                    "policy": point.series,
-                    "at": categories.index(point.category),
-                    **_limits(point.value, point.low, point.high),
-                    "published": _number(point.published),
-                    "question": numbers[verdict.compared],
-                }
-                for point, verdict in zip(panel.points, panel.verdicts)
-                if point.value is not None
-            ],
-        }
-
-
-def _limits(*limits: float | None) -> Json:
-    return dict(zip(("value", "low", "high"), map(_number, limits)))
-
-
-def _number(value: float | None) -> float | None:
-    """Return a number as JSON holds it: infinite limits become very large, missing ones null."""
-    return None if value is None else float(np.clip(round(value, 4), -1e9, 1e9))

@@ -25,7 +25,7 @@ from .templates import Slots, fill
 if TYPE_CHECKING:
     import pandas as pd
 
-    from .drawing import Draw
+    from .drawing import Draw, Panel
 
 SATURATED = "†"
 _SAME = 1e-9  # a value so near a threshold differs from it by rounding alone
@@ -47,6 +47,9 @@ class Figure:
         data: what it shows, one row a point.
         height: of the drawing [inch]; the width is that of all figures.
         draw: draws it on an empty canvas.
+        title: what it shows in a few words.
+        panels: the panels that it draws, of which each point can be clicked in the page.
+        level: the level of its intervals.
     """
 
     name: str
@@ -54,6 +57,9 @@ class Figure:
     data: pd.DataFrame
     height: float
     draw: Draw
+    title: str = ""
+    panels: tuple[Panel, ...] = ()
+    level: str = ""
 
 
 class Sentence(NamedTuple):

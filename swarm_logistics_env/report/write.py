@@ -20,7 +20,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 
 from .document import Document, document
 from .drawing import images
-from .page import axis, page_data
+from .page import forest, page_data, views
 from .section import Section, percent
 
 
@@ -53,7 +53,7 @@ def write_report(
             write_text(pictures / f"{figure.name}.svg", svg)
             with atomic_write(pictures / f"{figure.name}.png", StudyError) as part:
                 part.write_bytes(png)
-            drawings[figure.name] = base64.b64encode(svg.encode()).decode()
+            drawings[figure.name] = svg
         write_text(paths[0], markdown(report, pictures=pictures.name))
         write_text(page, html(results, report, drawings))
     except OSError as error:
@@ -138,7 +138,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
     Args:
         results: what its script draws.
         document: the report.
-        drawings: SVG of every figure in base64, by name.
+        drawings: SVG of every figure, by name.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -155,9 +155,10 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         paired=results.plan.paired,
         answer=document.answer,
         level=percent(document.answer.level),
-        axis=axis(document.answer),
+        forest=forest(document.answer, drawings["answer"]),
+        views=list(views(results, document, drawings)),
         colours=_COLOURS,
-        drawings=drawings,
+        drawings={name: base64.b64encode(svg.encode()).decode() for name, svg in drawings.items()},
         latex=latex_tables((document.answer.section, *document.summary)),
         # A text must not end the script that it stands in.
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),

@@ -8,10 +8,12 @@ import re
 import shlex
 import shutil
 import subprocess
+from collections.abc import Iterable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -19,8 +21,7 @@ import pytest
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
-from swarm_logistics_env.report.answer import answer
-from swarm_logistics_env.report.page import axis, watch_command
+from swarm_logistics_env.report.page import watch_command
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.watch import Session, messages
@@ -61,43 +62,103 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
 def test_text_of_a_study_cannot_end_the_script(made: Made) -> None:
     assert HOSTILE not in made.page
     assert made.page.count("</script>") == 2
-    assert made.data["policies"] == ["swarm-dt", HOSTILE]
+    names = {condition["name"] for condition in made.data["conditions"]}
+    assert any(name.startswith(f"{HOSTILE}, ") for name in names)
+
+
+def drawings(page: str) -> dict[str, ElementTree.Element]:
+    """The drawings to choose from, by name."""
+    views = re.findall(r'role="img" aria-label="([^"]*)">(<svg.*?</svg>)', page)
+    return {html.unescape(name): ElementTree.fromstring(svg) for name, svg in views}
+
+
+def places(marks: Iterable[ElementTree.Element], axis: str) -> list[float]:
+    """Where markers are drawn, along an axis of the drawing."""
+    return [float(use.attrib[axis]) for mark in marks for use in mark.iter("use")]
+
+
+class Scale:
+    """The value of a place on an axis, of which two places are known."""
+
+    def __init__(self, places: Iterable[float], values: Iterable[float]) -> None:
+        pairs = sorted(zip(values, places, strict=True))
+        (low, start), (high, end) = pairs[0], pairs[-1]
+        self.factor = (end - start) / (high - low)
+        self.start = start - low * self.factor
+
+    def values(self, places: Iterable[float]) -> list[float]:
+        return [(place - self.start) / self.factor for place in places]
 
 
 def test_every_seed_stands_behind_its_interval(made: Made) -> None:
-    data = made.data
-    view = data["views"][0]
-    means = {(cell.policy, cell.words): cell.mean for cell in made.found.cells}
-    for point in view["points"]:
-        condition = data["conditions"][point["condition"]]
-        words = condition["name"].removeprefix(f"{point['policy']}, ")
-        limits = [point["value"], point["low"], point["high"]]
-        assert limits == pytest.approx(means[point["policy"], words], abs=1e-3)
-        assert point["value"] == pytest.approx(np.mean(condition["p"]), abs=1e-3)
-    for condition in data["conditions"]:
+    conditions = made.data["conditions"]
+    means = {f"{cell.policy}, {cell.words}": cell.mean.value for cell in made.found.cells}
+    for condition in conditions:
+        assert np.mean(condition["p"]) == pytest.approx(means[condition["name"]], abs=1e-3)
         assert [len(gaps) for gaps in condition["curves"]] == condition["p"]
-    (robustness,) = (view for view in data["views"] if view["name"].startswith("R: "))
-    assert len(robustness["points"]) == 4
-    for point in robustness["points"]:
-        asked = data["questions"][point["question"]]
-        before, after = (np.mean(data["conditions"][c]["p"]) for _, _, c in asked["arms"])
-        m = int(asked["head"].split("m = ")[1].split(",")[0])
-        assert point["value"] == pytest.approx((after - before) / before + m / 4, abs=1e-3)
+    view = next(svg for name, svg in drawings(made.page).items() if name.startswith("P: "))
+    marks: dict[int, list[ElementTree.Element]] = {}
+    for group in view.iterfind(".//g[@data-condition]"):
+        marks.setdefault(int(group.attrib["data-condition"]), []).append(group)
+    assert len(marks) > 4
+    dots = {number: places([groups[0]], "y") for number, groups in marks.items()}
+    flat = [(y, p) for c, ys in dots.items() for y, p in zip(ys, conditions[c]["p"], strict=True)]
+    scale = Scale(*zip(*flat))
+    assert scale.values(y for y, _ in flat) == pytest.approx([p for _, p in flat], abs=0.02)
+    for number, groups in marks.items():
+        seeds = [use.attrib["data-seed"] for use in groups[0].iter("use")]
+        assert seeds == [str(seed) for seed in range(3)]
+        (mean,) = scale.values(places(groups[-1:], "y"))
+        assert mean == pytest.approx(np.mean(conditions[number]["p"]), abs=0.02)
+
+
+def test_a_mark_of_an_indicator_shows_its_question(made: Made) -> None:
+    data = made.data
+    (view,) = (svg for name, svg in drawings(made.page).items() if "R: " in name)
+    drawn = {int(g.attrib["data-question"]): g for g in view.iterfind(".//g[@data-question]")}
+    heights, values = [], []
+    for number, group in drawn.items():
+        question = data["questions"][number]
+        if ", robust?" not in question["head"]:
+            continue
+        before, after = (np.mean(data["conditions"][c]["p"]) for _, _, c in question["arms"])
+        m = int(question["head"].split("m = ")[1].split(",")[0])
+        heights += places([group], "y")
+        values.append((after - before) / before + m / 4)
+    assert len(values) == 4
+    assert Scale(heights, values).values(heights) == pytest.approx(values, abs=0.02)
 
 
 def test_intervals_of_the_answer_are_drawn_to_the_ends_of_their_axis(made: Made) -> None:
-    first, last = axis(answer(made.found))
-    shape = r'<g class="(\w+)" data-question="(\d+)"><path d="M(\S+),\S+H(\S+)"/>.*?d="M([^,]+),'
-    drawn = {int(number): (word, *ends) for word, number, *ends in re.findall(shape, made.page)}
     known = {n: test for n, test in enumerate(made.found.verdicts) if test.interval}
-    assert drawn.keys() == known.keys()
+    ends: dict[int, list[float]] = {}
+    centres: dict[int, float] = {}
+    limits = set()
+    for row in re.findall(r'<td class="forest">(.*?)</td>', made.page):
+        svg = ElementTree.fromstring(row)
+        left, _, width, _ = map(float, svg.attrib["viewBox"].split())
+        limits.add((left, left + width))
+        for verdict in svg.findall("g[@class]"):
+            groups = verdict.findall("g[@data-question]")
+            number = int(groups[0].attrib["data-question"])
+            assert verdict.attrib["class"] == known[number].conclusion
+            assert {group.attrib["data-question"] for group in groups} == {str(number)}
+            paths = [path for group in groups for path in group.findall("path")]
+            numbers = re.findall(r"-?[\d.]+", paths[0].attrib["d"]) if paths else []
+            ends[number] = [float(x) for x in numbers[0::2]]
+            centres[number] = places(groups[-1:], "x")[0]
+    assert centres.keys() == known.keys()
+    ((left, right),) = limits
+    values = {n: test.value or 0.0 for n, test in known.items()}
+    scale = Scale(centres.values(), (values[n] for n in centres))
     for number, test in known.items():
-        word, *places = drawn[number]
+        assert left < centres[number] < right
         value, low, high = test.interval or (0.0, None, None)
-        assert word == test.conclusion
-        ends = max(first, low or value), min(last, high or value), value
-        assert [float(x) for x in places] == pytest.approx(ends)
-        assert first < value < last
+        assert scale.values([centres[number]]) == pytest.approx([value], abs=0.02)
+        if low is not None and high is not None:
+            for x, end in zip(ends[number], (low, high), strict=True):
+                shown = scale.values([x])[0]
+                assert shown == pytest.approx(end, abs=0.02) or not left < x < right
 
 
 def test_command_of_a_run_plays_the_stored_one(
