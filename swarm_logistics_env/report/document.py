@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from typing import NamedTuple
 
@@ -12,10 +12,11 @@ from swarm_logistics_env.questions.plan import Origin, Plan
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
 from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures
-from .section import Figure, Section, join_names, percent, seeds_text, sentence
+from .section import Figure, Section, Sentence, join_names, percent, seeds_text, sentence
 from .tables import fault_sections, tables, warnings
 
 
@@ -34,12 +35,14 @@ class Document(NamedTuple):
         title, text: its heading and the sentences below it.
         answer: what the study found.
         chapters: its parts, in order.
+        sentences: every verdict in words, in the order of the study.
     """
 
     title: str
     text: tuple[str, ...]
     answer: Answer
     chapters: tuple[Chapter, ...]
+    sentences: tuple[Sentence, ...]
 
     @property
     def summary(self) -> tuple[Section, ...]:
@@ -71,6 +74,7 @@ def document(results: StudyResults) -> Document:
     if results.reference:
         text.append(f'"paper" is {results.reference.source}.')
     study_answer = answer(results)
+    sentences = tuple(sentence(results, verdict) for verdict in results.verdicts)
     lines = tuple(warnings(results))
     figures = forest_figure(results, study_answer), *indicator_figures(results)
     chapters = [
@@ -84,7 +88,7 @@ def document(results: StudyResults) -> Document:
             "Verdicts",
             "One sentence per question. Verdicts are Holm-adjusted; the family is all comparisons "
             "of one indicator for one policy.",
-            tuple(_verdicts(results)),
+            tuple(_verdicts(results.verdicts, sentences)),
         ),
         Chapter(
             "Results",
@@ -103,7 +107,7 @@ def document(results: StudyResults) -> Document:
     ]
     shown = tuple(chapter for chapter in chapters if chapter.sections)
     title = f"Study {plan.specification.name!r}"
-    report = Document(title, tuple(text), study_answer, shown)
+    report = Document(title, tuple(text), study_answer, shown, sentences)
     _make_names_differ(report.figures())
     return report
 
@@ -120,12 +124,12 @@ def _make_names_differ(figures: Iterator[Figure]) -> None:
         used_names.add(figure.name.lower())
 
 
-def _verdicts(results: StudyResults) -> Iterator[Section]:
-    families = grouped(results.verdicts, lambda verdict: verdict.compared.family)
-    for (policy, indicator), verdicts in families.items():
+def _verdicts(verdicts: Sequence[Verdict], sentences: Sequence[Sentence]) -> Iterator[Section]:
+    families = grouped(zip(verdicts, sentences), lambda pair: pair[0].compared.family)
+    for (policy, indicator), pairs in families.items():
         yield Section(
             f"{policy}: {DEFINITIONS[indicator].heading}",
-            sentences=tuple(sentence(results, verdict) for verdict in verdicts),
+            sentences=tuple(sentence for _, sentence in pairs),
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, TypeAlias
@@ -13,22 +13,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
-from swarm_logistics_env.questions.comparison import Arm
+from swarm_logistics_env.questions.comparison import Arm, Comparison
 from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.tasks.task import DEFAULT, Outcome
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
 from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from . import drawing
 from .answer import Answer
-from .document import Document
 from .drawing import Panel
 from .figures import performance_panels
 from .inline_svg import forest_rows, inline
-from .section import P_LEVEL, bracketed, digits_of, sentence
+from .section import P_LEVEL, Figure, Sentence, bracketed, digits_of
 
 Json: TypeAlias = dict[str, JsonValue]
+# P seed by seed of every condition, by the key of its case; None: a run failed, or is missing.
+Runs: TypeAlias = Mapping[str, Sequence[float | None]]
 # Name, drawing, what it shows, and what its marks mean.
 Chart: TypeAlias = tuple[str, str, Sequence[Panel], tuple[str, ...]]
 _HEIGHT = 2.9  # inch, of a drawing of P
@@ -49,13 +49,16 @@ class View(NamedTuple):
     legend: tuple[str, ...]
 
 
-def views(results: StudyResults, report: Document, drawings: Mapping[str, str]) -> Iterator[View]:
+def views(
+    results: StudyResults, runs: Runs, figures: Iterable[Figure], drawings: Mapping[str, str]
+) -> Iterator[View]:
     """Yield P of every policy in the conditions of each table, then the figures of indicators.
 
     Args:
-        drawings: SVG of every figure of the report, by name.
+        figures: those of the report.
+        drawings: SVG of each figure, by name.
     """
-    charts = [*_performance_charts(results), *_indicator_charts(report, drawings)]
+    charts = [*_performance_charts(results, runs), *_indicator_charts(figures, drawings)]
     for number, (name, svg, panels, legend) in enumerate(charts):
         has_published = any(
             point.published is not None for panel in panels for point in panel.points
@@ -65,8 +68,7 @@ def views(results: StudyResults, report: Document, drawings: Mapping[str, str]) 
         yield View(name, inline(svg, f"v{number}", _titles(panels)), legend)
 
 
-def _performance_charts(results: StudyResults) -> Iterator[Chart]:
-    runs = {key: _p_by_seed(results, arm) for key, arm in _arms(results).items()}
+def _performance_charts(results: StudyResults, runs: Runs) -> Iterator[Chart]:
     repeat = "seed" if results.plan.paired else "trial"
     legend = (f"bar: {P_LEVEL} interval", f"dot: one {repeat}, click it")
     for table, panel in performance_panels(results.cells, results.policies, runs):
@@ -74,8 +76,8 @@ def _performance_charts(results: StudyResults) -> Iterator[Chart]:
         yield f"P: {table}", svg, [panel], legend
 
 
-def _indicator_charts(report: Document, drawings: Mapping[str, str]) -> Iterator[Chart]:
-    for figure in report.figures():
+def _indicator_charts(figures: Iterable[Figure], drawings: Mapping[str, str]) -> Iterator[Chart]:
+    for figure in figures:
         if figure.panels:
             legend = (f"bar: {figure.level} interval",)
             yield figure.title, drawings[figure.name], figure.panels, legend
@@ -112,16 +114,33 @@ def forest(answer: Answer, svg: str) -> list[str]:
     return forest_rows(svg, links)
 
 
-def page_data(results: StudyResults) -> Json:
-    """Return all that the page's script needs, as JSON holds it."""
-    arms = _arms(results)
-    indices = {key: index for index, key in enumerate(arms)}
+def page_data(results: StudyResults, runs: Runs, sentences: Sequence[Sentence]) -> Json:
+    """Return all that the page's script needs, as JSON holds it.
+
+    Args:
+        sentences: every verdict in words, in the order of the study.
+    """
+    indices = {key: index for index, key in enumerate(runs)}
     return {
         # A script rounds larger numbers.
         "seeds": [seed if seed < 2**53 else str(seed) for seed in results.plan.seeds],
         "paired": results.plan.paired,
-        "conditions": list(_conditions(results, list(arms.values()))),
-        "questions": [_question(results, verdict, indices) for verdict in results.verdicts],
+        "conditions": list(_conditions(results, runs)),
+        "questions": [
+            _question(verdict.compared, words, indices)
+            for verdict, words in zip(results.verdicts, sentences)
+        ],
+    }
+
+
+def p_by_seed(results: StudyResults) -> Runs:
+    """Return mean P over the trainings, seed by seed, of every condition, each once."""
+    return {
+        key: [
+            _mean_p([results.outcome(training, seed) for training in _trainings(arm)])
+            for seed in results.plan.seeds
+        ]
+        for key, arm in _arms(results).items()
     }
 
 
@@ -134,26 +153,17 @@ def _trainings(arm: Arm) -> list[Arm]:
     return [replace(arm, case=case) for case in arm.case.trainings]
 
 
-def _p_by_seed(results: StudyResults, arm: Arm) -> list[float | None]:
-    """Return mean P over the trainings, seed by seed; None: a run failed, or is missing."""
-    trainings = _trainings(arm)
-    return [
-        _mean_p([results.outcome(training, seed) for training in trainings])
-        for seed in results.plan.seeds
-    ]
-
-
-def _conditions(results: StudyResults, arms: Sequence[Arm]) -> Iterator[Json]:
+def _conditions(results: StudyResults, runs: Runs) -> Iterator[Json]:
     n_deliveries = sum(len(outcome.delivery_times) for outcome in results.outcomes.values())
     share = min(1.0, _MOST_TIMES / max(1, n_deliveries))
     n_curves = max(1, int(share * len(results.plan.seeds)))
-    for arm in arms:
+    for key, arm in _arms(results).items():
         first_training = _trainings(arm)[0]
         outcomes = [results.outcome(first_training, seed) for seed in results.plan.seeds]
         yield {
             "name": f"{arm.case.policy.title}, {arm.setting}",
             "end": float(arm.case.scenario.duration),
-            "p": [*_p_by_seed(results, arm)],
+            "p": [*runs[key]],
             # Deliveries in whole seconds, each as the time since the one before; of the first
             # training, where there are several.
             "curves": [
@@ -198,9 +208,7 @@ def watch_command(arm: Arm) -> str | None:
     return shlex.join(words)
 
 
-def _question(results: StudyResults, verdict: Verdict, indices: dict[str, int]) -> Json:
-    words = sentence(results, verdict)
-    comparison = verdict.compared
+def _question(comparison: Comparison, words: Sentence, indices: Mapping[str, int]) -> Json:
     return {
         "table": comparison.table,
         "head": words.head,

@@ -20,7 +20,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 
 from .document import Document, document
 from .drawing import images
-from .page import forest, page_data, views
+from .page import forest, p_by_seed, page_data, views
 from .section import Section, percent
 
 
@@ -149,14 +149,15 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str])
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    data = page_data(results)
+    runs = p_by_seed(results)
+    data = page_data(results, runs, document.sentences)
     return environment.get_template("page.html.jinja").render(
         document=document,
         paired=results.plan.paired,
         answer=document.answer,
         level=percent(document.answer.level),
         forest=forest(document.answer, drawings["answer"]),
-        views=list(views(results, document, drawings)),
+        views=list(views(results, runs, document.figures(), drawings)),
         colours=_COLOURS,
         drawings={name: base64.b64encode(svg.encode()).decode() for name, svg in drawings.items()},
         latex=latex_tables((document.answer.section, *document.summary)),
