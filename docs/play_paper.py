@@ -216,7 +216,7 @@ def _counts(tests: Iterable[Verdict]) -> str:
 
 def _verdict(test: Verdict) -> str:
     """Return the verdict on a claim as the page counts it."""
-    word = section.counted_as(test, test.on_claim.adjusted if test.on_claim else UNDEFINED)
+    word = section.word_to_count(test, test.on_claim.adjusted if test.on_claim else UNDEFINED)
     return "contradicted" if word == "refuted" else word
 
 

@@ -81,10 +81,10 @@ def robust_block(results: StudyResults) -> str:
         row = [label, section.mean_p(cell)]
         for symbol in ("R", "FT"):
             test = by_symbol[symbol]
-            row.append(f"{section.ratio(test)}, {section.concluded(test)}")
+            row.append(f"{section.ratio(test)}, {section.conclusion_text(test)}")
             by_answer.setdefault(answer(test), []).append(f"{symbol} under {label}")
         rows.append(row)
-    summary = "; ".join(f"{word}: {section.listed(tests)}" for word, tests in by_answer.items())
+    summary = "; ".join(f"{word}: {section.join_names(tests)}" for word, tests in by_answer.items())
     return table(
         ("", "P", "R above 0?", "FT above 0?"),
         rows,

@@ -18,7 +18,7 @@ Counts = NDArray[np.float64]  # of every seed, or of every training and seed
 
 def with_verdict(test: Verdict) -> str:
     """Return an indicator with its interval and its verdict."""
-    return f"{section.ratio(test)} {section.concluded(test)}"
+    return f"{section.ratio(test)} {section.conclusion_text(test)}"
 
 
 def _seeds(results: StudyResults) -> str:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
-from itertools import zip_longest
-from textwrap import wrap
 from typing import NamedTuple
 
 from swarm_logistics_env import spi
@@ -19,8 +17,10 @@ from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import POWER, UNAFFECTED, UNDEFINED, Verdict
 
-from . import section
+from . import section, templates
+from .answer_notes import notes
 from .section import Section
+from .templates import Slots, fill
 
 MOST_LINES = 30  # of the answer of `paper` at a terminal
 _EFFECT = 0.1  # of an indicator, for which seeds are counted
@@ -33,31 +33,32 @@ class Line(NamedTuple):
         policy: whose swarm it is about.
         indicator: its symbol.
         question: indicator and what is changed, e.g. "R FM4, 1 of 25".
-        tests: the verdicts, in the order of the values.
-        numbers: their places among the verdicts of the study.
+        verdicts: in the order of the values.
+        numbers: the indices of these verdicts among those of the study.
     """
 
     policy: str
     indicator: str
     question: str
-    tests: tuple[Verdict, ...]
+    verdicts: tuple[Verdict, ...]
     numbers: tuple[int, ...]
 
     @property
     def thresholds(self) -> list[float]:
         """What the values are tested against."""
-        return [test.compared.threshold for test in self.tests]
+        return [verdict.compared.threshold for verdict in self.verdicts]
 
     @property
     def value(self) -> str:
         """The values, one after the other; from the lowest to the highest where they are many."""
-        known = [test.value for test in self.tests if test.value is not None]
-        if not known:
+        values = [verdict.value for verdict in self.verdicts if verdict.value is not None]
+        if not values:
             return section.NOTHING
-        if len(self.tests) > 3:
-            return " to ".join(self._fixed(value) for value in (min(known), max(known)))
-        capped = any(test.saturated for test in self.tests)
-        return " ".join(map(self._fixed, known)) + capped * section.SATURATED
+        if len(self.verdicts) > 3:
+            return f"{self._fixed(min(values))} to {self._fixed(max(values))}"
+        text = " ".join(map(self._fixed, values))
+        is_capped = any(verdict.saturated for verdict in self.verdicts)
+        return text + section.SATURATED if is_capped else text
 
     def _fixed(self, value: float) -> str:
         return section.fixed(value, 2, self.thresholds)
@@ -68,55 +69,68 @@ class Line(NamedTuple):
         Args:
             level: that the heading names; another one stands behind the interval.
         """
-        known = [t.interval for t in self.tests if t.interval and t.conclusion != UNAFFECTED]
-        low = [one.low for one in known if one.low is not None]
-        high = [one.high for one in known if one.high is not None]
-        if not (low and high):
+        intervals = [
+            verdict.interval
+            for verdict in self.verdicts
+            if verdict.interval and verdict.conclusion != UNAFFECTED
+        ]
+        lows = [interval.low for interval in intervals if interval.low is not None]
+        highs = [interval.high for interval in intervals if interval.high is not None]
+        if not (lows and highs):
             return ""
-        whole = f"[{self._fixed(min(low))}, {self._fixed(max(high))}]"
-        whole += section.other_levels(self.tests, level)
-        if len(self.tests) == 1:
-            return whole
+        hull = f"[{self._fixed(min(lows))}, {self._fixed(max(highs))}]"
+        hull += section.other_levels(self.verdicts, level)
+        if len(self.verdicts) == 1:
+            return hull
         # A value that is capped or alone has none.
-        if len(low) == len(self.tests):
-            return f"in {whole}"
-        return f"{len(low)} of {len(self.tests)} in {whole}"
+        if len(lows) == len(self.verdicts):
+            return f"in {hull}"
+        return f"{len(lows)} of {len(self.verdicts)} in {hull}"
 
     @property
-    def verdict(self) -> str:
+    def verdict_text(self) -> str:
         """The verdicts in words, and what an open one takes."""
-        words, test = section.concluded(*self.tests), self.tests[0]
-        if not any(one.estimate for one in self.tests):
-            if all(str(one.problem).endswith(" missing") for one in self.tests):
-                return "not played yet"
-            return f"{words}: {test.problem}"
-        if all(one.estimate and one.conclusion == UNDEFINED for one in self.tests):
-            return f"no verdict: {self.indicator} lacks runs"
-        if len(self.tests) > 1:
-            return words
-        assert test.estimate is not None
-        if test.conclusion == UNAFFECTED:
-            return f"{words}, exact"
-        if test.estimate.untestable:
-            return f"{words}: it cannot be below {test.compared.threshold:g}"
-        if "unbounded" in test.flags and test.on_property.adjusted in section.DECIDED:
-            return f"{words} by its test; P_o is too near 0 for an interval"
-        if test.conclusion != "open":
-            return words
-        # An effect on the side of the value, which 80 % power finds.
-        estimate, threshold = test.estimate, test.estimate.threshold
-        effect = threshold + math.copysign(_EFFECT, estimate.value - threshold)
-        needed = spi.seeds_for_power(estimate, effect, POWER)
-        if needed is None or needed <= estimate.n_seeds:
-            return words
-        runs = "seeds" if estimate.paired else "trials"
-        return f"open: {needed - estimate.n_seeds} more {runs} tell {effect:g}"
+        case, slots = self._case()
+        return templates.LINE[case].format(**slots)
+
+    def _case(self) -> tuple[str, Slots]:
+        """Return which template of a line applies, and its slots."""
+        first = self.verdicts[0]
+        words = section.conclusion_text(*self.verdicts)
+        if not any(verdict.estimate for verdict in self.verdicts):
+            if all(str(verdict.problem).endswith(" missing") for verdict in self.verdicts):
+                return "not_played", {}
+            return "problem", {"words": words, "problem": first.problem}
+        if all(v.estimate and v.conclusion == UNDEFINED for v in self.verdicts):
+            return "family_lacks_runs", {"indicator": self.indicator}
+        if len(self.verdicts) > 1:
+            return "words", {"words": words}
+        estimate = first.estimate
+        assert estimate is not None
+        if first.conclusion == UNAFFECTED:
+            return "unaffected", {"words": words}
+        if estimate.untestable:
+            return "untestable", {"words": words, "threshold": estimate.threshold}
+        if "unbounded" in first.flags and first.on_property.adjusted in section.DECIDED:
+            return "unbounded", {"words": words}
+        if first.conclusion == "open":
+            # An effect on the side of the value, which 80 % power finds.
+            effect = estimate.threshold + math.copysign(
+                _EFFECT, estimate.value - estimate.threshold
+            )
+            n_needed = spi.seeds_for_power(estimate, effect, POWER)
+            if n_needed is not None and n_needed > estimate.n_seeds:
+                runs = "seeds" if estimate.paired else "trials"
+                n_more = n_needed - estimate.n_seeds
+                return "more_runs", {"n_more": n_more, "runs": runs, "effect": effect}
+        return "words", {"words": words}
 
     @property
     def contradicts(self) -> bool:
         """Whether a verdict contradicts what the study's reference claims."""
+        decisions = [verdict.on_claim for verdict in self.verdicts]
         return any(
-            test.on_claim is not None and test.on_claim.adjusted == "refuted" for test in self.tests
+            decision is not None and decision.adjusted == "refuted" for decision in decisions
         )
 
 
@@ -124,27 +138,33 @@ class Answer(NamedTuple):
     """What a study found.
 
     Attributes:
-        asked: how much was asked, of whom, and over which seeds.
+        scope: how much was asked, of which policies, and over which seeds.
         performance: P of every policy where the swarm is as it should be.
         lines: the questions.
-        last: how to read the verdicts, and what is still open.
+        notes: how to read the verdicts, and what is still open.
     """
 
-    asked: str
+    scope: str
     performance: str
     lines: tuple[Line, ...]
-    last: str
+    notes: str
 
     @property
     def questions(self) -> list[str]:
         """The question of each line, with its policy where there are several."""
-        several = len({line.policy for line in self.lines}) > 1
-        return [f"{one.policy}: {one.question}" if several else one.question for one in self.lines]
+        if len({line.policy for line in self.lines}) > 1:
+            return [f"{line.policy}: {line.question}" for line in self.lines]
+        return [line.question for line in self.lines]
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        """The verdicts of all lines."""
+        return [verdict for line in self.lines for verdict in line.verdicts]
 
     @property
     def level(self) -> float:
         """The level of most intervals, which the heading names."""
-        return section.level_of(test for line in self.lines for test in line.tests)
+        return section.level_of(self.verdicts)
 
     @property
     def section(self) -> Section:
@@ -152,10 +172,10 @@ class Answer(NamedTuple):
         level = self.level
         columns = "question", "value", f"{section.percent(level)} interval", "verdict"
         rows = tuple(
-            (question, line.value, line.interval(level), line.verdict)
+            (question, line.value, line.interval(level), line.verdict_text)
             for question, line in zip(self.questions, self.lines)
         )
-        return Section("Answer", columns, rows, (self.performance, self.last))
+        return Section("Answer", columns, rows, (self.performance, self.notes))
 
 
 def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
@@ -165,22 +185,21 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
         most: lines at most, as far as what is alike can share one; None: a line a question.
     """
     lines: list[Line] = []
-    for shared in range(4):
-        alike = grouped(enumerate(results.verdicts), partial(_alike, shared))
-        lines = [_line(here) for here in alike.values()]
+    for sharing in range(4):
+        groups = grouped(enumerate(results.verdicts), partial(_what_a_line_shares, sharing))
+        lines = [_line(group) for group in groups.values()]
         if most is None or len(lines) <= most:
             break
     # Recorded trials may ask one question in several tables, at other values of a parameter.
-    times = Counter((line.policy, line.question) for line in lines)
-    lines = [
-        line._replace(question=f"{line.question}, {_part_of_title(line.tests[0].compared.table)}")
-        if times[line.policy, line.question] > 1
-        else line
-        for line in lines
-    ]
-    order, policies = list(DEFINITIONS), results.policies
-    lines.sort(key=lambda line: (policies.index(line.policy), order.index(line.indicator)))
-    return Answer(_asked(results), _performance(results), tuple(lines), _last(results))
+    counts = Counter((line.policy, line.question) for line in lines)
+    for index, line in enumerate(lines):
+        if counts[line.policy, line.question] > 1:
+            condition = _part_of_title(line.verdicts[0].compared.table)
+            lines[index] = line._replace(question=f"{line.question}, {condition}")
+    policies = results.policies
+    indicators = list(DEFINITIONS)
+    lines.sort(key=lambda line: (policies.index(line.policy), indicators.index(line.indicator)))
+    return Answer(_scope(results), _performance(results), tuple(lines), notes(results))
 
 
 def _part_of_title(table: str) -> str:
@@ -188,214 +207,153 @@ def _part_of_title(table: str) -> str:
     return table.rstrip(")").rpartition(" (")[2]
 
 
-def _alike(shared: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
+def _what_a_line_shares(sharing: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
     """Return what the questions of a line have in common.
 
     Args:
-        shared: 0: a line has one question; 1: those of one failure mode; 2: those of any one
+        sharing: 0: a line has one question; 1: those of one failure mode; 2: those of any one
             factor; 3: those of an indicator in a table.
-        numbered: a verdict, and its place among those of the study.
+        numbered: a verdict, and its index among those of the study.
     """
-    number, test = numbered
-    compared, after = test.compared, test.after
-    if shared == 0 or (shared == 1 and after.kind != "fault"):
+    number, verdict = numbered
+    comparison = verdict.compared
+    after = verdict.after
+    if sharing == 0 or (sharing == 1 and after.kind != "fault"):
         return (number,)
-    indicator = compared.policy, compared.table, compared.indicator
-    return indicator if shared == 3 else (*indicator, after.name, after.onset, compared.threshold)
+    indicator = comparison.policy, comparison.table, comparison.indicator
+    if sharing == 3:
+        return indicator
+    return (*indicator, after.name, after.onset, comparison.threshold)
 
 
 def _line(numbered: Sequence[tuple[int, Verdict]]) -> Line:
-    numbers, tests = zip(*numbered)
-    compared = tests[0].compared
-    question = f"{compared.indicator} {_about(tests)}"
-    return Line(compared.policy, compared.indicator, question, tests, numbers)
+    numbers, verdicts = zip(*numbered)
+    comparison = verdicts[0].compared
+    case, slots = _question(verdicts)
+    question = f"{comparison.indicator} {templates.QUESTION[case].format(**slots)}"
+    return Line(comparison.policy, comparison.indicator, question, verdicts, numbers)
 
 
-def _about(tests: Sequence[Verdict]) -> str:
-    compared, after = tests[0].compared, tests[0].after
-    before = compared.original.setting
-    usual = compared.definition.adjectives.get(0.0)
-    asked = "" if tests[0].property_name == usual else f", {tests[0].property_name}"
-    names = {test.after.name for test in tests}
+def _question(verdicts: Sequence[Verdict]) -> tuple[str, Slots]:
+    """Return which template of a question applies, and its slots."""
+    first = verdicts[0]
+    comparison = first.compared
+    before = comparison.original.setting
+    after = first.after
+    usual_property = comparison.definition.adjectives.get(0.0)
+    named = "" if first.property_name == usual_property else f", {first.property_name}"
     start = f" from {after.onset:g} s" if after.onset else ""
-    values = [f"{test.after.value:g}" for test in tests]
+    names = {verdict.after.name for verdict in verdicts}
+    values = [f"{verdict.after.value:g}" for verdict in verdicts]
     if after.kind == "size":
-        chain = [f"{before.value:g}", *values]
-        return f"N {'→'.join(chain if len(chain) <= 4 else [chain[0], '…', chain[-1]])}{asked}"
+        sizes = [f"{before.value:g}", *values]
+        if len(sizes) > 4:
+            sizes = [sizes[0], "…", sizes[-1]]
+        return "sizes", {"chain": "→".join(sizes), "property": named}
     if len(names) > 1:
-        return f"{len(names)} {'failure modes' if after.kind == 'fault' else 'parameters'}{start}"
+        case = "failure_modes" if after.kind == "fault" else "parameters"
+        return case, {"count": len(names), "start": start}
+    slots = {"name": after.name, "values": ", ".join(values), "property": named}
     if after.kind == "fault":
-        return f"{after.name}{start}, {', '.join(values)} of {compared.n_robots}{asked}"
+        return "fault", {**slots, "start": start, "n_robots": comparison.n_robots}
     if after.kind == "policy":
-        return f"with {after.name}{asked}"
-    return f"{after.name} {before.value:g}→{', '.join(values)}{asked}"
+        return "policy", slots
+    return "parameter", {**slots, "before": before.value}
 
 
-def _asked(results: StudyResults) -> str:
+def _scope(results: StudyResults) -> str:
     policies = results.policies
-    whose = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
-    seeds = section.seeds_text(results).split(" (")[0]
-    if any(cell.problem for cell in results.cells):
-        seeds = f"up to {seeds}"
-    name = results.plan.specification.name
-    return f"{name}: {section.plural(len(results.verdicts), 'question')}, {whose}, {seeds}."
+    case = "incomplete" if any(cell.problem for cell in results.cells) else "complete"
+    return templates.SCOPE[case].format(
+        study=results.plan.specification.name,
+        questions=section.plural(len(results.verdicts), "question"),
+        policies=policies[0] if len(policies) == 1 else f"{len(policies)} policies",
+        seeds=section.seeds_text(results).split(" (")[0],
+    )
 
 
 def _performance(results: StudyResults) -> str:
-    shown = [one for one in results.cells if one.arm.setting.kind != "policy" and one.n_seeds]
+    cells = [c for c in results.cells if c.arm.setting.kind != "policy" and c.n_seeds]
+    if not cells:
+        return templates.PERFORMANCE["nothing"]
     # Where the swarm is as it should be, or else in the first condition.
-    base = [c for c in shown if c.arm.setting.kind == "fault" and not c.arm.setting.value] or shown
-    here = {c.policy: c for c in reversed(base) if c.arm.setting == base[0].arm.setting}
-    if not here:
-        return "P: no run has succeeded."
-    cell, scenario = base[0], base[0].arm.case.scenario
-    where = f"N = {scenario.n_robots}"
-    where += "" if cell.arm.setting.kind == "size" else f", {cell.arm.setting}"
-    several = len(results.policies) > 1
-    told = (f"{one.policy} " * several + _mean(one) for one in reversed(here.values()))
-    is_usual = cell.arm.case.task.name == DEFAULT
-    level = (
-        f" [{section.P_LEVEL}]" if any(one.mean.low is not None for one in here.values()) else ""
+    sound = [c for c in cells if c.arm.setting.kind == "fault" and not c.arm.setting.value]
+    candidates = sound or cells
+    setting = candidates[0].arm.setting
+    case = candidates[0].arm.case
+    # The first cell of each policy, the policy with the last one first.
+    cell_of = {cell.policy: cell for cell in reversed(candidates) if cell.arm.setting == setting}
+    by_policy = list(reversed(cell_of.values()))
+    condition = f"N = {case.scenario.n_robots}"
+    if setting.kind != "size":
+        condition += f", {setting}"
+    means = [_mean(cell) for cell in by_policy]
+    if len(results.policies) > 1:
+        means = [f"{cell.policy} {mean}" for cell, mean in zip(by_policy, means)]
+    template = "items" if case.task.name == DEFAULT else "other_task"
+    if any(cell.mean.low is not None for cell in by_policy):
+        template += "_with_interval"
+    return templates.PERFORMANCE[template].format(
+        level=section.P_LEVEL,
+        duration=case.scenario.duration,
+        condition=condition,
+        means=", ".join(means),
     )
-    measured = f"P{level}, items in {scenario.duration:g} s," if is_usual else f"P{level}"
-    return f"{measured} at {where}: {', '.join(told)}."
 
 
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
-    failed = f" ({cell.problem} and do not count)" if cell.problem else ""
+    slots: dict[str, Slots] = {}
     if cell.by_seed.any():
-        cleared = any(outcome.all_delivered for outcome in cell.outcomes)
-        time = f", all items after {section.time_to_clear(cell)} s" if cleared else ""
-        return section.mean_p(cell) + failed + time
-    most = -math.log(1.0 - CONFIDENCE) / cell.n_seeds
-    why = f"none of {cell.n_seeds} runs delivered anything"
-    problem = f"; {cell.problem}" if cell.problem else ""
-    return f"0 (at most {most:.2f} at {section.P_LEVEL}, as {why}{problem})"
-
-
-def _last(results: StudyResults) -> str:
-    """Return what the symbols mean, how to read the verdicts, and what limits them, in one line."""
-    tests, reference = results.verdicts, results.reference
-    runs = "seeds" if results.plan.paired else "trials a condition"
-    asked = {test.compared.indicator for test in tests} - {"change"}
-    named = [one.heading for symbol, one in DEFINITIONS.items() if symbol in asked]
-    parts = [f"{', '.join(named)}: good above 0"] if named else []
-    level = section.level_of(tests)
-    differ = section.other_levels(tests, level) and ", or as said behind them"
-    if any(test.interval and test.interval.low is not None for test in tests):
-        parts.append(f"{section.percent(level)} intervals{differ}")
-    parts.append("verdicts are Holm-adjusted")
-    flags = {flag for test in tests for flag in test.flags}
-    if "assumes_normal" in flags:
-        few = "below ten seeds" if results.plan.paired else "unpaired"
-        parts.append(f"provisional ({few} they assume normality)")
-    if "cannot_fail" in flags:
-        parts.append("untestable where it cannot lie below the threshold, as P cannot below 0")
-    if "too_few_seeds" in flags:
-        parts.append("two seeds give no verdict")
-    if results.damage:
-        parts.append(results.damage)
-    if results.exploratory:
-        parts.append("exploratory: other seeds than were declared, whose report this replaces")
-    if results.late_margin:
-        parts.append("equivalence is exploratory: another margin was declared")
-    if any(test.saturated for test in tests):
-        parts.append(f"{section.SATURATED} P is capped: --clearing or --restock has no cap")
-    if any(cell.stalled for cell in results.cells):
-        parts.append("some runs stalled (P below a quarter of the median; --full names them)")
-    undecided = [test for test in tests if test.conclusion == "open"]
-    if undecided:
-        parts.append(
-            f"so many more {runs} would tell such a value from the threshold in 4 of 5 studies"
-        )
-    beside = [test for test in undecided if section.lies_above(test) is not None]
-    reasons = {
-        "so few seeds may hide stalls": any("hidden_stalls" in test.flags for test in beside),
-        "Holm counts all questions": any(
-            test.on_threshold.plain in section.DECIDED for test in beside
-        ),
-    }
-    if why := " or ".join(reason for reason, holds in reasons.items() if holds):
-        parts.append(f"open beside an interval on one side of it: {why}")
-    claims = [test for test in tests if test.on_claim is not None]
-    told = reference.claims if reference else {}
-    of_text = [test for test in claims if test.compared.question in told]
-    of_others = [test for test in claims if test not in of_text]
-    for where, here in ((" in the paper's text", of_text), (" beside it" * bool(told), of_others)):
-        if here:
-            found = section.counted(test.on_claim.adjusted for test in here if test.on_claim)
-            parts.append(f"of {section.plural(len(here), 'claim')}{where} {found}")
-    line = "; ".join(parts)
-    return f"{line[0].upper()}{line[1:]}."
+        slots["mean"] = {"mean": section.mean_p(cell)}
+        if cell.problem:
+            slots["problem"] = {"problem": cell.problem}
+        if any(outcome.all_delivered for outcome in cell.outcomes):
+            slots["all_delivered"] = {"time": section.time_to_clear(cell)}
+    else:
+        slots["nothing_and_problem" if cell.problem else "nothing"] = {
+            "most": -math.log(1.0 - CONFIDENCE) / cell.n_seeds,
+            "level": section.P_LEVEL,
+            "n_runs": cell.n_seeds,
+            "problem": cell.problem,
+        }
+    return "".join(fill(templates.MEAN, slots))
 
 
 def in_a_sentence(results: StudyResults) -> str:
     """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
-    known = [one for one in results.verdicts if one.interval and one.interval.low is not None]
-    known = [test for test in known if test.compared.indicator != "change"] or known
-    told = f"{_performance(results)[:-1]} over {section.seeds_text(results)}"
-    worst = min(known or results.verdicts, key=lambda test: test.value or 0.0)
-    line = _line([(0, worst)])
-    value, level = f"{line.question} = {line.value}", section.level_of([worst])
-    if interval := line.interval(level):
-        value += f", {section.percent(level)} interval {interval}"
-    if len(results.verdicts) == 1:
-        asked = f"{line.indicator} > {worst.compared.threshold:.3g}"
-        told += f"; {value}; {asked}: {section.concluded(worst)} (Holm)"
+    verdicts = results.verdicts
+    with_interval = [v for v in verdicts if v.interval and v.interval.low is not None]
+    # A change of P has another scale than the indicators.
+    candidates = [v for v in with_interval if v.compared.indicator != "change"] or with_interval
+    lowest = min(candidates or verdicts, key=lambda verdict: verdict.value or 0.0)
+    line = _line([(0, lowest)])
+    words = section.conclusion_text(*verdicts)
+    if len(verdicts) == 1:
+        case = "one_question"
     else:
-        words = section.concluded(*results.verdicts)
-        if words == worst.on_property.adjusted:  # all alike
-            words = f"{len(results.verdicts)} {words}"
-        told += f"; of {len(results.verdicts)} questions {words} (Holm)"
-        told += f"; the lowest is {value}" if known else ""
-    whose = results.policies
-    if results.plan.origin and len(whose) == 1:  # nobody named it
-        whose = (results.plan.specification.name,)
-    return f"{', '.join(whose)}: {told}."
+        case = "several_questions" if candidates else "no_value"
+        if words == lowest.on_property.adjusted:  # all are alike
+            words = f"{len(verdicts)} {words}"
+    policies = results.policies
+    if results.plan.origin and len(policies) == 1:  # nobody named it
+        policies = (results.plan.specification.name,)
+    return templates.FOR_A_PAPER[case].format(
+        policies=", ".join(policies),
+        performance=_performance(results)[:-1],
+        seeds=section.seeds_text(results),
+        lowest=_question_with_value(line, section.level_of([lowest])),
+        property=f"{line.indicator} > {lowest.compared.threshold:.3g}",
+        n_questions=len(verdicts),
+        words=words,
+    )
 
 
-def digest(found: Answer, width: int, most: int | None = MOST_LINES) -> str:
-    """Return the answer for a terminal.
-
-    Args:
-        found: to show.
-        width: of the terminal [characters]; no line is longer.
-        most: lines at most; None: as many as it takes.
-    """
-    head = [line for text in (found.asked, found.performance) for line in _fold(text, width)]
-    tail = _fold(found.last, width)
-    rows = _rows(found, width)
-    room = None if most is None else most - len(head) - len(tail)
-    if room is not None and len(rows) > room:
-        rows = [*rows[: room - 1], f"and {len(rows) - room + 1} lines more: --full"]
-    return "\n".join([*head, *rows, *tail])
-
-
-def _rows(found: Answer, width: int) -> list[str]:
-    """Return the lines in columns, as few as questions and verdicts can be folded into."""
-    level = found.level
-    columns = zip(*((line.question, line.value, line.interval(level)) for line in found.lines))
-    longest, *others = [max(map(len, column)) for column in columns]
-    most = min(longest, max(8, width - sum(others) - 16))
-    tried = range(min(20, most), most + 1)
-    return min((list(_in_columns(found, [w, *others], width)) for w in tried), key=len)
-
-
-def _in_columns(found: Answer, widths: Sequence[int], width: int) -> Iterator[str]:
-    for policy, lines in grouped(found.lines, lambda line: line.policy).items():
-        if len({line.policy for line in found.lines}) > 1:
-            yield f"{policy}:"
-        for line in lines:
-            question, *more = wrap(line.question, widths[0], subsequent_indent="  ")
-            interval = line.interval(found.level)
-            left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {interval:{widths[2]}}"
-            verdict = wrap(line.verdict, max(10, width - len(left) - 2)) or [""]
-            yield f"{left}  {verdict[0]}".rstrip()
-            for first, second in zip_longest(more, verdict[1:], fillvalue=""):
-                yield f"{first:{len(left)}}  {second}".rstrip()
-
-
-def _fold(text: str, width: int) -> list[str]:
-    # Paths and names are longer than a line sometimes: they are broken, never cut.
-    return wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)
+def _question_with_value(line: Line, level: float) -> str:
+    interval = line.interval(level)
+    return templates.QUESTION_WITH_VALUE["interval" if interval else "value"].format(
+        question=line.question,
+        value=line.value,
+        level=section.percent(level),
+        interval=interval,
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -37,22 +37,21 @@ def table(results: StudyResults) -> Section:
     level = level_of(results.verdicts)
     rows: list[Texts] = []
     shown: set[str] = set()  # the sound swarm is the original condition of most titles
-    for title, tests in grouped(results.verdicts, lambda one: one.compared.table).items():
+    by_title = grouped(results.verdicts, lambda verdict: verdict.compared.table)
+    for title, verdicts in by_title.items():
         rows.append((title, "", "", ""))
-        first = tests[0].compared
-        original = first.original
+        original = verdicts[0].compared.original
         if original.case.key not in shown:
             shown.add(original.case.key)
-            rows.append(
-                (f"  {original.setting}", mean_p(results.cells_of(first)[original]), "", "")
-            )
-        for changed, found in grouped(tests, lambda one: one.compared.changed).items():
-            by_symbol = {test.compared.indicator: test for test in found}
+            p = mean_p(results.cells_of(verdicts[0].compared)[original])
+            rows.append((f"  {original.setting}", p, "", ""))
+        for changed, of_arm in grouped(verdicts, lambda v: v.compared.changed).items():
+            by_symbol = {verdict.compared.indicator: verdict for verdict in of_arm}
             tolerance = by_symbol.pop("FT", None)
-            others = [f"{symbol} {ratio(test, level)}" for symbol, test in by_symbol.items()]
-            p = mean_p(results.cells_of(found[0].compared)[changed])
+            indicators = [f"{symbol} {ratio(v, level)}" for symbol, v in by_symbol.items()]
+            p = mean_p(results.cells_of(of_arm[0].compared)[changed])
             ft = NOTHING if tolerance is None else ratio(tolerance, level)
-            rows.append((f"  {changed.setting}", p, "; ".join(others), ft))
+            rows.append((f"  {changed.setting}", p, "; ".join(indicators), ft))
     return Section(
         f"{results.policies[0]}: benchmark of robustness",
         (
@@ -67,12 +66,13 @@ def table(results: StudyResults) -> Section:
 
 
 def _notes(results: StudyResults) -> Iterator[str]:
-    test, share = worst(results)
-    cells = results.cells_of(test.compared)
-    changed, original = cells[test.compared.changed], cells[test.compared.original]
+    verdict, share = worst(results)
+    cells = results.cells_of(verdict.compared)
+    changed = cells[verdict.compared.changed]
+    original = cells[verdict.compared.original]
     yield (
-        f"Worst cell: {test.compared.table}, {changed.words}: P {mean_p(changed)}, {share:.0%} of "
-        f"{mean_p(original)}."
+        f"Worst cell: {verdict.compared.table}, {changed.words}: P {mean_p(changed)}, {share:.0%} "
+        f"of {mean_p(original)}."
     )
     held_out = bracketed(spi.mean_interval(score(results), CONFIDENCE), 1)
     yield (
@@ -89,15 +89,16 @@ def worst(results: StudyResults) -> tuple[Verdict, float]:
     Raises:
         StudyError: no comparison has its runs.
     """
-    shares = [
-        (test, cells[test.compared.changed].mean.value / cells[test.compared.original].mean.value)
-        for test in results.verdicts
-        if test.estimate is not None and test.after.kind != "size"
-        for cells in [results.cells_of(test.compared)]
-    ]
+    shares = []
+    for verdict in results.verdicts:
+        if verdict.estimate is not None and verdict.after.kind != "size":
+            comparison = verdict.compared
+            cells = results.cells_of(comparison)
+            share = cells[comparison.changed].mean.value / cells[comparison.original].mean.value
+            shares.append((verdict, share))
     if not shares:
         raise StudyError("no comparison of the benchmark has its runs: all of them failed")
-    return min(shares, key=lambda one: one[1])
+    return min(shares, key=lambda verdict_and_share: verdict_and_share[1])
 
 
 def score(results: StudyResults) -> Numbers:
@@ -115,9 +116,9 @@ def score(results: StudyResults) -> Numbers:
 
 def _held_out(results: StudyResults) -> dict[Arm, Cell]:
     return {
-        test.compared.changed: results.cells_of(test.compared)[test.compared.changed]
-        for test in results.verdicts
-        if test.compared.table.startswith(HELD_OUT)
+        verdict.compared.changed: results.cells_of(verdict.compared)[verdict.compared.changed]
+        for verdict in results.verdicts
+        if verdict.compared.table.startswith(HELD_OUT)
     }
 
 
@@ -132,30 +133,22 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
     """
     from scipy.stats import rankdata
 
-    scores = [np.atleast_2d(one) for one in entries.values()]
-    rng = np.random.Generator(np.random.Philox(key=len(entries)))
-    n_seeds = min(one.shape[1] for one in scores)
-    drawn = []
-    for _ in range(RESAMPLES):
-        seeds = rng.integers(n_seeds, size=n_seeds)
-        resampled = (one[rng.integers(len(one), size=len(one))][:, seeds] for one in scores)
-        drawn.append([one.mean() for one in resampled])
-    # 1 + how many entries score higher.
-    found = rankdata([-one.mean() for one in scores], method="min")
-    ranks = rankdata(-np.array(drawn), method="min", axis=1)
+    names = list(entries)
+    scores = [np.atleast_2d(entry) for entry in entries.values()]
+    ranks = rankdata([-entry.mean() for entry in scores], method="min")
+    resampled_ranks = rankdata(-_resampled_means(scores), method="min", axis=1)
     outside = 50.0 * (1.0 - CONFIDENCE)
     ends = outside, 100.0 - outside
-    best, worst = np.percentile(ranks, ends, axis=0, method="nearest").astype(int)
-    same = (ranks == found).mean(axis=0)
-    named = list(entries.items())
+    best, worst = np.percentile(resampled_ranks, ends, axis=0, method="nearest").astype(int)
+    stability = (resampled_ranks == ranks).mean(axis=0)
     rows = tuple(
         (
-            named[one][0],
-            bracketed(spi.mean_interval(named[one][1], CONFIDENCE), 1),
-            f"{found[one]:.0f} [{best[one]}, {worst[one]}]",
-            f"{same[one]:.0%}",
+            names[entry],
+            bracketed(spi.mean_interval(entries[names[entry]], CONFIDENCE), 1),
+            f"{ranks[entry]:.0f} [{best[entry]}, {worst[entry]}]",
+            f"{stability[entry]:.0%}",
         )
-        for one in np.argsort(found, kind="stable")
+        for entry in np.argsort(ranks, kind="stable")
     )
     return Section(
         "Benchmark of robustness: entries by score",
@@ -166,3 +159,15 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
             f"Limits of a rank, and how often it is the same: of {RESAMPLES} resamples of both.",
         ),
     )
+
+
+def _resampled_means(scores: Sequence[Numbers]) -> Numbers:
+    """Return the mean score of each entry (columns) in each resample of seeds and trainings."""
+    rng = np.random.Generator(np.random.Philox(key=len(scores)))
+    n_seeds = min(entry.shape[1] for entry in scores)
+    means = []
+    for _ in range(RESAMPLES):
+        seeds = rng.integers(n_seeds, size=n_seeds)
+        resampled = (entry[rng.integers(len(entry), size=len(entry))][:, seeds] for entry in scores)
+        means.append([entry.mean() for entry in resampled])
+    return np.array(means)

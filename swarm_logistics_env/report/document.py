@@ -15,7 +15,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures
-from .section import Figure, Section, listed, percent, seeds_text, sentence
+from .section import Figure, Section, join_names, percent, seeds_text, sentence
 from .tables import fault_sections, tables, warnings
 
 
@@ -45,8 +45,13 @@ class Document(NamedTuple):
     def summary(self) -> tuple[Section, ...]:
         """Warnings, tables and measures of faults alone, for a terminal."""
         shown = ("Warnings", "Results", "Beyond the paper")
-        sections = [one for each in self.chapters if each.title in shown for one in each.sections]
-        return tuple(one._replace(figures=()) for one in sections if one.columns or one.lines)
+        return tuple(
+            section._replace(figures=())
+            for chapter in self.chapters
+            if chapter.title in shown
+            for section in chapter.sections
+            if section.columns or section.lines
+        )
 
     def figures(self) -> Iterator[Figure]:
         """Yield every figure, in the order of the report."""
@@ -65,10 +70,9 @@ def document(results: StudyResults) -> Document:
     text = [about]
     if results.reference:
         text.append(f'"paper" is {results.reference.source}.')
-    found = answer(results)
-    result_tables, lines = tuple(tables(results)), tuple(warnings(results))
-    faults = tuple(fault_sections(results))
-    figures = forest_figure(results, found), *indicator_figures(results)
+    study_answer = answer(results)
+    lines = tuple(warnings(results))
+    figures = forest_figure(results, study_answer), *indicator_figures(results)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
         Chapter(
@@ -87,35 +91,41 @@ def document(results: StudyResults) -> Document:
             f"P is {plan.specification.played.performance}. Square brackets hold intervals at the "
             "level that the heading gives, or at that behind them; "
             '"one run" is where a single further run falls.',
-            result_tables,
+            tuple(tables(results)),
         ),
         Chapter(
             "Beyond the paper",
             "Measures that the paper does not define; none of them enters a verdict above.",
-            faults,
+            tuple(fault_sections(results)),
         ),
         Chapter("Set-up", "", setup_sheet(plan)),
         Chapter("Methods", "", (Section("", lines=(methods(plan, results.looks),)),)),
     ]
     shown = tuple(chapter for chapter in chapters if chapter.sections)
-    whole = Document(f"Study {plan.specification.name!r}", tuple(text), found, shown)
-    # Policies and tables that differ in punctuation or case alone would give equal files.
-    taken: set[str] = set()
-    for figure in whole.figures():
-        name, number = figure.name, 1
-        while figure.name.lower() in taken:
+    title = f"Study {plan.specification.name!r}"
+    report = Document(title, tuple(text), study_answer, shown)
+    _make_names_differ(report.figures())
+    return report
+
+
+def _make_names_differ(figures: Iterator[Figure]) -> None:
+    """Number figures whose policies or tables differ in punctuation or case alone."""
+    used_names: set[str] = set()
+    for figure in figures:
+        name = figure.name
+        number = 1
+        while figure.name.lower() in used_names:
             number += 1
             figure.name = f"{name}-{number}"
-        taken.add(figure.name.lower())
-    return whole
+        used_names.add(figure.name.lower())
 
 
 def _verdicts(results: StudyResults) -> Iterator[Section]:
-    families = grouped(results.verdicts, lambda test: test.compared.family)
-    for (policy, indicator), tests in families.items():
+    families = grouped(results.verdicts, lambda verdict: verdict.compared.family)
+    for (policy, indicator), verdicts in families.items():
         yield Section(
             f"{policy}: {DEFINITIONS[indicator].heading}",
-            sentences=tuple(sentence(results, test) for test in tests),
+            sentences=tuple(sentence(results, verdict) for verdict in verdicts),
         )
 
 
@@ -139,22 +149,22 @@ def setup_sheet(plan: Plan) -> tuple[Section, ...]:
 
 def _failure_modes(plan: Plan) -> Iterator[Section]:
     modes = dict.fromkeys(fault.mode for case in plan.cases for fault in case.faults)
-    known = plan.cases[0].task.failure_modes
+    descriptions = plan.cases[0].task.failure_modes
     if modes:
-        rows = tuple((mode, known[mode]) for mode in modes)
+        rows = tuple((mode, descriptions[mode]) for mode in modes)
         yield Section("Failure modes", ("mode", "what it does to a robot"), rows)
 
 
 def _variations(plan: Plan) -> Iterator[str]:
-    asked = plan.specification
-    base = asked.scenario.model_dump()
-    for factor in (*asked.sizes, *asked.faults, *asked.parameters, *asked.ablations):
-        changed = plan.cases[0].task.vary(asked.scenario, factor.scenario).model_dump()
+    study = plan.specification
+    base = study.scenario.model_dump()
+    for factor in (*study.sizes, *study.faults, *study.parameters, *study.ablations):
+        changed = plan.cases[0].task.vary(study.scenario, factor.scenario).model_dump()
         differing = [f"{name} = {x}" for name, x in changed.items() if x != base[name]]
         if differing:
             title = factor.title or type(factor).__name__
             yield f"{title} differs: {', '.join(differing)}."
-    for faults in asked.faults:
+    for faults in study.faults:
         if manner := str(faults):
             yield f"{faults.title or 'Faults'}: robots fail {manner}."
 
@@ -162,14 +172,14 @@ def _variations(plan: Plan) -> Iterator[str]:
 def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:
     """Return what is known of the trials, the set-up that the user states, and the methods."""
     shared = "Paired by the seeds that it names" if origin.paired else "Unpaired: it names no seeds"
-    known = (
+    text = (
         f"Study {plan.specification.name!r}: {len(plan.cases)} conditions, imported from "
         f"{origin.file}. {shared}. Of their conditions what varies is known, and what is "
         "stated below."
     )
     unstated = () if origin.setup else ("Nothing is stated of the set-up (--setup NAME=VALUE).",)
     return (
-        Section("Study", lines=(known,)),
+        Section("Study", lines=(text,)),
         Section("Set-up as stated", ("condition", "value"), origin.setup, unstated),
     )
 
@@ -180,34 +190,37 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
     Args:
         looks: numbers of seeds at which comparisons might stop; none: they are not looked at.
     """
-    asked = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
-    names = [DEFINITIONS[symbol].heading for symbol in asked]
+    symbols = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
+    names = [DEFINITIONS[symbol].heading for symbol in symbols]
     n = len(plan.seeds)
     if plan.paired:
-        what = "trials" if plan.origin else "simulated runs"
-        least = "at least " * bool(looks)
-        trials = f"{least}{n} {what} of each of {len(plan.cases)} conditions, paired by seed"
+        runs = "trials" if plan.origin else "simulated runs"
+        count = f"at least {n}" if looks else f"{n}"
+        trials = f"{count} {runs} of each of {len(plan.cases)} conditions, paired by seed"
         test = "the paired t-test (Fieller's interval)"
         if n >= MIN_SEEDS:
             test += " and its studentised bootstrap, whichever gives the larger p"
     else:
         trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
         test = "Welch's t-test for independent samples"
-    level, side = percent(CONFIDENCE), f"{50 * (1 - CONFIDENCE):.3g} %"
-    holds, stops = f"the {level} interval", ""
+    level = percent(CONFIDENCE)
+    side = f"{50 * (1 - CONFIDENCE):.3g} %"
+    interval = f"the {level} interval"
+    stops = ""
     if looks:
-        holds, side = "the interval", f"its share of {side}"
+        interval = "the interval"
+        side = f"its share of {side}"
         stops = (
-            f" The study was looked at after {listed([*map(str, looks)])} seeds, and each "
+            f" The study was looked at after {join_names([*map(str, looks)])} seeds, and each "
             "comparison stopped where it was clear. Its error was spent over these looks in "
             "proportion to the seeds, so that an interval has the level of its look, which stands "
             f"with it, and those of all looks together hold the true value with {level}."
         )
     return (
-        f"We measured performance P in {trials}. We report {listed(names)}, each a ratio of mean "
-        f"performances, with {holds} that inverts {test}.{stops} An indicator is called above its "
-        f"threshold (supported) or below it (refuted) where this test rejects at {side} on that "
-        "side, else open; it is untestable where it cannot lie below. Beside it "
+        f"We measured performance P in {trials}. We report {join_names(names)}, each a ratio of "
+        f"mean performances, with {interval} that inverts {test}.{stops} An indicator is called "
+        "above its threshold (supported) or below it (refuted) where this test rejects at "
+        f"{side} on that side, else open; it is untestable where it cannot lie below. Beside it "
         "stands whether two one-sided tests find that P changes by less than "
         f"{100 * plan.specification.margin:.3g} % of P_o; p is adjusted by Holm's method over all "
         f"comparisons of one indicator for one policy. Computed with {_version()}."

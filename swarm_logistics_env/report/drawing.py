@@ -60,7 +60,7 @@ def images(draw: Draw, height: float) -> tuple[str, bytes]:
         canvas = NewCanvas(figsize=(WIDTH, height), layout="constrained")
         draw(canvas)
         canvas.savefig(svg, format="svg", metadata=_NO_METADATA)
-        canvas.set_layout_engine("none")  # the same places, which take long to find
+        canvas.set_layout_engine("none")  # the same layout, which takes long to find
         canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
     return svg.getvalue(), png.getvalue()
 
@@ -87,7 +87,7 @@ class Point(NamedTuple):
 
     Attributes:
         series: label of its series.
-        style: place of its colour and marker.
+        style: index of its colour and marker.
         category: where it stands on the axis.
         value, low, high: None: missing.
         published: a cross beside it; None: none.
@@ -111,7 +111,7 @@ class Panel:
     """One pair of axes: series over shared categories, and thresholds.
 
     Attributes:
-        tests: the verdicts that the points show, in their order; empty: they show something else.
+        verdicts: those that the points show, in their order; empty: they show something else.
     """
 
     title: str
@@ -119,7 +119,7 @@ class Panel:
     points: tuple[Point, ...]
     thresholds: tuple[float, ...]
     x_label: str
-    tests: tuple[Verdict, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
 
 
 def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
@@ -168,8 +168,9 @@ def _mark(axes: Axes, at: float, point: Point, *, level: bool = False) -> None:
     value, low, high = point.value, point.low, point.high
     if value is None:
         return
-    place = point.style % len(COLOURS)
-    colour, error = COLOURS[place], None
+    style = point.style % len(COLOURS)
+    colour = COLOURS[style]
+    error = None
     if low is not None and high is not None:
         # An infinite end is drawn far outside.
         error = np.clip([[value - low], [high - value]], 0.0, 1e3)
@@ -178,7 +179,7 @@ def _mark(axes: Axes, at: float, point: Point, *, level: bool = False) -> None:
         at if level else value,
         xerr=error if level else None,
         yerr=None if level else error,
-        fmt="o" if level else MARKERS[place],
+        fmt="o" if level else MARKERS[style],
         color=colour,
         markerfacecolor=colour if point.decided else PAPER,
         label=point.series,
@@ -193,17 +194,18 @@ def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
         rows: the label of each, and its points; a point's `published` is its threshold.
     """
     axes = canvas.subplots()
-    for place, (_, here) in enumerate(rows):
-        for index, point in enumerate(here):
-            _mark(axes, place + 0.6 * ((index + 0.5) / len(here) - 0.5), point, level=True)
+    for row, (_, points) in enumerate(rows):
+        for index, point in enumerate(points):
+            height = row + 0.6 * ((index + 0.5) / len(points) - 0.5)
+            _mark(axes, height, point, level=True)
             if point.published:
-                axes.vlines(point.published, place - 0.4, place + 0.4, color=INK, linewidth=0.8)
+                axes.vlines(point.published, row - 0.4, row + 0.4, color=INK, linewidth=0.8)
     axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     axes.set_yticks(range(len(rows)), [label for label, _ in rows])
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
     axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="indicator")
-    axes.set_xlim(_limits([point for _, here in rows for point in here]))
+    axes.set_xlim(_limits([point for _, points in rows for point in points]))
 
 
 def rates(

@@ -21,7 +21,7 @@ from swarm_logistics_env.verdicts.verdict import Verdict
 from . import drawing
 from .answer import Answer
 from .drawing import Panel, Point
-from .section import DECIDED, P_LEVEL, Figure, levels, listed, seeds_text, slug
+from .section import DECIDED, P_LEVEL, Figure, join_names, levels, seeds_text, slug
 
 _COLUMNS = [
     "policy", "table", "indicator", "comparison", "value", "low", "high", "confidence",
@@ -29,18 +29,18 @@ _COLUMNS = [
 ]  # fmt: skip
 
 
-def forest_figure(results: StudyResults, found: Answer) -> Figure:
+def forest_figure(results: StudyResults, answer: Answer) -> Figure:
     """Return the lines of the answer as a forest of intervals."""
     points = (
-        [_point(results, test, "", test.compared.threshold) for test in line.tests]
-        for line in found.lines
+        [_point(results, verdict, "", verdict.compared.threshold) for verdict in line.verdicts]
+        for line in answer.lines
     )
-    rows = list(zip(found.questions, points))
-    tests = [test for line in found.lines for test in line.tests]
+    rows = list(zip(answer.questions, points))
+    verdicts = answer.verdicts
     return Figure(
         "answer",
-        f"{found.asked} Every question with its interval. {_marks(tests)}.{_capped(tests)}",
-        frame(tests, VERDICT_COLUMNS)[_COLUMNS],
+        f"{answer.scope} Every question with its interval. {_marks(verdicts)}.{_capped(verdicts)}",
+        frame(verdicts, VERDICT_COLUMNS)[_COLUMNS],
         0.9 + 0.27 * len(rows),
         partial(drawing.forest, rows=rows),
     )
@@ -48,18 +48,21 @@ def forest_figure(results: StudyResults, found: Answer) -> Figure:
 
 def indicator_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield S per step, FT and R per mode and m, A per value, and P without a part."""
-    for (table, _, onset, swarm), tests in _by_figure(results).items():
-        names = table, f"{onset:g}s" if onset else ""
-        definitions = _definitions(tests)
-        crosses = "; crosses: published" if any(t.published is not None for t in tests) else ""
-        caption = f"{listed(list(dict.fromkeys(t.compared.policy for t in tests)))}, "
-        caption += f"{_where(table, onset, swarm)}: {_caption(definitions)} "
-        caption += f"{seeds_text(results).capitalize()}. {_marks(tests)}{crosses}."
-        panels = [_panel(results, tests, definition) for definition in definitions]
+    for (table, _, onset, swarm), verdicts in _by_figure(results).items():
+        definitions = _definitions(verdicts)
+        symbols = [definition.symbol for definition in definitions]
+        has_published = any(verdict.published is not None for verdict in verdicts)
+        crosses = "; crosses: published" if has_published else ""
+        policies = join_names(list(dict.fromkeys(v.compared.policy for v in verdicts)))
+        caption = (
+            f"{policies}, {_condition(table, onset, swarm)}: {_caption(definitions)} "
+            f"{seeds_text(results).capitalize()}. {_marks(verdicts)}{crosses}.{_capped(verdicts)}"
+        )
+        panels = [_panel(results, verdicts, definition) for definition in definitions]
         yield Figure(
-            slug(*(definition.symbol for definition in definitions), *names),
-            caption + _capped(tests),
-            frame(tests, VERDICT_COLUMNS)[_COLUMNS],
+            slug(*symbols, table, f"{onset:g}s" if onset else ""),
+            caption,
+            frame(verdicts, VERDICT_COLUMNS)[_COLUMNS],
             0.5 + 2.5 * len(panels),
             partial(drawing.intervals, panels=panels),
         )
@@ -67,52 +70,60 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
 
 def indicator_panels(results: StudyResults) -> Iterator[tuple[str, Panel]]:
     """Yield the panels of `indicator_figures`, each with what it is about."""
-    for (table, _, onset, swarm), tests in _by_figure(results).items():
-        for definition in _definitions(tests):
-            yield _where(table, onset, swarm), _panel(results, tests, definition)
+    for (table, _, onset, swarm), verdicts in _by_figure(results).items():
+        for definition in _definitions(verdicts):
+            yield _condition(table, onset, swarm), _panel(results, verdicts, definition)
 
 
 def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int], list[Verdict]]:
     """Return each value once, by table, kind, onset, and swarm size where robots fail."""
 
-    def place(test: Verdict) -> tuple[str, FactorKind, float, int]:
-        after, by_fault = test.after, test.after.kind == "fault"
-        return test.compared.table, after.kind, after.onset, test.compared.n_robots * by_fault
+    def figure_of(verdict: Verdict) -> tuple[str, FactorKind, float, int]:
+        after = verdict.after
+        swarm = verdict.compared.n_robots if after.kind == "fault" else 0
+        return verdict.compared.table, after.kind, after.onset, swarm
 
-    alike = grouped(
+    by_value = grouped(
         results.verdicts,
-        lambda test: (*test.compared.family, test.compared.table, test.compared.label),
+        lambda verdict: (
+            *verdict.compared.family,
+            verdict.compared.table,
+            verdict.compared.label,
+        ),
     )
-    # That against the lowest threshold shows them all.
-    return grouped(
-        (min(same, key=lambda t: t.compared.threshold) for same in alike.values()), place
-    )
+    # The verdict on the lowest threshold shows the value for them all.
+    lowest = [
+        min(verdicts, key=lambda verdict: verdict.compared.threshold)
+        for verdicts in by_value.values()
+    ]
+    return grouped(lowest, figure_of)
 
 
-def _where(table: str, onset: float, swarm: int) -> str:
+def _condition(table: str, onset: float, swarm: int) -> str:
     start = f", faults from {onset:g} s" if onset else ""
     return f"{table}, N = {swarm}{start}" if swarm else table
 
 
-def _panel(results: StudyResults, tests: Sequence[Verdict], definition: Definition) -> Panel:
+def _panel(results: StudyResults, verdicts: Sequence[Verdict], definition: Definition) -> Panel:
     """Return a pair of axes for an indicator, a series a policy."""
-    here = [test for test in tests if test.compared.indicator == definition.symbol]
-    after, first = here[0].after, here[0].compared.policy
+    of_indicator = [v for v in verdicts if v.compared.indicator == definition.symbol]
+    after = of_indicator[0].after
+    first_policy = of_indicator[0].compared.policy
     points = tuple(
         # The published values stand beside the first policy.
         _point(
             results,
-            test,
-            _category(test),
-            test.published if test.compared.policy == first else None,
+            verdict,
+            _category(verdict),
+            verdict.published if verdict.compared.policy == first_policy else None,
         )
-        for test in here
+        for verdict in of_indicator
     )
     # 0 first: it is the threshold that always stands in the picture.
-    asked = [test.compared.threshold for test in here]
-    thresholds = dict.fromkeys([0.0, *definition.adjectives, *asked])
+    thresholds = [verdict.compared.threshold for verdict in of_indicator]
+    shown = tuple(dict.fromkeys([0.0, *definition.adjectives, *thresholds]))
     x_label = f"{after.name}, x_o → x_new" if after.kind == "parameter" else X_LABELS[after.kind]
-    return Panel("", definition.heading, points, tuple(thresholds), x_label, tuple(here))
+    return Panel("", definition.heading, points, shown, x_label, tuple(of_indicator))
 
 
 X_LABELS = {
@@ -122,58 +133,83 @@ X_LABELS = {
 }
 
 
-def _category(test: Verdict) -> str:
-    before, after = test.compared.original.setting, test.after
+def _category(verdict: Verdict) -> str:
+    before = verdict.compared.original.setting
+    after = verdict.after
     if after.kind == "fault":
         return f"{after.name} {after.value:g}"
-    return test.compared.label if after.kind == "policy" else f"{before.value:g}→{after.value:g}"
+    if after.kind == "policy":
+        return verdict.compared.label
+    return f"{before.value:g}→{after.value:g}"
 
 
-def _point(results: StudyResults, test: Verdict, category: str, published: float | None) -> Point:
-    policy = test.compared.policy
-    value, low, high = test.interval or (None, None, None)
-    style, decided = results.policies.index(policy), test.on_threshold.adjusted in DECIDED
-    return Point(policy, style, category, value, low, high, published, decided, test.saturated)
-
-
-def _marks(tests: Sequence[Verdict]) -> str:
-    return (
-        "Filled: the Holm-adjusted verdict is decided; hollow: it is not; bars: "
-        f"{levels(tests)} intervals, without an end where they leave the axis; dashed: thresholds"
+def _point(
+    results: StudyResults, verdict: Verdict, category: str, published: float | None
+) -> Point:
+    policy = verdict.compared.policy
+    value, low, high = verdict.interval or (None, None, None)
+    return Point(
+        policy,
+        results.policies.index(policy),
+        category,
+        value,
+        low,
+        high,
+        published,
+        decided=verdict.on_threshold.adjusted in DECIDED,
+        saturated=verdict.saturated,
     )
 
 
-def _capped(tests: Sequence[Verdict]) -> str:
-    is_capped = any(test.saturated for test in tests)
-    return " †: P is capped, every item was delivered in a run." * is_capped
+def _marks(verdicts: Sequence[Verdict]) -> str:
+    return (
+        "Filled: the Holm-adjusted verdict is decided; hollow: it is not; bars: "
+        f"{levels(verdicts)} intervals, without an end where they leave the axis; "
+        "dashed: thresholds"
+    )
 
 
-def _definitions(tests: Sequence[Verdict]) -> list[Definition]:
-    asked = {test.compared.indicator for test in tests}
-    return [definition for symbol, definition in DEFINITIONS.items() if symbol in asked]
+def _capped(verdicts: Sequence[Verdict]) -> str:
+    if any(verdict.saturated for verdict in verdicts):
+        return " †: P is capped, every item was delivered in a run."
+    return ""
+
+
+def _definitions(verdicts: Sequence[Verdict]) -> list[Definition]:
+    indicators = {verdict.compared.indicator for verdict in verdicts}
+    return [definition for symbol, definition in DEFINITIONS.items() if symbol in indicators]
 
 
 def _caption(definitions: Sequence[Definition]) -> str:
     """Return what a figure shows, e.g. "robustness R; above 0 robust."."""
-    named = [named for definition in definitions for named in definition.adjectives.items()]
-    above = grouped(named, lambda one: one[0]).items()
-    says = ", ".join(f"above {at:g} {', '.join(word for _, word in here)}" for at, here in above)
-    if not says:
-        says = "(P_new - P_o) / P_o; below a threshold P falls by more than that share"
-    return f"{listed([definition.heading for definition in definitions])}; {says}."
+    words_above: dict[float, list[str]] = {}
+    for definition in definitions:
+        for threshold, word in definition.adjectives.items():
+            words_above.setdefault(threshold, []).append(word)
+    meaning = ", ".join(f"above {at:g} {', '.join(words)}" for at, words in words_above.items())
+    if not meaning:
+        meaning = "(P_new - P_o) / P_o; below a threshold P falls by more than that share"
+    return f"{join_names([definition.heading for definition in definitions])}; {meaning}."
 
 
 def rate_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
     import pandas as pd
 
-    def place(one: Comparison) -> tuple[str | float, ...]:
-        setting = one.changed.setting
-        return one.policy, one.table, one.n_robots, setting.name, setting.onset
+    def figure_of(comparison: Comparison) -> tuple[str | float, ...]:
+        setting = comparison.changed.setting
+        return (
+            comparison.policy, comparison.table, comparison.n_robots, setting.name, setting.onset,
+        )  # fmt: skip
 
-    for compared in grouped(mid_run_faults(results), place).values():
-        one, setting, window = compared[0], compared[0].changed.setting, window_of(compared[0])
-        panels = {f"m = {c.changed.setting.value:g}": rate_curves(results, c) for c in compared}
+    for comparisons in grouped(mid_run_faults(results), figure_of).values():
+        first = comparisons[0]
+        setting = first.changed.setting
+        window = window_of(first)
+        panels = {
+            f"m = {comparison.changed.setting.value:g}": rate_curves(results, comparison)
+            for comparison in comparisons
+        }
         rows = [
             (title, curve.runs, *point, CONFIDENCE)
             for title, curves in panels.items()
@@ -182,8 +218,8 @@ def rate_figures(results: StudyResults) -> Iterator[Figure]:
         ]
         if rows:
             yield Figure(
-                slug("deliveries", one.policy, one.table, setting.name, f"{setting.onset:g}s"),
-                f"{one.policy}, {one.table}, N = {one.n_robots}: deliveries in the trailing "
+                slug("deliveries", first.policy, first.table, setting.name, f"{setting.onset:g}s"),
+                f"{first.policy}, {first.table}, N = {first.n_robots}: deliveries in the trailing "
                 f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s (dotted "
                 f"line). Mean over {seeds_text(results)} with pointwise {P_LEVEL} t-intervals.",
                 pd.DataFrame(rows, columns=["panel", "runs", *RateCurve._fields[1:], "confidence"]),

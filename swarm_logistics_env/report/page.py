@@ -28,10 +28,9 @@ Json: TypeAlias = dict[str, JsonValue]
 _MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
 
 
-def axis(found: Answer) -> tuple[float, float]:
+def axis(answer: Answer) -> tuple[float, float]:
     """Return the ends of the axis that all intervals of the first screen share."""
-    tests = [test for line in found.lines for test in line.tests]
-    values = [0.0, *(test.value for test in tests if test.value is not None)]
+    values = [0.0, *(verdict.value for verdict in answer.verdicts if verdict.value is not None)]
     # An interval that is much wider than the values lie apart leaves the axis.
     span = max(max(values) - min(values), 0.5)
     return min(values) - span, max(values) + span
@@ -40,25 +39,29 @@ def axis(found: Answer) -> tuple[float, float]:
 def page_data(results: StudyResults) -> Json:
     """Return all that the page's script needs, as JSON holds it."""
     arms = {arm.case.key: arm for _, _, arm in results.plan.cells}
-    places = {key: place for place, key in enumerate(arms)}
+    indices = {key: index for index, key in enumerate(arms)}
     return {
         "policies": [*results.policies],
         # A script rounds larger numbers.
         "seeds": [seed if seed < 2**53 else str(seed) for seed in results.plan.seeds],
         "paired": results.plan.paired,
         "conditions": list(_conditions(results, list(arms.values()))),
-        "questions": [_question(results, test, places) for test in results.verdicts],
-        "views": [*_performance_views(results, places), *_indicator_views(results)],
+        "questions": [_question(results, verdict, indices) for verdict in results.verdicts],
+        "views": [*_performance_views(results, indices), *_indicator_views(results)],
     }
 
 
 def _conditions(results: StudyResults, arms: Sequence[Arm]) -> Iterator[Json]:
-    delivered = sum(len(outcome.delivery_times) for outcome in results.outcomes.values())
-    share = min(1.0, _MOST_TIMES / max(1, delivered))
-    shown = max(1, int(share * len(results.plan.seeds)))
+    n_deliveries = sum(len(outcome.delivery_times) for outcome in results.outcomes.values())
+    share = min(1.0, _MOST_TIMES / max(1, n_deliveries))
+    n_curves = max(1, int(share * len(results.plan.seeds)))
     for arm in arms:
         trainings = [replace(arm, case=case) for case in arm.case.trainings]
-        at_seed = [[results.outcome(one, s) for one in trainings] for s in results.plan.seeds]
+        at_seed = [
+            [results.outcome(training, seed) for training in trainings]
+            for seed in results.plan.seeds
+        ]
+        first_training = [outcomes[0] for outcomes in at_seed[:n_curves]]
         yield {
             "name": f"{arm.case.policy.title}, {arm.setting}",
             "end": float(arm.case.scenario.duration),
@@ -66,8 +69,10 @@ def _conditions(results: StudyResults, arms: Sequence[Arm]) -> Iterator[Json]:
             # Deliveries in whole seconds, each as the time since the one before; of the first
             # training, where there are several.
             "curves": [
-                None if one is None or one.untimed is not None else _steps(one.delivery_times)
-                for one, *_ in at_seed[:shown]
+                None
+                if outcome is None or outcome.untimed is not None
+                else _steps(outcome.delivery_times)
+                for outcome in first_training
             ],
             "command": watch_command(trainings[0]),
         }
@@ -75,8 +80,8 @@ def _conditions(results: StudyResults, arms: Sequence[Arm]) -> Iterator[Json]:
 
 def _mean_p(outcomes: Sequence[Outcome | None]) -> float | None:
     """Return mean P over the trainings at one seed; None: a run failed, or is missing."""
-    found = [one.delivered for one in outcomes if one is not None]
-    return round(float(np.mean(found)), 4) if len(found) == len(outcomes) else None
+    p = [outcome.delivered for outcome in outcomes if outcome is not None]
+    return round(float(np.mean(p)), 4) if len(p) == len(outcomes) else None
 
 
 def _steps(times: ArrayLike) -> list[JsonValue]:
@@ -90,69 +95,71 @@ def watch_command(arm: Arm) -> str | None:
         return None
     words = ["swarm-logistics", "watch", "--policy", case.policy.name]
     # A class that is typed is trusted by that; the code in a file is not.
-    words += ["--trust-code"] if case.policy.runs_code and ":" not in case.policy.name else []
+    if case.policy.runs_code and ":" not in case.policy.name:
+        words.append("--trust-code")
     default = case.task.default.model_dump(mode="json")
     for name, value in case.scenario.model_dump(mode="json").items():
         if value != default[name]:
             text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
             words += ["--set", f"{name}={text}"]
     for fault in case.faults:
-        described = text_of(fault) if isinstance(fault, Fault) else None
-        if described is None:
+        text_of_fault = text_of(fault) if isinstance(fault, Fault) else None
+        if text_of_fault is None:
             return None
-        words += ["--fault", described]
+        words += ["--fault", text_of_fault]
     return shlex.join(words)
 
 
-def _question(results: StudyResults, test: Verdict, places: dict[str, int]) -> Json:
-    told, compared = sentence(results, test), test.compared
+def _question(results: StudyResults, verdict: Verdict, indices: dict[str, int]) -> Json:
+    words = sentence(results, verdict)
+    comparison = verdict.compared
     return {
-        "table": compared.table,
-        "head": told.head,
-        "text": told.text,
+        "table": comparison.table,
+        "head": words.head,
+        "text": words.text,
         "arms": [
-            [compared.definition.performances[name], str(arm.setting), places[arm.case.key]]
-            for name, arm in compared.arguments.items()
+            [comparison.definition.performances[name], str(arm.setting), indices[arm.case.key]]
+            for name, arm in comparison.arguments.items()
         ],
     }
 
 
-def _performance_views(results: StudyResults, places: dict[str, int]) -> Iterator[Json]:
+def _performance_views(results: StudyResults, indices: dict[str, int]) -> Iterator[Json]:
     """Yield P of every policy in the conditions of each table, on one axis."""
     shown = [cell for cell in results.cells if cell.arm.setting.kind != "policy"]
-    for table, here in grouped(shown, lambda cell: cell.table).items():
-        categories = list(dict.fromkeys(row.words for row in here))
-        setting = here[0].arm.setting
+    for table, cells in grouped(shown, lambda cell: cell.table).items():
+        categories = list(dict.fromkeys(cell.words for cell in cells))
+        setting = cells[0].arm.setting
         yield {
             "name": f"P: {table}",
             "y": f"performance P over {X_LABELS.get(setting.kind, setting.name)}",
             "level": P_LEVEL,
             "thresholds": [],
             # "N = 10" stands there as "10", "FM1, m = 2" as "FM1 2".
-            "categories": [re.sub(r"^\w+ = |, m =", "", one) for one in categories],
+            "categories": [re.sub(r"^\w+ = |, m =", "", category) for category in categories],
             "points": [
                 {
-                    "policy": row.policy,
-                    "at": categories.index(row.words),
-                    **_limits(*row.mean),
-                    "published": _number(row.published),
-                    "condition": places[row.arm.case.key],
+                    "policy": cell.policy,
+                    "at": categories.index(cell.words),
+                    **_limits(*cell.mean),
+                    "published": _number(cell.published),
+                    "condition": indices[cell.arm.case.key],
                 }
-                for row in here
-                if row.n_seeds
+                for cell in cells
+                if cell.n_seeds
             ],
         }
 
 
 def _indicator_views(results: StudyResults) -> Iterator[Json]:
     """Yield every pair of axes of the figures."""
-    numbers = {test.compared: number for number, test in enumerate(results.verdicts)}
-    for where, panel in indicator_panels(results):
+    numbers = {verdict.compared: number for number, verdict in enumerate(results.verdicts)}
+    for condition, panel in indicator_panels(results):
         categories = list(dict.fromkeys(point.category for point in panel.points))
         yield {
-            "name": f"{panel.tests[0].compared.indicator}: {where}",
+            "name": f"{panel.verdicts[0].compared.indicator}: {condition}",
             "y": f"{panel.y_label} over {panel.x_label}",
-            "level": levels(panel.tests),
+            "level": levels(panel.verdicts),
             "thresholds": [float(threshold) for threshold in panel.thresholds],
             "categories": [*categories],
             "points": [
@@ -161,9 +168,9 @@ def _indicator_views(results: StudyResults) -> Iterator[Json]:
                     "at": categories.index(point.category),
                     **_limits(point.value, point.low, point.high),
                     "published": _number(point.published),
-                    "question": numbers[test.compared],
+                    "question": numbers[verdict.compared],
                 }
-                for point, test in zip(panel.points, panel.tests)
+                for point, verdict in zip(panel.points, panel.verdicts)
                 if point.value is not None
             ],
         }

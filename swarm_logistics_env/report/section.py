@@ -19,6 +19,9 @@ from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
 
+from . import templates
+from .templates import Slots, fill
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -30,23 +33,6 @@ NOTHING = "–"
 DECIDED = ("supported", "refuted", "equivalent")
 # The words of decisions, in the order in which they are counted.
 WORDS = (*DECIDED, "open", "unaffected", "untestable", "undefined")
-FLAGS = {
-    "single_seed": "One seed gives a value, but no interval and no verdict",
-    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance",
-    "degenerate": "The seeds show no spread, so there is no interval and no verdict",
-    "cannot_fail": "As no P is below 0, it cannot lie below the threshold, so it is not tested and "
-    "has no verdict",
-    "capped": "P is capped on the side that the verdict leans to, so the verdict is open",
-    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
-    "so it is open",
-    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
-    "the verdict comes from the test",
-    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
-    "ten, or unpaired",
-    "few_trainings": "Fewer than five trainings give no verdict",
-    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
-    "its level says",
-}
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 Texts = tuple[str, ...]
 
@@ -76,13 +62,13 @@ class Sentence(NamedTuple):
     Attributes:
         head: what is asked.
         text: all that is known.
-        verdict: the conclusion, a name in `WORDS`.
+        conclusion: a name in `WORDS`.
         word: the answer to what is asked.
     """
 
     head: str
     text: str
-    verdict: str
+    conclusion: str
     word: str
 
 
@@ -113,11 +99,11 @@ def fixed(value: float, digits: int, thresholds: Iterable[float] = ()) -> str:
     Args:
         thresholds: numbers on whose side the value is shown, by more digits where it takes them.
     """
+    distinct = [threshold for threshold in thresholds if abs(value - threshold) > _SAME]
 
-    def sides(x: float) -> list[bool]:
-        return [one for t in thresholds if abs(value - t) > _SAME for one in (x > t, x < t)]
+    def sides(x: float) -> list[tuple[bool, bool]]:
+        return [(x > threshold, x < threshold) for threshold in distinct]
 
-    thresholds = tuple(thresholds)
     while sides(round(value, digits)) != sides(value):
         digits += 1
     # "+ 0.0" after rounding: no minus sign before a zero.
@@ -132,8 +118,9 @@ def limits(interval: spi.Interval | Estimate, digits: int, thresholds: Iterable[
     """
     if interval.low is None or interval.high is None:
         return ""
-    told = _thresholds(interval, thresholds)
-    return f"[{fixed(interval.low, digits, told)}, {fixed(interval.high, digits, told)}]"
+    thresholds = _all_thresholds(interval, thresholds)
+    low, high = (fixed(end, digits, thresholds) for end in (interval.low, interval.high))
+    return f"[{low}, {high}]"
 
 
 def bracketed(
@@ -142,13 +129,17 @@ def bracketed(
     """Return a value with its limits, as `limits` does, e.g. "124.0 [101.2, ∞]"."""
     if interval is None:
         return NOTHING
-    told = _thresholds(interval, thresholds)
-    return f"{fixed(interval.value, digits, told)} {limits(interval, digits, told)}".rstrip()
+    thresholds = _all_thresholds(interval, thresholds)
+    value = fixed(interval.value, digits, thresholds)
+    return f"{value} {limits(interval, digits, thresholds)}".rstrip()
 
 
-def _thresholds(interval: spi.Interval | Estimate, others: Iterable[float]) -> tuple[float, ...]:
-    own = (interval.threshold,) if isinstance(interval, Estimate) else ()
-    return (*own, *others)
+def _all_thresholds(
+    interval: spi.Interval | Estimate, thresholds: Iterable[float]
+) -> tuple[float, ...]:
+    if isinstance(interval, Estimate):
+        return (interval.threshold, *thresholds)
+    return tuple(thresholds)
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -164,98 +155,106 @@ def percent(confidence: float) -> str:
 P_LEVEL = percent(CONFIDENCE)  # of intervals of P
 
 
-def _with_interval(tests: Iterable[Verdict]) -> list[Estimate]:
-    estimates = (test.estimate for test in tests)
-    return [one for one in estimates if one and one.low is not None and not one.identical]
+def _with_interval(verdicts: Iterable[Verdict]) -> list[Estimate]:
+    estimates = [verdict.estimate for verdict in verdicts if verdict.estimate]
+    return [
+        estimate for estimate in estimates if estimate.low is not None and not estimate.identical
+    ]
 
 
-def level_of(tests: Iterable[Verdict]) -> float:
-    """Return the level of most intervals of these tests, for a heading over all of them."""
-    counts = Counter(one.confidence for one in _with_interval(tests))
+def level_of(verdicts: Iterable[Verdict]) -> float:
+    """Return the level of most intervals of these verdicts, for a heading over all of them."""
+    counts = Counter(estimate.confidence for estimate in _with_interval(verdicts))
     return max(counts, key=counts.__getitem__, default=CONFIDENCE)
 
 
-def levels(tests: Iterable[Verdict]) -> str:
-    """Return the levels of the intervals of these tests, e.g. "95 %" or "97.8 % to 99.2 %"."""
-    found = {one.confidence for one in _with_interval(tests)} or {CONFIDENCE}
-    return " to ".join(dict.fromkeys(map(percent, (min(found), max(found)))))
+def levels(verdicts: Iterable[Verdict]) -> str:
+    """Return the levels of the intervals of verdicts, e.g. "95 %" or "97.8 % to 99.2 %"."""
+    confidences = {estimate.confidence for estimate in _with_interval(verdicts)} or {CONFIDENCE}
+    ends = min(confidences), max(confidences)
+    return " to ".join(dict.fromkeys(map(percent, ends)))
 
 
-def other_levels(tests: Sequence[Verdict], level: float) -> str:
-    """Return the levels of these tests' intervals behind one blank, if any is not `level`."""
-    differ = any(one.confidence != level for one in _with_interval(tests))
-    return f" {levels(tests)}" if differ else ""
+def other_levels(verdicts: Sequence[Verdict], level: float) -> str:
+    """Return the levels of these verdicts' intervals behind a blank, if any is not `level`."""
+    differ = any(estimate.confidence != level for estimate in _with_interval(verdicts))
+    return f" {levels(verdicts)}" if differ else ""
 
 
 def mean_p(cell: Cell) -> str:
     """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
         return "no run"
-    return bracketed(cell.mean, digits_of(cell.mean.value)) + SATURATED * cell.saturated
+    mean = bracketed(cell.mean, digits_of(cell.mean.value))
+    return mean + SATURATED if cell.saturated else mean
 
 
-def ratio(test: Verdict, level: float = CONFIDENCE) -> str:
+def ratio(verdict: Verdict, level: float = CONFIDENCE) -> str:
     """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]".
 
     Args:
         level: that the heading names; another one of the interval stands behind it.
     """
-    capped = SATURATED * (test.saturated and test.estimate is not None)
-    return bracketed(test.estimate, 3) + capped + other_levels([test], level)
+    text = bracketed(verdict.estimate, 3)
+    if verdict.saturated and verdict.estimate is not None:
+        text += SATURATED
+    return text + other_levels([verdict], level)
 
 
-def lies_above(test: Verdict) -> bool | None:
+def lies_above(verdict: Verdict) -> bool | None:
     """Return whether an interval lies above the threshold; None: it holds it, or there is none."""
-    _, low, high = test.interval or (None, None, None)
-    threshold = test.compared.threshold
+    _, low, high = verdict.interval or (None, None, None)
+    threshold = verdict.compared.threshold
     if low is None or high is None or low <= threshold <= high:
         return None
     return low > threshold
 
 
-def concluded(*tests: Verdict) -> str:
+def conclusion_text(*verdicts: Verdict) -> str:
     """Return the answers under Holm, then what else is known: "open; P changes by less than 10 %".
 
-    Of several tests they are counted, unless all are the same.
+    Of several verdicts they are counted, unless all are the same.
     """
-    words = [test.on_property.adjusted for test in tests]
-    told = [words[0] if len(set(words)) == 1 else counted(words)]
-    same = Counter(_unchanged(test) for test in tests if test.conclusion == "equivalent")
-    for known, count in same.items():
-        told.append(known if count == len(tests) else f"{known} in {count}")
-    return "; ".join(told)
+    words = [verdict.on_property.adjusted for verdict in verdicts]
+    clauses = [words[0] if len(set(words)) == 1 else count_words(words)]
+    unchanged = Counter(
+        _equivalence_text(verdict) for verdict in verdicts if verdict.conclusion == "equivalent"
+    )
+    for clause, count in unchanged.items():
+        clauses.append(clause if count == len(verdicts) else f"{clause} in {count}")
+    return "; ".join(clauses)
 
 
-def _unchanged(test: Verdict) -> str:
-    margin = f"{100 * test.margin:.3g} %"
-    if test.compared.definition.needs_removed:
+def _equivalence_text(verdict: Verdict) -> str:
+    margin = f"{100 * verdict.margin:.3g} %"
+    if verdict.compared.definition.needs_removed:
         return f"P_F and P_S differ by less than {margin} of P_o"
     return f"P changes by less than {margin}"
 
 
-def answered(test: Verdict) -> str:
-    """Return the unadjusted verdict on the property, and Holm's in brackets where it differs."""
-    plain, adjusted = test.on_property
+def decision_text(verdict: Verdict) -> str:
+    """Return the unadjusted decision on the property, and Holm's in brackets where it differs."""
+    plain, adjusted = verdict.on_property
     return plain if plain == adjusted else f"{plain} ({adjusted})"
 
 
-def counted_as(test: Verdict, verdict: str) -> str:
-    """Return what a verdict on this test counts as in `counted`.
+def word_to_count(verdict: Verdict, word: str) -> str:
+    """Return what a decision counts as in `count_words`.
 
-    A count is a headline: a verdict that assumes normal differences does not stand in it.
+    A count is a headline: a decision that assumes normal differences does not stand in it.
     """
-    if verdict in DECIDED and "assumes_normal" in test.flags:
+    if word in DECIDED and "assumes_normal" in verdict.flags:
         return _NOT_COUNTED
-    return verdict
+    return word
 
 
-def counted(verdicts: Iterable[str]) -> str:
+def count_words(words: Iterable[str]) -> str:
     """Return how many of each word, e.g. "7 supported, 1 refuted"."""
-    counts = Counter(verdicts)
+    counts = Counter(words)
     return ", ".join(f"{counts[word]} {word}" for word in (*WORDS, _NOT_COUNTED) if counts[word])
 
 
-def listed(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """Return names as a list, e.g. "swarm-dt, random-walk and central"."""
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
@@ -272,12 +271,13 @@ def time_to_clear(cell: Cell) -> str:
     Of several trainings the mean over trainings and seeds; an interval needs all runs in time.
     """
     times = [outcome.time_to_clear for outcome in cell.outcomes]
-    late = sum(map(math.isinf, times))
-    several = len(cell.arm.case.trainings)
-    if several > 1 and not (late or cell.problem):
-        return bracketed(spi.mean_interval(np.reshape(times, (several, -1)), CONFIDENCE), 0)
-    found = bracketed(spi.median_interval(times, CONFIDENCE), 0)
-    return f"{found} ({late} of {len(times)})" if late else found
+    n_late = sum(map(math.isinf, times))
+    n_trainings = len(cell.arm.case.trainings)
+    if n_trainings > 1 and not (n_late or cell.problem):
+        by_training = np.reshape(times, (n_trainings, -1))
+        return bracketed(spi.mean_interval(by_training, CONFIDENCE), 0)
+    median = bracketed(spi.median_interval(times, CONFIDENCE), 0)
+    return f"{median} ({n_late} of {len(times)})" if n_late else median
 
 
 def seeds_text(results: StudyResults) -> str:
@@ -291,63 +291,96 @@ def seeds_text(results: StudyResults) -> str:
     return f"{count} ({seeds_in_words(seeds)})"
 
 
-def sentence(results: StudyResults, test: Verdict) -> Sentence:
+def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
     """Return the verdict on one comparison in words."""
-    compared = test.compared
-    swarm = (
-        "" if compared.original.setting.kind in ("size", "policy") else f", N = {compared.n_robots}"
-    )
-    head = f"{compared.policy}, {test.property_name}? {compared.label}{swarm}."
-    text = " ".join(_parts(results, test))
-    return Sentence(head, text, test.conclusion, test.on_property.adjusted)
+    comparison = verdict.compared
+    swarm = f", N = {comparison.n_robots}"
+    if comparison.original.setting.kind in ("size", "policy"):
+        swarm = ""
+    head = f"{comparison.policy}, {verdict.property_name}? {comparison.label}{swarm}."
+    text = " ".join(fill(templates.VERDICT, dict(_parts(results, verdict))))
+    return Sentence(head, text, verdict.conclusion, verdict.on_property.adjusted)
 
 
-def _parts(results: StudyResults, test: Verdict) -> Iterator[str]:
-    estimate, indicator = test.estimate, test.compared.indicator
+def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots]]:
+    """Yield what is known of a verdict: the templates that apply, each with its slots."""
+    estimate = verdict.estimate
+    indicator = verdict.compared.indicator
     if estimate is None:
-        yield f"Undefined: {test.problem}."
+        yield "undefined", {"problem": verdict.problem}
         return
+    seeds = _seeds_of(results, estimate)
+    if estimate.identical:
+        yield "unaffected", {"indicator": indicator, "value": estimate.value, "seeds": seeds}
+        return
+    interval = limits(estimate, 3)
+    yield (
+        "interval" if interval else "no_interval",
+        {
+            "indicator": indicator,
+            "mark": SATURATED if verdict.saturated else "",
+            "value": fixed(estimate.value, 3, [estimate.threshold]),
+            "level": percent(estimate.confidence),
+            "limits": interval,
+            "seeds": seeds,
+        },
+    )
+    if not estimate.untestable:
+        plain, adjusted = verdict.on_property
+        yield (
+            "decision",
+            {
+                "plain": plain,
+                "p": _p(estimate.p_value),
+                "adjusted": adjusted,
+                # One seed gives no p, and Holm's placeholder of 1 says nothing.
+                "adjusted_p": _p(None if estimate.p_value is None else verdict.p_adjusted),
+            },
+        )
+    if verdict.on_claim is not None:
+        plain, adjusted = verdict.on_claim
+        words = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
+        yield "claim", {"claim": verdict.claim, "words": words}
+    if verdict.equivalence is not None and verdict.on_equivalence is not None:
+        plain, adjusted = verdict.on_equivalence
+        words = plain if plain == adjusted else f"{plain} ({adjusted} under Holm)"
+        yield (
+            "equivalence",
+            {
+                "question": verdict.equivalence_name,
+                "change": _change(verdict.equivalence.change, verdict.margin),
+                "words": words,
+            },
+        )
+    if verdict.flags:
+        yield "flags", {"flags": " ".join(templates.FLAGS[flag] for flag in verdict.flags)}
+    if "hidden_stalls" in verdict.flags:
+        yield "hidden_stalls", {"n_seeds": spi.seeds_against_stalls(estimate)}
+    if results.plan.specification.until_clear:
+        case = "open_after_all_looks" if verdict.stopped_at is None else "clear_at_a_look"
+        yield case, {"n_seeds": estimate.n_seeds, "most": results.looks[-1]}
+    if results.exploratory:
+        yield "exploratory", {}
+
+
+def _seeds_of(results: StudyResults, estimate: Estimate) -> str:
+    """Return over which seeds an estimate is."""
     seeds = f"{estimate.n_seeds} runs a condition, unpaired"
     if results.plan.paired:
         seeds = seeds_text(results)
     if results.plan.specification.until_clear:
         seeds = f"{estimate.n_seeds} paired seeds"
-    if estimate.n_trainings is not None:
-        seeds = f"{estimate.n_trainings} trainings x {seeds}"
-    if estimate.identical:
-        yield f"{indicator} = {estimate.value:.3f} exactly, over {seeds}: unaffected."
-        yield "Both conditions gave the same runs, so there is nothing to test."
-        return
-    found = limits(estimate, 3)
-    level = f", {percent(estimate.confidence)} interval {found}" if found else " (no interval)"
-    capped = SATURATED * test.saturated
-    value = fixed(estimate.value, 3, [estimate.threshold])
-    yield f"{indicator}{capped} = {value}{level} over {seeds}."
-    if not estimate.untestable:
-        # One seed gives no p, and Holm's placeholder of 1 says nothing.
-        adjusted_p = None if estimate.p_value is None else test.p_adjusted
-        yield f"Unadjusted: {test.on_property.plain}{_p(estimate.p_value)};"
-        yield f"Holm-adjusted: {test.on_property.adjusted}{_p(adjusted_p)}."
-    if test.on_claim is not None:
-        plain, adjusted = test.on_claim
-        both = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
-        yield f'Claim "{test.claim}": {both}.'
-    if test.equivalence is not None and test.on_equivalence is not None:
-        unchanged, holm = test.on_equivalence
-        under_holm = "" if unchanged == holm else f" ({holm} under Holm)"
-        change = test.equivalence.change
-        told = bracketed(change, 3, [-test.margin, test.margin])
-        if change.low is not None and not change.identical:
-            told += f" ({percent(change.confidence)})"
-        yield f"{test.equivalence_name}? Change {told}: {unchanged}{under_holm}."
-    yield from (f"{FLAGS[flag]}." for flag in test.flags)
-    if "hidden_stalls" in test.flags:
-        yield f"It needs at least {spi.seeds_against_stalls(estimate)} seeds."
-    if results.plan.specification.until_clear:
-        where = "Open after" if test.stopped_at is None else "Clear at"
-        yield f"{where} {estimate.n_seeds} of at most {results.looks[-1]} seeds."
-    if results.exploratory:
-        yield "Exploratory."
+    if estimate.n_trainings is None:
+        return seeds
+    return f"{estimate.n_trainings} trainings x {seeds}"
+
+
+def _change(change: Estimate, margin: float) -> str:
+    """Return a change of P with its interval, and the level of that."""
+    text = bracketed(change, 3, [-margin, margin])
+    if change.low is None or change.identical:
+        return text
+    return f"{text} ({percent(change.confidence)})"
 
 
 def _p(p: float | None) -> str:

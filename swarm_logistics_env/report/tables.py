@@ -12,7 +12,7 @@ from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.verdicts.agreement import Agreement, agreements
 from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.mid_run_faults import RepairCurve, resiliences
+from swarm_logistics_env.verdicts.mid_run_faults import RepairCurve, Resilience, resiliences
 from swarm_logistics_env.verdicts.reference import Reference
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict
@@ -25,34 +25,49 @@ CellColumn = tuple[str, Callable[[Cell], str]]
 
 
 def tables(results: StudyResults) -> Iterator[Section]:
-    """Yield the tables of a study's results, policy by policy; then how near each comes.
-
-    Each has a table of P and the first indicator, then one of each further indicator.
-    """
-    tests = grouped(results.verdicts, lambda test: (test.compared.policy, test.compared.table))
-    for place in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
-        rows = [cell for cell in results.cells if (cell.policy, cell.table) == place]
-        published = any(cell.published is not None for cell in rows)
-        setting: CellColumn = ("", lambda cell: cell.words)
-        columns = [setting]
-        if published:
-            columns.append(("P paper", _published))
-        columns.append((f"P{' ours' * published} [{section.P_LEVEL}]", section.mean_p))
-        columns.append((f"one run [{section.P_LEVEL}]", _one_run))
-        whole = title = ": ".join(place)
-        asked_here = tests.get(place, ())
-        for indicator, asked in grouped(asked_here, lambda test: test.compared.indicator).items():
-            answers = _answers(indicator, asked, published=published)
-            shown = [*columns, *answers]
-            lines = tuple(tuple(text(cell) for _, text in shown) for cell in rows)
-            yield Section(title, tuple(heading for heading, _ in shown), lines)
-            # P is printed once: the tables of further indicators hold what was asked alone.
-            changed = {test.compared.changed for test in asked}
-            rows = [cell for cell in rows if cell.arm in changed]
-            columns, title = [setting], f"{whole}, continued"
+    """Yield the tables of a study's results, policy by policy; then how near each comes."""
+    verdicts_of = grouped(results.verdicts, lambda v: (v.compared.policy, v.compared.table))
+    cells_of = grouped(results.cells, lambda cell: (cell.policy, cell.table))
+    for policy_and_table, cells in cells_of.items():
+        verdicts = verdicts_of.get(policy_and_table, [])
+        yield from _tables_of(": ".join(policy_and_table), cells, verdicts)
     yield from map(_agreement, agreements(results))
-    yield from _sentences(results)
-    yield from _times_to_clear(results)
+    yield from _text_sections(results)
+    yield from _times_to_clear(results.cells)
+
+
+def _tables_of(title: str, cells: Sequence[Cell], verdicts: Sequence[Verdict]) -> Iterator[Section]:
+    """Yield the tables of one policy and one heading of the plan.
+
+    The first has P and the first indicator; each further one has an indicator, without P again,
+    and the cells alone for which it was asked.
+    """
+    has_published = any(cell.published is not None for cell in cells)
+    setting: CellColumn = ("", lambda cell: cell.words)
+    for index, (indicator, same_indicator) in enumerate(
+        grouped(verdicts, lambda verdict: verdict.compared.indicator).items()
+    ):
+        answers = _answers(indicator, same_indicator, published=has_published)
+        if index == 0:
+            columns = [setting, *_performance_columns(published=has_published), *answers]
+            yield _table(title, columns, cells)
+        else:
+            yield _table(f"{title}, continued", [setting, *answers], cells)
+        changed = {verdict.compared.changed for verdict in same_indicator}
+        cells = [cell for cell in cells if cell.arm in changed]
+
+
+def _table(title: str, columns: Sequence[CellColumn], cells: Sequence[Cell]) -> Section:
+    rows = tuple(tuple(text(cell) for _, text in columns) for cell in cells)
+    return Section(title, tuple(heading for heading, _ in columns), rows)
+
+
+def _performance_columns(*, published: bool) -> Iterator[CellColumn]:
+    if published:
+        yield "P paper", _published
+    heading = "P ours" if published else "P"
+    yield f"{heading} [{section.P_LEVEL}]", section.mean_p
+    yield f"one run [{section.P_LEVEL}]", _one_run
 
 
 def _published(cell: Cell) -> str:
@@ -63,82 +78,90 @@ def _one_run(cell: Cell) -> str:
     return section.limits(cell.one_run, section.digits_of(cell.mean.value)) or NOTHING
 
 
-def _answers(indicator: str, tests: Sequence[Verdict], *, published: bool) -> Iterator[CellColumn]:
+def _answers(
+    indicator: str, verdicts: Sequence[Verdict], *, published: bool
+) -> Iterator[CellColumn]:
     """Yield the columns of one indicator in a table of cells.
 
     Value with interval, the paper's value, and per property (scalable, superlinear, ...) the
-    verdict, with Holm's in brackets where it differs, beside what the paper claims.
+    decision, with Holm's in brackets where it differs, beside what the paper claims.
     """
-
-    def column(
-        heading: str, asked: Sequence[Verdict], text: Callable[[Verdict], str]
-    ) -> CellColumn:
-        by_arm = {test.compared.changed: test for test in asked}
-        return heading, lambda cell: text(by_arm[cell.arm]) if cell.arm in by_arm else NOTHING
-
-    level = section.level_of(tests)
-    shown = partial(section.ratio, level=level)
-    yield column(f"{indicator} [{section.percent(level)}]", tests, shown)
+    level = section.level_of(verdicts)
+    ratio = partial(section.ratio, level=level)
+    yield _column(f"{indicator} [{section.percent(level)}]", verdicts, ratio)
     if published:
-        yield column(f"{indicator} paper", tests, lambda test: section.number(test.published))
-    for name, asked in grouped(tests, lambda test: test.property_name).items():
-        yield column(name, asked, section.answered)
+        yield _column(f"{indicator} paper", verdicts, lambda v: section.number(v.published))
+    for name, of_property in grouped(verdicts, lambda verdict: verdict.property_name).items():
+        yield _column(name, of_property, section.decision_text)
         if published:
-            yield column("paper", asked, _claimed)
+            yield _column("paper", of_property, _claimed)
 
 
-def _claimed(test: Verdict) -> str:
-    return NOTHING if test.claimed is None else "yes" if test.claimed else "no"
+def _column(
+    heading: str, verdicts: Sequence[Verdict], text: Callable[[Verdict], str]
+) -> CellColumn:
+    verdict_of = {verdict.compared.changed: verdict for verdict in verdicts}
+    return heading, lambda cell: text(verdict_of[cell.arm]) if cell.arm in verdict_of else NOTHING
 
 
-def _sentences(results: StudyResults) -> Iterator[Section]:
+def _claimed(verdict: Verdict) -> str:
+    if verdict.claimed is None:
+        return NOTHING
+    return "yes" if verdict.claimed else "no"
+
+
+def _text_sections(results: StudyResults) -> Iterator[Section]:
     """Yield what the reference's text says beside what each policy does."""
-    if (reference := results.reference) is None:
+    reference = results.reference
+    if reference is None:
         return
-    for policy, tests in grouped(results.verdicts, lambda test: test.compared.policy).items():
-        if said := sentences(reference, tests):
+    for policy, verdicts in grouped(results.verdicts, lambda v: v.compared.policy).items():
+        if rows := sentences(reference, verdicts):
             columns = ("the text", "claim", f"ours [{section.P_LEVEL}]", "verdict")
-            yield Section(f"{policy}: what the text says", columns, tuple(said), (reference.whose,))
+            yield Section(f"{policy}: what the text says", columns, tuple(rows), (reference.whose,))
 
 
-def sentences(reference: Reference, tests: Sequence[Verdict]) -> list[Texts]:
+def sentences(reference: Reference, verdicts: Sequence[Verdict]) -> list[Texts]:
     """Return a row for each claim of the reference's text, those of a sentence together."""
-    by_question = {test.compared.question: test for test in tests}
+    verdict_on = {verdict.compared.question: verdict for verdict in verdicts}
     rows = []
     for sentence, questions in reference.sentences.items():
-        rows += claims(
-            f'"{sentence}"', [by_question[one] for one in questions if one in by_question]
-        )
+        of_sentence = [verdict_on[question] for question in questions if question in verdict_on]
+        rows += claims(f'"{sentence}"', of_sentence)
     return rows
 
 
-def claims(heading: str, tests: Sequence[Verdict]) -> list[Texts]:
+def claims(heading: str, verdicts: Sequence[Verdict]) -> list[Texts]:
     """Return a row for each claim: below the heading what it asks, our value, and the verdict."""
     rows: list[Texts] = []
-    for test in tests:
-        compared = test.compared
-        sign = ">" if test.claimed else "<" if compared.definition.compares == "policy" else "≤"
-        asked = f"{compared.label}: {compared.indicator} {sign} {compared.threshold:.3g}"
-        rows.append((heading, asked, section.ratio(test), _on_claim(test)))
+    for verdict in verdicts:
+        comparison = verdict.compared
+        if verdict.claimed:
+            sign = ">"
+        else:
+            sign = "<" if comparison.definition.compares == "policy" else "≤"
+        claim = f"{comparison.label}: {comparison.indicator} {sign} {comparison.threshold:.3g}"
+        rows.append((heading, claim, section.ratio(verdict), _on_claim(verdict)))
         heading = ""
     return rows
 
 
-def _on_claim(test: Verdict) -> str:
-    """Return the verdict on a claim; of an open one the side on which its interval lies."""
-    said = section.counted_as(test, test.on_claim.adjusted if test.on_claim else UNDEFINED)
-    above = section.lies_above(test)
-    if said == "open" and above is not None:
-        return f"open, leans {'for' if above == test.claimed else 'against'}"
-    return "contradicted" if said == "refuted" else said
+def _on_claim(verdict: Verdict) -> str:
+    """Return the decision on a claim; of an open one the side on which its interval lies."""
+    decision = verdict.on_claim.adjusted if verdict.on_claim else UNDEFINED
+    word = section.word_to_count(verdict, decision)
+    above = section.lies_above(verdict)
+    if word == "open" and above is not None:
+        return f"open, leans {'for' if above == verdict.claimed else 'against'}"
+    return "contradicted" if word == "refuted" else word
 
 
-def _times_to_clear(results: StudyResults) -> Iterator[Section]:
+def _times_to_clear(cells: Sequence[Cell]) -> Iterator[Section]:
     """Yield the time until all items were delivered, where a run delivered all of them."""
     rows = tuple(
         (f"{cell.policy}: {cell.words}", section.time_to_clear(cell))
-        for cell in results.cells
-        if any(run.all_delivered for run in cell.outcomes)
+        for cell in cells
+        if any(outcome.all_delivered for outcome in cell.outcomes)
     )
     line = (
         'No number of items caps it. "x of y": so many runs were not done when the time was up; '
@@ -149,22 +172,22 @@ def _times_to_clear(results: StudyResults) -> Iterator[Section]:
         yield Section("Time until all items are delivered", columns, rows, (line,))
 
 
-def _agreement(found: Agreement) -> Section:
-    total = len(found.cells)
+def _agreement(agreement: Agreement) -> Section:
+    n_cells = len(agreement.cells)
     level = section.P_LEVEL
     lines = [f"Cells inside the {level} prediction interval: one seed gives no interval."]
-    if all(cell.n_seeds > 1 for cell in found.cells):
+    if all(cell.n_seeds > 1 for cell in agreement.cells):
         lines = [
             (
                 f"Cells whose published P lies inside the {level} prediction interval of one of "
-                f"our runs: {total - len(found.misses)} of {total}; inside that of our mean: "
-                f"{len(found.met)} of {total}."
+                f"our runs: {n_cells - len(agreement.misses)} of {n_cells}; inside that of our "
+                f"mean: {len(agreement.met)} of {n_cells}."
             ),
-            f"Misses: {'; '.join(cell.words for cell in found.misses) or 'none'}.",
+            f"Misses: {'; '.join(cell.words for cell in agreement.misses) or 'none'}.",
         ]
-    if found.mean_log_error is not None:
-        lines.append(f"Mean |log error| of our mean P: {found.mean_log_error:.3f}.")
-    return Section(f"{found.policy}: agreement with the published values", lines=tuple(lines))
+    if agreement.mean_log_error is not None:
+        lines.append(f"Mean |log error| of our mean P: {agreement.mean_log_error:.3f}.")
+    return Section(f"{agreement.policy}: agreement with the published values", lines=tuple(lines))
 
 
 def warnings(results: StudyResults) -> Iterator[str]:
@@ -179,10 +202,13 @@ def warnings(results: StudyResults) -> Iterator[str]:
         )
     stalls = [cell for cell in results.cells if cell.stalled > 0.0]
     if stalls:
-        told = (f"{c.policy}, {c.arm.setting} ({c.stalled:.0%} of {c.n_seeds})" for c in stalls)
+        shares = [
+            f"{cell.policy}, {cell.arm.setting} ({cell.stalled:.0%} of {cell.n_seeds})"
+            for cell in stalls
+        ]
         yield (
             "Runs stalled: they have less than a quarter of the median P of their condition: "
-            f"{'; '.join(dict.fromkeys(told))}."
+            f"{'; '.join(dict.fromkeys(shares))}."
         )
     if results.exploratory:
         yield (
@@ -197,11 +223,11 @@ def warnings(results: StudyResults) -> Iterator[str]:
     for cell in results.cells:
         if cell.problem:
             yield f"{cell.policy}, {cell.table}, {cell.arm.setting} is incomplete: {cell.problem}."
-    for test in results.verdicts:
-        if test.problem:
-            compared = test.compared
-            what = f"{compared.policy}, {compared.indicator}, {compared.label}"
-            yield f"{what} is undefined: {test.problem}."
+    for verdict in results.verdicts:
+        if verdict.problem:
+            comparison = verdict.compared
+            name = f"{comparison.policy}, {comparison.indicator}, {comparison.label}"
+            yield f"{name} is undefined: {verdict.problem}."
 
 
 _SINGLE_TEXT = (
@@ -213,54 +239,67 @@ _SINGLE_TEXT = (
 
 def fault_sections(results: StudyResults) -> Iterator[Section]:
     """Yield the measures of faults in mid-run, and the curves of what is delivered around them."""
-    found = list(resiliences(results))
-    if not found:
+    measures = list(resiliences(results))
+    if not measures:
         return
-    who = [(one.compared.policy, str(one.compared.changed.setting)) for one in found]
-    indices = (x for one in found for x in (one.against_removed, one.against_whole) if x)
-    level = section.percent(next((index.confidence for index in indices), CONFIDENCE))
-    columns = (
-        "policy", "fault", f"over the removed robots' [{level}]", "above 1",
-        f"over the whole swarm's [{level}]", "above 1 - m/N",
-    )  # fmt: skip
-    rows = tuple(
-        (*whose, *_index(one.against_removed), *_index(one.against_whole))
-        for whose, one in zip(who, found)
-    )
-    line = (
-        "Deliveries after the onset over those of the paired reference. Reference with the robots "
-        "removed at the onset: fault tolerance local in time; whole swarm: robustness local in "
-        f"time. Verdicts unadjusted; {section.seeds_text(results)}."
-    )
-    yield Section("Resilience: deliveries after the onset", columns, rows, (line,))
+    faults = [
+        (measure.compared.policy, str(measure.compared.changed.setting)) for measure in measures
+    ]
+    yield _resilience_table(faults, measures, section.seeds_text(results))
     figures = tuple(rate_figures(results))
     if figures:
         yield Section("", figures=figures)
     columns = ("policy", "fault", "median [s]", "not back", "null's median [s]", "null not back")
     rows = tuple(
-        (*whose, *_back(one.single[0]), *_back(one.single[1]))
-        for whose, one in zip(who, found)
-        if one.single
+        (*fault, *_back(measure.single[0]), *_back(measure.single[1]))
+        for fault, measure in zip(faults, measures)
+        if measure.single
     )
     problems = [
-        f"{policy}, {fault}: no time to come back: {one.problem}."
-        for (policy, fault), one in zip(who, found)
-        if one.problem
+        f"{policy}, {fault}: no time to come back: {measure.problem}."
+        for (policy, fault), measure in zip(faults, measures)
+        if measure.problem
     ]
     yield Section("Time until single runs are back", columns, rows, (_SINGLE_TEXT, *problems))
 
 
+def _resilience_table(
+    faults: Sequence[tuple[str, str]], measures: Sequence[Resilience], seeds: str
+) -> Section:
+    indices = [
+        index
+        for measure in measures
+        for index in (measure.against_removed, measure.against_whole)
+        if index
+    ]
+    level = section.percent(indices[0].confidence if indices else CONFIDENCE)
+    columns = (
+        "policy", "fault", f"over the removed robots' [{level}]", "above 1",
+        f"over the whole swarm's [{level}]", "above 1 - m/N",
+    )  # fmt: skip
+    rows = tuple(
+        (*fault, *_index(measure.against_removed), *_index(measure.against_whole))
+        for fault, measure in zip(faults, measures)
+    )
+    line = (
+        "Deliveries after the onset over those of the paired reference. Reference with the robots "
+        "removed at the onset: fault tolerance local in time; whole swarm: robustness local in "
+        f"time. Verdicts unadjusted; {seeds}."
+    )
+    return Section("Resilience: deliveries after the onset", columns, rows, (line,))
+
+
 def _index(estimate: Estimate | None) -> Texts:
-    """Return an index with its interval, and its verdict."""
+    """Return an index with its interval, and its decision."""
     if estimate is None:
         return NOTHING, "undefined"
-    said = UNAFFECTED if estimate.identical else estimate.verdict
-    capped = section.SATURATED * ("capped" in estimate.flags)
-    return section.bracketed(estimate, 3), said + capped
+    word = UNAFFECTED if estimate.identical else estimate.verdict
+    mark = section.SATURATED if "capped" in estimate.flags else ""
+    return section.bracketed(estimate, 3), word + mark
 
 
-def _back(found: RepairCurve) -> Texts:
+def _back(curve: RepairCurve) -> Texts:
     """Return the median time until runs are back, and how many never are."""
-    median = found.curve.median()
-    told = "not reached" if median is None else f"{median:g}"
-    return told, f"{np.count_nonzero(~found.back)} of {found.back.size} runs"
+    median = curve.curve.median()
+    time = "not reached" if median is None else f"{median:g}"
+    return time, f"{np.count_nonzero(~curve.back)} of {curve.back.size} runs"

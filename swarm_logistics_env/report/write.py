@@ -25,7 +25,7 @@ from .section import Section, percent
 
 
 def write_report(
-    results: StudyResults, directory: Path, whole: Document | None = None
+    results: StudyResults, directory: Path, report: Document | None = None
 ) -> tuple[Path, ...]:
     """Write report.md, cells.csv, claims.csv, tables.tex, every figure's data, and with the extra
     `study` report.html and every figure as SVG and PNG; return the paths of report and tables.
@@ -33,7 +33,7 @@ def write_report(
     Raises:
         StudyError: a file cannot be written.
     """
-    whole = whole or document(results)
+    report = report or document(results)
     names = "report.md", "cells.csv", "claims.csv", "tables.tex"
     paths = tuple(directory / name for name in names)
     pictures, page = directory / "figures", directory / "report.html"
@@ -41,21 +41,21 @@ def write_report(
         pictures.mkdir(parents=True, exist_ok=True)
         write_csv(paths[1], frame(results.cells, CELL_COLUMNS), StudyError)
         write_csv(paths[2], frame(results.verdicts, VERDICT_COLUMNS), StudyError)
-        write_text(paths[3], latex_tables((whole.answer.section, *whole.summary)))
-        for figure in whole.figures():
+        write_text(paths[3], latex_tables((report.answer.section, *report.summary)))
+        for figure in report.figures():
             write_csv(pictures / f"{figure.name}.csv", figure.data, StudyError)
         if advice := how_to_get_figures():
-            write_text(paths[0], markdown(whole, note=advice))
+            write_text(paths[0], markdown(report, note=advice))
             return paths
         drawings = {}
-        for figure in whole.figures():
+        for figure in report.figures():
             svg, png = images(figure.draw, figure.height)
             write_text(pictures / f"{figure.name}.svg", svg)
             with atomic_write(pictures / f"{figure.name}.png", StudyError) as part:
                 part.write_bytes(png)
             drawings[figure.name] = base64.b64encode(svg.encode()).decode()
-        write_text(paths[0], markdown(whole, pictures=pictures.name))
-        write_text(page, html(results, whole, drawings))
+        write_text(paths[0], markdown(report, pictures=pictures.name))
+        write_text(page, html(results, report, drawings))
     except OSError as error:
         raise StudyError(f"cannot write {error.filename}: {error.strerror}") from error
     return page, *paths
@@ -110,9 +110,9 @@ def section_markdown(section: Section, *, level: int = 2, pictures: str | None =
             lines += [f"![{figure.name}]({pictures}/{figure.name}.png)", ""]
         lines += [_inert(figure.caption), ""]
     if section.sentences:
-        lines += [f"* **{_inert(one.head)}** {_inert(one.text)}" for one in section.sentences] + [
-            ""
-        ]
+        for sentence in section.sentences:
+            lines += [f"* **{_inert(sentence.head)}** {_inert(sentence.text)}"]
+        lines += [""]
     if section.columns:
         lines += [_row(section.columns), _row(["---"] * len(section.columns))]
         lines += [_row(row) for row in section.rows] + [""]
@@ -129,7 +129,7 @@ def _row(values: Sequence[str]) -> str:
 def _inert(text: str) -> str:
     """Return a text of which Markdown makes neither a tag, nor a link, nor a picture."""
     live = r"<(?=[A-Za-z/!?])|(?<=\])(?=\()"
-    return re.sub(live, lambda found: "&lt;" if found[0] else "\\", plain(text))
+    return re.sub(live, lambda match: "&lt;" if match[0] else "\\", plain(text))
 
 
 def html(results: StudyResults, document: Document, drawings: Mapping[str, str]) -> str:
@@ -182,7 +182,7 @@ _ESCAPES = {
     "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
     "->": r"$\to$", "–": "--", "∞": r"$\infty$", "†": r"\dag{}", "<": "$<$", ">": "$>$",
 }  # fmt: skip
-_FOUND = re.compile("|".join(map(re.escape, sorted(_ESCAPES, key=len, reverse=True))))
+_SPECIAL = re.compile("|".join(map(re.escape, sorted(_ESCAPES, key=len, reverse=True))))
 
 
 def latex_tables(sections: Iterable[Section]) -> str:
@@ -194,7 +194,7 @@ def _latex_table(section: Section) -> str:
     lines = [
         r"\begin{table}",
         r"\centering",
-        rf"\caption{{{_escaped(section.title)}}}",
+        rf"\caption{{{_escape(section.title)}}}",
         rf"\begin{{tabular}}{{{'l' * len(section.columns)}}}",
         r"\toprule",
         _latex_row(section.columns),
@@ -209,8 +209,8 @@ def _latex_table(section: Section) -> str:
 
 def _latex_row(cells: Iterable[str]) -> str:
     # In braces: a row that starts with "[" would be read as an option of the line break before it.
-    return " & ".join(f"{{{_escaped(cell)}}}" for cell in cells) + r" \\"
+    return " & ".join(f"{{{_escape(cell)}}}" for cell in cells) + r" \\"
 
 
-def _escaped(text: str) -> str:
-    return _FOUND.sub(lambda found: _ESCAPES[found[0]], text)
+def _escape(text: str) -> str:
+    return _SPECIAL.sub(lambda match: _ESCAPES[match[0]], text)

@@ -8,7 +8,8 @@ from collections import Counter
 import pytest
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.report.answer import MOST_LINES, answer, digest
+from swarm_logistics_env.report.answer import MOST_LINES, answer
+from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.section import limits
 from swarm_logistics_env.verdicts.results import StudyResults
 from tests.made_up import decided, paper
@@ -19,7 +20,7 @@ def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
     numbers = [number for line in lines for number in line.numbers]
     assert sorted(numbers) == [*range(len(few.verdicts))]
     for line in lines:
-        ((number,), (test,)) = line.numbers, line.tests
+        ((number,), (test,)) = line.numbers, line.verdicts
         assert test is few.verdicts[number]
         assert test.interval is not None
         value, low, high = test.interval
@@ -30,9 +31,9 @@ def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
         told = limits(test.estimate or test.interval, 2)
         assert told == f"[{low:.2f}, {high:.2f}]" or abs(low) < 0.005
         assert (line.interval(0.95), line.interval(0.9)) == (told, f"{told} 95 %")
-        assert line.verdict.startswith(test.on_property.adjusted)
+        assert line.verdict_text.startswith(test.on_property.adjusted)
         assert line.question.startswith(test.compared.indicator)
-        more = re.fullmatch(r"open: (\d+) more seeds tell 0.1", line.verdict)
+        more = re.fullmatch(r"open: (\d+) more seeds tell 0.1", line.verdict_text)
         if more:
             assert test.estimate is not None
             effect = test.compared.threshold + (0.1 if value > test.compared.threshold else -0.1)
@@ -42,12 +43,12 @@ def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
 def test_what_is_alike_shares_a_line_and_no_question_is_lost(few: StudyResults) -> None:
     lines = answer(few).lines
     assert len(lines) <= MOST_LINES - 5
-    assert sum(len(line.tests) for line in lines) == len(few.verdicts)
-    for line in (line for line in lines if len(line.tests) > 1):
-        assert len({test.compared.family for test in line.tests}) == 1
-        counts = Counter(test.on_property.adjusted for test in line.tests)
+    assert sum(len(line.verdicts) for line in lines) == len(few.verdicts)
+    for line in (line for line in lines if len(line.verdicts) > 1):
+        assert len({test.compared.family for test in line.verdicts}) == 1
+        counts = Counter(test.on_property.adjusted for test in line.verdicts)
         for word, count in counts.items():
-            assert (word if len(counts) == 1 else f"{count} {word}") in line.verdict
+            assert (word if len(counts) == 1 else f"{count} {word}") in line.verdict_text
     asked = [line.question for line in lines if "FM4" in line.question]
     assert asked == ["FT FM4, 1, 2, 3 of 25", "R FM4, 1, 2, 3 of 25"]
 
@@ -69,7 +70,7 @@ def test_claims_are_counted_and_what_contradicts_the_paper_is_marked(few: StudyR
     claims = Counter(decided(test.on_claim).adjusted for test in few.verdicts if test.claim)
     # Two of them are not in the text: that P falls without taxis.
     count, supported = claims.total() - 2, claims["supported"] - 2
-    last = answer(few).last
+    last = answer(few).notes
     assert f"of {count} claims in the paper's text {supported} supported, " in last
     # The robots of a fleet that FM4 spares deliver all the same: the paper says they do not.
     tough = answer(paper(lambda _, at: 39.0 if at.name == "FM4" else 20.0), most=None)
@@ -82,12 +83,12 @@ def test_claims_are_counted_and_what_contradicts_the_paper_is_marked(few: StudyR
 
 def test_words_for_what_is_no_plain_verdict() -> None:
     nothing = answer(paper(lambda *_: 0.0, seeds=1), most=None)
-    undefined = {line.verdict for line in nothing.lines if line.indicator == "S"}
+    undefined = {line.verdict_text for line in nothing.lines if line.indicator == "S"}
     assert undefined == {"undefined: it delivers nothing"}
     same = answer(paper(same=frozenset({"FM2"})), most=None)
-    exact = {line.verdict for line in same.lines if line.question.startswith("R FM2")}
+    exact = {line.verdict_text for line in same.lines if line.question.startswith("R FM2")}
     assert exact == {"unaffected, exact"}
-    assert "provisional" not in same.last
+    assert "provisional" not in same.notes
 
 
 def test_policies_stand_one_below_the_other_each_with_its_p(compared: StudyResults) -> None:

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import Setting
-from swarm_logistics_env.report.answer import answer, digest, in_a_sentence
+from swarm_logistics_env.report.answer import answer, in_a_sentence
+from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import bracketed, concluded, fixed, levels, percent
+from swarm_logistics_env.report.section import bracketed, conclusion_text, fixed, levels, percent
 from swarm_logistics_env.report.write import latex_tables, markdown, write_report
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcome
@@ -136,10 +137,12 @@ def test_what_is_asked_is_answered_before_what_else_is_known() -> None:
         "R": "open; P changes by less than 10 %",
     }
     assert {test.compared.indicator for test in same} == {*told}
-    assert [concluded(test) for test in same] == [told[test.compared.indicator] for test in same]
-    said = [line.verdict for line in answer(found, most=None).lines]
+    assert [conclusion_text(test) for test in same] == [
+        told[test.compared.indicator] for test in same
+    ]
+    said = [line.verdict_text for line in answer(found, most=None).lines]
     assert Counter(word for word in said if word in told.values()) == Counter(
-        concluded(test) for test in same
+        conclusion_text(test) for test in same
     )
     text = markdown(document(found))
     assert not re.search(r"\| equivalent|\d equivalent", text)

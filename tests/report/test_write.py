@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import pytest
 
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import Section, counted_as, limits, sentence
+from swarm_logistics_env.report.section import Section, limits, sentence, word_to_count
 from swarm_logistics_env.report.write import latex_tables, markdown, section_markdown, write_report
 from swarm_logistics_env.verdicts.results import StudyResults
 from tests.made_up import paper
@@ -20,10 +20,10 @@ from tests.made_up import paper
 
 def test_no_headline_counts_a_verdict_that_assumes_normal_differences(few: StudyResults) -> None:
     assumed = [test for test in few.verdicts if "assumes_normal" in test.flags]
-    decided = {counted_as(test, "supported") for test in assumed}
+    decided = {word_to_count(test, "supported") for test in assumed}
     assert len(decided) == 1
     assert decided.isdisjoint({"supported", "refuted", "equivalent"})
-    assert {counted_as(test, "open") for test in assumed} == {"open"}
+    assert {word_to_count(test, "open") for test in assumed} == {"open"}
 
 
 def test_no_name_breaks_a_table() -> None:

@@ -69,7 +69,7 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     assert (doubled.p_adjusted, doubled.stopped_at) == (None, 20)
     assert (half.conclusion, half.p_adjusted is None) == ("supported", False)
     (line, _), last = answer(study.findings())[2:]
-    assert line.verdict == "untestable: it cannot be below 0"
+    assert line.verdict_text == "untestable: it cannot be below 0"
     assert "untestable where it cannot lie below the threshold" in last
     told = sentence(study.findings(), doubled).text
     assert "it cannot lie below the threshold, so it is not tested" in told

@@ -1,0 +1,81 @@
+"""Notes on an answer: what its symbols mean, how to read its verdicts, and what limits them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
+
+from . import section, templates
+from .templates import Slots, fill
+
+
+def notes(results: StudyResults) -> str:
+    """Return the notes on the answer of a study, in one line."""
+    line = "; ".join(fill(templates.NOTES, dict(_notes_that_apply(results))))
+    return f"{line[0].upper()}{line[1:]}."
+
+
+def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
+    """Yield the notes on an answer that apply, each with its slots; `NOTES` has their order."""
+    verdicts = results.verdicts
+    is_paired = results.plan.paired
+    indicators = {verdict.compared.indicator for verdict in verdicts} - {"change"}
+    if indicators:
+        headings = [d.heading for symbol, d in DEFINITIONS.items() if symbol in indicators]
+        yield "indicators", {"indicators": ", ".join(headings)}
+    if any(verdict.interval and verdict.interval.low is not None for verdict in verdicts):
+        level = section.level_of(verdicts)
+        differ = section.other_levels(verdicts, level) != ""
+        case = "intervals_of_several_levels" if differ else "intervals"
+        yield case, {"level": section.percent(level)}
+    yield "adjusted", {}
+    flags = {flag for verdict in verdicts for flag in verdict.flags}
+    if "assumes_normal" in flags:
+        yield "few_seeds" if is_paired else "unpaired", {}
+    for flag in ("cannot_fail", "too_few_seeds"):
+        if flag in flags:
+            yield flag, {}
+    if results.damage:
+        yield "damage", {"damage": results.damage}
+    if results.exploratory:
+        yield "exploratory", {}
+    if results.late_margin:
+        yield "late_margin", {}
+    if any(verdict.saturated for verdict in verdicts):
+        yield "capped", {"mark": section.SATURATED}
+    if any(cell.stalled for cell in results.cells):
+        yield "stalled", {}
+    open_verdicts = [verdict for verdict in verdicts if verdict.conclusion == "open"]
+    if open_verdicts:
+        yield "open", {"runs": "seeds" if is_paired else "trials a condition"}
+    if reasons := fill(templates.REASONS_TO_BE_OPEN, dict(_reasons_to_be_open(open_verdicts))):
+        yield "open_at_an_interval_on_one_side", {"reasons": " or ".join(reasons)}
+    claims_of_text = results.reference.claims if results.reference else {}
+    claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
+    in_text = [verdict for verdict in claims if verdict.compared.question in claims_of_text]
+    not_in_text = [verdict for verdict in claims if verdict not in in_text]
+    if in_text:
+        yield "claims_of_the_text", _claims(in_text)
+    if not_in_text:
+        case = "claims_beside_the_text" if claims_of_text else "claims_without_text"
+        yield case, _claims(not_in_text)
+
+
+def _reasons_to_be_open(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, Slots]]:
+    """Yield why verdicts are open though their intervals lie on one side of the threshold."""
+    one_sided = [verdict for verdict in verdicts if section.lies_above(verdict) is not None]
+    if any("hidden_stalls" in verdict.flags for verdict in one_sided):
+        yield "hidden_stalls", {}
+    if any(verdict.on_threshold.plain in section.DECIDED for verdict in one_sided):
+        yield "holm", {}
+
+
+def _claims(verdicts: Sequence[Verdict]) -> Slots:
+    words = [verdict.on_claim.adjusted for verdict in verdicts if verdict.on_claim]
+    return {
+        "claims": section.plural(len(verdicts), "claim"),
+        "counts": section.count_words(words),
+    }

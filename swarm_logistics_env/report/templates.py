@@ -1,0 +1,146 @@
+"""The sentences of a report, each under the name of its case, with slots in braces.
+
+`answer.py` and `section.py` decide which cases apply and what stands in their slots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeAlias
+
+Slots: TypeAlias = Mapping[str, object]
+
+
+def fill(templates: Mapping[str, str], slots_by_case: Mapping[str, Slots]) -> list[str]:
+    """Return the templates of the cases that apply, in the order of the table, slots filled."""
+    unknown = slots_by_case.keys() - templates.keys()
+    if unknown:
+        raise KeyError(f"no template for {sorted(unknown)}")
+    return [
+        template.format(**slots_by_case[case])
+        for case, template in templates.items()
+        if case in slots_by_case
+    ]
+
+
+# The first line of the answer.
+SCOPE = {
+    "complete": "{study}: {questions}, {policies}, {seeds}.",
+    "incomplete": "{study}: {questions}, {policies}, up to {seeds}.",
+}
+
+# The second line of the answer: P where the swarm is as it should be.
+PERFORMANCE = {
+    "nothing": "P: no run has succeeded.",
+    "items": "P, items in {duration:g} s, at {condition}: {means}.",
+    "items_with_interval": "P [{level}], items in {duration:g} s, at {condition}: {means}.",
+    "other_task": "P at {condition}: {means}.",
+    "other_task_with_interval": "P [{level}] at {condition}: {means}.",
+}
+
+# Mean P of one policy: the cases that apply, one after the other.
+MEAN = {
+    "mean": "{mean}",
+    "problem": " ({problem} and do not count)",
+    "all_delivered": ", all items after {time} s",
+    "nothing": "0 (at most {most:.2f} at {level}, as none of {n_runs} runs delivered anything)",
+    "nothing_and_problem": "0 (at most {most:.2f} at {level}, as none of {n_runs} runs delivered "
+    "anything; {problem})",
+}
+
+# What a line of the answer asks, behind the symbol of its indicator.
+QUESTION = {
+    "sizes": "N {chain}{property}",
+    "failure_modes": "{count} failure modes{start}",
+    "parameters": "{count} parameters{start}",
+    "fault": "{name}{start}, {values} of {n_robots}{property}",
+    "policy": "with {name}{property}",
+    "parameter": "{name} {before:g}→{values}{property}",
+}
+
+# What a line of the answer says.
+LINE = {
+    "not_played": "not played yet",
+    "problem": "{words}: {problem}",
+    "family_lacks_runs": "no verdict: {indicator} lacks runs",
+    "words": "{words}",
+    "unaffected": "{words}, exact",
+    "untestable": "{words}: it cannot be below {threshold:g}",
+    "unbounded": "{words} by its test; P_o is too near 0 for an interval",
+    "more_runs": "open: {n_more} more {runs} tell {effect:g}",
+}
+
+# How to read the answer, and what limits it: the cases that apply, with "; " between them.
+NOTES = {
+    "indicators": "{indicators}: good above 0",
+    "intervals": "{level} intervals",
+    "intervals_of_several_levels": "{level} intervals, or as said behind them",
+    "adjusted": "verdicts are Holm-adjusted",
+    "few_seeds": "provisional (below ten seeds they assume normality)",
+    "unpaired": "provisional (unpaired they assume normality)",
+    "cannot_fail": "untestable where it cannot lie below the threshold, as P cannot below 0",
+    "too_few_seeds": "two seeds give no verdict",
+    "damage": "{damage}",
+    "exploratory": "exploratory: other seeds than were declared, whose report this replaces",
+    "late_margin": "equivalence is exploratory: another margin was declared",
+    "capped": "{mark} P is capped: --clearing or --restock has no cap",
+    "stalled": "some runs stalled (P below a quarter of the median; --full names them)",
+    "open": "so many more {runs} would tell such a value from the threshold in 4 of 5 studies",
+    "open_at_an_interval_on_one_side": "open beside an interval on one side of it: {reasons}",
+    "claims_of_the_text": "of {claims} in the paper's text {counts}",
+    "claims_beside_the_text": "of {claims} beside it {counts}",
+    "claims_without_text": "of {claims} {counts}",
+}
+REASONS_TO_BE_OPEN = {
+    "hidden_stalls": "so few seeds may hide stalls",
+    "holm": "Holm counts all questions",
+}
+
+# The sentence that a paper can quote.
+FOR_A_PAPER = {
+    "one_question": "{policies}: {performance} over {seeds}; {lowest}; {property}: {words} (Holm).",
+    "several_questions": "{policies}: {performance} over {seeds}; of {n_questions} questions "
+    "{words} (Holm); the lowest is {lowest}.",
+    "no_value": "{policies}: {performance} over {seeds}; of {n_questions} questions {words} "
+    "(Holm).",
+}
+QUESTION_WITH_VALUE = {
+    "value": "{question} = {value}",
+    "interval": "{question} = {value}, {level} interval {interval}",
+}
+
+# One verdict in sentences: the cases that apply, one after the other.
+VERDICT = {
+    "undefined": "Undefined: {problem}.",
+    "unaffected": "{indicator} = {value:.3f} exactly, over {seeds}: unaffected. Both conditions "
+    "gave the same runs, so there is nothing to test.",
+    "interval": "{indicator}{mark} = {value}, {level} interval {limits} over {seeds}.",
+    "no_interval": "{indicator}{mark} = {value} (no interval) over {seeds}.",
+    "decision": "Unadjusted: {plain}{p}; Holm-adjusted: {adjusted}{adjusted_p}.",
+    "claim": 'Claim "{claim}": {words}.',
+    "equivalence": "{question}? Change {change}: {words}.",
+    "flags": "{flags}",
+    "hidden_stalls": "It needs at least {n_seeds} seeds.",
+    "open_after_all_looks": "Open after {n_seeds} of at most {most} seeds.",
+    "clear_at_a_look": "Clear at {n_seeds} of at most {most} seeds.",
+    "exploratory": "Exploratory.",
+}
+
+# What limits a verdict, by the flag of its estimate.
+FLAGS = {
+    "single_seed": "One seed gives a value, but no interval and no verdict.",
+    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance.",
+    "degenerate": "The seeds show no spread, so there is no interval and no verdict.",
+    "cannot_fail": "As no P is below 0, it cannot lie below the threshold, so it is not tested and "
+    "has no verdict.",
+    "capped": "P is capped on the side that the verdict leans to, so the verdict is open.",
+    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
+    "so it is open.",
+    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
+    "the verdict comes from the test.",
+    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
+    "ten, or unpaired.",
+    "few_trainings": "Fewer than five trainings give no verdict.",
+    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
+    "its level says.",
+}
