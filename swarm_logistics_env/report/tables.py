@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from swarm_logistics_env.grouping import grouped
-from swarm_logistics_env.questions.comparison import CONFIDENCE
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.verdicts.agreement import Agreement, agreements
 from swarm_logistics_env.verdicts.cell import Cell
@@ -27,39 +27,44 @@ CellColumn = tuple[str, Callable[[Cell], str]]
 def tables(results: StudyResults) -> Iterator[Section]:
     """Yield the tables of a study's results, policy by policy; then how near each comes."""
     verdicts_of = grouped(results.verdicts, lambda v: (v.compared.policy, v.compared.table))
-    cells_of = grouped(results.cells, lambda cell: (cell.policy, cell.table))
-    for policy_and_table, cells in cells_of.items():
-        verdicts = verdicts_of.get(policy_and_table, [])
-        yield from _tables_of(": ".join(policy_and_table), cells, verdicts)
+    for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
+        cells = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
+        has_published = any(cell.published is not None for cell in cells)
+        verdicts = verdicts_of.get((policy, table), [])
+        for title, columns, arms in _layouts(verdicts, published=has_published):
+            rows = tuple(
+                tuple(text(cell) for _, text in columns)
+                for cell in cells
+                if arms is None or cell.arm in arms
+            )
+            headings = tuple(heading for heading, _ in columns)
+            yield Section(f"{policy}: {table}{title}", headings, rows)
     yield from map(_agreement, agreements(results))
     yield from _text_sections(results)
     yield from _times_to_clear(results.cells)
 
 
-def _tables_of(title: str, cells: Sequence[Cell], verdicts: Sequence[Verdict]) -> Iterator[Section]:
-    """Yield the tables of one policy and one heading of the plan.
+def _layouts(
+    verdicts: Sequence[Verdict], *, published: bool
+) -> Iterator[tuple[str, list[CellColumn], set[Arm] | None]]:
+    """Yield the tables of one policy and one heading of the plan, without their cells.
 
     The first has P and the first indicator; each further one has an indicator, without P again,
-    and the cells alone for which it was asked.
+    and the cells alone for which every indicator before it was asked.
+
+    Yields:
+        What stands behind the title, the columns, and the arms of the rows; None: all.
     """
-    has_published = any(cell.published is not None for cell in cells)
     setting: CellColumn = ("", lambda cell: cell.words)
-    for index, (indicator, same_indicator) in enumerate(
-        grouped(verdicts, lambda verdict: verdict.compared.indicator).items()
-    ):
-        answers = _answers(indicator, same_indicator, published=has_published)
-        if index == 0:
-            columns = [setting, *_performance_columns(published=has_published), *answers]
-            yield _table(title, columns, cells)
-        else:
-            yield _table(f"{title}, continued", [setting, *answers], cells)
+    title = ""
+    columns = [setting, *_performance_columns(published=published)]
+    arms: set[Arm] | None = None
+    for indicator, same_indicator in grouped(verdicts, lambda v: v.compared.indicator).items():
+        yield title, [*columns, *_answers(indicator, same_indicator, published=published)], arms
+        title = ", continued"
+        columns = [setting]
         changed = {verdict.compared.changed for verdict in same_indicator}
-        cells = [cell for cell in cells if cell.arm in changed]
-
-
-def _table(title: str, columns: Sequence[CellColumn], cells: Sequence[Cell]) -> Section:
-    rows = tuple(tuple(text(cell) for _, text in columns) for cell in cells)
-    return Section(title, tuple(heading for heading, _ in columns), rows)
+        arms = changed if arms is None else arms & changed
 
 
 def _performance_columns(*, published: bool) -> Iterator[CellColumn]:
