@@ -34,7 +34,7 @@ from .study_commands import (
     run_study,
     say_what_a_pilot_shows,
     study_of,
-    until_cleared,
+    switch_to_clearing,
 )
 from .terminal import say, say_what_was_played, show, show_report, show_table
 
@@ -198,7 +198,7 @@ def judge_policy(
         looks = until_clear and most_seeds > FIRST_LOOK
         study = study_of(STUDY, directory, most_seeds, [policy_text], trust_code, until_clear=looks)
     if clearing:
-        until_cleared(study)
+        switch_to_clearing(study)
     say(f"{study.plan()}, kept in {directory}")
     echo()
     say_what_a_pilot_shows(study)

@@ -78,7 +78,7 @@ def prepare_output() -> None:
     was never open, is lost without an error.
     """
     _occupy_closed()
-    sys.stdout, sys.stderr = _prepared(sys.stdout), _prepared(sys.stderr)
+    sys.stdout, sys.stderr = _prepare(sys.stdout), _prepare(sys.stderr)
 
 
 def _occupy_closed() -> None:
@@ -88,7 +88,7 @@ def _occupy_closed() -> None:
     os.close(number)
 
 
-def _prepared(stream: TextIO | None) -> TextIO:
+def _prepare(stream: TextIO | None) -> TextIO:
     if stream is None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         stream = os.fdopen(nowhere, "w", encoding="utf-8")

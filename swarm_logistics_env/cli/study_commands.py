@@ -117,7 +117,7 @@ def run_command(
         study_name, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
     )
     if clearing:
-        until_cleared(study)
+        switch_to_clearing(study)
     if restock:
         specification = study.specification
         scenario = specification.played.vary(specification.scenario, {"restock": True})
@@ -351,7 +351,7 @@ def study_of(
     return Study.preset(study_name, out=out, **fields)
 
 
-def until_cleared(study: Study) -> None:
+def switch_to_clearing(study: Study) -> None:
     """Let P be the rate at which the items of a study's warehouse are cleared.
 
     Raises:

@@ -41,7 +41,8 @@ def forest_figure(results: StudyResults, answer: Answer) -> Figure:
     verdicts = answer.verdicts
     return Figure(
         "answer",
-        f"{answer.scope} Every question with its interval. {_marks(verdicts)}.{_capped(verdicts)}",
+        f"{answer.scope} Every question with its interval. {_marks(verdicts)}."
+        f"{_note_on_caps(verdicts)}",
         frame(verdicts, VERDICT_COLUMNS)[_COLUMNS],
         0.9 + 0.27 * len(rows),
         partial(drawing.forest, rows=rows),
@@ -58,7 +59,8 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
         policies = join_names(list(dict.fromkeys(v.compared.policy for v in verdicts)))
         caption = (
             f"{policies}, {_condition(table, onset, swarm)}: {_caption(definitions)} "
-            f"{seeds_text(results).capitalize()}. {_marks(verdicts)}{crosses}.{_capped(verdicts)}"
+            f"{seeds_text(results).capitalize()}. {_marks(verdicts)}{crosses}."
+            f"{_note_on_caps(verdicts)}"
         )
         panels = tuple(_panel(results, verdicts, definition) for definition in definitions)
         yield Figure(
@@ -203,7 +205,7 @@ def _marks(verdicts: Sequence[Verdict]) -> str:
     )
 
 
-def _capped(verdicts: Sequence[Verdict]) -> str:
+def _note_on_caps(verdicts: Sequence[Verdict]) -> str:
     if any(verdict.saturated for verdict in verdicts):
         return " †: P is capped, every item was delivered in a run."
     return ""

@@ -69,13 +69,13 @@ def _layouts(
 
 def _performance_columns(*, published: bool) -> Iterator[CellColumn]:
     if published:
-        yield "P paper", _published
+        yield "P paper", _published_text
     heading = "P ours" if published else "P"
     yield f"{heading} [{section.P_LEVEL}]", section.mean_p
     yield f"one run [{section.P_LEVEL}]", _one_run
 
 
-def _published(cell: Cell) -> str:
+def _published_text(cell: Cell) -> str:
     return NOTHING if cell.published is None else f"{cell.published:g}"
 
 
@@ -99,7 +99,7 @@ def _answers(
     for name, of_property in grouped(verdicts, lambda verdict: verdict.property_name).items():
         yield _column(name, of_property, section.decision_text)
         if published:
-            yield _column("paper", of_property, _claimed)
+            yield _column("paper", of_property, _claim_text)
 
 
 def _column(
@@ -109,7 +109,7 @@ def _column(
     return heading, lambda cell: text(verdict_of[cell.arm]) if cell.arm in verdict_of else NOTHING
 
 
-def _claimed(verdict: Verdict) -> str:
+def _claim_text(verdict: Verdict) -> str:
     if verdict.claimed is None:
         return NOTHING
     return "yes" if verdict.claimed else "no"

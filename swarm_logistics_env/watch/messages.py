@@ -84,7 +84,7 @@ def encode(message: Message) -> str:
     return json.dumps(message, separators=(",", ":"), allow_nan=False)
 
 
-_checked = validate_call(
+_check_types = validate_call(
     config=ConfigDict(strict=True, arbitrary_types_allowed=True, allow_inf_nan=False)
 )
 # Orders by name; the rest of an order is the arguments, which have to be of the right types.
@@ -119,7 +119,7 @@ def obey(session: Session, text: str) -> None:
             f'order: should be a JSON object whose "do" is one of {", ".join(_ORDERS)}'
         ) from None
     try:
-        _checked(act)(session, **arguments)
+        _check_types(act)(session, **arguments)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
         argument = ".".join(str(part) for part in first["loc"])
