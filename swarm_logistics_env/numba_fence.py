@@ -16,7 +16,6 @@ import warnings
 from typing import Any, cast
 
 import numba
-from numba.core import config
 
 FIRST_TESTED, LAST_TESTED = (0, 61), (0, 68)  # versions of numba; pyproject.toml has them, too
 WAY = "SWARM_LOGISTICS_KERNELS"  # environment variable: "plain" or "fast", whatever the version
@@ -52,4 +51,4 @@ def choose_way(version: str, wish: str | None) -> str:
 
 IS_PLAIN = choose_way(numba.__version__, os.environ.get(WAY)) == "plain"
 # Nothing is compiled where numba was told so, as tests tell it to see the lines of kernels.
-IS_INTERPRETED = IS_PLAIN or bool(cast("Any", config).DISABLE_JIT)
+IS_INTERPRETED = IS_PLAIN or bool(cast("Any", numba).config.DISABLE_JIT)
