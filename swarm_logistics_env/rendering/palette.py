@@ -30,7 +30,7 @@ OBSTACLE: RGB = (110, 110, 110)
 SEARCHING: RGB = (86, 180, 233)  # sky blue
 SHUFFLING: RGB = (0, 114, 178)  # blue
 DELIVERING: RGB = (240, 228, 66)  # yellow
-TIMER_COLOUR: RGB = (0, 158, 115)  # bluish green
+TIMER: RGB = (0, 158, 115)  # bluish green
 REQUESTED: RGB = (213, 94, 0)  # vermillion
 LINK: RGB = (158, 67, 117)  # reddish purple, darkened: thin things need contrast
 BEAM: RGB = (230, 159, 0)  # orange
@@ -38,7 +38,7 @@ ITEM: RGB = (214, 214, 214)
 ITEM_EDGE: RGB = (120, 120, 120)
 TRAIL: RGB = (150, 150, 150)
 
-# All of them by name, for films and for the page in the browser.
+# All of them by name, for films and for the page in the browser, whose scripts use these names.
 ROBOT_COLOURS: dict[str, RGB] = {
     name: colour for name, colour in dict(globals()).items() if isinstance(colour, tuple)
 }
@@ -61,7 +61,7 @@ MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}
 
 # What lies behind, and what stands before it; smooth edges between the two take four steps.
 _BEHIND = (FLOOR, DELIVERY_AREA, INK)
-_BEFORE = (INK, SEARCHING, SHUFFLING, DELIVERING, TIMER_COLOUR, REQUESTED, LINK)
+_BEFORE = (INK, SEARCHING, SHUFFLING, DELIVERING, TIMER, REQUESTED, LINK)
 
 
 def film_colours() -> list[RGB]:

@@ -14,7 +14,7 @@ import pygame
 from numpy.typing import NDArray
 from pygame import Rect, Surface, Vector2
 
-from .palette import ACTIVITIES, FLOOR, INK, ITEM, ITEM_EDGE, OBSTACLE, REQUESTED, RGB, TIMER_COLOUR
+from .palette import ACTIVITIES, FLOOR, INK, ITEM, ITEM_EDGE, OBSTACLE, REQUESTED, RGB, TIMER
 
 Pixels = NDArray[np.uint8]  # (H, W, 3), red, green, blue
 
@@ -93,10 +93,10 @@ def halo(radius: float, age: int) -> Surface:
     """Return the glow about a robot of that radius [px]; `age` in [0, HALOS), oldest last."""
     strength = 1.0 - age / HALOS
     reach = round(radius * (1.5 + strength))
-    sheet = _sheet(reach, TIMER_COLOUR)
+    sheet = _sheet(reach, TIMER)
     for ring in range(reach, 0, -1):
         fading = min(1.0, (reach - ring + 1) / (reach - radius))
-        _disc(sheet, (*TIMER_COLOUR, round(255 * fading * (0.25 + 0.4 * strength))), ring)
+        _disc(sheet, (*TIMER, round(255 * fading * (0.25 + 0.4 * strength))), ring)
     return _shrink(sheet)
 
 
