@@ -1,4 +1,4 @@
-"""Declaration: what a store says of its study besides the runs, and one study merged of several."""
+"""Notes: what a store says of its study besides the runs, and one study merged of several."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ class Runs:
         Killed or failed before, it leaves nothing that looks like a store.
 
         Args:
-            way: what is done, for errors, e.g. "merge".
+            verb: what is done, for errors, e.g. "merge".
 
         Raises:
             StudyError: `out` holds a study, or cannot be written.
