@@ -9,11 +9,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from more_itertools import map_reduce
 
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.questions.presets import load_preset
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.verdicts.cell import Cell
 
 
 def means(files: list[str]) -> dict[str, float]:
@@ -34,7 +35,7 @@ def means(files: list[str]) -> dict[str, float]:
     )
     study.run(processes=2)
     cells = {(cell.policy, cell.arm.case.key): cell for cell in study.findings().cells}
-    by_policy = grouped(cells.values(), lambda cell: cell.policy)
+    by_policy: dict[str, list[Cell]] = map_reduce(cells.values(), lambda cell: cell.policy)
     return {file: float(np.mean([cell.mean.value for cell in by_policy[file]])) for file in files}
 
 

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
+from more_itertools import map_reduce
 from tables import table
 
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.questions.comparison import Setting
 from swarm_logistics_env.report import section
 from swarm_logistics_env.report.drawing import images
@@ -143,7 +143,8 @@ def _change(drift: Cells, exact: Cells) -> str:
 
 def _rows(cells: Iterable[Cell], missed: Sequence[Cell]) -> Iterator[tuple[str, ...]]:
     """Yield the rows, in which the levels of a fault or a parameter stand side by side."""
-    for levels in grouped(cells, lambda cell: cell.arm.setting.name).values():
+    by_factor: dict[str, list[Cell]] = map_reduce(cells, lambda cell: cell.arm.setting.name)
+    for levels in by_factor.values():
         is_size = levels[0].arm.setting.kind == "size"
         for row in [[level] for level in levels] if is_size else [levels]:
             published = [f"**{c.published:g}**" if c in missed else f"{c.published:g}" for c in row]

@@ -11,16 +11,17 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import question_tables as tables
+from more_itertools import map_reduce
 from play_tables import OUT, play
 from tables import ROOT, example, rewrite
 
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.drawing import Draw, Panel, Point
 from swarm_logistics_env.report.section import DECIDED
 from swarm_logistics_env.verdicts.mid_run_faults import RateCurve, rate_curves
 from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
@@ -31,7 +32,7 @@ Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and
 
 def policies_compared(results: StudyResults) -> Answer:
     """Answer with all policies side by side, and the report's figure of R."""
-    figures = document(results).figures()
+    figures = document(results).figures
     figure = next(figure for figure in figures if figure.name.startswith("R-Two-robots"))
     return {"answer": tables.side_by_side(results)}, figure.draw, figure.height
 
@@ -44,7 +45,8 @@ def larger_swarms(results: StudyResults) -> Answer:
     }
     robustness = [test for test in results.verdicts if test.compared.indicator == "R"]
     panels = []
-    for mode, tests in grouped(robustness, lambda test: test.after.name).items():
+    by_mode: dict[str, list[Verdict]] = map_reduce(robustness, lambda test: test.after.name)
+    for mode, tests in by_mode.items():
         points = tuple(
             Point(
                 test.compared.policy,

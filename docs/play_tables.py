@@ -14,18 +14,19 @@ from typing import TYPE_CHECKING, Any
 
 import front_page
 import numpy as np
+from more_itertools import map_reduce
 from play_paper import claim_rows, draw_figures, paper_block, paper_studies, sentences_block
 from tables import ROOT, answer, by_policy, example, rewrite, seeds_from, table, write_rows
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.judging import ENTRIES
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.report import benchmark, drawing, section
 from swarm_logistics_env.runs.engines import usable_cores
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,7 +76,10 @@ def robust_block(results: StudyResults) -> str:
     """Return R and FT under each failure mode, and what Holm's method makes of them."""
     rows = []
     by_answer: dict[str, list[str]] = {}
-    for label, tests in grouped(results.verdicts, lambda test: test.compared.label).items():
+    by_label: dict[str, list[Verdict]] = map_reduce(
+        results.verdicts, lambda verdict: verdict.compared.label
+    )
+    for label, tests in by_label.items():
         cell = results.cells_of(tests[0].compared)[tests[0].compared.changed]
         by_symbol = {test.compared.indicator: test for test in tests}
         row = [label, section.mean_p(cell)]

@@ -3,13 +3,15 @@
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from more_itertools import map_reduce
 from numpy.typing import NDArray
 from tables import by_policy, seeds_from, table
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.grouping import grouped
+from swarm_logistics_env.questions.comparison import Question
 from swarm_logistics_env.report import section
 from swarm_logistics_env.spi.summaries import Interval, t_interval
+from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
 
@@ -63,9 +65,12 @@ def side_by_side(results: StudyResults) -> str:
     ]
     # A case may stand in several tables; that of sizes names it.
     cells.sort(key=lambda cell: cell.arm.setting.kind != "size")
-    distinct = [equal[0] for equal in grouped(cells, lambda cell: cell.arm.case.key).values()]
+    by_case: dict[str, list[Cell]] = map_reduce(cells, lambda cell: cell.arm.case.key)
+    distinct = [equal[0] for equal in by_case.values()]
     tests = [test for test in results.verdicts if test.after.kind != "policy"]
-    questions = grouped(tests, lambda test: (test.compared.table, test.compared.question))
+    questions: dict[tuple[str, Question], list[Verdict]] = map_reduce(
+        tests, lambda test: (test.compared.table, test.compared.question)
+    )
     asked_of_several = [test for alike in questions.values() if len(alike) > 1 for test in alike]
     return by_policy(results.policies, distinct, asked_of_several, with_verdict, _seeds(results))
 
@@ -73,7 +78,7 @@ def side_by_side(results: StudyResults) -> str:
 def by_size(results: StudyResults) -> str:
     """Return R of every failure mode against N, and its change from the first N to the last."""
     robustness = [test for test in results.verdicts if test.compared.indicator == "R"]
-    by_mode = grouped(robustness, lambda test: (test.compared.policy, test.after.name))
+    by_mode = map_reduce(robustness, lambda test: (test.compared.policy, test.after.name))
     sizes = [test.compared.n_robots for test in next(iter(by_mode.values()))]
     head = ("policy", "mode", *(f"N = {n}" for n in sizes), f"N = {sizes[-1]} less N = {sizes[0]}")
     body = []
@@ -89,7 +94,7 @@ def performances_by_size(results: StudyResults) -> str:
     sized = [cell for cell in results.cells if cell.arm.setting.kind == "size"]
     sizes = dict.fromkeys(cell.arm.setting.value for cell in sized)
     body = []
-    for policy, cells in grouped(sized, lambda cell: cell.policy).items():
+    for policy, cells in map_reduce(sized, lambda cell: cell.policy).items():
         by_robot = (f"{cell.mean.value / cell.arm.setting.value:.2f}" for cell in cells)
         steps = [test for test in results.verdicts if test.compared.family == (policy, "S")]
         body += [
@@ -106,7 +111,7 @@ REPAIRED_AT = 200.0  # [s]: failed at 100 s, for 100 s
 def repaired_tests(results: StudyResults) -> Iterator[tuple[str, str, tuple[Verdict, Verdict]]]:
     """Yield policy, mode, and the fault that stays until the end with the one that is repaired."""
     late = [test for test in results.verdicts if test.after.onset]
-    pairs = grouped(late, lambda test: (f"`{test.compared.policy}`", test.after.name))
+    pairs = map_reduce(late, lambda test: (f"`{test.compared.policy}`", test.after.name))
     for (policy, mode), (permanent, repaired) in pairs.items():
         yield policy, mode, (permanent, repaired)
 
@@ -128,7 +133,13 @@ def after_repairs(results: StudyResults) -> str:
     for policy, mode, tests in repaired_tests(results):
         arms = tests[0].compared.original, *(test.compared.changed for test in tests)
         sound, *faulty = (
-            np.array([np.count_nonzero(run > REPAIRED_AT) for run in results.times_of(arm)]) * 1.0
+            np.array(
+                [
+                    np.count_nonzero(outcome.delivery_times > REPAIRED_AT)
+                    for outcome in results.timed_outcomes[arm]
+                ]
+            )
+            * 1.0
             for arm in arms
         )
         equivalent = spi.equivalence(sound, faulty[1], margin=margin).verdict

@@ -22,7 +22,6 @@ from swarm_logistics_env.runs.notes import StoredStudy, note
 from swarm_logistics_env.runs.recorded import imported_plan
 from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.tasks.task import Run, Task, refuse_untrusted
-from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.results import StudyResults, judge
 from swarm_logistics_env.verdicts.until_clear import latest_look
 
@@ -276,11 +275,11 @@ class Study:
 
     def performance(self) -> pd.DataFrame:
         """Return one row per policy and condition: mean P and its intervals (`CELL_COLUMNS`)."""
-        return frame(self.findings().cells, CELL_COLUMNS)
+        return self.findings().cell_table
 
     def indicators(self) -> pd.DataFrame:
         """Return one row per comparison: indicator, interval, verdicts (`VERDICT_COLUMNS`)."""
-        return frame(self.findings().verdicts, VERDICT_COLUMNS)
+        return self.findings().verdict_table
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
         """Write the report into a directory, see `report.write`; return the paths of its files.

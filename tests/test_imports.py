@@ -50,15 +50,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS | {"code_files", "fingerprint"},
-    "grouping": set(),
-    "questions": {"errors", "grouping", "policies", "records", "spi", "tasks"},
+    "questions": {"errors", "policies", "records", "spi", "tasks"},
     # Neither knows the other: what was played, and what it says.
-    "runs": RUNS
-    | {"code_files", "fingerprint", "grouping", "progress_bar", "questions", "spi", "tasks"},
-    "verdicts": {"errors", "grouping", "questions", "records", "spi", "tasks"},
+    "runs": RUNS | {"code_files", "fingerprint", "progress_bar", "questions", "spi", "tasks"},
+    "verdicts": {"errors", "questions", "records", "spi", "tasks"},
     "report": {
         "errors",
-        "grouping",
         "questions",
         "records",
         "spi",

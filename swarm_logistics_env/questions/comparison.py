@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Unpack
+from typing import NamedTuple, TypeAlias, Unpack
 
 from swarm_logistics_env.spi.definitions import (
     DEFINITIONS,
@@ -55,6 +55,9 @@ class Arm:
     case: Case
 
 
+Family: TypeAlias = tuple[str, str]  # policy and indicator, whose p Holm adjusts together
+
+
 class Question(NamedTuple):
     """What a comparison asks, whichever policy it is asked of."""
 
@@ -102,7 +105,7 @@ class Comparison:
         return Question(self.indicator, self.original.setting, self.changed.setting, self.threshold)
 
     @property
-    def family(self) -> tuple[str, str]:
+    def family(self) -> Family:
         """Holm's family: all comparisons of one indicator for one policy."""
         return self.policy, self.indicator
 

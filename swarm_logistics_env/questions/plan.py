@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, pairwise, product
 
+from more_itertools import map_reduce
+
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.spi.trials import Trial
@@ -87,7 +88,9 @@ class Plan:
             for arm in comparison.arms
         ]
         cells += [(null.case.policy.title, table, null) for (table, _), null in self.nulls.items()]
-        by_factor = grouped(cells, lambda cell: (cell[0], cell[1], cell[2].setting.name))
+        by_factor: dict[tuple[str, str, str], list[CellKey]] = map_reduce(
+            cells, lambda cell: (cell[0], cell[1], cell[2].setting.name)
+        )
         return tuple(dict.fromkeys(chain.from_iterable(by_factor.values())))
 
     @cached_property

@@ -8,14 +8,15 @@ from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
+from more_itertools import map_reduce
+
 from swarm_logistics_env import spi
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.task import DEFAULT
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import POWER, UNAFFECTED, UNDEFINED, Verdict
+from swarm_logistics_env.verdicts.verdict import POWER, UNAFFECTED, UNDEFINED, Verdict, level_of
 
 from . import section, templates
 from .answer_notes import notes
@@ -164,7 +165,7 @@ class Answer(NamedTuple):
     @property
     def level(self) -> float:
         """The level of most intervals, which the heading names."""
-        return section.level_of(self.verdicts)
+        return level_of(self.verdicts)
 
     @property
     def section(self) -> Section:
@@ -186,7 +187,7 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     """
     lines: list[Line] = []
     for sharing in range(4):
-        groups = grouped(enumerate(results.verdicts), partial(_what_a_line_shares, sharing))
+        groups = map_reduce(enumerate(results.verdicts), partial(_what_a_line_shares, sharing))
         lines = [_line(group) for group in groups.values()]
         if most is None or len(lines) <= most:
             break
@@ -268,7 +269,7 @@ def _scope(results: StudyResults) -> str:
         study=results.plan.specification.name,
         questions=section.plural(len(results.verdicts), "question"),
         policies=policies[0] if len(policies) == 1 else f"{len(policies)} policies",
-        seeds=section.seeds_text(results).split(" (")[0],
+        seeds=results.seeds_text.split(" (")[0],
     )
 
 
@@ -341,8 +342,8 @@ def in_a_sentence(results: StudyResults) -> str:
     return templates.FOR_A_PAPER[case].format(
         policies=", ".join(policies),
         performance=_performance(results)[:-1],
-        seeds=section.seeds_text(results),
-        lowest=_question_with_value(line, section.level_of([lowest])),
+        seeds=results.seeds_text,
+        lowest=_question_with_value(line, level_of([lowest])),
         property=f"{line.indicator} > {lowest.compared.threshold:.3g}",
         n_questions=len(verdicts),
         words=words,

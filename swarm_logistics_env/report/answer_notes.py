@@ -14,7 +14,8 @@ from .templates import Slots, fill
 
 def notes(results: StudyResults) -> str:
     """Return the notes on the answer of a study, in one line."""
-    line = "; ".join(fill(templates.NOTES, dict(_notes_that_apply(results))))
+    slots_by_case = dict(_notes_that_apply(results))
+    line = "; ".join(fill(templates.NOTES, slots_by_case))
     return f"{line[0].upper()}{line[1:]}."
 
 
@@ -27,10 +28,9 @@ def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
         headings = [d.heading for symbol, d in DEFINITIONS.items() if symbol in indicators]
         yield "indicators", {"indicators": ", ".join(headings)}
     if any(verdict.interval and verdict.interval.low is not None for verdict in verdicts):
-        level = section.level_of(verdicts)
-        differ = section.other_levels(verdicts, level) != ""
+        differ = len({verdict.level for verdict in verdicts} - {None}) > 1
         case = "intervals_of_several_levels" if differ else "intervals"
-        yield case, {"level": section.percent(level)}
+        yield case, {"level": section.percent(results.level)}
     yield "adjusted", {}
     flags = {flag for verdict in verdicts for flag in verdict.flags}
     if "assumes_normal" in flags:
@@ -51,7 +51,8 @@ def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
     open_verdicts = [verdict for verdict in verdicts if verdict.conclusion == "open"]
     if open_verdicts:
         yield "open", {"runs": "seeds" if is_paired else "trials a condition"}
-    if reasons := fill(templates.REASONS_TO_BE_OPEN, dict(_reasons_to_be_open(open_verdicts))):
+    reasons = list(_reasons_to_be_open(open_verdicts))
+    if reasons:
         yield "open_at_an_interval_on_one_side", {"reasons": " or ".join(reasons)}
     claims_of_text = results.reference.claims if results.reference else {}
     claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
@@ -64,13 +65,13 @@ def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
         yield case, _claims(not_in_text)
 
 
-def _reasons_to_be_open(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, Slots]]:
+def _reasons_to_be_open(verdicts: Sequence[Verdict]) -> Iterator[str]:
     """Yield why verdicts are open though their intervals lie on one side of the threshold."""
-    one_sided = [verdict for verdict in verdicts if section.lies_above(verdict) is not None]
+    one_sided = [verdict for verdict in verdicts if verdict.lies_above is not None]
     if any("hidden_stalls" in verdict.flags for verdict in one_sided):
-        yield "hidden_stalls", {}
+        yield templates.REASONS_TO_BE_OPEN["hidden_stalls"]
     if any(verdict.on_threshold.plain in section.DECIDED for verdict in one_sided):
-        yield "holm", {}
+        yield templates.REASONS_TO_BE_OPEN["holm"]
 
 
 def _claims(verdicts: Sequence[Verdict]) -> Slots:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from more_itertools import map_reduce
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.verdicts.cell import Cell
@@ -21,7 +21,6 @@ from .section import (
     Section,
     Texts,
     bracketed,
-    level_of,
     mean_p,
     percent,
     ratio,
@@ -34,10 +33,12 @@ RESAMPLES = 2_000
 
 def table(results: StudyResults) -> Section:
     """Return P, S, R or A, and FT of every condition, those of a title together."""
-    level = level_of(results.verdicts)
+    level = results.level
     rows: list[Texts] = []
     shown: set[str] = set()  # the sound swarm is the original condition of most titles
-    by_title = grouped(results.verdicts, lambda verdict: verdict.compared.table)
+    by_title: dict[str, list[Verdict]] = map_reduce(
+        results.verdicts, lambda verdict: verdict.compared.table
+    )
     for title, verdicts in by_title.items():
         rows.append((title, "", "", ""))
         original = verdicts[0].compared.original
@@ -45,7 +46,8 @@ def table(results: StudyResults) -> Section:
             shown.add(original.case.key)
             p = mean_p(results.cells_of(verdicts[0].compared)[original])
             rows.append((f"  {original.setting}", p, "", ""))
-        for changed, of_arm in grouped(verdicts, lambda v: v.compared.changed).items():
+        by_arm: dict[Arm, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.changed)
+        for changed, of_arm in by_arm.items():
             by_symbol = {verdict.compared.indicator: verdict for verdict in of_arm}
             tolerance = by_symbol.pop("FT", None)
             indicators = [f"{symbol} {ratio(v, level)}" for symbol, v in by_symbol.items()]

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from textwrap import wrap
 
-from swarm_logistics_env.grouping import grouped
+from more_itertools import map_reduce
 
-from .answer import MOST_LINES, Answer
+from .answer import MOST_LINES, Answer, Line
 
 
 def digest(answer: Answer, width: int, most: int | None = MOST_LINES) -> str:
@@ -41,7 +41,7 @@ def _rows(answer: Answer, width: int) -> list[str]:
 
 
 def _in_columns(answer: Answer, widths: Sequence[int], width: int) -> Iterator[str]:
-    lines_by_policy = grouped(answer.lines, lambda line: line.policy)
+    lines_by_policy: dict[str, list[Line]] = map_reduce(answer.lines, lambda line: line.policy)
     for policy, lines in lines_by_policy.items():
         if len(lines_by_policy) > 1:
             yield f"{policy}:"

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from importlib.metadata import version
 from typing import NamedTuple
 
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.questions.plan import Origin, Plan
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.ratio import MIN_SEEDS
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
 
 from .answer import Answer, answer
 from .figures import forest_figure, indicator_figures
-from .section import Figure, Section, Sentence, join_names, percent, seeds_text, sentence
-from .tables import fault_sections, tables, warnings
+from .section import Figure, Section, Sentence, join_names, percent, sentence
+from .tables import fault_sections, tables, verdict_sections, warnings
 
 
 class Chapter(NamedTuple):
@@ -56,26 +54,35 @@ class Document(NamedTuple):
             if section.columns or section.lines
         )
 
-    def figures(self) -> Iterator[Figure]:
-        """Yield every figure, in the order of the report."""
-        for chapter in self.chapters:
-            for section in chapter.sections:
-                yield from section.figures
+    @property
+    def figures(self) -> list[Figure]:
+        """Every figure, in the order of the report."""
+        return [
+            figure
+            for chapter in self.chapters
+            for section in chapter.sections
+            for figure in section.figures
+        ]
 
 
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
     about = (
-        f"{plan.specification.name}: {len(plan.cases)} conditions, {seeds_text(results)}; every "
+        f"{plan.specification.name}: {len(plan.cases)} conditions, {results.seeds_text}; every "
         "verdict holds for the conditions of the set-up sheet below and for no others."
     )
     text = [about]
     if results.reference:
         text.append(f'"paper" is {results.reference.source}.')
+    setup = setup_sheet(plan)
+    method = methods(plan, results.looks)
     study_answer = answer(results)
     sentences = tuple(sentence(results, verdict) for verdict in results.verdicts)
     lines = tuple(warnings(results))
+    in_words = tuple(verdict_sections(results.verdicts, sentences))
+    result_tables = tuple(tables(results))
+    of_faults = tuple(fault_sections(results))
     figures = forest_figure(results, study_answer), *indicator_figures(results)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
@@ -88,31 +95,31 @@ def document(results: StudyResults) -> Document:
             "Verdicts",
             "One sentence per question. Verdicts are Holm-adjusted; the family is all comparisons "
             "of one indicator for one policy.",
-            tuple(_verdicts(results.verdicts, sentences)),
+            in_words,
         ),
         Chapter(
             "Results",
             f"P is {plan.specification.played.performance}. Square brackets hold intervals at the "
             "level that the heading gives, or at that behind them; "
             '"one run" is where a single further run falls.',
-            tuple(tables(results)),
+            result_tables,
         ),
         Chapter(
             "Beyond the paper",
             "Measures that the paper does not define; none of them enters a verdict above.",
-            tuple(fault_sections(results)),
+            of_faults,
         ),
-        Chapter("Set-up", "", setup_sheet(plan)),
-        Chapter("Methods", "", (Section("", lines=(methods(plan, results.looks),)),)),
+        Chapter("Set-up", "", setup),
+        Chapter("Methods", "", (Section("", lines=(method,)),)),
     ]
     shown = tuple(chapter for chapter in chapters if chapter.sections)
     title = f"Study {plan.specification.name!r}"
     report = Document(title, tuple(text), study_answer, shown, sentences)
-    _make_names_differ(report.figures())
+    _make_names_differ(report.figures)
     return report
 
 
-def _make_names_differ(figures: Iterator[Figure]) -> None:
+def _make_names_differ(figures: Iterable[Figure]) -> None:
     """Number figures whose policies or tables differ in punctuation or case alone."""
     used_names: set[str] = set()
     for figure in figures:
@@ -122,15 +129,6 @@ def _make_names_differ(figures: Iterator[Figure]) -> None:
             number += 1
             figure.name = f"{name}-{number}"
         used_names.add(figure.name.lower())
-
-
-def _verdicts(verdicts: Sequence[Verdict], sentences: Sequence[Sentence]) -> Iterator[Section]:
-    families = grouped(zip(verdicts, sentences), lambda pair: pair[0].compared.family)
-    for (policy, indicator), pairs in families.items():
-        yield Section(
-            f"{policy}: {DEFINITIONS[indicator].heading}",
-            sentences=tuple(sentence for _, sentence in pairs),
-        )
 
 
 def setup_sheet(plan: Plan) -> tuple[Section, ...]:

@@ -47,7 +47,14 @@ _NO_METADATA = {"Creator": None, "Date": None, "Format": None, "Type": None}
 DOTS_PER_INCH = 200
 
 
-def images(draw: Draw, height: float) -> tuple[str, bytes]:
+class Images(NamedTuple):
+    """One drawing as SVG and as PNG."""
+
+    svg: str
+    png: bytes
+
+
+def images(draw: Draw, height: float) -> Images:
     """Return a drawing of the given height [inch] as SVG and as PNG; equal ones as equal bytes."""
     png = io.BytesIO()
     with _style():
@@ -55,7 +62,7 @@ def images(draw: Draw, height: float) -> tuple[str, bytes]:
         svg = _svg(canvas)
         canvas.set_layout_engine("none")  # the same layout, which takes long to find
         canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
-    return svg, png.getvalue()
+    return Images(svg, png.getvalue())
 
 
 def svg_image(draw: Draw, height: float) -> str:

@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
-from swarm_logistics_env.grouping import grouped
-from swarm_logistics_env.questions.comparison import CONFIDENCE, Comparison
+from more_itertools import map_reduce
+
+from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorKind
-from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.columns import VERDICT_COLUMNS, frame
-from swarm_logistics_env.verdicts.mid_run_faults import (
-    RateCurve,
-    mid_run_faults,
-    rate_curves,
-    window_of,
-)
+from swarm_logistics_env.verdicts.mid_run_faults import RateCurve, Resilience, window_of
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
 
 from . import drawing
 from .answer import Answer
 from .drawing import Panel, Point
-from .section import DECIDED, P_LEVEL, Figure, join_names, levels, seeds_text, slug
+from .section import DECIDED, P_LEVEL, Figure, join_names, levels, slug
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _COLUMNS = [
     "policy", "table", "indicator", "comparison", "value", "low", "high", "confidence",
@@ -43,7 +40,7 @@ def forest_figure(results: StudyResults, answer: Answer) -> Figure:
         "answer",
         f"{answer.scope} Every question with its interval. {_marks(verdicts)}."
         f"{_note_on_caps(verdicts)}",
-        frame(verdicts, VERDICT_COLUMNS)[_COLUMNS],
+        _rows(results, verdicts),
         0.9 + 0.27 * len(rows),
         partial(drawing.forest, rows=rows),
     )
@@ -53,61 +50,28 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield S per step, FT and R per mode and m, A per value, and P without a part."""
     for (table, _, onset, swarm), verdicts in _by_figure(results).items():
         definitions = _definitions(verdicts)
+        panels = tuple(_panel(results, verdicts, definition) for definition in definitions)
+        rows = _rows(results, verdicts)
+        condition = _condition(table, onset, swarm)
         symbols = [definition.symbol for definition in definitions]
         has_published = any(verdict.published is not None for verdict in verdicts)
         crosses = "; crosses: published" if has_published else ""
         policies = join_names(list(dict.fromkeys(v.compared.policy for v in verdicts)))
         caption = (
-            f"{policies}, {_condition(table, onset, swarm)}: {_caption(definitions)} "
-            f"{seeds_text(results).capitalize()}. {_marks(verdicts)}{crosses}."
+            f"{policies}, {condition}: {_caption(definitions)} "
+            f"{results.seeds_text.capitalize()}. {_marks(verdicts)}{crosses}."
             f"{_note_on_caps(verdicts)}"
         )
-        panels = tuple(_panel(results, verdicts, definition) for definition in definitions)
         yield Figure(
             slug(*symbols, table, f"{onset:g}s" if onset else ""),
             caption,
-            frame(verdicts, VERDICT_COLUMNS)[_COLUMNS],
+            rows,
             0.5 + 2.5 * len(panels),
             partial(drawing.intervals, panels=panels),
-            title=f"{' and '.join(symbols)}: {_condition(table, onset, swarm)}",
+            title=f"{' and '.join(symbols)}: {condition}",
             panels=panels,
             level=levels(verdicts),
         )
-
-
-def performance_panels(
-    cells: Iterable[Cell], policies: Sequence[str], runs: Mapping[str, Sequence[float | None]]
-) -> Iterator[tuple[str, Panel]]:
-    """Yield P of every policy in the conditions of each table, with its runs; and the table.
-
-    Args:
-        policies: in the order of their colours.
-        runs: P seed by seed of every condition, by the key of its case.
-    """
-    conditions = list(runs)
-    shown = [cell for cell in cells if cell.arm.setting.kind != "policy"]
-    for table, of_table in grouped(shown, lambda cell: cell.table).items():
-        points = tuple(
-            Point(
-                cell.policy,
-                policies.index(cell.policy),
-                # "N = 10" stands there as "10", "FM1, m = 2" as "FM1 2".
-                re.sub(r"^\w+ = |, m =", "", cell.words),
-                *cell.mean,
-                # The published values stand beside the first policy.
-                cell.published if cell.policy == policies[0] else None,
-                decided=True,
-                saturated=cell.saturated,
-                link=f"condition-{conditions.index(cell.arm.case.key)}",
-                runs=tuple(runs[cell.arm.case.key]),
-            )
-            for cell in of_table
-            if cell.n_seeds
-        )
-        setting = of_table[0].arm.setting
-        x_label = X_LABELS.get(setting.kind, setting.name)
-        if points:
-            yield table, Panel("", "performance P", points, (), x_label)
 
 
 def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int], list[Verdict]]:
@@ -118,7 +82,7 @@ def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int]
         swarm = verdict.compared.n_robots if after.kind == "fault" else 0
         return verdict.compared.table, after.kind, after.onset, swarm
 
-    by_value = grouped(
+    by_value: dict[tuple[str, ...], list[Verdict]] = map_reduce(
         results.verdicts,
         lambda verdict: (
             *verdict.compared.family,
@@ -131,7 +95,7 @@ def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int]
         min(verdicts, key=lambda verdict: verdict.compared.threshold)
         for verdicts in by_value.values()
     ]
-    return grouped(lowest, figure_of)
+    return map_reduce(lowest, figure_of)
 
 
 def _condition(table: str, onset: float, swarm: int) -> str:
@@ -197,6 +161,12 @@ def _point(
     )
 
 
+def _rows(results: StudyResults, verdicts: Sequence[Verdict]) -> pd.DataFrame:
+    """Return what a figure shows of these verdicts, one row each."""
+    rows = [results.verdicts.index(verdict) for verdict in verdicts]
+    return results.verdict_table.iloc[rows].reset_index(drop=True)[_COLUMNS]
+
+
 def _marks(verdicts: Sequence[Verdict]) -> str:
     return (
         "Filled: the Holm-adjusted verdict is decided; hollow: it is not; bars: "
@@ -228,23 +198,27 @@ def _caption(definitions: Sequence[Definition]) -> str:
     return f"{join_names([definition.heading for definition in definitions])}; {meaning}."
 
 
-def rate_figures(results: StudyResults) -> Iterator[Figure]:
-    """Yield deliveries over time around every fault in mid-run, a figure per failure mode."""
+def rate_figures(measures: Iterable[Resilience], seeds: str) -> Iterator[Figure]:
+    """Yield deliveries over time around every fault in mid-run, a figure per failure mode.
+
+    Args:
+        seeds: over which the measures are, in words.
+    """
     import pandas as pd
 
-    def figure_of(comparison: Comparison) -> tuple[str | float, ...]:
+    def figure_of(measure: Resilience) -> tuple[str | float, ...]:
+        comparison = measure.compared
         setting = comparison.changed.setting
         return (
             comparison.policy, comparison.table, comparison.n_robots, setting.name, setting.onset,
         )  # fmt: skip
 
-    for comparisons in grouped(mid_run_faults(results), figure_of).values():
-        first = comparisons[0]
+    for of_mode in map_reduce(measures, figure_of).values():
+        first = of_mode[0].compared
         setting = first.changed.setting
         window = window_of(first)
         panels = {
-            f"m = {comparison.changed.setting.value:g}": rate_curves(results, comparison)
-            for comparison in comparisons
+            f"m = {measure.compared.changed.setting.value:g}": measure.curves for measure in of_mode
         }
         rows = [
             (title, curve.runs, *point, CONFIDENCE)
@@ -257,7 +231,7 @@ def rate_figures(results: StudyResults) -> Iterator[Figure]:
                 slug("deliveries", first.policy, first.table, setting.name, f"{setting.onset:g}s"),
                 f"{first.policy}, {first.table}, N = {first.n_robots}: deliveries in the trailing "
                 f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s (dotted "
-                f"line). Mean over {seeds_text(results)} with pointwise {P_LEVEL} t-intervals.",
+                f"line). Mean over {seeds} with pointwise {P_LEVEL} t-intervals.",
                 pd.DataFrame(rows, columns=["panel", "runs", *RateCurve._fields[1:], "confidence"]),
                 0.6 + 2.3 * len(panels),
                 partial(

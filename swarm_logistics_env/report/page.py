@@ -1,30 +1,35 @@
-"""What the HTML page shows beyond the report: drawings to choose from, and what a click shows."""
+"""The report as an HTML page: drawings to choose from, and what a click shows."""
 
 from __future__ import annotations
 
+import base64
 import json
+import re
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
+from importlib.resources import files
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from more_itertools import map_reduce
 from numpy.typing import ArrayLike
 from pydantic import JsonValue
 
 from swarm_logistics_env.questions.comparison import Arm, Comparison
 from swarm_logistics_env.spi import Interval
-from swarm_logistics_env.tasks.task import DEFAULT, Outcome
+from swarm_logistics_env.tasks.task import DEFAULT, Case, Outcome
+from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from . import drawing
 from .answer import Answer
-from .drawing import Panel
-from .figures import performance_panels
+from .document import Document
+from .drawing import Panel, Point
+from .figures import X_LABELS
 from .inline_svg import forest_rows, inline
-from .section import P_LEVEL, Figure, Sentence, bracketed, digits_of
+from .section import P_LEVEL, Figure, Sentence, bracketed, digits_of, percent
 
 Json: TypeAlias = dict[str, JsonValue]
 # P seed by seed of every condition, by the key of its case; None: a run failed, or is missing.
@@ -33,6 +38,16 @@ Runs: TypeAlias = Mapping[str, Sequence[float | None]]
 Chart: TypeAlias = tuple[str, str, Sequence[Panel], tuple[str, ...]]
 _HEIGHT = 2.9  # inch, of a drawing of P
 _MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
+# Of decisions, on light and on dark paper, after Okabe and Ito.
+_COLOURS = {
+    "supported": ("#006b4c", "#3fc79a"),
+    "refuted": ("#a84300", "#f5915a"),
+    "equivalent": ("#005b94", "#6cb8ee"),
+    "open": ("#5b6068", "#a9afb8"),
+    "unaffected": ("#5b6068", "#a9afb8"),
+    "untestable": ("#5b6068", "#a9afb8"),
+    "undefined": ("#a84300", "#f5915a"),
+}
 
 
 class View(NamedTuple):
@@ -49,7 +64,43 @@ class View(NamedTuple):
     legend: tuple[str, ...]
 
 
-def views(
+def html(results: StudyResults, document: Document, drawings: Mapping[str, str], latex: str) -> str:
+    """Return the whole report as one page that loads nothing.
+
+    Args:
+        results: what its script draws.
+        document: the report.
+        drawings: SVG of every figure, by name.
+        latex: the tables for a paper, which the page shows as text.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("swarm_logistics_env", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    runs = _p_by_seed(results)
+    data = _page_data(results, runs, document.sentences)
+    return environment.get_template("page.html.jinja").render(
+        document=document,
+        paired=results.plan.paired,
+        answer=document.answer,
+        level=percent(document.answer.level),
+        forest=_forest(document.answer, drawings["answer"]),
+        views=list(_views(results, runs, document.figures, drawings)),
+        colours=_COLOURS,
+        drawings={name: base64.b64encode(svg.encode()).decode() for name, svg in drawings.items()},
+        latex=latex,
+        # A text must not end the script that it stands in.
+        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
+        script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
+    )
+
+
+def _views(
     results: StudyResults, runs: Runs, figures: Iterable[Figure], drawings: Mapping[str, str]
 ) -> Iterator[View]:
     """Yield P of every policy in the conditions of each table, then the figures of indicators.
@@ -58,7 +109,8 @@ def views(
         figures: those of the report.
         drawings: SVG of each figure, by name.
     """
-    charts = [*_performance_charts(results, runs), *_indicator_charts(figures, drawings)]
+    of_indicators = list(_indicator_charts(figures, drawings))
+    charts = [*_performance_charts(results, runs), *of_indicators]
     for number, (name, svg, panels, legend) in enumerate(charts):
         has_published = any(
             point.published is not None for panel in panels for point in panel.points
@@ -71,9 +123,39 @@ def views(
 def _performance_charts(results: StudyResults, runs: Runs) -> Iterator[Chart]:
     repeat = "seed" if results.plan.paired else "trial"
     legend = (f"bar: {P_LEVEL} interval", f"dot: one {repeat}, click it")
-    for table, panel in performance_panels(results.cells, results.policies, runs):
+    for table, panel in _performance_panels(results, runs):
         svg = drawing.svg_image(partial(drawing.intervals, panels=[panel]), _HEIGHT)
         yield f"P: {table}", svg, [panel], legend
+
+
+def _performance_panels(results: StudyResults, runs: Runs) -> Iterator[tuple[str, Panel]]:
+    """Yield P of every policy in the conditions of each table, with its runs; and the table."""
+    conditions = list(runs)
+    policies = results.policies
+    shown = [cell for cell in results.cells if cell.arm.setting.kind != "policy"]
+    by_table: dict[str, list[Cell]] = map_reduce(shown, lambda cell: cell.table)
+    for table, cells in by_table.items():
+        points = tuple(
+            Point(
+                cell.policy,
+                policies.index(cell.policy),
+                # "N = 10" stands there as "10", "FM1, m = 2" as "FM1 2".
+                re.sub(r"^\w+ = |, m =", "", cell.words),
+                *cell.mean,
+                # The published values stand beside the first policy.
+                cell.published if cell.policy == policies[0] else None,
+                decided=True,
+                saturated=cell.saturated,
+                link=f"condition-{conditions.index(cell.arm.case.key)}",
+                runs=tuple(runs[cell.arm.case.key]),
+            )
+            for cell in cells
+            if cell.n_seeds
+        )
+        setting = cells[0].arm.setting
+        x_label = X_LABELS.get(setting.kind, setting.name)
+        if points:
+            yield table, Panel("", "performance P", points, (), x_label)
 
 
 def _indicator_charts(figures: Iterable[Figure], drawings: Mapping[str, str]) -> Iterator[Chart]:
@@ -98,7 +180,7 @@ def _titles(panels: Sequence[Panel]) -> dict[str, str]:
     return titles
 
 
-def forest(answer: Answer, svg: str) -> list[str]:
+def _forest(answer: Answer, svg: str) -> list[str]:
     """Return the intervals of each line of the answer as a part of the page.
 
     Args:
@@ -114,7 +196,7 @@ def forest(answer: Answer, svg: str) -> list[str]:
     return forest_rows(svg, links)
 
 
-def page_data(results: StudyResults, runs: Runs, sentences: Sequence[Sentence]) -> Json:
+def _page_data(results: StudyResults, runs: Runs, sentences: Sequence[Sentence]) -> Json:
     """Return all that the page's script needs, as JSON holds it.
 
     Args:
@@ -133,11 +215,11 @@ def page_data(results: StudyResults, runs: Runs, sentences: Sequence[Sentence]) 
     }
 
 
-def p_by_seed(results: StudyResults) -> Runs:
+def _p_by_seed(results: StudyResults) -> Runs:
     """Return mean P over the trainings, seed by seed, of every condition, each once."""
     return {
         key: [
-            _mean_p([results.outcome(training, seed) for training in _trainings(arm)])
+            _mean_p([results.succeeded.get((case.key, seed)) for case in arm.case.trainings])
             for seed in results.plan.seeds
         ]
         for key, arm in _arms(results).items()
@@ -149,17 +231,15 @@ def _arms(results: StudyResults) -> dict[str, Arm]:
     return {arm.case.key: arm for _, _, arm in results.plan.cells}
 
 
-def _trainings(arm: Arm) -> list[Arm]:
-    return [replace(arm, case=case) for case in arm.case.trainings]
-
-
 def _conditions(results: StudyResults, runs: Runs) -> Iterator[Json]:
     n_deliveries = sum(len(outcome.delivery_times) for outcome in results.outcomes.values())
     share = min(1.0, _MOST_TIMES / max(1, n_deliveries))
     n_curves = max(1, int(share * len(results.plan.seeds)))
     for key, arm in _arms(results).items():
-        first_training = _trainings(arm)[0]
-        outcomes = [results.outcome(first_training, seed) for seed in results.plan.seeds]
+        first_training = arm.case.trainings[0]
+        outcomes = [
+            results.succeeded.get((first_training.key, seed)) for seed in results.plan.seeds
+        ]
         yield {
             "name": f"{arm.case.policy.title}, {arm.setting}",
             "end": float(arm.case.scenario.duration),
@@ -186,9 +266,8 @@ def _steps(times: ArrayLike) -> list[JsonValue]:
     return [*np.diff(np.rint(times).astype(int), prepend=0).tolist()]
 
 
-def watch_command(arm: Arm) -> str | None:
+def watch_command(case: Case) -> str | None:
     """Return the command that plays a condition but for its seed; None: there is none."""
-    case = arm.case
     if case.task.name != DEFAULT or case.behaviour or not case.policy.is_text:
         return None
     words = ["swarm-logistics", "watch", "--policy", case.policy.name]

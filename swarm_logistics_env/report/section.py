@@ -13,7 +13,6 @@ import numpy as np
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import CONFIDENCE
-from swarm_logistics_env.questions.specification import seeds_in_words
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
@@ -161,29 +160,16 @@ def percent(confidence: float) -> str:
 P_LEVEL = percent(CONFIDENCE)  # of intervals of P
 
 
-def _with_interval(verdicts: Iterable[Verdict]) -> list[Estimate]:
-    estimates = [verdict.estimate for verdict in verdicts if verdict.estimate]
-    return [
-        estimate for estimate in estimates if estimate.low is not None and not estimate.identical
-    ]
-
-
-def level_of(verdicts: Iterable[Verdict]) -> float:
-    """Return the level of most intervals of these verdicts, for a heading over all of them."""
-    counts = Counter(estimate.confidence for estimate in _with_interval(verdicts))
-    return max(counts, key=counts.__getitem__, default=CONFIDENCE)
-
-
 def levels(verdicts: Iterable[Verdict]) -> str:
     """Return the levels of the intervals of verdicts, e.g. "95 %" or "97.8 % to 99.2 %"."""
-    confidences = {estimate.confidence for estimate in _with_interval(verdicts)} or {CONFIDENCE}
+    confidences = {verdict.level for verdict in verdicts if verdict.level} or {CONFIDENCE}
     ends = min(confidences), max(confidences)
     return " to ".join(dict.fromkeys(map(percent, ends)))
 
 
 def other_levels(verdicts: Sequence[Verdict], level: float) -> str:
     """Return the levels of these verdicts' intervals behind a blank, if any is not `level`."""
-    differ = any(estimate.confidence != level for estimate in _with_interval(verdicts))
+    differ = any(verdict.level not in (None, level) for verdict in verdicts)
     return f" {levels(verdicts)}" if differ else ""
 
 
@@ -205,15 +191,6 @@ def ratio(verdict: Verdict, level: float = CONFIDENCE) -> str:
     if verdict.saturated and verdict.estimate is not None:
         text += SATURATED
     return text + other_levels([verdict], level)
-
-
-def lies_above(verdict: Verdict) -> bool | None:
-    """Return whether an interval lies above the threshold; None: it holds it, or there is none."""
-    _, low, high = verdict.interval or (None, None, None)
-    threshold = verdict.compared.threshold
-    if low is None or high is None or low <= threshold <= high:
-        return None
-    return low > threshold
 
 
 def conclusion_text(*verdicts: Verdict) -> str:
@@ -286,17 +263,6 @@ def time_to_clear(cell: Cell) -> str:
     return f"{median} ({n_late} of {len(times)})" if n_late else median
 
 
-def seeds_text(results: StudyResults) -> str:
-    """Return over which seeds everything is, e.g. "20 paired seeds (0 to 19)"."""
-    seeds = results.plan.seeds
-    if not results.plan.paired:
-        fewest = min(cell.n_seeds for cell in results.cells)
-        count = f"{fewest} to {len(seeds)}" if fewest < len(seeds) else f"{fewest}"
-        return f"{count} unpaired {'run' if count == '1' else 'runs'} a condition"
-    count = "one seed" if len(seeds) == 1 else f"{len(seeds)} paired seeds"
-    return f"{count} ({seeds_in_words(seeds)})"
-
-
 def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
     """Return the verdict on one comparison in words."""
     comparison = verdict.compared
@@ -304,7 +270,8 @@ def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
     if comparison.original.setting.kind in ("size", "policy"):
         swarm = ""
     head = f"{comparison.policy}, {verdict.property_name}? {comparison.label}{swarm}."
-    text = " ".join(fill(templates.VERDICT, dict(_parts(results, verdict))))
+    slots_by_case = dict(_parts(results, verdict))
+    text = " ".join(fill(templates.VERDICT, slots_by_case))
     return Sentence(head, text, verdict.conclusion, verdict.on_property.adjusted)
 
 
@@ -373,7 +340,7 @@ def _seeds_of(results: StudyResults, estimate: Estimate) -> str:
     """Return over which seeds an estimate is."""
     seeds = f"{estimate.n_seeds} runs a condition, unpaired"
     if results.plan.paired:
-        seeds = seeds_text(results)
+        seeds = results.seeds_text
     if results.plan.specification.until_clear:
         seeds = f"{estimate.n_seeds} paired seeds"
     if estimate.n_trainings is None:

@@ -6,27 +6,49 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
+from more_itertools import map_reduce
 
-from swarm_logistics_env.grouping import grouped
-from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Family
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.verdicts.agreement import Agreement, agreements
+from swarm_logistics_env.verdicts.agreement import Agreement
 from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.mid_run_faults import RepairCurve, Resilience, resiliences
+from swarm_logistics_env.verdicts.mid_run_faults import (
+    RUNS_ARE_MISSING,
+    RepairCurve,
+    Resilience,
+    resiliences,
+)
 from swarm_logistics_env.verdicts.reference import Reference
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict
+from swarm_logistics_env.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict, level_of
 
 from . import section
 from .figures import rate_figures
-from .section import NOTHING, Section, Texts
+from .section import NOTHING, Section, Sentence, Texts
 
 CellColumn = tuple[str, Callable[[Cell], str]]
 
 
+def verdict_sections(
+    verdicts: Sequence[Verdict], sentences: Sequence[Sentence]
+) -> Iterator[Section]:
+    """Yield the verdicts in words, those of one policy and indicator together."""
+    families: dict[Family, list[tuple[Verdict, Sentence]]] = map_reduce(
+        zip(verdicts, sentences), lambda pair: pair[0].compared.family
+    )
+    for (policy, indicator), pairs in families.items():
+        yield Section(
+            f"{policy}: {DEFINITIONS[indicator].heading}",
+            sentences=tuple(sentence for _, sentence in pairs),
+        )
+
+
 def tables(results: StudyResults) -> Iterator[Section]:
     """Yield the tables of a study's results, policy by policy; then how near each comes."""
-    verdicts_of = grouped(results.verdicts, lambda v: (v.compared.policy, v.compared.table))
+    verdicts_of: dict[tuple[str, str], list[Verdict]] = map_reduce(
+        results.verdicts, lambda verdict: (verdict.compared.policy, verdict.compared.table)
+    )
     for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
         cells = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
         has_published = any(cell.published is not None for cell in cells)
@@ -39,7 +61,7 @@ def tables(results: StudyResults) -> Iterator[Section]:
             )
             headings = tuple(heading for heading, _ in columns)
             yield Section(f"{policy}: {table}{title}", headings, rows)
-    yield from map(_agreement, agreements(results))
+    yield from map(_agreement, results.agreements)
     yield from _text_sections(results)
     yield from _times_to_clear(results.cells)
 
@@ -59,7 +81,8 @@ def _layouts(
     title = ""
     columns = [setting, *_performance_columns(published=published)]
     arms: set[Arm] | None = None
-    for indicator, same_indicator in grouped(verdicts, lambda v: v.compared.indicator).items():
+    by_indicator: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.indicator)
+    for indicator, same_indicator in by_indicator.items():
         yield title, [*columns, *_answers(indicator, same_indicator, published=published)], arms
         title = ", continued"
         columns = [setting]
@@ -91,12 +114,13 @@ def _answers(
     Value with interval, the paper's value, and per property (scalable, superlinear, ...) the
     decision, with Holm's in brackets where it differs, beside what the paper claims.
     """
-    level = section.level_of(verdicts)
+    level = level_of(verdicts)
     ratio = partial(section.ratio, level=level)
     yield _column(f"{indicator} [{section.percent(level)}]", verdicts, ratio)
     if published:
         yield _column(f"{indicator} paper", verdicts, lambda v: section.number(v.published))
-    for name, of_property in grouped(verdicts, lambda verdict: verdict.property_name).items():
+    by_property: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.property_name)
+    for name, of_property in by_property.items():
         yield _column(name, of_property, section.decision_text)
         if published:
             yield _column("paper", of_property, _claim_text)
@@ -120,7 +144,10 @@ def _text_sections(results: StudyResults) -> Iterator[Section]:
     reference = results.reference
     if reference is None:
         return
-    for policy, verdicts in grouped(results.verdicts, lambda v: v.compared.policy).items():
+    by_policy: dict[str, list[Verdict]] = map_reduce(
+        results.verdicts, lambda verdict: verdict.compared.policy
+    )
+    for policy, verdicts in by_policy.items():
         if rows := sentences(reference, verdicts):
             columns = ("the text", "claim", f"ours [{section.P_LEVEL}]", "verdict")
             yield Section(f"{policy}: what the text says", columns, tuple(rows), (reference.whose,))
@@ -138,27 +165,33 @@ def sentences(reference: Reference, verdicts: Sequence[Verdict]) -> list[Texts]:
 
 def claims(heading: str, verdicts: Sequence[Verdict]) -> list[Texts]:
     """Return a row for each claim: below the heading what it asks, our value, and the verdict."""
-    rows: list[Texts] = []
-    for verdict in verdicts:
-        comparison = verdict.compared
-        if verdict.claimed:
-            sign = ">"
-        else:
-            sign = "<" if comparison.definition.compares == "policy" else "≤"
-        claim = f"{comparison.label}: {comparison.indicator} {sign} {comparison.threshold:.3g}"
-        rows.append((heading, claim, section.ratio(verdict), _on_claim(verdict)))
-        heading = ""
-    return rows
+    headings = [heading] + [""] * len(verdicts)
+    return [
+        (headings[index], *(text(verdict) for text in _CLAIM_COLUMNS))
+        for index, verdict in enumerate(verdicts)
+    ]
+
+
+def _claim(verdict: Verdict) -> str:
+    """Return what is claimed, e.g. "N 5 -> 10: S > 0"."""
+    comparison = verdict.compared
+    below = "<" if comparison.definition.compares == "policy" else "≤"
+    sign = ">" if verdict.claimed else below
+    return f"{comparison.label}: {comparison.indicator} {sign} {comparison.threshold:.3g}"
 
 
 def _on_claim(verdict: Verdict) -> str:
     """Return the decision on a claim; of an open one the side on which its interval lies."""
     decision = verdict.on_claim.adjusted if verdict.on_claim else UNDEFINED
     word = section.word_to_count(verdict, decision)
-    above = section.lies_above(verdict)
+    above = verdict.lies_above
     if word == "open" and above is not None:
         return f"open, leans {'for' if above == verdict.claimed else 'against'}"
     return "contradicted" if word == "refuted" else word
+
+
+# What is claimed, our value, and the verdict.
+_CLAIM_COLUMNS: tuple[Callable[[Verdict], str], ...] = (_claim, section.ratio, _on_claim)
 
 
 def _times_to_clear(cells: Sequence[Cell]) -> Iterator[Section]:
@@ -244,14 +277,15 @@ _SINGLE_TEXT = (
 
 def fault_sections(results: StudyResults) -> Iterator[Section]:
     """Yield the measures of faults in mid-run, and the curves of what is delivered around them."""
-    measures = list(resiliences(results))
+    all_measures = list(resiliences(results))
+    measures = [measure for measure in all_measures if measure.problem != RUNS_ARE_MISSING]
     if not measures:
         return
     faults = [
         (measure.compared.policy, str(measure.compared.changed.setting)) for measure in measures
     ]
-    yield _resilience_table(faults, measures, section.seeds_text(results))
-    figures = tuple(rate_figures(results))
+    yield _resilience_table(faults, measures, results.seeds_text)
+    figures = tuple(rate_figures(all_measures, results.seeds_text))
     if figures:
         yield Section("", figures=figures)
     columns = ("policy", "fault", "median [s]", "not back", "null's median [s]", "null not back")

@@ -5,23 +5,19 @@ Equal rows give equal bytes.
 
 from __future__ import annotations
 
-import base64
-import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from importlib.resources import files
+from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 from swarm_logistics_env.errors import StudyError, how_to_install
 from swarm_logistics_env.records import atomic_write, plain, write_csv
-from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.results import StudyResults
 
 from .document import Document, document
 from .drawing import images
-from .page import forest, p_by_seed, page_data, views
-from .section import Section, percent
+from .page import html
+from .section import Section
 
 
 def write_report(
@@ -39,23 +35,23 @@ def write_report(
     pictures, page = directory / "figures", directory / "report.html"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
-        write_csv(paths[1], frame(results.cells, CELL_COLUMNS), StudyError)
-        write_csv(paths[2], frame(results.verdicts, VERDICT_COLUMNS), StudyError)
-        write_text(paths[3], latex_tables((report.answer.section, *report.summary)))
-        for figure in report.figures():
+        write_csv(paths[1], results.cell_table, StudyError)
+        write_csv(paths[2], results.verdict_table, StudyError)
+        for figure in report.figures:
             write_csv(pictures / f"{figure.name}.csv", figure.data, StudyError)
+        latex = latex_tables((report.answer.section, *report.summary))
+        write_text(paths[3], latex)
         if advice := how_to_get_figures():
             write_text(paths[0], markdown(report, note=advice))
             return paths
-        drawings = {}
-        for figure in report.figures():
-            svg, png = images(figure.draw, figure.height)
-            write_text(pictures / f"{figure.name}.svg", svg)
-            with atomic_write(pictures / f"{figure.name}.png", StudyError) as part:
-                part.write_bytes(png)
-            drawings[figure.name] = svg
+        drawings = {figure.name: images(figure.draw, figure.height) for figure in report.figures}
+        for name, drawing in drawings.items():
+            write_text(pictures / f"{name}.svg", drawing.svg)
+            with atomic_write(pictures / f"{name}.png", StudyError) as part:
+                part.write_bytes(drawing.png)
         write_text(paths[0], markdown(report, pictures=pictures.name))
-        write_text(page, html(results, report, drawings))
+        svgs = {name: drawing.svg for name, drawing in drawings.items()}
+        write_text(page, html(results, report, svgs, latex))
     except OSError as error:
         raise StudyError(f"cannot write {error.filename}: {error.strerror}") from error
     return page, *paths
@@ -130,53 +126,6 @@ def _inert(text: str) -> str:
     """Return a text of which Markdown makes neither a tag, nor a link, nor a picture."""
     live = r"<(?=[A-Za-z/!?])|(?<=\])(?=\()"
     return re.sub(live, lambda match: "&lt;" if match[0] else "\\", plain(text))
-
-
-def html(results: StudyResults, document: Document, drawings: Mapping[str, str]) -> str:
-    """Return the whole report as one page that loads nothing.
-
-    Args:
-        results: what its script draws.
-        document: the report.
-        drawings: SVG of every figure, by name.
-    """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("swarm_logistics_env", "report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    runs = p_by_seed(results)
-    data = page_data(results, runs, document.sentences)
-    return environment.get_template("page.html.jinja").render(
-        document=document,
-        paired=results.plan.paired,
-        answer=document.answer,
-        level=percent(document.answer.level),
-        forest=forest(document.answer, drawings["answer"]),
-        views=list(views(results, runs, document.figures(), drawings)),
-        colours=_COLOURS,
-        drawings={name: base64.b64encode(svg.encode()).decode() for name, svg in drawings.items()},
-        latex=latex_tables((document.answer.section, *document.summary)),
-        # A text must not end the script that it stands in.
-        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
-        script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
-    )
-
-
-# Of decisions, on light and on dark paper, after Okabe and Ito.
-_COLOURS = {
-    "supported": ("#006b4c", "#3fc79a"),
-    "refuted": ("#a84300", "#f5915a"),
-    "equivalent": ("#005b94", "#6cb8ee"),
-    "open": ("#5b6068", "#a9afb8"),
-    "unaffected": ("#5b6068", "#a9afb8"),
-    "untestable": ("#5b6068", "#a9afb8"),
-    "undefined": ("#a84300", "#f5915a"),
-}
 
 
 _ESCAPES = {

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from more_itertools import map_reduce
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.grouping import grouped
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.questions.comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
 from swarm_logistics_env.questions.declaration import Declaration
@@ -78,7 +78,7 @@ def origin_of(trials: Trials, setup: Mapping[str, str] | None = None) -> Origin:
 
 
 def _conditions(trials: Trials) -> dict[tuple[object, ...], list[Trial]]:
-    return grouped(trials.rows, lambda row: row.condition)
+    return map_reduce(trials.rows, lambda row: row.condition)
 
 
 def _without_removed(trials: Trials) -> Iterator[str]:
@@ -145,7 +145,10 @@ def _tables(trials: Sequence[Trial]) -> Iterator[tuple[str, _Varied]]:
     Yields:
         The heading in the report, and the rows with what each has of that thing.
     """
-    for (_, table), rows in grouped(trials, lambda row: (row.policy, row.table)).items():
+    by_table: dict[tuple[str, str], list[Trial]] = map_reduce(
+        trials, lambda row: (row.policy, row.table)
+    )
+    for (_, table), rows in by_table.items():
         plain = [row for row in rows if row.fault == NO_FAULT_WORD]
         sized = [row for row in plain if row.n_robots is not None]
         of = f"{table}: " if table else ""
@@ -163,7 +166,7 @@ def _split(
     varied: Callable[[Sequence[Trial]], _Varied],
 ) -> Iterator[tuple[str, _Varied]]:
     """Yield a table for each group of rows that have the same fixed values and differ otherwise."""
-    tables_by_values = {key: varied(group) for key, group in grouped(rows, fixed).items()}
+    tables_by_values = {key: varied(group) for key, group in map_reduce(rows, fixed).items()}
     tables = {key: table for key, table in tables_by_values.items() if len(table) > 1}
     for key, table in tables.items():
         values_text = ", ".join(f"{name} = {value:g}" for name, value in key)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-
-from swarm_logistics_env.grouping import grouped
+from more_itertools import map_reduce
 
 from .cell import Cell
-from .results import StudyResults
 
 
 class Agreement(NamedTuple):
@@ -32,12 +30,13 @@ class Agreement(NamedTuple):
     mean_log_error: float | None
 
 
-def agreements(results: StudyResults) -> tuple[Agreement, ...]:
+def agreements(cells: Iterable[Cell]) -> tuple[Agreement, ...]:
     """Return the agreement of every policy all of whose cells have runs; none without reference."""
-    counted = grouped([cell for cell in results.cells if cell.counted], lambda cell: cell.policy)
+    counted = [cell for cell in cells if cell.counted]
+    by_policy: dict[str, list[Cell]] = map_reduce(counted, lambda cell: cell.policy)
     return tuple(
         agreement(policy, cells)
-        for policy, cells in counted.items()
+        for policy, cells in by_policy.items()
         if not any(cell.problem for cell in cells)
     )
 

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from swarm_logistics_env.questions.comparison import Arm, Comparison
 from swarm_logistics_env.questions.declaration import Declaration
 from swarm_logistics_env.questions.plan import CellKey, Plan
-from swarm_logistics_env.spi.inputs import Numbers
+from swarm_logistics_env.questions.specification import seeds_in_words
 from swarm_logistics_env.tasks.task import Outcome, Outcomes
 
+from .agreement import Agreement, agreements
 from .cell import Cell
+from .columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from .reference import PAPER, Reference
 from .until_clear import latest_look
-from .verdict import Verdict, adjust_families, judge_comparison
+from .verdict import Verdict, adjust_families, judge_comparison, level_of
 
-TimesBySeed = tuple[Numbers, ...]
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -64,24 +68,57 @@ class StudyResults:
         """Labels of the policies that are judged, the baseline first."""
         return tuple(dict.fromkeys(verdict.compared.policy for verdict in self.verdicts))
 
-    def outcome(self, arm: Arm, seed: int) -> Outcome | None:
-        """Return what an arm's run at a seed gave; None: it failed, or is missing."""
-        outcome = self.outcomes.get((arm.case.key, seed))
-        return None if outcome is None or outcome.error is not None else outcome
+    @cached_property
+    def succeeded(self) -> Outcomes:
+        """The outcomes of the runs that did not fail, by the key of the case and the seed."""
+        return {key: outcome for key, outcome in self.outcomes.items() if outcome.error is None}
 
-    def outcomes_of(self, arm: Arm) -> tuple[Outcome, ...]:
-        """Return an arm's outcomes by seed; none if one failed, is missing or has no times."""
-        outcomes = [self.outcome(arm, seed) for seed in self.plan.seeds]
+    @cached_property
+    def timed_outcomes(self) -> Mapping[Arm, tuple[Outcome, ...]]:
+        """Outcomes of each arm by seed; none if one failed, is missing or has no times."""
+        arms = [*(arm for _, _, arm in self.plan.cells), *self.plan.nulls.values()]
+        return {arm: self._timed_outcomes(arm) for arm in dict.fromkeys(arms)}
+
+    def _timed_outcomes(self, arm: Arm) -> tuple[Outcome, ...]:
+        seeds = self.plan.seeds
+        outcomes = [self.succeeded.get((arm.case.key, seed)) for seed in seeds]
         timed = tuple(
             outcome for outcome in outcomes if outcome is not None and outcome.untimed is None
         )
         # Unpaired results need not be equally many everywhere.
-        is_complete = len(timed) == len(outcomes) or not self.plan.paired
+        is_complete = len(timed) == len(seeds) or not self.plan.paired
         return timed if is_complete else ()
 
-    def times_of(self, arm: Arm) -> TimesBySeed:
-        """Return an arm's delivery times [s] seed by seed; none as `outcomes_of`."""
-        return tuple(outcome.delivery_times for outcome in self.outcomes_of(arm))
+    @cached_property
+    def cell_table(self) -> pd.DataFrame:
+        """The cells, a row each, with the columns `CELL_COLUMNS`."""
+        return frame(self.cells, CELL_COLUMNS)
+
+    @cached_property
+    def verdict_table(self) -> pd.DataFrame:
+        """The verdicts, a row each, with the columns `VERDICT_COLUMNS`."""
+        return frame(self.verdicts, VERDICT_COLUMNS)
+
+    @cached_property
+    def agreements(self) -> tuple[Agreement, ...]:
+        """How near each policy comes to the reference; none without one."""
+        return agreements(self.cells)
+
+    @property
+    def level(self) -> float:
+        """The level of most intervals of its verdicts, in (0, 1)."""
+        return level_of(self.verdicts)
+
+    @property
+    def seeds_text(self) -> str:
+        """Over which seeds everything is, e.g. "20 paired seeds (0 to 19)"."""
+        seeds = self.plan.seeds
+        if not self.plan.paired:
+            fewest = min(cell.n_seeds for cell in self.cells)
+            count = f"{fewest} to {len(seeds)}" if fewest < len(seeds) else f"{fewest}"
+            return f"{count} unpaired {'run' if count == '1' else 'runs'} a condition"
+        count = "one seed" if len(seeds) == 1 else f"{len(seeds)} paired seeds"
+        return f"{count} ({seeds_in_words(seeds)})"
 
 
 def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -> StudyResults:

@@ -16,9 +16,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from more_itertools import map_reduce
+
 from swarm_logistics_env import spi
-from swarm_logistics_env.grouping import grouped
-from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Comparison
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Comparison, Family
 from swarm_logistics_env.questions.plan import Plan
 from swarm_logistics_env.spi.equivalence import ALPHA
 from swarm_logistics_env.tasks.task import Case, Outcomes, Run
@@ -50,7 +51,9 @@ def latest_look(plan: Plan, outcomes: Outcomes) -> LatestLook:
     looks = _Looks(plan, outcomes)
     next_runs = looks.missing(plan.cases, looks.seeds[0])
     verdicts = dict[Comparison, Verdict]()
-    families = grouped(plan.comparisons, lambda comparison: comparison.family)
+    families: dict[Family, list[Comparison]] = map_reduce(
+        plan.comparisons, lambda comparison: comparison.family
+    )
     for comparisons in families.values():
         family = _Family(comparisons, looks)
         next_runs |= family.next_runs

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
 
+from more_itertools import map_reduce
+
 from swarm_logistics_env import spi
-from swarm_logistics_env.grouping import grouped
-from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Comparison, Setting
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Comparison, Family, Setting
 from swarm_logistics_env.spi import Equivalence, Estimate, Interval, equivalence
 from swarm_logistics_env.spi.equivalence import ALPHA
 
@@ -95,6 +97,23 @@ class Verdict:
         return self.estimate.flags if self.estimate else ()
 
     @property
+    def level(self) -> float | None:
+        """The level of its interval, in (0, 1); None: it has none, or the value is exact."""
+        estimate = self.estimate
+        if estimate is None or estimate.low is None or estimate.identical:
+            return None
+        return estimate.confidence
+
+    @property
+    def lies_above(self) -> bool | None:
+        """Whether its interval lies above the threshold; None: it holds it, or there is none."""
+        _, low, high = self.interval or (None, None, None)
+        threshold = self.compared.threshold
+        if low is None or high is None or low <= threshold <= high:
+            return None
+        return low > threshold
+
+    @property
     def after(self) -> Setting:
         """The setting of the changed condition."""
         return self.compared.changed.setting
@@ -156,6 +175,12 @@ class Verdict:
     def detectable(self) -> float | None:
         """Distance from the threshold that these seeds find with 80 % power."""
         return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
+
+
+def level_of(verdicts: Iterable[Verdict]) -> float:
+    """Return the level of most intervals of these verdicts, for a heading over all of them."""
+    counts = Counter(verdict.level for verdict in verdicts if verdict.level is not None)
+    return max(counts, key=counts.__getitem__, default=CONFIDENCE)
 
 
 def judge_comparison(
@@ -238,7 +263,10 @@ def adjust_families(verdicts: Sequence[Verdict]) -> Iterator[Verdict]:
     An undefined comparison leaves its family without adjusted decisions: it would be too small.
     """
     adjusted: dict[Comparison, Verdict] = {}
-    for family in grouped(verdicts, lambda verdict: verdict.compared.family).values():
+    families: dict[Family, list[Verdict]] = map_reduce(
+        verdicts, lambda verdict: verdict.compared.family
+    )
+    for family in families.values():
         estimates = [verdict.estimate for verdict in family if verdict.estimate]
         if len(estimates) == len(family):
             p_values = spi.adjusted_p_values(estimates)

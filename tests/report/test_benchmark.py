@@ -49,7 +49,7 @@ def test_the_table_names_the_worst_cell_and_the_score() -> None:
     assert benchmark.score(results) == pytest.approx(held_out)
     # Both failures hold for the same robots.
     (arm,) = {one.compared.changed for one in results.verdicts if "both" in one.compared.table}
-    outcome = results.outcome(arm, 0)
+    outcome = results.succeeded.get((arm.case.key, 0))
     assert outcome is not None
     assert len(outcome.failed_robots) == 3
 

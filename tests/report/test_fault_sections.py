@@ -135,6 +135,6 @@ def test_figures_have_files_and_numbers_of_their_own() -> None:
     sizes = [{"title": title, "values": [5, 10]} for title in ("My sizes", "my-sizes")]
     study = Study(seeds=4, sizes=sizes, ablations=[{"policy": "random-walk", "fall": 0.25}])
     found = judged(study, lambda _, at, s: delivered((20 if at.name == "random-walk" else 40) + s))
-    *others, last = document(found).figures()
+    *others, last = document(found).figures
     assert [figure.name for figure in others] == ["answer", "S-My-sizes", "S-my-sizes-2"]
     assert last.data["value"].tolist() == pytest.approx([21.5 / 41.5 - 1])

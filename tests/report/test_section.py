@@ -104,7 +104,7 @@ def test_every_surface_names_the_level_that_it_prints(
         "page": page.split("<script", maxsplit=1)[0],
         "tables": latex_tables((whole.answer.section, *whole.summary)).replace("\\%", "%"),
         "sentence": in_a_sentence(stopped),
-        "captions": " ".join(figure.caption for figure in whole.figures()),
+        "captions": " ".join(figure.caption for figure in whole.figures),
     }
     for name, text in surfaces.items():
         assert "95 %" not in re.sub(ALWAYS_95, "", text), name

@@ -76,7 +76,7 @@ def test_page_needs_nothing_but_itself(directory: Path) -> None:
 
 
 def test_every_figure_comes_as_drawing_and_data(few: StudyResults, directory: Path) -> None:
-    names = [figure.name for figure in document(few).figures()]
+    names = [figure.name for figure in document(few).figures]
     assert len(names) == len(set(names)) >= 5
     page, text = (directory / "report.html").read_text(), (directory / "report.md").read_text()
     for name in names:

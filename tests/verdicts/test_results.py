@@ -12,7 +12,6 @@ from swarm_logistics_env.questions.declaration import Declaration
 from swarm_logistics_env.report.tables import warnings
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcome
-from swarm_logistics_env.verdicts.agreement import agreements
 from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.results import StudyResults, judge
 from swarm_logistics_env.verdicts.verdict import Verdict
@@ -31,13 +30,13 @@ def found() -> StudyResults:
 
 
 def test_misses_lie_outside_the_interval_of_one_run(found: StudyResults) -> None:
-    (own,) = agreements(found)
+    (own,) = found.agreements
     assert len(own.cells) == 33
     # Three cells share the base run with 39 under other published values: 41 twice missing.
     assert {cell.words for cell in own.misses} <= {"warehouse_width = 10"}
     assert (own.mean_log_error or 1.0) < 0.03
     assert len(own.met) > 25
-    (more,) = agreements(paper(lambda *where: published(*where) + 2.0))
+    (more,) = paper(lambda *where: published(*where) + 2.0).agreements
     assert len(more.met) < 5
     logs = [abs(math.log(c.by_seed.mean() / (c.published or 0.0))) for c in more.cells]
     assert more.mean_log_error == pytest.approx(np.mean(logs))
