@@ -371,6 +371,7 @@ class Warehouse:
             items=state.items,
             obstacles=state.obstacle_position,
             progress=state.progress,
+            contacts=state.contacts,
             outcome=blank(StepResult, lengths),
             robot_grid=self._robot_grid,
             item_grid=self._item_grid,
