@@ -26,6 +26,7 @@ from .section import (
     percent,
     ratio,
 )
+from .tables import CONTACTS_HEADING, contacts_text
 
 STUDY = "benchmark"
 HELD_OUT = "Held out"  # how the titles of its tables begin that give the score
@@ -33,30 +34,32 @@ RESAMPLES = 2_000
 
 
 def table(results: StudyResults) -> Section:
-    """Return P, S, R or A, and FT of every condition, those of a title together."""
+    """Return P, contacts, S, R or A, and FT of every condition, those of a title together."""
     level = level_of(results.verdicts)
     rows: list[Texts] = []
     shown: set[str] = set()  # the sound swarm is the original condition of most titles
     by_title = grouped(results.verdicts, lambda verdict: verdict.compared.table)
     for title, verdicts in by_title.items():
-        rows.append((title, "", "", ""))
+        rows.append((title, "", "", "", ""))
         original = verdicts[0].compared.original
         if original.case.key not in shown:
             shown.add(original.case.key)
-            p = mean_p(results.cells_of(verdicts[0].compared)[original])
-            rows.append((f"  {original.setting}", p, "", ""))
+            cell = results.cells_of(verdicts[0].compared)[original]
+            rows.append((f"  {original.setting}", mean_p(cell), contacts_text(cell), "", ""))
         for changed, of_arm in grouped(verdicts, lambda v: v.compared.changed).items():
             by_symbol = {verdict.compared.indicator: verdict for verdict in of_arm}
             tolerance = by_symbol.pop("FT", None)
             indicators = [f"{symbol} {ratio(v, level)}" for symbol, v in by_symbol.items()]
-            p = mean_p(results.cells_of(of_arm[0].compared)[changed])
+            cell = results.cells_of(of_arm[0].compared)[changed]
             ft = NOTHING if tolerance is None else ratio(tolerance, level)
-            rows.append((f"  {changed.setting}", p, "; ".join(indicators), ft))
+            p, contacts = mean_p(cell), contacts_text(cell)
+            rows.append((f"  {changed.setting}", p, contacts, "; ".join(indicators), ft))
     return Section(
         f"{results.policies[0]}: benchmark of robustness",
         (
             "condition",
             f"P [{P_LEVEL}]",
+            CONTACTS_HEADING,
             f"S, R or A [{percent(level)}]",
             f"FT [{percent(level)}]",
         ),

@@ -15,7 +15,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
 
 from .answer import Answer, answer
-from .figures import forest_figure, indicator_figures
+from .figures import forest_figure, indicator_figures, trade_off_figure
 from .section import Figure, Section, Sentence, join_names, percent, seeds_text, sentence
 from .tables import fault_sections, tables, warnings
 
@@ -100,7 +100,10 @@ def document(results: StudyResults) -> Document:
         Chapter(
             "Beyond the paper",
             "Measures that the paper does not define; none of them enters a verdict above.",
-            tuple(fault_sections(results)),
+            (
+                *(Section("", figures=(figure,)) for figure in trade_off_figure(results)),
+                *fault_sections(results),
+            ),
         ),
         Chapter("Set-up", "", setup_sheet(plan)),
         Chapter("Methods", "", (Section("", lines=(methods(plan, results.looks),)),)),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 
 from swarm_logistics_env.grouping import grouped
-from swarm_logistics_env.questions.comparison import CONFIDENCE, Comparison
+from swarm_logistics_env.questions.comparison import CONFIDENCE, NO_FAULT, Comparison
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorKind
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.columns import VERDICT_COLUMNS, frame
@@ -108,6 +109,53 @@ def performance_panels(
         x_label = X_LABELS.get(setting.kind, setting.name)
         if points:
             yield table, Panel("", "performance P", points, (), x_label)
+
+
+_MOST_PANELS = 12
+
+
+def trade_off_figure(results: StudyResults) -> Iterator[Figure]:
+    """Yield P against contacts, a point a policy, where contacts were counted.
+
+    Each condition has a panel; where they are many, all are in one.
+    """
+    import pandas as pd
+
+    cells = [
+        same_case[0]
+        for same_case in grouped(results.cells, lambda c: (c.policy, c.arm.case.key)).values()
+        if same_case[0].contacts.value >= 0.0
+    ]
+    if not cells:
+        return
+    policies = list(dict.fromkeys(cell.policy for cell in cells))
+    panels = grouped(cells, lambda cell: cell.words)
+    if len(panels) > _MOST_PANELS:
+        panels = {"": cells}
+    points = {
+        title: [(_cell_point(cell, policies), cell.contacts) for cell in of_panel]
+        for title, of_panel in panels.items()
+    }
+    rows = [(cell.policy, cell.words, *cell.contacts, *cell.mean, CONFIDENCE) for cell in cells]
+    columns = ["policy", "cell", "contacts", "contacts_low", "contacts_high"]
+    yield Figure(
+        "trade-off",
+        f"P against contacts per robot-minute, a point for each policy and condition. Filled: no "
+        f"robot fails; hollow: some do; bars: {P_LEVEL} intervals. "
+        f"{seeds_text(results).capitalize()}.",
+        pd.DataFrame(rows, columns=[*columns, "mean", "low", "high", "confidence"]),
+        0.8 + 1.9 * math.ceil(len(panels) / 2) if len(panels) > 1 else 3.2,
+        partial(drawing.trade_off, panels=points),
+        title="P against contacts",
+    )
+
+
+def _cell_point(cell: Cell, policies: Sequence[str]) -> Point:
+    """Return mean P of a cell; filled where no robot fails."""
+    setting = cell.arm.setting
+    is_sound = setting.kind != "fault" or setting == NO_FAULT
+    style = policies.index(cell.policy)
+    return Point(cell.policy, style, cell.words, *cell.mean, decided=is_sound)
 
 
 def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int], list[Verdict]]:
