@@ -117,6 +117,12 @@ def score(results: StudyResults) -> Numbers:
     return np.asarray(np.mean([cell.by_seed for cell in cells.values()], axis=0))
 
 
+def contacts(results: StudyResults) -> str:
+    """Return contacts per robot-minute, the mean of the held-out conditions."""
+    mean = float(np.mean([cell.contacts.value for cell in _held_out(results).values()]))
+    return NOTHING if np.isnan(mean) else f"{mean:.1f}"
+
+
 def _held_out(results: StudyResults) -> dict[Arm, Cell]:
     return {
         verdict.compared.changed: results.cells_of(verdict.compared)[verdict.compared.changed]
