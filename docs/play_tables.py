@@ -21,6 +21,7 @@ from tables import ROOT, answer, by_policy, example, rewrite, seeds_from, table,
 from swarm_logistics_env import spi
 from swarm_logistics_env.cli.judging import ENTRIES
 from swarm_logistics_env.report import benchmark, drawing, section
+from swarm_logistics_env.report.tables import contacts_text
 from swarm_logistics_env.runs.engines import usable_cores
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.studies import Study
@@ -82,7 +83,7 @@ def robust_block(results: StudyResults) -> str:
     for label, tests in by_label.items():
         cell = results.cells_of(tests[0].compared)[tests[0].compared.changed]
         by_symbol = {test.compared.indicator: test for test in tests}
-        row = [label, section.mean_p(cell)]
+        row = [label, section.mean_p(cell), contacts_text(cell)]
         for symbol in ("R", "FT"):
             test = by_symbol[symbol]
             row.append(f"{section.ratio(test)}, {section.conclusion_text(test)}")
@@ -90,7 +91,7 @@ def robust_block(results: StudyResults) -> str:
         rows.append(row)
     summary = "; ".join(f"{word}: {section.join_names(tests)}" for word, tests in by_answer.items())
     return table(
-        ("", "P", "R above 0?", "FT above 0?"),
+        ("", "P", "contacts a robot-minute", "R above 0?", "FT above 0?"),
         rows,
         f"`{results.policies[0]}`, {seeds_from(results, 'seeds of each')}; verdicts by Holm's "
         f"method. {summary[:1].upper()}{summary[1:]}.",
@@ -252,13 +253,17 @@ def benchmark_block(studies: Sequence[StudyResults]) -> str:
     entries = {name: score.tolist() for name, score in scores.items()}
     ENTRIES.write_text(json.dumps(entries) + "\n")
     board = benchmark.leaderboard(scores)
-    worst_cells = {}
+    worst_cells, contacts = {}, {}
     for results in studies:
         test, share = benchmark.worst(results)
         worst_cells[results.policies[0]] = f"{test.compared.table}, {test.after}: {share:.0%}"
+        contacts[results.policies[0]] = benchmark.contacts(results)
     return table(
-        (*board.columns, "worst cell, share of P without it"),
-        [(f"`{name}`", *columns, worst_cells[name]) for name, *columns in board.rows],
+        (*board.columns, "contacts a robot-minute", "worst cell, share of P without it"),
+        [
+            (f"`{name}`", *columns, contacts[name], worst_cells[name])
+            for name, *columns in board.rows
+        ],
         f"{seeds_from(studies[0])}, of each training. {' '.join(board.lines)}",
     )
 

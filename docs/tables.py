@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env.report import section
+from swarm_logistics_env.report.tables import contacts_text
 from swarm_logistics_env.report.write import section_markdown
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.cell import Cell
@@ -57,10 +58,17 @@ def by_policy(
     text: Callable[[Verdict], str],
     *lines: str,
 ) -> str:
-    """Return a table of P and of indicators with a column for each policy, and lines below."""
+    """Return a table of P, contacts per robot-minute and indicators, and lines below.
+
+    Each policy has a column; contacts have rows where they were counted.
+    """
     rows: dict[str, dict[str, str]] = {}
+    cells = list(cells)
     for cell in cells:
         rows.setdefault(f"P, {cell.words}", {})[cell.policy] = section.mean_p(cell)
+    for cell in cells:
+        if cell.contacts.value >= 0.0:
+            rows.setdefault(f"contacts, {cell.words}", {})[cell.policy] = contacts_text(cell)
     for test in tests:
         label = f"{test.compared.indicator}, {test.compared.label}"
         rows.setdefault(label, {})[test.compared.policy] = text(test)

@@ -13,6 +13,7 @@ from swarm_logistics_env.errors import CommandError, PolicyError
 from swarm_logistics_env.policies.policy import Policy, decide, one_thread, start
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
+from swarm_logistics_env.warehouse.contacts import NO_MEASURES, ContactMeasures
 from swarm_logistics_env.warehouse.faults import FaultLike
 
 
@@ -29,6 +30,7 @@ class Episode:
         anchoring_seconds: robot-seconds that working robots spent touching failed ones.
         digest: hash of every robot's position at every control step and of all deliveries, in
             hexadecimal. Runs of equal digest went the same way, whatever their timers said.
+        contacts: how often robots ran into each other, how deep, and their accelerations.
     """
 
     seed: int
@@ -38,6 +40,7 @@ class Episode:
     failed_robots: tuple[int, ...]
     anchoring_seconds: float
     digest: str
+    contacts: ContactMeasures = NO_MEASURES
 
     @property
     def delivered(self) -> int:
@@ -140,4 +143,5 @@ def run_episode(
         failed_robots=world.struck_robots,
         anchoring_seconds=round(state.anchoring_seconds, 9),
         digest=digest.hexdigest(),
+        contacts=state.contact_measures,
     )

@@ -25,6 +25,7 @@ from .section import (
     percent,
     ratio,
 )
+from .tables import CONTACTS_HEADING, contacts_text
 
 STUDY = "benchmark"
 HELD_OUT = "Held out"  # how the titles of its tables begin that give the score
@@ -32,7 +33,7 @@ RESAMPLES = 2_000
 
 
 def table(results: StudyResults) -> Section:
-    """Return P, S, R or A, and FT of every condition, those of a title together."""
+    """Return P, contacts, S, R or A, and FT of every condition, those of a title together."""
     level = results.level
     rows: list[Texts] = []
     shown: set[str] = set()  # the sound swarm is the original condition of most titles
@@ -40,25 +41,27 @@ def table(results: StudyResults) -> Section:
         results.verdicts, lambda verdict: verdict.compared.table
     )
     for title, verdicts in by_title.items():
-        rows.append((title, "", "", ""))
+        rows.append((title, "", "", "", ""))
         original = verdicts[0].compared.original
         if original.case.key not in shown:
             shown.add(original.case.key)
-            p = mean_p(results.cells_of(verdicts[0].compared)[original])
-            rows.append((f"  {original.setting}", p, "", ""))
+            cell = results.cells_of(verdicts[0].compared)[original]
+            rows.append((f"  {original.setting}", mean_p(cell), contacts_text(cell), "", ""))
         by_arm: dict[Arm, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.changed)
         for changed, of_arm in by_arm.items():
             by_symbol = {verdict.compared.indicator: verdict for verdict in of_arm}
             tolerance = by_symbol.pop("FT", None)
             indicators = [f"{symbol} {ratio(v, level)}" for symbol, v in by_symbol.items()]
-            p = mean_p(results.cells_of(of_arm[0].compared)[changed])
+            cell = results.cells_of(of_arm[0].compared)[changed]
             ft = NOTHING if tolerance is None else ratio(tolerance, level)
-            rows.append((f"  {changed.setting}", p, "; ".join(indicators), ft))
+            p, contacts = mean_p(cell), contacts_text(cell)
+            rows.append((f"  {changed.setting}", p, contacts, "; ".join(indicators), ft))
     return Section(
         f"{results.policies[0]}: benchmark of robustness",
         (
             "condition",
             f"P [{P_LEVEL}]",
+            CONTACTS_HEADING,
             f"S, R or A [{percent(level)}]",
             f"FT [{percent(level)}]",
         ),
@@ -114,6 +117,12 @@ def score(results: StudyResults) -> Numbers:
         if cell.problem:
             raise StudyError(f"{arm.setting}: {cell.problem}, so there is no score")
     return np.asarray(np.mean([cell.by_seed for cell in cells.values()], axis=0))
+
+
+def contacts(results: StudyResults) -> str:
+    """Return contacts per robot-minute, the mean of the held-out conditions."""
+    mean = float(np.mean([cell.contacts.value for cell in _held_out(results).values()]))
+    return NOTHING if np.isnan(mean) else f"{mean:.1f}"
 
 
 def _held_out(results: StudyResults) -> dict[Arm, Cell]:

@@ -13,7 +13,7 @@ from swarm_logistics_env.spi.ratio import MIN_SEEDS
 from swarm_logistics_env.verdicts.results import StudyResults
 
 from .answer import Answer, answer
-from .figures import forest_figure, indicator_figures
+from .figures import forest_figure, indicator_figures, trade_off_figure
 from .section import Figure, Section, Sentence, join_names, percent, sentence
 from .tables import fault_sections, tables, verdict_sections, warnings
 
@@ -83,6 +83,7 @@ def document(results: StudyResults) -> Document:
     in_words = tuple(verdict_sections(results.verdicts, sentences))
     result_tables = tuple(tables(results))
     of_faults = tuple(fault_sections(results))
+    trade_offs = tuple(trade_off_figure(results))
     figures = forest_figure(results, study_answer), *indicator_figures(results)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
@@ -107,7 +108,7 @@ def document(results: StudyResults) -> Document:
         Chapter(
             "Beyond the paper",
             "Measures that the paper does not define; none of them enters a verdict above.",
-            of_faults,
+            (*(Section("", figures=(figure,)) for figure in trade_offs), *of_faults),
         ),
         Chapter("Set-up", "", setup),
         Chapter("Methods", "", (Section("", lines=(method,)),)),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.verdicts.mid_run_faults import RateCurve
 
 if TYPE_CHECKING:
@@ -271,6 +273,34 @@ def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
     axes.grid(visible=True, axis="x")
     axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="indicator")
     axes.set_xlim(_limits([point for _, points in rows for point in points]))
+
+
+def trade_off(canvas: Canvas, panels: Mapping[str, Sequence[tuple[Point, Interval]]]) -> None:
+    """Draw values against contacts per robot-minute with their intervals, on one scale.
+
+    Args:
+        canvas: to draw on.
+        panels: points, each with its contacts, by the title of their panel.
+    """
+    n_rows = math.ceil(len(panels) / 2)
+    n_columns = min(len(panels), 2)
+    grid = canvas.subplots(n_rows, n_columns, squeeze=False, sharex=True, sharey=True)
+    for axes, (title, points) in zip(grid.flat, panels.items()):
+        for point, contacts in points:
+            if contacts.low is not None and contacts.high is not None:
+                colour = COLOURS[point.style % len(COLOURS)]
+                axes.hlines(point.value or 0.0, contacts.low, contacts.high, color=colour)
+            _mark(axes, contacts.value, point)
+        axes.set_title(title)
+    for axes in grid.flat[len(panels) :]:
+        axes.set_visible(False)
+        grid[-2, -1].tick_params(labelbottom=True)
+    canvas.supxlabel("contacts per robot-minute", fontsize=9.5)
+    canvas.supylabel("performance P", fontsize=9.5)
+    grid[0, 0].set_ylim(_limits([point for points in panels.values() for point, _ in points]))
+    grid[0, 0].set_ylim(bottom=0.0)
+    grid[0, 0].set_xlim(left=0.0)
+    _legend(canvas, grid[0, 0])
 
 
 def rates(

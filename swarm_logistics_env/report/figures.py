@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from more_itertools import map_reduce
+from more_itertools import map_reduce, unique_everseen
 
-from swarm_logistics_env.questions.comparison import CONFIDENCE
+from swarm_logistics_env.questions.comparison import CONFIDENCE, NO_FAULT
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorKind
+from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.mid_run_faults import RateCurve, Resilience, window_of
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
@@ -72,6 +74,51 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
             panels=panels,
             level=levels(verdicts),
         )
+
+
+_MOST_PANELS = 12
+
+
+def trade_off_figure(results: StudyResults) -> Iterator[Figure]:
+    """Yield P against contacts, a point a policy, where contacts were counted.
+
+    Each condition has a panel; where they are many, all are in one.
+    """
+    import pandas as pd
+
+    # A case may stand in several tables.
+    distinct = unique_everseen(results.cells, lambda cell: (cell.policy, cell.arm.case.key))
+    cells = [cell for cell in distinct if cell.contacts.value >= 0.0]
+    if not cells:
+        return
+    policies = list(dict.fromkeys(cell.policy for cell in cells))
+    panels: dict[str, list[Cell]] = map_reduce(cells, lambda cell: cell.words)
+    if len(panels) > _MOST_PANELS:
+        panels = {"": cells}
+    points = {
+        title: [(_cell_point(cell, policies), cell.contacts) for cell in of_panel]
+        for title, of_panel in panels.items()
+    }
+    rows = [(cell.policy, cell.words, *cell.contacts, *cell.mean, CONFIDENCE) for cell in cells]
+    columns = ["policy", "cell", "contacts", "contacts_low", "contacts_high"]
+    yield Figure(
+        "trade-off",
+        f"P against contacts per robot-minute, a point for each policy and condition. Filled: no "
+        f"robot fails; hollow: some do; bars: {P_LEVEL} intervals. "
+        f"{results.seeds_text.capitalize()}.",
+        pd.DataFrame(rows, columns=[*columns, "mean", "low", "high", "confidence"]),
+        0.8 + 1.9 * math.ceil(len(panels) / 2) if len(panels) > 1 else 3.2,
+        partial(drawing.trade_off, panels=points),
+        title="P against contacts",
+    )
+
+
+def _cell_point(cell: Cell, policies: Sequence[str]) -> Point:
+    """Return mean P of a cell; filled where no robot fails."""
+    setting = cell.arm.setting
+    is_sound = setting.kind != "fault" or setting == NO_FAULT
+    style = policies.index(cell.policy)
+    return Point(cell.policy, style, cell.words, *cell.mean, decided=is_sound)
 
 
 def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int], list[Verdict]]:

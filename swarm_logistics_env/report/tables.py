@@ -52,8 +52,11 @@ def tables(results: StudyResults) -> Iterator[Section]:
     for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
         cells = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
         has_published = any(cell.published is not None for cell in cells)
+        has_contacts = any(cell.contacts.value >= 0.0 for cell in cells)  # NaN: not counted
         verdicts = verdicts_of.get((policy, table), [])
-        for title, columns, arms in _layouts(verdicts, published=has_published):
+        for title, columns, arms in _layouts(
+            verdicts, published=has_published, contacts=has_contacts
+        ):
             rows = tuple(
                 tuple(text(cell) for _, text in columns)
                 for cell in cells
@@ -67,7 +70,7 @@ def tables(results: StudyResults) -> Iterator[Section]:
 
 
 def _layouts(
-    verdicts: Sequence[Verdict], *, published: bool
+    verdicts: Sequence[Verdict], *, published: bool, contacts: bool
 ) -> Iterator[tuple[str, list[CellColumn], set[Arm] | None]]:
     """Yield the tables of one policy and one heading of the plan, without their cells.
 
@@ -79,7 +82,7 @@ def _layouts(
     """
     setting: CellColumn = ("", lambda cell: cell.words)
     title = ""
-    columns = [setting, *_performance_columns(published=published)]
+    columns = [setting, *_performance_columns(published=published, contacts=contacts)]
     arms: set[Arm] | None = None
     by_indicator: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.indicator)
     for indicator, same_indicator in by_indicator.items():
@@ -90,12 +93,22 @@ def _layouts(
         arms = changed if arms is None else arms & changed
 
 
-def _performance_columns(*, published: bool) -> Iterator[CellColumn]:
+def _performance_columns(*, published: bool, contacts: bool) -> Iterator[CellColumn]:
     if published:
         yield "P paper", _published_text
     heading = "P ours" if published else "P"
     yield f"{heading} [{section.P_LEVEL}]", section.mean_p
     yield f"one run [{section.P_LEVEL}]", _one_run
+    if contacts:
+        yield CONTACTS_HEADING, contacts_text
+
+
+CONTACTS_HEADING = f"contacts a robot-minute [{section.P_LEVEL}]"
+
+
+def contacts_text(cell: Cell) -> str:
+    """Return the mean contacts per robot-minute of a cell with its limits."""
+    return section.bracketed(cell.contacts, 1) if cell.contacts.value >= 0.0 else NOTHING
 
 
 def _published_text(cell: Cell) -> str:

@@ -30,21 +30,23 @@ def write_report(
         StudyError: a file cannot be written.
     """
     report = report or document(results)
+    advice = how_to_get_figures()
     names = "report.md", "cells.csv", "claims.csv", "tables.tex"
     paths = tuple(directory / name for name in names)
     pictures, page = directory / "figures", directory / "report.html"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
+        drawn = () if advice else report.figures
+        drawings = {figure.name: images(figure.draw, figure.height) for figure in drawn}
         write_csv(paths[1], results.cell_table, StudyError)
         write_csv(paths[2], results.verdict_table, StudyError)
         for figure in report.figures:
             write_csv(pictures / f"{figure.name}.csv", figure.data, StudyError)
         latex = latex_tables((report.answer.section, *report.summary))
         write_text(paths[3], latex)
-        if advice := how_to_get_figures():
+        if advice:
             write_text(paths[0], markdown(report, note=advice))
             return paths
-        drawings = {figure.name: images(figure.draw, figure.height) for figure in report.figures}
         for name, drawing in drawings.items():
             write_text(pictures / f"{name}.svg", drawing.svg)
             with atomic_write(pictures / f"{name}.png", StudyError) as part:

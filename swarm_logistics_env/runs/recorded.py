@@ -131,8 +131,12 @@ def _case(origin: Origin, row: Trial) -> Case:
 
 def _outcome(row: Trial) -> Outcome:
     if row.times is None:
-        return Outcome(untimed=row.performance)
-    return Outcome(delivery_times=np.array(row.times), ended_at=row.duration or 0.0)
+        return Outcome(untimed=row.performance, contacts_per_robot_minute=row.contacts)
+    return Outcome(
+        delivery_times=np.array(row.times),
+        ended_at=row.duration or 0.0,
+        contacts_per_robot_minute=row.contacts,
+    )
 
 
 _Varied = list[tuple[Setting, Trial]]  # the rows of a table, the original condition first

@@ -11,9 +11,12 @@ from pydantic import TypeAdapter
 
 from swarm_logistics_env.records import canonical_json
 from swarm_logistics_env.tasks.task import Outcome, Run
+from swarm_logistics_env.warehouse.contacts import ContactMeasures
 
 _OUTCOME = TypeAdapter(Outcome)
 _FIELDS = {one.name for one in fields(Outcome)} - {"wall_seconds"}
+# Left out where they are missing: older rows have none of them.
+_COUNTED = set(ContactMeasures._fields)
 _DESCRIBED = {
     "policy", "policy_identity", "task", "scenario", "faults", "behaviour", "code", "seed"
 }  # fmt: skip
@@ -61,7 +64,8 @@ def row_digest(*values: object) -> str:
 
 def content_of(run: Run, outcome: Outcome) -> Content:
     """Return what a store keeps of a run and its outcome besides the wall time."""
-    result = _OUTCOME.dump_json(outcome, exclude={"wall_seconds"}).decode()
+    missing = {name for name in _COUNTED if getattr(outcome, name) is None}
+    result = _OUTCOME.dump_json(outcome, exclude={"wall_seconds", *missing}).decode()
     return run.key, canonical_json(_described(run)), int(outcome.error is not None), result
 
 
@@ -86,10 +90,10 @@ def outcome_of(text: str) -> Outcome:
     Raises:
         ValueError: it does not read, or a field is unknown or missing: P is never guessed.
     """
-    fields = _OUTCOME.validate_json(text, strict=True)
-    if json.loads(text).keys() != _FIELDS:
+    outcome = _OUTCOME.validate_json(text, strict=True)
+    if json.loads(text).keys() | _COUNTED != _FIELDS:
         raise ValueError(f"an outcome should have the fields {sorted(_FIELDS)}")
-    return fields
+    return outcome
 
 
 def case_of(text: str) -> dict[str, Any]:

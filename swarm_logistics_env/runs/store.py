@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.records import atomic_write, canonical_json, plain, write_csv
 from swarm_logistics_env.tasks.task import Outcome, Run
+from swarm_logistics_env.warehouse.contacts import ContactMeasures
 
 from .rows import StoredRow, case_of, content_of, outcome_of, row_digest
 
@@ -202,14 +203,16 @@ class Runs:
             The columns `run` (key), `policy`, `policy_identity`, `task`, `scenario`, `faults`,
             `behaviour`, `code`, `seed`, `delivered` and those of `Outcome`; `scenario` and
             `faults` are JSON, `delivery_times` lists [s]; the fields of an outcome are None where
-            the run failed.
+            the run failed, those of `ContactMeasures` also where nobody counted.
         """
         import pandas as pd
 
         records = []
         for row in sorted(self._rows(None if keys is None else set(keys)), key=lambda row: row.key):
             outcome = outcome_of(row.outcome)
-            result = json.loads(row.outcome) | {"delivered": outcome.delivered}
+            result = json.loads(row.outcome)
+            result |= {name: result.get(name) for name in ContactMeasures._fields}
+            result |= {"delivered": outcome.delivered}
             if outcome.error is not None:
                 result = dict.fromkeys(result) | {"error": outcome.error}
             case = case_of(row.run)

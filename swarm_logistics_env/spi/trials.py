@@ -41,6 +41,7 @@ class Trial:
         performance: P, 0 or more; of an event log the number of deliveries.
         times: of the deliveries [s], ascending; None: not recorded.
         duration: of the trial [s]; None: not given.
+        contacts: per robot-minute [1/min]; None: not recorded.
     """
 
     line: int
@@ -55,6 +56,7 @@ class Trial:
     performance: float
     times: tuple[float, ...] | None = None
     duration: float | None = None
+    contacts: float | None = None
 
     @property
     def condition(self) -> tuple[object, ...]:
@@ -123,7 +125,7 @@ def read_trials(
     """Read one run a row, or one delivery a row (an event log), from a CSV file.
 
     The delimiter (comma, semicolon, tab) is found out. The columns are `robots`,
-    `fault`, `faulty`, `onset`, `policy`, `seed`, `trial` and `performance`, or words of
+    `fault`, `faulty`, `onset`, `policy`, `seed`, `trial`, `contacts` and `performance`, or words of
     `trials_table.NAMES` for them, as far as they apply; any other column of numbers that vary is a
     parameter of that name. An event log has `time` instead of `performance`; a run without any
     delivery is a row with an empty time. A column `table` tells tables apart of which each has
@@ -218,6 +220,7 @@ def _trial(
         row.whole_or_none("seed", 0),
         0.0,
         duration=duration,
+        contacts=row.number_or_none("contacts"),
     )
 
 

@@ -26,6 +26,7 @@ COLUMN_NAMES: dict[str, tuple[str, ...]] = {
     "time": (),
     "duration": ("length",),
     "table": (),
+    "contacts": ("contacts_per_robot_minute",),
 }
 _MEANING = {word: column for column, words in COLUMN_NAMES.items() for word in (column, *words)}
 _TEXTS = ("fault", "policy", "trial", "table")  # columns that hold no numbers

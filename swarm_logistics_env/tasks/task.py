@@ -73,6 +73,14 @@ class Outcome:
         error: traceback, its middle left out where it is very long; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
         untimed: P, 0 or more, where it is not the number of times; None: it is.
+        contacts_per_robot_minute: how often a robot begins to overlap another [1/min].
+        fast_contacts: share of these that close faster than 1 m/s.
+        overlap_share: share of the control steps with two robots that overlap by more than 10 mm.
+        mean_acceleration: of a robot from step to step, over robots and steps [m/s2].
+        p95_acceleration: its 95th percentile [m/s2].
+
+    The last five are those of `ContactMeasures`; None: nobody counted, as in runs of version 0.3,
+    or there was nothing to count.
     """
 
     delivery_times: Times = field(default_factory=lambda: np.empty(0))
@@ -84,6 +92,11 @@ class Outcome:
     error: Annotated[str | None, BeforeValidator(_make_storable)] = None
     wall_seconds: float = 0.0  # a clock may be set back
     untimed: NonNegativeFloat | None = None
+    contacts_per_robot_minute: NonNegativeFloat | None = None
+    fast_contacts: NonNegativeFloat | None = None
+    overlap_share: NonNegativeFloat | None = None
+    mean_acceleration: NonNegativeFloat | None = None
+    p95_acceleration: NonNegativeFloat | None = None
 
     @property
     def delivered(self) -> float:

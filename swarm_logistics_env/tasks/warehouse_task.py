@@ -83,6 +83,7 @@ class WarehouseTask:
             failed_robots=episode.failed_robots,
             anchoring_seconds=episode.anchoring_seconds,
             digest=episode.digest,
+            **episode.contacts._asdict(),
         )
 
 

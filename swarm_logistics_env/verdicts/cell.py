@@ -106,6 +106,40 @@ class Cell:
         p = self.by_seed.ravel()
         return self._possible(spi.prediction_interval(p, CONFIDENCE)) if p.size else _UNKNOWN
 
+    @cached_property
+    def contacts(self) -> Interval:
+        """Mean contacts per robot-minute with its interval; NaN: not counted in every run."""
+        rates = np.array([outcome.contacts_per_robot_minute for outcome in self.outcomes], float)
+        if not rates.size or np.isnan(rates).any():
+            return _UNKNOWN
+        return spi.mean_interval(rates.reshape(self.by_seed.shape), CONFIDENCE)
+
+    @property
+    def fast_contacts(self) -> float | None:
+        """Share of the contacts of all runs that close faster than 1 m/s; None: unknown, or none.
+
+        Runs count by their contacts per robot-minute.
+        """
+        rates = [outcome.contacts_per_robot_minute or 0.0 for outcome in self.outcomes]
+        fast = [outcome.fast_contacts or 0.0 for outcome in self.outcomes]
+        is_known = not math.isnan(self.contacts.value) and sum(rates) > 0.0
+        return float(np.average(fast, weights=rates)) if is_known else None
+
+    @property
+    def overlap_share(self) -> float | None:
+        """Mean over runs of the share of steps with an overlap above 10 mm; None: unknown."""
+        return _mean([outcome.overlap_share for outcome in self.outcomes])
+
+    @property
+    def mean_acceleration(self) -> float | None:
+        """Mean over runs of a robot's mean acceleration [m/s2]; None: unknown."""
+        return _mean([outcome.mean_acceleration for outcome in self.outcomes])
+
+    @property
+    def p95_acceleration(self) -> float | None:
+        """Mean over runs of the 95th percentile of the acceleration [m/s2]; None: unknown."""
+        return _mean([outcome.p95_acceleration for outcome in self.outcomes])
+
     def _possible(self, interval: Interval) -> Interval:
         """Return an interval that ends at the number of items where none comes back."""
         scenario = self.arm.case.scenario
@@ -129,6 +163,12 @@ class Cell:
         """Whether the published P lies in the interval of one run; None: unknown."""
         p, (_, low, high) = self.published, self.one_run
         return None if p is None or low is None or high is None else low <= p <= high
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """Return the mean of what every run has; None: one lacks it, or there is none."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known and len(known) == len(values) else None
 
 
 def same_runs(before: Sequence[Outcome], after: Sequence[Outcome]) -> bool:

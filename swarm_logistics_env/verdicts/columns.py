@@ -78,6 +78,33 @@ CELL_COLUMNS: Columns[Cell] = {
         lambda cell: cell.stalled,
         "share of runs with less than a quarter of the median P",
     ),
+    "contacts": (
+        float,
+        lambda cell: cell.contacts.value,
+        "mean contacts per robot-minute [1/min], see `ContactMeasures`; missing: not counted",
+    ),
+    "contacts_low": (float, lambda cell: cell.contacts.low, "lower limit of its interval"),
+    "contacts_high": (float, lambda cell: cell.contacts.high, "upper limit of it"),
+    "fast_contacts": (
+        float,
+        lambda cell: cell.fast_contacts,
+        "share of them that close faster than 1 m/s; missing: none",
+    ),
+    "overlap_share": (
+        float,
+        lambda cell: cell.overlap_share,
+        "share of steps with two robots that overlap by more than 10 mm",
+    ),
+    "mean_acceleration": (
+        float,
+        lambda cell: cell.mean_acceleration,
+        "mean acceleration of a robot [m/s2]",
+    ),
+    "p95_acceleration": (
+        float,
+        lambda cell: cell.p95_acceleration,
+        "95th percentile of it, mean over runs [m/s2]",
+    ),
     "problem": (str, lambda cell: cell.problem, "why runs are missing; missing: they are complete"),
 }
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.scenario import Scenario
 
+from .contacts import ContactMeasures, contact_measures
 from .packing import blank
 from .structs import (
     CARRIED,
@@ -14,6 +15,7 @@ from .structs import (
     NOBODY,
     STORED,
     Capabilities,
+    ContactCounts,
     Flags,
     Integers,
     Items,
@@ -72,6 +74,7 @@ class WarehouseState:
         self.able = blank(Capabilities, lengths)
         self.items = blank(Items, lengths)
         self.progress = blank(Progress, lengths)
+        self.contacts = blank(ContactCounts, lengths)
         robots.present[:] = True
         for nobody in (robots.item, robots.memory, robots.last_in_delivery, self.items.carrier):
             nobody[...] = NOBODY
@@ -129,6 +132,11 @@ class WarehouseState:
     def anchoring_seconds(self) -> float:
         """Seconds for which working robots touched failed ones, summed over robots."""
         return float(self.progress.anchoring_seconds[0])
+
+    @property
+    def contact_measures(self) -> ContactMeasures:
+        """How often robots ran into each other so far, how deep, and their accelerations."""
+        return contact_measures(self.contacts, self.step, self.time)
 
     @property
     def n_robots(self) -> int:

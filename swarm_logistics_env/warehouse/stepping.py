@@ -5,6 +5,7 @@ from __future__ import annotations
 from swarm_logistics_env.kernels import engine_kernel, kernel
 
 from .addresses import unpacked_at
+from .contacts import count_motion, count_step
 from .demand import ask
 from .grid import fill
 from .logistics import (
@@ -41,6 +42,7 @@ def perceive(address: int, rows: Sensed) -> None:
         world.nearby.is_free[item] = items.status[item] == STORED
     fill(world.item_grid, items.position, world.nearby.is_free)
     n_anchored = sense(world, rows)
+    count_step(world)
     progress.anchoring_seconds[0] += n_anchored * world.parameters.control_period
 
 
@@ -103,6 +105,7 @@ def move(world: World) -> None:
     drive(world)
     unmask_left(world)
     advance(world)
+    count_motion(world)
     robots, bodies = world.robots, world.engine.bodies.numbers
     for robot in range(len(robots.item)):
         is_there = 1.0 if robots.present[robot] else 0.0

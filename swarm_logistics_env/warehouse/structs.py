@@ -19,6 +19,7 @@ from swarm_logistics_env.scenario import Scenario
 from .failure_modes import FAILURE_MODES
 
 STORED, CARRIED, DELIVERED = 0, 1, 2
+N_ACCELERATIONS = 1024  # bins that accelerations are counted in
 NOBODY = -1
 
 Numbers: TypeAlias = NDArray[np.float64]
@@ -132,6 +133,19 @@ class Progress(NamedTuple):
     last_step: Annotated[Integers, 1]  # the step in which the time is up
     pause_step: Annotated[Integers, 1]  # it ends before anything is sensed, as faults change then
     is_changed: Annotated[Flags, 1]  # faults or conditions changed since the step before
+
+
+class ContactCounts(NamedTuple):
+    """What `contacts` counts since the start, and what it keeps of the step before."""
+
+    position_before: Annotated[Numbers, "N", 2]  # [m] of the robots
+    velocity_before: Annotated[Numbers, "N", 2]  # [m/s]
+    n_contacts: Annotated[Integers, 1]  # pairs that began to overlap
+    n_fast: Annotated[Integers, 1]  # those of them that closed fast
+    is_deep: Annotated[Flags, 1]  # a pair overlaps deeply in this step
+    n_deep_steps: Annotated[Integers, 1]  # steps in which one did
+    acceleration_sum: Annotated[Numbers, 1]  # [m/s2] over robots and steps
+    accelerations: Annotated[Integers, "accelerations"]  # robots and steps by acceleration
 
 
 class Grid(NamedTuple):
@@ -250,6 +264,7 @@ class World(NamedTuple):
     items: Items
     obstacles: Annotated[Numbers, "n_obstacles", 2]  # [m]
     progress: Progress
+    contacts: ContactCounts
     outcome: StepResult
     robot_grid: Grid
     item_grid: Grid
@@ -266,6 +281,7 @@ def lengths_of(scenario: Scenario) -> dict[str, int]:
     return {
         "N": n,
         "I": n_items,
+        "accelerations": N_ACCELERATIONS,
         "K": n_kept,
         "K N": n_kept * n,
         "beams": 3 * N_BEAMS,

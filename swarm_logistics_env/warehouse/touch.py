@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from swarm_logistics_env.kernels import inlined_kernel
 
+from .contacts import count_overlap
 from .pose import Pose
 from .structs import World
 
@@ -27,14 +28,20 @@ def touches_solid(pose: Pose, world: World) -> bool:
 
 @inlined_kernel
 def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
-    """Return whether `me` touches a robot, and whether it is sound and touches one that failed."""
+    """Return whether `me` touches a robot, and whether it is sound and touches one that failed.
+
+    Counts those of higher numbers that it overlaps.
+    """
     limit = (2.0 * world.parameters.robot_radius + TOUCHING_GAP) ** 2
+    overlapping = (2.0 * world.parameters.robot_radius) ** 2
     failed = world.robots.failed
     touches = is_anchored = False
     for index in range(n_found):
         if world.nearby.square[index] < limit:
             other = world.robot_grid.members[world.nearby.slot[index]]
             touches = True
+            if other > me and world.nearby.square[index] < overlapping:
+                count_overlap(me, other, world.nearby.square[index], world)
             is_anchored |= failed[other] and not failed[me]
     return touches, is_anchored
 

@@ -340,10 +340,8 @@ class Warehouse:
         state = self.state
         period = self.scenario.control_period
         now, next_step = state.time, (state.step + 1) * period
-        change = min(
-            (occurrence.next_change(now, next_step) for occurrence in self._occurrences),
-            default=math.inf,
-        )
+        changes = (occurrence.next_change(now, next_step) for occurrence in self._occurrences)
+        change = min(changes, default=math.inf)
         state.progress.is_changed[0] = True
         # The first step that ends when it has come; or none of any episode.
         is_ever = change <= LARGEST
@@ -371,6 +369,7 @@ class Warehouse:
             items=state.items,
             obstacles=state.obstacle_position,
             progress=state.progress,
+            contacts=state.contacts,
             outcome=blank(StepResult, lengths),
             robot_grid=self._robot_grid,
             item_grid=self._item_grid,

@@ -9,6 +9,7 @@ from scipy import stats
 from swarm_logistics_env.questions.plan import make_plan
 from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.report import benchmark
+from swarm_logistics_env.report.section import bracketed
 from swarm_logistics_env.studies import Study
 
 SMALL = {"warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.0}
@@ -42,6 +43,10 @@ def test_the_table_names_the_worst_cell_and_the_score() -> None:
     results = study.findings()
     shown = benchmark.table(results)
     cells = {cell.words: cell.by_seed for cell in results.cells}
+    (sound,) = (row for row in shown.rows if row[0].strip() == "no fault")
+    cell = next(cell for cell in results.cells if cell.words == "no fault")
+    assert sound[2] == bracketed(cell.contacts, 1)
+    assert float(benchmark.contacts(results)) > 0.0
     # The sound swarm stands once, not under every title.
     assert [row[0].strip() for row in shown.rows].count("no fault") == 1
     assert "Worst cell: Held out: slow, max_speed = 0.1" in shown.lines[0]

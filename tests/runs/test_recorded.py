@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -157,3 +158,23 @@ def test_p_o_is_of_trials_without_a_fault_and_repeated_ones_are_their_null(tmp_p
     assert [arm.setting for arm in study.plan().nulls.values()] == [OTHER_BEHAVIOUR]
     behaviours = dict(study.results()[["delivered", "behaviour"]].to_numpy().tolist())
     assert [behaviours[p] for p in (9.0, 22.0, 18.0)] == [1, 0, 0]
+
+
+def test_recorded_contacts_stand_beside_p_and_are_missing_without_a_column(tmp_path: Path) -> None:
+    rows = [
+        f"4,{fault},{faulty},{seed},{30 - 5 * faulty + seed},{1.5 + seed + faulty}"
+        for fault, faulty in (("none", 0), ("wheel", 1))
+        for seed in range(3)
+    ]
+    text = "\n".join(["robots,fault,faulty,seed,delivered,contacts", *rows])
+    study = imported(tmp_path, text)
+    assert study.performance()["contacts"].tolist() == [2.5, 3.5]
+    assert "| 2.5 [0.0, 5.0] |" in markdown(document(study.findings()))
+    (tmp_path / "without").mkdir()
+    without = imported(tmp_path / "without", re.sub(r",[^,\n]*$", "", text, flags=re.MULTILINE))
+    assert without.performance()["contacts"].isna().all()
+    assert "contacts" not in markdown(document(without.findings()))
+    # Contacts as a second P: what is read is what is judged.
+    columns = {"performance": "contacts"}
+    trials = spi.read_trials(tmp_path / "table.csv", columns=columns, ignore=["delivered"])
+    assert [trial.performance for trial in trials.rows][:2] == [1.5, 2.5]

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.warehouse.contacts import ContactMeasures
 
 CASE = Case(PolicySpec(name="swarm-dt", label="mine"), "identity", Scenario(), task=WAREHOUSE)
 
@@ -151,6 +153,25 @@ def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: P
     assert path.read_bytes() == before
     assert (place, kept.delivery_times.tolist()) == ((CASE.key, 0), times)
     assert (kept.ended_at, kept.failed_robots, kept.anchoring_seconds) == (500.0, (3,), 1.5)
+
+
+def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) -> None:
+    counted = replace(outcome(1.0), contacts_per_robot_minute=0.0, overlap_share=0.25)
+    with Runs(tmp_path / FILE_NAME) as runs, Runs(None) as other:
+        runs.add(run(0), outcome(1.0))  # as an older version, which knew none of the fields
+        runs.add(run(1), counted)
+        written = [row.outcome for row in sorted(runs._rows(), key=lambda row: row.rowid)]
+        assert not any(name in written[0] for name in ContactMeasures._fields)
+        older, newer = (runs.outcomes([run(seed)])[CASE.key, seed] for seed in range(2))
+        assert [getattr(older, name) for name in ContactMeasures._fields] == [None] * 5
+        assert (newer.contacts_per_robot_minute, newer.fast_contacts) == (0.0, None)
+        other.absorb(runs)
+        assert other.outcomes([run(1)])[CASE.key, 1].overlap_share == 0.25
+        export(runs, tmp_path / "rows.csv")
+    table = pd.read_csv(tmp_path / "rows.csv").sort_values("seed")
+    assert table["contacts_per_robot_minute"].isna().tolist() == [True, False]
+    assert table["overlap_share"].iloc[1] == 0.25
+    assert table["mean_acceleration"].isna().all()
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.verdicts.results import StudyResults, judge
 from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.warehouse.contacts import ContactMeasures
 from tests.made_up import decided, judged, paper, published
 
 
@@ -174,7 +176,16 @@ def test_every_column_has_a_value_somewhere(found: StudyResults) -> None:
     # Every column has a value somewhere in a whole study, but for what only others have.
     claimed = paper(same=frozenset({"FM2"}), seeds=40)
     cells, verdicts = frame(claimed.cells, CELL_COLUMNS), frame(claimed.verdicts, VERDICT_COLUMNS)
-    assert {*cells.columns[cells.isna().all()]} == {"problem"}
+    counted = {
+        "contacts", "contacts_low", "contacts_high", "fast_contacts", "overlap_share",
+        "mean_acceleration", "p95_acceleration",
+    }  # fmt: skip
+    assert {*cells.columns[cells.isna().all()]} == {"problem", *counted}
+    for cell in claimed.cells:
+        measures = ContactMeasures(2.0, 0.5, 0.1, 6.0, 15.0)._asdict()
+        outcomes = [replace(outcome, **measures) for outcome in cell.outcomes]
+        (row,) = frame([replace(cell, outcomes=tuple(outcomes))], CELL_COLUMNS).to_dict("records")
+        assert [row[name] for name in sorted(counted)] == [2.0, 2.0, 2.0, 0.5, 6.0, 0.1, 15.0]
     assert {*verdicts.columns[verdicts.isna().all()]} == {"n_trainings", "stopped_at", "problem"}
 
 

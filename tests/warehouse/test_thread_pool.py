@@ -81,6 +81,7 @@ def test_a_pool_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
     for mine, theirs in zip(together, apart):
         assert mine.state.delivery_times == theirs.state.delivery_times
         assert mine.state.anchoring_seconds == theirs.state.anchoring_seconds
+        assert mine.state.contact_measures == theirs.state.contact_measures
     pool.close()
 
 
