@@ -362,6 +362,10 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots
         yield "flags", {"flags": " ".join(templates.FLAGS[flag] for flag in verdict.flags)}
     if "hidden_stalls" in verdict.flags:
         yield "hidden_stalls", {"n_seeds": spi.seeds_against_stalls(estimate)}
+    if estimate.collapsed is not None:
+        yield "collapsed", {"collapsed": estimate.collapsed}
+    if "hidden_collapses" in verdict.flags:
+        yield "hidden_collapses", {"n_trainings": spi.trainings_against_collapses(estimate)}
     if results.plan.specification.until_clear:
         case = "open_after_all_looks" if verdict.stopped_at is None else "clear_at_a_look"
         yield case, {"n_seeds": estimate.n_seeds, "most": results.looks[-1]}

@@ -41,6 +41,7 @@ from .summaries import (
 from .trials import Trial, Trials, read_trials
 
 __all__ = [
+    "Collapsed",
     "DecisionWord",
     "Equivalence",
     "Estimate",
@@ -79,8 +80,8 @@ __all__ = [
     "seeds_against_stalls",
     "seeds_for_equivalence",
     "seeds_for_power",
-    "trainings_against_collapses",
     "share_stalled",
+    "trainings_against_collapses",
     "worst_decile",
 ]
 

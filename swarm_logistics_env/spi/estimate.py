@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from .hidden import Collapsed, Hidden, collapsed, hidden_of
 from .inputs import (
     IndicatorError,
-    Numbers,
     between_0_and_1,
     finite,
     performance,

@@ -9,7 +9,6 @@ and p(s) the p of the test if the share had lowered the mean.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -83,7 +82,7 @@ def share_stalled(p: ArrayLike) -> float:
 
 def stalls(sample: Numbers) -> Hidden:
     """Return what a sample (..., n) shows of runs that stall."""
-    return Hidden(_stalled(sample).sum(axis=-1), sample.shape[-1], STALL_SHARE)
+    return Hidden(_stalled(sample).sum(axis=-1).astype(np.float64), sample.shape[-1], STALL_SHARE)
 
 
 def hidden_of(
@@ -102,18 +101,19 @@ def hidden_of(
     changed, *_, reference = samples
     beside = [*[reference] * (len(samples) - 1), changed]
     found: list[Hidden | None] = [
-        None if (sample == sample[0]).all() else _collapses(sample, other)
+        None if (sample == sample[..., :1, :]).all() else _collapses(sample, other)
         for sample, other in zip(samples, beside)
     ]
     return found if reference_too else [*found[:-1], None]
 
 
 def _collapses(sample: Numbers, reference: Numbers) -> Hidden:
-    changed, original = sample.mean(axis=1), reference.mean(axis=1)
-    some = original > 0.0
-    median = float(np.median(changed[some] / original[some])) if some.any() else 0.0
-    seen = (changed < COLLAPSED_BELOW * median * original).sum()
-    return Hidden(np.asarray(seen, np.float64), len(sample), 1.0)
+    changed, original = sample.mean(axis=-1), reference.mean(axis=-1)
+    # A training that delivers nothing in its reference counts as one that keeps all.
+    kept = np.divide(changed, original, out=np.full(changed.shape, np.inf), where=original > 0.0)
+    median = np.median(kept, axis=-1, keepdims=True)
+    seen = (kept < COLLAPSED_BELOW * np.where(np.isfinite(median), median, 0.0)).sum(axis=-1)
+    return Hidden(seen.astype(np.float64), changed.shape[-1], 1.0)
 
 
 def collapsed(hidden: Hidden) -> Collapsed:
@@ -141,15 +141,18 @@ def p_with_hidden(p_if_kept: Callable[[Numbers], Numbers], hidden: Hidden | None
         hidden: None: nothing is.
     """
     p = p_if_kept(np.ones(()))
-    if hidden is not None:
-        for share in hidden.most * np.linspace(0.0, 1.0, _SHARES)[1:] ** 2:
-            kept, chance = kept_and_chance(float(share), hidden)
-            p = np.maximum(p, chance * p_if_kept(kept))
-    return p
+    if hidden is None:
+        return p
+    shares = hidden.most * np.linspace(0.0, 1.0, _SHARES)[1:] ** 2
+    kept, chance = kept_and_chance(shares.reshape(-1, *(1,) * p.ndim), hidden)
+    return np.asarray(np.maximum(p, (chance * p_if_kept(kept)).max(axis=0)))
 
 
-def kept_and_chance(share: float, hidden: Hidden) -> tuple[Numbers, Numbers]:
-    """What is left of the mean seen if that share stalls, and the chance to see as few, (...)."""
+def kept_and_chance(share: Numbers | float, hidden: Hidden) -> tuple[Numbers, Numbers]:
+    """What is left of the mean seen if that share stalls, and the chance to see as few.
+
+    A share of shape (s, ...) beside `hidden` of shape (...) gives (s, ...).
+    """
     from scipy.special import bdtr
 
     working = 1.0 - hidden.seen / hidden.of

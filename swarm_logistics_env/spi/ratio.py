@@ -76,8 +76,8 @@ class Design(NamedTuple):
 
     Attributes:
         paired: whether they share their seeds.
-        trainings: whether they are of shape (K trainings, S seeds), K >= 2, S >= 2, row k being
-            one training in all of them; else (..., n), an entry for each seed. A value over
+        trainings: whether they are of shape (..., K trainings, S seeds), K >= 2, S >= 2, row k
+            being one training in all of them; else (..., n), an entry for each seed. A value over
             trainings varies with both, and an interval over seeds alone would only hold for the
             networks at hand.
     """
@@ -87,13 +87,17 @@ class Design(NamedTuple):
 
     def mean(self, sample: Numbers) -> Numbers:
         """Mean over seeds, and over trainings, shape (...)."""
-        return np.asarray(sample.mean() if self.trainings else sample.mean(axis=-1))
+        return np.asarray(sample.mean(axis=(-2, -1) if self.trainings else -1))
+
+    def scaled(self, sample: Numbers, unit: Numbers) -> Numbers:
+        """Sample times a unit of shape (...)."""
+        return np.asarray(unit[..., None, None] if self.trainings else unit[..., None]) * sample
 
     def scatter(self, parts: Sequence[Numbers]) -> tuple[Numbers, Numbers]:
         """Squared standard error of the mean of the sum, and its degrees of freedom, (...)."""
         if self.trainings:
             _, variance, df = mean_over_trainings(parts, paired=self.paired)
-            return np.asarray(variance), np.asarray(df)
+            return variance, df
         if self.paired:
             together, n = sum(parts, np.zeros(())), parts[0].shape[-1]
             variance = np.asarray(together.var(axis=-1, ddof=1) / n)
@@ -134,8 +138,8 @@ class Balance(NamedTuple):
                 np.nan_to_num(weight / (np.where(weight > 0.0, above, below) + raised))
                 for weight in weights
             ]
-        scaled = [unit[..., None] * term.sample for term, unit in zip(terms, units)]
-        variance, df = design.scatter(scaled)
+        parts = [design.scaled(term.sample, unit) for term, unit in zip(terms, units)]
+        variance, df = design.scatter(parts)
         return cls(above, below, np.sqrt(variance), df)
 
     def t(self, side: int, kept: Numbers | float = 1.0) -> Numbers:
@@ -207,7 +211,7 @@ def ratio_test(
         for term in terms
     )
     # The spread of D itself, of which that of the logarithm is a share.
-    variance, _ = design.scatter([term.weight(null)[..., None] * term.sample for term in terms])
+    variance, _ = design.scatter([design.scaled(t.sample, t.weight(null)) for t in terms])
     degenerate = np.sqrt(variance) <= ROUNDING * scale
     p = np.ones(balance.s.shape)
     p_seen = p.copy()

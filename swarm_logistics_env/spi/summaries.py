@@ -36,7 +36,7 @@ def mean_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     from scipy.special import stdtrit
 
     between_0_and_1("confidence", confidence)
-    mean, variance, df = mean_over_trainings([checked], paired=True)
+    mean, variance, df = map(float, mean_over_trainings([checked], paired=True))
     half = float(stdtrit(df, 0.5 + confidence / 2)) * math.sqrt(variance)
     return Interval(mean, max(0.0, mean - half), mean + half)
 
@@ -167,31 +167,36 @@ def t_interval(
     return Interval(mean, max(least, mean - half), mean + half)
 
 
-def mean_over_trainings(weighted: Sequence[Numbers], *, paired: bool) -> tuple[float, float, float]:
-    """Return the mean of the sum, its squared standard error and degrees of freedom.
+def mean_over_trainings(
+    weighted: Sequence[Numbers], *, paired: bool
+) -> tuple[Numbers, Numbers, Numbers]:
+    """Return the mean of the sum, its squared standard error and degrees of freedom, shape (...).
 
     Trainings and seeds are crossed factors without replication, so the variance of the mean is
     (MS_k + MS_s - MS_e) / KS of the two-way analysis of variance (Searle, Casella and McCulloch
     1992), its degrees of freedom after Satterthwaite (1946).
 
     Args:
-        weighted: shape (K, S) each, K >= 2. Unless paired, the seeds of each are others.
+        weighted: shape (..., K, S) each, K >= 2. Unless paired, the seeds of each are others.
     """
-    parts = [np.sum(weighted, axis=0)] if paired else weighted
-    by_training = np.sum([part.mean(axis=1) for part in parts], axis=0)
-    count = by_training.size
-    of_trainings = float(by_training.var(ddof=1)) / count
+    parts = [sum(weighted, np.zeros(()))] if paired else weighted
+    by_training = sum((part.mean(axis=-1) for part in parts), np.zeros(()))
+    count = by_training.shape[-1]
+    of_trainings = by_training.var(axis=-1, ddof=1) / count
     # The residual is in both mean squares: that of the seeds counts without it.
-    of_seeds, without_residual = 0.0, 0.0
+    of_seeds, without_residual = np.zeros(()), np.zeros(())
     freedom = of_trainings**2 / (count - 1)
     for part in parts:
-        seeds = part.shape[1]
-        residual = part - part.mean(axis=0) - part.mean(axis=1, keepdims=True) + part.mean()
-        square = float(part.mean(axis=0).var(ddof=1)) / seeds
-        error = float(np.square(residual).sum()) / ((count - 1) * (seeds - 1)) / part.size
-        of_seeds += square
-        without_residual += square - error
-        freedom += square**2 / (seeds - 1)
-    variance = max(of_trainings + without_residual, of_trainings, of_seeds)
-    df = max(variance**2 / freedom, 1.0) if freedom else math.inf
-    return float(by_training.mean()), variance, df
+        seeds = part.shape[-1]
+        over_trainings, over_seeds = part.mean(axis=-2), part.mean(axis=-1)
+        middle = over_seeds.mean(axis=-1)[..., None, None]
+        residual = part - over_trainings[..., None, :] - over_seeds[..., None] + middle
+        square = over_trainings.var(axis=-1, ddof=1) / seeds
+        error = np.square(residual).sum(axis=(-2, -1)) / ((count - 1) * (seeds - 1))
+        of_seeds = of_seeds + square
+        without_residual = without_residual + square - error / (count * seeds)
+        freedom = freedom + square**2 / (seeds - 1)
+    variance = np.maximum(np.maximum(of_trainings + without_residual, of_trainings), of_seeds)
+    with np.errstate(all="ignore"):
+        df = np.where(freedom > 0.0, np.maximum(variance**2 / freedom, 1.0), np.inf)
+    return np.asarray(by_training.mean(axis=-1)), variance, df

@@ -15,8 +15,8 @@ from verification.verdict_errors import MODELS, STALLS, judged
 
 rng = np.random.default_rng(11)
 P_O = rng.poisson(39, 10)
-# Of normal differences that hide no stalls: what both add to a plan is tested below.
-PLAIN: dict[str, Any] = {"difference_skewness": None, "at_stake": (0.0, 0.0)}
+# That hides no stalls: what they add to a plan is tested below.
+PLAIN: dict[str, Any] = {"hidden": (None, None)}
 PILOT = dataclasses.replace(spi.robustness(P_O, rng.poisson(36, 10), n=25, m=2), **PLAIN)
 
 
