@@ -246,7 +246,7 @@ def hidden_of_side(
     return least_seen([found for found, does in zip(hidden, counts) if found and does])
 
 
-_DOUBLINGS, _STEPS = 40, 60
+_GROWTHS, _STEPS = 20, 60
 
 
 def _limits(
@@ -285,14 +285,14 @@ def _root(
     within = np.minimum if end == np.inf else np.maximum
     outer = within(inner + step, end)
     rejected = outside(outer) > 0.0
-    for _ in range(_DOUBLINGS):
-        if rejected.all():
+    for _ in range(_GROWTHS):
+        if (rejected | (outer == end)).all():
             break
         inner = np.where(rejected, inner, outer)
-        step = np.where(rejected, step, 2.0 * step)
+        step = np.where(rejected, step, 4.0 * step)
         outer = np.where(rejected, outer, within(outer + step, end))
         rejected = rejected | (outside(outer) > 0.0)
-    at_inner, at_outer = outside(inner), outside(outer)
+    middle, at_inner, at_outer = outer, outside(inner), outside(outer)
     was_outer = np.full(rejected.shape, -1)
     for _ in range(_STEPS):  # regula falsi, Illinois
         with np.errstate(all="ignore"):
@@ -305,6 +305,7 @@ def _root(
         at_outer = np.where(is_outer, at_middle, np.where(again, at_outer / 2.0, at_outer))
         was_outer = np.where(is_outer, 1, 0)
         inner, outer = np.where(is_outer, inner, middle), np.where(is_outer, middle, outer)
-        if (np.abs(outer - inner) <= 1e-12 * np.abs(step)).all() or (at_middle == 0.0).all():
+        close = np.abs(outer - inner) <= 1e-12 * np.abs(step)
+        if (close | (at_middle == 0.0) | ~rejected).all():
             break
     return np.where(rejected, middle, end)

@@ -70,8 +70,8 @@ def test_clear_effects_keep_their_verdicts_and_so_do_those_that_a_stall_would_ad
 def test_equivalence_holds_its_level_though_some_runs_stall(stalled: str, paired: bool) -> None:
     for n in (6, 10, 20):
         assert share_equivalent(stalled, n, -0.1, 800, paired=paired) <= 0.06
-        assert share_equivalent(stalled, n, -0.1, 800, paired=paired, only_seen=True) >= 0.0
-    assert share_equivalent("5% stall", 6, -0.1, 800, only_seen=True) > 0.2
+    # Of the runs seen alone they would err.
+    assert share_equivalent("5% stall", 20, -0.1, 800, only_seen=True) > 0.2
 
 
 @pytest.mark.parametrize("stalled", ["3% stall", "5% stall", "5% stall, P 39"])
