@@ -20,12 +20,12 @@ from swarm_logistics_env.spi.hidden import hidden_of
 from swarm_logistics_env.spi.ratio import Balance, Design, RatioTest, Term, ratio_test
 from swarm_logistics_env.verdicts.until_clear import SPENDING
 
-STUDIES, TRAINED_STUDIES = 2_000, 1_000
+STUDIES, TRAINED_STUDIES = 4_000, 1_000
 P_O, P_F, LEARNED_P = 39.0, 34.0, 300.0  # true means [items]
 EDGE = 0.1
 REMOVED, ROBOTS = 3, 25
 LEFT = 0.02  # of P, by a training that collapsed
-FILE = Path('/tmp/stats/out.csv')
+FILE = Path(__file__).parents[1] / "docs" / "results" / "verdict_errors.csv"
 
 Floats = NDArray[Any]
 Rng = np.random.Generator
@@ -212,7 +212,7 @@ def wrong_verdicts(
     looks; with `only_seen` stalls that no run showed are left out of account.
     """
     draw, mean_o, mean_f = _ALL[model]
-    p_o, p_new = draw(np.random.default_rng(len(looks)), (studies, looks[-1]), mean_f)
+    p_o, p_new = draw(np.random.default_rng(looks), (studies, looks[-1]), mean_f)
     running = np.arange(studies)
     above = below = 0
     for n, level in zip(looks, spi.look_alphas(looks, alpha, spending=SPENDING)):
@@ -351,18 +351,20 @@ def trainings_rows() -> Iterator[Row]:
 
 
 TABLES = {
-    f"Wrong verdicts, {STUDIES:,} studies": verdict_rows,
-    f"Wrong verdicts until clear, {STUDIES:,} studies": looks_rows,
-    f"Equivalent, {STUDIES:,} studies": equivalence_rows,
-    f"Supported, {STUDIES:,} studies": power_rows,
-    f"Verdicts over trainings, {TRAINED_STUDIES:,} studies": trainings_rows,
+    "wrong verdicts": verdict_rows,
+    "wrong verdicts until clear": looks_rows,
+    "equivalent": equivalence_rows,
+    "supported": power_rows,
+    "over trainings": trainings_rows,
 }
 
 if __name__ == "__main__":
-    texts = []
+    tables = []
     for title, rows in TABLES.items():
         table = pd.DataFrame(rows())
         text = table.to_string(float_format="{:.3f}".format, na_rep="", index=False)
         print(f"{title}:\n\n{text}\n", flush=True)
-        texts.append(f"# {title}\n{table.to_csv(index=False, float_format='%.3f')}")
-    FILE.write_text("\n".join(texts), encoding="utf-8")
+        tables.append(table.assign(table=title))
+    together = pd.concat(tables)
+    columns = ["table", *together.columns.drop("table")]
+    together.to_csv(FILE, columns=columns, index=False, float_format="%.3f")

@@ -305,7 +305,10 @@ def _tested(
         pairing_correlation=correlation,
         log_sd=None if over_trainings else test.log_sd,
         base=test.base,
-        hidden=tuple(hidden_of_side(terms, hidden, null, side) for side in (1, -1)),
+        hidden=(
+            hidden_of_side(terms, hidden, null, 1),
+            hidden_of_side(terms, hidden, null, -1),
+        ),
         collapsed=collapsed(hidden[0]) if over_trainings and hidden[0] else None,
         degrees_of_freedom=test.degrees_of_freedom,
         flags=tuple(flag for flag, holds in flags.items() if holds),

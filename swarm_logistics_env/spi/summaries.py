@@ -179,8 +179,8 @@ def mean_over_trainings(
     Args:
         weighted: shape (..., K, S) each, K >= 2. Unless paired, the seeds of each are others.
     """
-    parts = [sum(weighted, np.zeros(()))] if paired else weighted
-    by_training = sum((part.mean(axis=-1) for part in parts), np.zeros(()))
+    parts = [np.asarray(sum(weighted))] if paired else weighted
+    by_training = np.asarray(sum(part.mean(axis=-1) for part in parts))
     count = by_training.shape[-1]
     of_trainings = by_training.var(axis=-1, ddof=1) / count
     # The residual is in both mean squares: that of the seeds counts without it.

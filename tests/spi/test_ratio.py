@@ -50,7 +50,7 @@ def test_statistic_is_students_of_the_logarithm_of_raised_means(threshold: float
     logarithm = abs(math.log((P_F.mean() + raised) / (less.mean() + raised)))
     found = change(P_O, P_F, threshold=threshold)
     assert found.p_seen == pytest.approx(
-        2 * t.sf((logarithm - s**2 / 2) / (s * (1 + 3 * s**2)), 6), rel=1e-9
+        2 * t.sf((logarithm - s**2 / 2) / (s * (1 + 4 * s**2)), 6), rel=1e-9
     )
     # Of runs that scatter little it is the t test of the differences.
     near = 400.0 + P_O - P_O.mean(), 400.0 + P_F - P_F.mean() - 1.5
