@@ -142,7 +142,7 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
 
         def poisson(run: Run, _: Outcome, number: int = number) -> Outcome:
             rng = np.random.default_rng([number, run.seed, *map(ord, mode_of(run))])
-            return delivered(rng.poisson(35 if run.case.faults else 40))
+            return delivered(rng.poisson(33 if run.case.faults else 40))
 
         study = until_clear(30)
         study.run(Engine(poisson))
