@@ -247,7 +247,7 @@ def decision_text(verdict: Verdict) -> str:
 def word_to_count(verdict: Verdict, word: str) -> str:
     """Return what a decision counts as in `count_words`.
 
-    A count is a headline: a decision that assumes normal differences does not stand in it.
+    A count is a headline: a provisional decision does not stand in it.
     """
     if word in DECIDED and "assumes_normal" in verdict.flags:
         return _NOT_COUNTED
