@@ -37,7 +37,7 @@ BOTH = "+"  # between failure modes that the same robots have at once
 MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
-# Below twenty seeds the studentised bootstrap of skewed counts errs at the small levels of a look.
+# Below twenty seeds a test of skewed counts may err at the small levels of a look.
 FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 20, 10
 
 

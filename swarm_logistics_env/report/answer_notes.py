@@ -34,7 +34,7 @@ def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
     yield "adjusted", {}
     flags = {flag for verdict in verdicts for flag in verdict.flags}
     if "assumes_normal" in flags:
-        yield "few_seeds" if is_paired else "unpaired", {}
+        yield "few_seeds", {}
     for flag in ("cannot_fail", "too_few_seeds"):
         if flag in flags:
             yield flag, {}

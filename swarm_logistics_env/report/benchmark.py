@@ -10,6 +10,7 @@ from more_itertools import map_reduce
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm
+from swarm_logistics_env.spi.estimate import LEAST_TRAININGS
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
@@ -137,29 +138,24 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
     """Return the table of entries by score, and how stable that order is.
 
     Seeds are resampled for all entries together, as they are played over the same ones, trainings
-    for each entry by itself. Only a single training has no spread over trainings.
+    for each entry by itself. Only a single training has no spread over trainings. Of two trainings
+    or more, but too few for a verdict, resamples tell nothing: such an entry has no rank, and the
+    ranks of all others are among themselves.
 
     Args:
         entries: name to scores, (K, n) or (n,), each over the same n seeds.
     """
-    from scipy.stats import rankdata
-
-    names = list(entries)
-    scores = [np.atleast_2d(entry) for entry in entries.values()]
-    ranks = rankdata([-entry.mean() for entry in scores], method="min")
-    resampled_ranks = rankdata(-_resampled_means(scores), method="min", axis=1)
-    outside = 50.0 * (1.0 - CONFIDENCE)
-    ends = outside, 100.0 - outside
-    best, worst = np.percentile(resampled_ranks, ends, axis=0, method="nearest").astype(int)
-    stability = (resampled_ranks == ranks).mean(axis=0)
+    names = sorted(entries, key=lambda name: -float(np.mean(entries[name])))
+    ranked = [n for n in names if not 1 < len(np.atleast_2d(entries[n])) < LEAST_TRAININGS]
+    ranks = _ranks([np.atleast_2d(entries[name]) for name in ranked])
+    of_name = dict(zip(ranked, ranks))
     rows = tuple(
         (
-            names[entry],
-            bracketed(spi.mean_interval(entries[names[entry]], CONFIDENCE), 1),
-            f"{ranks[entry]:.0f} [{best[entry]}, {worst[entry]}]",
-            f"{stability[entry]:.0%}",
+            name,
+            bracketed(spi.mean_interval(entries[name], CONFIDENCE), 1),
+            *of_name.get(name, ("open", NOTHING)),
         )
-        for entry in np.argsort(ranks, kind="stable")
+        for name in names
     )
     return Section(
         "Benchmark of robustness: entries by score",
@@ -168,8 +164,27 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
         (
             "Score: mean P of the held-out cells, over trainings and seeds.",
             f"Limits of a rank, and how often it is the same: of {RESAMPLES} resamples of both.",
+            f"Open: of two to {LEAST_TRAININGS - 1} trainings, which are too few for a rank.",
         ),
     )
+
+
+def _ranks(scores: Sequence[Numbers]) -> list[tuple[str, str]]:
+    """Return the rank of each entry with its limits, and how often it is the same."""
+    from scipy.stats import rankdata
+
+    if not scores:
+        return []
+    ranks = rankdata([-entry.mean() for entry in scores], method="min")
+    resampled_ranks = rankdata(-_resampled_means(scores), method="min", axis=1)
+    outside = 50.0 * (1.0 - CONFIDENCE)
+    ends = outside, 100.0 - outside
+    best, worst = np.percentile(resampled_ranks, ends, axis=0, method="nearest").astype(int)
+    stability = (resampled_ranks == ranks).mean(axis=0)
+    return [
+        (f"{rank:.0f} [{low}, {high}]", f"{share:.0%}")
+        for rank, low, high, share in zip(ranks, best, worst, stability)
+    ]
 
 
 def _resampled_means(scores: Sequence[Numbers]) -> Numbers:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.questions.plan import Origin, Plan
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.spi.ratio import MIN_SEEDS
 from swarm_logistics_env.verdicts.results import StudyResults
 
 from .answer import Answer, answer
@@ -200,12 +199,10 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
         runs = "trials" if plan.origin else "simulated runs"
         count = f"at least {n}" if looks else f"{n}"
         trials = f"{count} {runs} of each of {len(plan.cases)} conditions, paired by seed"
-        test = "the paired t-test (Fieller's interval)"
-        if n >= MIN_SEEDS:
-            test += " and its studentised bootstrap, whichever gives the larger p"
+        test = "the paired t-test of a logarithm, which allows for hidden stalls,"
     else:
         trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
-        test = "Welch's t-test for independent samples"
+        test = "Welch's t-test of a logarithm, which allows for hidden stalls,"
     level = percent(CONFIDENCE)
     side = f"{50 * (1 - CONFIDENCE):.3g} %"
     interval = f"the {level} interval"

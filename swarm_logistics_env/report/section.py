@@ -224,7 +224,7 @@ def decision_text(verdict: Verdict) -> str:
 def word_to_count(verdict: Verdict, word: str) -> str:
     """Return what a decision counts as in `count_words`.
 
-    A count is a headline: a decision that assumes normal differences does not stand in it.
+    A count is a headline: a provisional decision does not stand in it.
     """
     if word in DECIDED and "assumes_normal" in verdict.flags:
         return _NOT_COUNTED
@@ -329,6 +329,10 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots
         yield "flags", {"flags": " ".join(templates.FLAGS[flag] for flag in verdict.flags)}
     if "hidden_stalls" in verdict.flags:
         yield "hidden_stalls", {"n_seeds": spi.seeds_against_stalls(estimate)}
+    if estimate.collapsed is not None:
+        yield "collapsed", {"collapsed": estimate.collapsed}
+    if "hidden_collapses" in verdict.flags:
+        yield "hidden_collapses", {"n_trainings": spi.trainings_against_collapses(estimate)}
     if results.plan.specification.until_clear:
         case = "open_after_all_looks" if verdict.stopped_at is None else "clear_at_a_look"
         yield case, {"n_seeds": estimate.n_seeds, "most": results.looks[-1]}

@@ -77,8 +77,7 @@ NOTES = {
     "intervals": "{level} intervals",
     "intervals_of_several_levels": "{level} intervals, or as said behind them",
     "adjusted": "verdicts are Holm-adjusted",
-    "few_seeds": "provisional (below ten seeds they assume normality)",
-    "unpaired": "provisional (unpaired they assume normality)",
+    "few_seeds": "provisional (below ten seeds)",
     "cannot_fail": "untestable where it cannot lie below the threshold, as P cannot below 0",
     "too_few_seeds": "two seeds give no verdict",
     "damage": "{damage}",
@@ -121,7 +120,9 @@ VERDICT = {
     "claim": 'Claim "{claim}": {words}.',
     "equivalence": "{question}? Change {change}: {words}.",
     "flags": "{flags}",
+    "collapsed": "Trainings: {collapsed}.",
     "hidden_stalls": "It needs at least {n_seeds} seeds.",
+    "hidden_collapses": "It needs at least {n_trainings} trainings.",
     "open_after_all_looks": "Open after {n_seeds} of at most {most} seeds.",
     "clear_at_a_look": "Clear at {n_seeds} of at most {most} seeds.",
     "exploratory": "Exploratory.",
@@ -139,9 +140,9 @@ FLAGS = {
     "so it is open.",
     "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
     "the verdict comes from the test.",
-    "assumes_normal": "The verdict assumes normal differences, because the seeds are fewer than "
-    "ten, or unpaired.",
+    "hidden_collapses": "These trainings are too few to exclude collapses that would turn the "
+    "verdict, so it is open.",
+    "assumes_normal": "The verdict is provisional, because fewer than ten seeds show too little of "
+    "how they scatter.",
     "few_trainings": "Fewer than five trainings give no verdict.",
-    "skewed": "The differences are so skewed that at so few seeds the verdict errs more often than "
-    "its level says.",
 }

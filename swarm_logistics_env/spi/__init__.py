@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NoReturn
 from .definitions import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .equivalence import Equivalence, equivalence
 from .estimate import DecisionWord, Estimate, Options
+from .hidden import Collapsed, share_stalled
 from .inputs import IndicatorError
 from .multiplicity import (
     FaultBudget,
@@ -24,6 +25,7 @@ from .power import (
     seeds_against_stalls,
     seeds_for_equivalence,
     seeds_for_power,
+    trainings_against_collapses,
 )
 from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_index
 from .summaries import (
@@ -34,12 +36,12 @@ from .summaries import (
     pairing_correlation,
     prediction_interval,
     probability_of_improvement,
-    share_stalled,
     worst_decile,
 )
 from .trials import Trial, Trials, read_trials
 
 __all__ = [
+    "Collapsed",
     "DecisionWord",
     "Equivalence",
     "Estimate",
@@ -79,6 +81,7 @@ __all__ = [
     "seeds_for_equivalence",
     "seeds_for_power",
     "share_stalled",
+    "trainings_against_collapses",
     "worst_decile",
 ]
 

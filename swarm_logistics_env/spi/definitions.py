@@ -148,7 +148,8 @@ def relative_change(p_o: ArrayLike, p_new: ArrayLike, **options: Unpack[Options]
         IndicatorError: Performance empty, negative or not finite, mean P_o = 0, unequal seed sets
             where paired.
     """
-    return estimate_ratio("change", {"p_new": (p_new, 1.0), "p_o": (p_o, -1.0)}, **options)
+    terms = {"p_new": (p_new, 1.0), "p_o": (p_o, -1.0)}
+    return estimate_ratio("change", terms, two_recipes=True, **options)
 
 
 FactorKind = Literal["size", "fault", "parameter", "policy"]

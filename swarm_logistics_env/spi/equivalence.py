@@ -102,8 +102,7 @@ def equivalence(
 ) -> Equivalence:
     """Test whether P_new is P_o, or P_s, but for a margin: |P_new - P_o| < margin P_o.
 
-    The two tests are those of the indicators: from ten paired seeds on p is the larger of the t
-    test's and the studentised bootstrap's. Declare the margin before the study.
+    The two tests are those of the indicators. Declare the margin before the study.
 
     Args:
         p_o: Performance P_o over seeds [items], shape (n_seeds,), which the change is relative to.

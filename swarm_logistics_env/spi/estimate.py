@@ -5,23 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Literal, TypeAlias, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .hidden import Collapsed, Hidden, collapsed, hidden_of
 from .inputs import (
     IndicatorError,
-    Numbers,
     between_0_and_1,
     finite,
     performance,
     positive_mean,
     same_seeds,
 )
-from .ratio import MIN_SEEDS, RatioTest, Term, over_trainings, paired_ratio, ratio_of_samples, welch
-from .summaries import at_stake, pairing_correlation
+from .ratio import Design, RatioTest, Term, hidden_of_side, ratio_test
+from .summaries import pairing_correlation
 
 # Performances by name, with their weights in the numerator; the last is the denominator.
 Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float]]
@@ -56,28 +55,31 @@ class Estimate:
         n_seeds: Number of seeds; of the smallest sample where unpaired.
         n_trainings: Number of trainings, each played over all seeds; None: one policy was judged,
             and nothing is said of another training of it.
-        p_value: Two-sided p of mean(D) = 0, in [0, 1]: what Holm acts on. From ten paired seeds on
-            the larger of the t test's and the studentised bootstrap's.
+        p_value: Two-sided p of mean(D) = 0, in [0, 1]: what Holm acts on. It holds for stalls and
+            collapses that may be hidden.
         paired: Whether the samples share their seeds, row by row.
         pairing_correlation: Pearson correlation of the two performances compared (P_F and P_S for
             FT); None where unpaired, below three seeds, or where one of them is constant.
-        difference_sd: Standard deviation of D over seeds, in items; where unpaired se(D) sqrt(n);
-            None over trainings, whose D has two spreads.
-        difference_skewness: Skewness of D over paired seeds; None where D shows no spread.
-        at_stake: What stalls of all runs would take from mean(D), and add to it, in items, where
-            none was seen: that a share of them may be hidden is part of p.
+        log_sd: Standard deviation over seeds of the logarithm that is tested: sqrt(n) times its
+            standard error; 0 where D shows no spread; None over trainings, which have two spreads.
+        base: Mean of what counts against theta at the threshold, in items: of R, what the swarm
+            delivers without faults, less the share that it may lose.
+        hidden: Stalls, or collapses, that those terms show which count for theta, and those which
+            count against it: that more are hidden is part of p.
+        collapsed: Trainings that collapsed under the change (P_F, P_N+m or P_new), with the exact
+            limit of their share; None: no trainings were judged.
         mean_denominator: mean(den), in items.
-        degrees_of_freedom: Degrees of freedom of the t-test: n - 1, or Welch's if unpaired.
+        degrees_of_freedom: Of the t-test: n - 1, Welch's if unpaired, or Satterthwaite's.
         flags: Some of "single_seed", "too_few_seeds" (two: counts agree by chance, so p = 1),
             "degenerate" (se(D) = 0: no limits, p = 1), "identical" (the runs compared are the same
             runs: the value is exact, and no evidence), "cannot_fail" (as no P is below 0, theta
             cannot lie below the threshold: there is no p, and no verdict), "capped" (a capped P
             blocks the verdict on the side that it leans to: p = 1), "hidden_stalls" (stalled runs
             that these seeds did not show could turn the verdict: it needs `seeds_against_stalls`),
+            "hidden_collapses" (so could trainings that collapse: `trainings_against_collapses`),
             "unbounded" (the mean denominator is not distinguishable from 0), "assumes_normal"
-            (below ten paired seeds, or unpaired: the verdict rests on normal differences), "skewed"
-            (D is so skewed that the verdict errs more often than it promises at this n),
-            "few_trainings" (fewer than five: p = 1).
+            (below ten seeds: provisional, as few show how they scatter), "few_trainings" (fewer
+            than five: p = 1).
     """
 
     indicator: str
@@ -92,9 +94,10 @@ class Estimate:
     p_value: float | None = None
     paired: bool
     pairing_correlation: float | None = None
-    difference_sd: float | None = None
-    difference_skewness: float | None = None
-    at_stake: tuple[float, float] = (0.0, 0.0)
+    log_sd: float | None = None
+    base: float | None = None
+    hidden: tuple[Hidden | None, Hidden | None] = (None, None)
+    collapsed: Collapsed | None = None
     mean_denominator: float
     degrees_of_freedom: float | None = None
     flags: tuple[str, ...] = ()
@@ -143,6 +146,7 @@ class Estimate:
         n += "" if self.paired else " a condition"
         n = n if self.n_trainings is None else f"{self.n_trainings} trainings x {n}"
         p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
+        p += "" if self.collapsed is None else f"; {self.collapsed}"
         return (
             f"{self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
             f"{word} ({n}{p})"
@@ -155,6 +159,8 @@ LEAST_SEEDS = 3
 # With three trainings an interval is 4.3 standard errors wide on each side, and one of three that
 # is lucky turns it: such few are shown, and decide nothing.
 LEAST_TRAININGS = 5
+# Fewer show too little of how they scatter for a headline.
+SEEDS_OF_HEADLINE = 10
 # The flags that concern the interval; all others are about a test.
 _OF_INTERVAL = ("single_seed", "degenerate", "unbounded")
 
@@ -191,6 +197,7 @@ def estimate_ratio(
     paired: bool = True,
     saturated: Collection[str] = (),
     identical: bool = False,
+    two_recipes: bool = False,
 ) -> Estimate:
     """Estimate one ratio of means and judge it against `threshold`; see `Options`.
 
@@ -201,6 +208,8 @@ def estimate_ratio(
             trainings of a policy each has a row, shape (K, n); a performance of shape (n,) beside
             it is of a policy that is not trained.
         offset: Added to the ratio of means.
+        two_recipes: Whether row k of the first and of the last performance are two trainings, not
+            one: the last may then collapse by itself.
 
     Raises:
         IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
@@ -231,7 +240,7 @@ def estimate_ratio(
     if n_seeds == 1:
         estimate = replace(untested, flags=("single_seed",))
     else:
-        estimate = _tested(untested, weighted, offset, saturated)
+        estimate = _tested(untested, weighted, offset, saturated, two_recipes=two_recipes)
     # D is a sum of weighted P, and no P is below 0.
     if min(term.weight(threshold - offset) for term in weighted.values()) >= 0.0:
         of_interval = [flag for flag in estimate.flags if flag in _OF_INTERVAL]
@@ -242,43 +251,47 @@ def estimate_ratio(
 
 
 def _tested(
-    untested: Estimate, weighted: Mapping[str, Term], offset: float, saturated: Collection[str]
+    untested: Estimate,
+    weighted: Mapping[str, Term],
+    offset: float,
+    saturated: Collection[str],
+    *,
+    two_recipes: bool,
 ) -> Estimate:
     """Return the estimate with the test that its seeds allow, and what is to be said of it."""
     n_seeds, paired, threshold = untested.n_seeds, untested.paired, untested.threshold
     terms, null = list(weighted.values()), threshold - offset
-    asking = {"offset": offset, "threshold": threshold, "confidence": untested.confidence}
-    skewness, correlation, stakes = None, None, (0.0, 0.0)
-    if untested.n_trainings is not None:
-        test = ratio_of_samples(terms, partial(over_trainings, paired=paired), **asking)
-    elif paired:
+    over_trainings = untested.n_trainings is not None
+    correlation = None
+    if paired and not over_trainings:
         correlation = pairing_correlation(terms[0].sample, terms[1].sample)
-        num = np.asarray(sum(term.in_num * term.sample for term in terms))
-        den = terms[-1].sample
-        taken, added = at_stake([(term.weight(null), term.sample) for term in terms])
-        stakes = float(taken), float(added)
-        test = RatioTest(*map(float, paired_ratio(num, den, **asking, at_stake=stakes)))
-        # Without spread the skewness of D would be one of rounding errors.
-        if test.difference_sd > 0.0 and n_seeds >= LEAST_SEEDS:
-            skewness = _skewness(num - null * den)
-    else:
-        test = ratio_of_samples(terms, welch, **asking)
-    degenerate = test.difference_sd == 0.0
+    hidden = hidden_of(
+        [term.sample for term in terms], trainings=over_trainings, reference_too=two_recipes
+    )
+    tests = ratio_test(
+        terms,
+        Design(paired=paired, trainings=over_trainings),
+        hidden,
+        offset=offset,
+        threshold=threshold,
+        confidence=untested.confidence,
+    )
+    test = RatioTest(*map(float, tests))
+    degenerate = test.log_sd == 0.0
     # The true P of one that is capped is larger, and moves D by the sign of its weight.
     leaning = test.value - threshold
     capped = any(weighted[name].weight(null) * leaning < 0.0 for name in saturated)
     few = untested.n_trainings is not None and untested.n_trainings < LEAST_TRAININGS
     blocked = capped or degenerate or n_seeds < LEAST_SEEDS or few
-    normal = not paired or n_seeds < MIN_SEEDS
-    hidden = test.p_seen < 1.0 - untested.confidence <= test.p_value
+    withheld = test.p_seen < 1.0 - untested.confidence <= test.p_value and not blocked
     p_value = 1.0 if blocked else test.p_value
     flags = {
-        "skewed": skewness is not None and _skewed(skewness, n_seeds),
         "too_few_seeds": n_seeds < LEAST_SEEDS,
         "degenerate": degenerate,
         "capped": capped,
-        "assumes_normal": normal and not blocked,
-        "hidden_stalls": hidden and not normal and not blocked,
+        "assumes_normal": n_seeds < SEEDS_OF_HEADLINE and not blocked,
+        "hidden_stalls": withheld and not over_trainings,
+        "hidden_collapses": withheld and over_trainings,
         "unbounded": math.isinf(test.low) and not degenerate,
         "few_trainings": few,
     }
@@ -290,9 +303,13 @@ def _tested(
         probability=1.0 - p_value / 2 if test.mean_difference > 0.0 else p_value / 2,
         p_value=p_value,
         pairing_correlation=correlation,
-        difference_sd=None if untested.n_trainings is not None else test.difference_sd,
-        difference_skewness=skewness,
-        at_stake=stakes,
+        log_sd=None if over_trainings else test.log_sd,
+        base=test.base,
+        hidden=(
+            hidden_of_side(terms, hidden, null, 1),
+            hidden_of_side(terms, hidden, null, -1),
+        ),
+        collapsed=collapsed(hidden[0]) if over_trainings and hidden[0] else None,
         degrees_of_freedom=test.degrees_of_freedom,
         flags=tuple(flag for flag, holds in flags.items() if holds),
     )
@@ -330,21 +347,3 @@ def _checked(
         name: Term(samples[name], weight, float(name == reference))
         for name, (_, weight) in terms.items()
     }
-
-
-def _skewness(difference: Numbers) -> float:
-    """Skewness g of the population, from a sample (n,) with spread, n >= 3."""
-    n = difference.size
-    deviation = difference - difference.mean()
-    spread = math.sqrt(float(np.mean(deviation**2)))
-    return float(np.mean((deviation / spread) ** 3)) * math.sqrt(n * (n - 1)) / (n - 2)
-
-
-def _skewed(g: float, n: int) -> bool:
-    """Whether n is too small for the skewness of D: Cochran's n > 25 g^2 fails, beyond chance.
-
-    Cochran (1977, Sampling Techniques, 2.15) gives the rule for the population's g. That of a few
-    seeds scatters, so it must also exceed twice its standard error under a normal D.
-    """
-    standard_error = math.sqrt(6 * n * (n - 1) / ((n - 2) * (n + 1) * (n + 3)))
-    return abs(g) > max(math.sqrt(n / 25), 2.0 * standard_error)

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 
 from .equivalence import Equivalence
-from .estimate import Estimate
+from .estimate import SEEDS_OF_HEADLINE, Estimate
+from .hidden import Hidden, remainder_and_chance
 from .inputs import IndicatorError, Numbers, between_0_and_1, count, finite
-from .ratio import MIN_SEEDS
-from .summaries import STALL_MARGIN, critical_with_hidden
+from .ratio import log_ratio, statistic
 
 MAX_SEEDS = 1_000_000
 # A pilot's own spread is as often too small as too large, and power falls faster on the one side
@@ -25,6 +25,8 @@ UNLUCKY_LIMIT = 0.9  # confidence limit of the spread that one pilot in ten exce
 # Beyond this critical t, as of two seeds at an early look, the statistic's normal part is lost
 # beside its chi-squared one, and the noncentral t would be summed over so many terms.
 _FAR_OUT = 1e3
+_FARTHEST = 1e6  # times the base: there the logarithm, of means that are raised, has its end
+_SHARES = 11  # points at which a plan counts what stalls may hide
 
 
 def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float | None:
@@ -32,7 +34,7 @@ def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float |
 
     In units of the indicator; the same on both sides, by two one-sided tests of
     (1 - confidence)/2. With the spread's 60 % upper confidence limit, so that the power is `power`
-    on average. None where `no_plan_because` says why.
+    on average. None where `no_plan_because` says why, or where no effect is found at that spread.
 
     Raises:
         IndicatorError: power outside (0, 1) or not above the tests' own (1 - confidence)/2.
@@ -42,19 +44,21 @@ def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float |
     _check_power(estimate, power)
     if estimate.untestable:
         return None
-    spread = _spread_limit(estimate, PLANNED_LIMIT) / estimate.mean_denominator
-    if not spread:
+    if estimate.base is None or not _spread_limit(estimate, PLANNED_LIMIT):
         return None
+    n, lowest = estimate.n_seeds, estimate.base / estimate.mean_denominator
 
     def excess(distance: float) -> float:
-        return power - min(
-            _power_at(estimate, side * distance, n, PLANNED_LIMIT) for side in (-1, 1)
-        )
+        # No P is below 0: farther below the threshold than that the indicator cannot lie.
+        sides = (-1, 1) if distance < lowest else (1,)
+        return power - min(_power_at(estimate, side * distance, n, PLANNED_LIMIT) for side in sides)
 
-    n, enough = estimate.n_seeds, spread
+    enough = lowest / 1024.0
     while excess(enough) > 0.0:
         enough *= 2.0
-    return float(brentq(excess, 0.0, enough, xtol=1e-9 * spread))
+        if enough > _FARTHEST * lowest:
+            return None
+    return float(brentq(excess, 0.0, enough, xtol=1e-9 * enough))
 
 
 def seeds_for_power(estimate: Estimate, effect: float, power: float = 0.8) -> int | None:
@@ -101,7 +105,7 @@ def seeds_for_equivalence(equivalence: Equivalence, power: float = 0.8) -> int |
     """
     tests = equivalence.above, equivalence.below
     _check_power(equivalence.change, power)
-    if equivalence.change.difference_sd in (None, 0.0) or any(
+    if equivalence.change.log_sd in (None, 0.0) or any(
         no_plan_because(test, 0.0) is not None for test in tests
     ):
         return None
@@ -114,18 +118,39 @@ def seeds_for_equivalence(equivalence: Equivalence, power: float = 0.8) -> int |
 
 
 def seeds_against_stalls(estimate: Estimate) -> int | None:
-    """Seeds below which no verdict can be had at the value found: too many stalls may be hidden.
+    """Seeds that would decide at the value and the spread found, if as few of them stall.
 
-    So many seeds of which none stalls leave too little chance for a share that would move the value
-    to the threshold. None where the verdict is not withheld for hidden stalls.
+    None where the verdict is not withheld for hidden stalls.
     """
     if "hidden_stalls" not in estimate.flags:
         return None
-    distance = (estimate.value - estimate.threshold) * estimate.mean_denominator
-    share = min(abs(distance) / estimate.at_stake[distance < 0.0], 0.5)
+    distance = estimate.value - estimate.threshold
+
+    def enough(n: int) -> bool:
+        needed, reached = _needed(estimate, distance, n, estimate.log_sd or 0.0)
+        return reached > needed
+
+    return _least(enough, estimate.n_seeds + 1)
+
+
+def trainings_against_collapses(estimate: Estimate) -> int | None:
+    """Trainings that would exclude, at the value hidden, so many collapses as turn the verdict.
+
+    So many of which as large a share collapses as of those seen. None where the verdict is not
+    withheld for hidden collapses.
+    """
+    if "hidden_collapses" not in estimate.flags:
+        return None
+    more, less, hidden = _sides(estimate, estimate.value - estimate.threshold)
+    assert hidden is not None
+    turning = 1.0 - float((1.0 - hidden.seen / hidden.of) * less / more)
     error = (1.0 - estimate.confidence) / 2
-    fewest = math.log(error / STALL_MARGIN) / math.log1p(-share)
-    return max(math.floor(fewest), estimate.n_seeds) + 1
+
+    def enough(n: int) -> bool:
+        further = Hidden(np.floor(hidden.seen / hidden.of * n), n, hidden.most)
+        return float(remainder_and_chance(turning, further)[1]) < error
+
+    return _least(enough, hidden.of + 1)
 
 
 def lower_decile_of_power(estimate: Estimate, effect: float, n_seeds: int) -> float | None:
@@ -153,14 +178,15 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
         return f"it cannot lie below {estimate.threshold:g}: there is nothing to find"
     if estimate.n_trainings is not None:
         return "of several trainings no number of seeds is planned: more trainings tell more"
-    if estimate.difference_sd is None:
+    if estimate.log_sd is None:
         return "one seed shows no spread between seeds"
-    if estimate.difference_sd == 0.0:
+    if estimate.log_sd == 0.0:
         return "the runs show no spread between seeds"
     if effect == estimate.threshold:
         return f"an effect of {effect:g} lies at the threshold: no number of seeds finds it"
     # Large samples need (z_confidence + z_power)^2 sd^2 / distance^2 seeds, about 8 at 80 %.
-    distance = abs(effect - estimate.threshold) * estimate.mean_denominator
+    more, less, _ = _sides(estimate, effect - estimate.threshold)
+    distance = float(log_ratio(more, less))
     if 8.0 * (_spread_limit(estimate, PLANNED_LIMIT) / distance) ** 2 > MAX_SEEDS:
         return f"an effect of {effect:g} needs more than {MAX_SEEDS:,} seeds"
     return None
@@ -168,10 +194,15 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
 
 def _least_seeds(enough: Callable[[int], bool]) -> int:
     """Return the smallest n that is enough and can give a headline verdict, ten or more."""
-    high = MIN_SEEDS
+    return _least(enough, SEEDS_OF_HEADLINE)
+
+
+def _least(enough: Callable[[int], bool], least: int) -> int:
+    """Return the smallest n that is enough, from `least` on."""
+    high = least
     while not enough(high):
         high *= 2
-    return MIN_SEEDS + bisect_left(range(MIN_SEEDS, high), x=True, key=enough)
+    return least + bisect_left(range(least, high), x=True, key=enough)
 
 
 def _check_power(estimate: Estimate, power: float) -> None:
@@ -182,10 +213,10 @@ def _check_power(estimate: Estimate, power: float) -> None:
 
 
 def _spread_limit(estimate: Estimate, confidence: float) -> float:
-    """Upper confidence limit of the standard deviation of D; 0 where there is none."""
+    """Upper confidence limit of the standard deviation of the logarithm; 0 where there is none."""
     from scipy.special import chdtri
 
-    sd, df = estimate.difference_sd, estimate.degrees_of_freedom
+    sd, df = estimate.log_sd, estimate.degrees_of_freedom
     if not sd or df is None:
         return 0.0
     return sd * math.sqrt(df / float(chdtri(df, confidence)))
@@ -195,45 +226,47 @@ def _power_at(estimate: Estimate, distance: float, n_seeds: int, confidence: flo
     """Power of so many seeds at a distance from the threshold, with that limit of the spread."""
     from scipy.special import chdtr, nctdtr
 
-    assert estimate.degrees_of_freedom is not None
-    # Welch's degrees of freedom grow with n - 1, as the paired ones do.
-    df = estimate.degrees_of_freedom * (n_seeds - 1) / (estimate.n_seeds - 1)
-    standard_error = _spread_limit(estimate, confidence) / math.sqrt(n_seeds)
-    noncentrality = abs(distance) * estimate.mean_denominator / standard_error
-    # Skewness g, of a long tail of D on the far side of the threshold, spreads the statistic: mean
-    # and spread of the seeds then move together (as those of gamma variables, whose excess kurtosis
-    # is 1.5 g^2).
-    side = 1 if distance > 0.0 else -1
-    g = max(0.0, -side * (estimate.difference_skewness or 0.0))
-    critical = _critical(estimate, side, g, n_seeds, df, standard_error)
-    drift = noncentrality / math.sqrt(n_seeds)
-    usual = 1.0 + drift**2 / 2.0
-    noncentrality = critical + (noncentrality - critical) * math.sqrt(
-        usual / (usual + g * drift + 0.375 * (g * drift) ** 2)
-    )
+    df = _degrees_of_freedom(estimate, n_seeds)
+    critical, reached = _needed(estimate, distance, n_seeds, _spread_limit(estimate, confidence))
     if critical > _FAR_OUT:
-        return float(chdtr(df, df * (noncentrality / critical) ** 2))
+        return float(chdtr(df, df * (reached / critical) ** 2))
     # Where the statistic lies far above, SciPy has no number for the chance that it is lower.
-    return 1.0 - float(np.nan_to_num(nctdtr(df, noncentrality, critical)))
+    return 1.0 - float(np.nan_to_num(nctdtr(df, reached, critical)))
 
 
-def _critical(
-    estimate: Estimate, side: int, g: float, n_seeds: int, df: float, standard_error: float
-) -> float:
-    """Statistic that the verdict on a side (-1: refuted, 1: supported) needs at so many seeds.
+def _needed(estimate: Estimate, distance: float, n: int, sd: float) -> tuple[float, float]:
+    """Statistic that a verdict of n seeds needs, and the one expected at that distance.
 
     Args:
-        g: skewness of D away from that side.
+        sd: Standard deviation of the logarithm.
     """
-    from scipy.special import ndtri, stdtrit
+    from scipy.special import stdtrit
 
-    # What the bootstrap asks for beyond the t test (Hall 1992, The Bootstrap and Edgeworth
-    # Expansion, 2.6).
-    tail = g / (6.0 * math.sqrt(n_seeds))
-
-    def quantile(p: Numbers) -> Numbers:
-        return np.asarray(stdtrit(df, 1.0 - p) + tail * (2.0 * ndtri(p) ** 2 + 1.0))
-
-    lost = estimate.at_stake[side < 0] if n_seeds >= MIN_SEEDS else 0.0
+    df, s = _degrees_of_freedom(estimate, n), np.asarray(sd / math.sqrt(n))
+    more, less, hidden = _sides(estimate, distance)
     error = (1.0 - estimate.confidence) / 2
-    return critical_with_hidden(quantile, error, lost / standard_error, n_seeds)
+    reached = float(statistic(log_ratio(more, less), s))
+    needed = float(stdtrit(df, 1.0 - error))
+    if hidden is not None:
+        seen = Hidden(np.floor(hidden.seen / hidden.of * n), n, hidden.most)
+        for share in np.linspace(0.0, hidden.most, _SHARES)[1:]:
+            remaining, chance = remainder_and_chance(float(share), seen)
+            if chance > error:
+                lost = reached - float(statistic(log_ratio(more * remaining, less), s))
+                needed = max(needed, float(stdtrit(df, 1.0 - error / chance)) + lost)
+    return needed, reached
+
+
+def _sides(estimate: Estimate, distance: float) -> tuple[Numbers, Numbers, Hidden | None]:
+    """Return the larger and the smaller mean at a distance, and what the larger one may hide."""
+    assert estimate.base is not None
+    base = np.asarray(estimate.base)
+    moved = np.maximum(0.0, base + distance * estimate.mean_denominator)
+    for_it, against = estimate.hidden
+    return (moved, base, for_it) if distance > 0.0 else (base, moved, against)
+
+
+def _degrees_of_freedom(estimate: Estimate, n_seeds: int) -> float:
+    """Welch's degrees of freedom grow with n - 1, as the paired ones do."""
+    assert estimate.degrees_of_freedom is not None
+    return estimate.degrees_of_freedom * (n_seeds - 1) / (estimate.n_seeds - 1)

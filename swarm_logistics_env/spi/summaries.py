@@ -1,13 +1,13 @@
-"""Raw performance P over seeds: intervals, what pairing achieved, and runs that stall."""
+"""Raw performance P over seeds: intervals, and what pairing achieved."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .inputs import IndicatorError, Numbers, between_0_and_1, numbers, performance, same_seeds
 
@@ -36,7 +36,7 @@ def mean_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     from scipy.special import stdtrit
 
     between_0_and_1("confidence", confidence)
-    mean, variance, df = mean_over_trainings([checked], paired=True)
+    mean, variance, df = map(float, mean_over_trainings([checked], paired=True))
     half = float(stdtrit(df, 0.5 + confidence / 2)) * math.sqrt(variance)
     return Interval(mean, max(0.0, mean - half), mean + half)
 
@@ -167,125 +167,36 @@ def t_interval(
     return Interval(mean, max(least, mean - half), mean + half)
 
 
-def mean_over_trainings(weighted: Sequence[Numbers], *, paired: bool) -> tuple[float, float, float]:
-    """Return the mean of the sum, its squared standard error and degrees of freedom.
+def mean_over_trainings(
+    weighted: Sequence[Numbers], *, paired: bool
+) -> tuple[Numbers, Numbers, Numbers]:
+    """Return the mean of the sum, its squared standard error and degrees of freedom, shape (...).
 
     Trainings and seeds are crossed factors without replication, so the variance of the mean is
     (MS_k + MS_s - MS_e) / KS of the two-way analysis of variance (Searle, Casella and McCulloch
     1992), its degrees of freedom after Satterthwaite (1946).
 
     Args:
-        weighted: shape (K, S) each, K >= 2. Unless paired, the seeds of each are others.
+        weighted: shape (..., K, S) each, K >= 2. Unless paired, the seeds of each are others.
     """
-    parts = [np.sum(weighted, axis=0)] if paired else weighted
-    by_training = np.sum([part.mean(axis=1) for part in parts], axis=0)
-    count = by_training.size
-    of_trainings = float(by_training.var(ddof=1)) / count
+    parts = [np.asarray(sum(weighted))] if paired else weighted
+    by_training = np.asarray(sum(part.mean(axis=-1) for part in parts))
+    count = by_training.shape[-1]
+    of_trainings = by_training.var(axis=-1, ddof=1) / count
     # The residual is in both mean squares: that of the seeds counts without it.
-    of_seeds, without_residual = 0.0, 0.0
+    of_seeds, without_residual = np.zeros(()), np.zeros(())
     freedom = of_trainings**2 / (count - 1)
     for part in parts:
-        seeds = part.shape[1]
-        residual = part - part.mean(axis=0) - part.mean(axis=1, keepdims=True) + part.mean()
-        square = float(part.mean(axis=0).var(ddof=1)) / seeds
-        error = float(np.square(residual).sum()) / ((count - 1) * (seeds - 1)) / part.size
-        of_seeds += square
-        without_residual += square - error
-        freedom += square**2 / (seeds - 1)
-    variance = max(of_trainings + without_residual, of_trainings, of_seeds)
-    df = max(variance**2 / freedom, 1.0) if freedom else math.inf
-    return float(by_training.mean()), variance, df
-
-
-# A policy that stalls in 5 % of its runs shows none in 36 % of studies of 20 seeds. Their mean is
-# then too high and their spread too small for any test to notice. So p has to hold for every share
-# s up to 10 %: it is at least 1.25 (1 - s)^n p(s), where (1 - s)^n is the chance that n runs show
-# no stall, and p(s) the p of the test if the share had lowered the mean. Where a run did stall, the
-# spread tells, and the test keeps its level by itself.
-#
-# Half the median is a bad run; below a quarter lies no run of a condition that never stalls (the
-# least of 2,000 Poisson counts of mean 30 is about 13). Counts that stop at random, as under FM4,
-# have 17 % of their runs there: they did stall, and their spread tells it.
-SHARE_OF_MEDIAN = 0.25
-# Of larger shares 10, 20 and 30 runs show nothing in at most 35, 12 and 4 % of studies. To guard
-# against them too would take the verdict from a clear loss of a fifth at ten seeds.
-LARGEST_SHARE = 0.1
-# Studies that show fewer stalls than their share err a little too, which the chance that they show
-# none makes room for: all of them together stay below 6 % a side at 3, 5 and 10 % of stalls.
-STALL_MARGIN = 1.25
-
-
-def share_stalled(p: ArrayLike) -> float:
-    """Share of runs that stalled, in [0, 1]: that have less than a quarter of the median.
-
-    Where more than half of the runs deliver next to nothing, that is the rule, and none stands out.
-
-    Args:
-        p: Performance of one condition over seeds, shape (n_seeds,), in any unit.
-
-    Raises:
-        IndicatorError: p empty, negative or not finite.
-    """
-    return float(_stalled(performance("p", p)).mean())
-
-
-def at_stake(terms: Sequence[tuple[float, Numbers]]) -> tuple[Numbers, Numbers]:
-    """What a stall of every run would take from mean(D), and add to it, where no run stalled.
-
-    Args:
-        terms: Weight in D and performances, shape (..., n), of each condition.
-
-    Returns:
-        Two arrays of shape (...), not negative, in the unit of D. A condition with a stalled run
-        counts in neither.
-    """
-    taken, added = np.zeros(()), np.zeros(())
-    for weight, sample in terms:
-        moved = np.where(_stalled(sample).any(axis=-1), 0.0, abs(weight) * sample.mean(axis=-1))
-        if weight > 0.0:
-            taken = taken + moved
-        else:
-            added = added + moved
-    return taken, added
-
-
-def p_with_hidden(
-    p_above: Callable[[Numbers], Numbers], statistic: Numbers, loss: Numbers, n: int
-) -> Numbers:
-    """One-sided p of a statistic that holds for every share of stalled runs that n runs may hide.
-
-    Args:
-        p_above: One-sided p of a statistic, both of shape (...).
-        statistic: mean(D) / se(D).
-        loss: What a stall of every run would take from it, shape (...).
-        n: Runs of which none stalled.
-    """
-    worst = np.zeros(())
-    for share, chance in zip(*_hidden(n)):
-        worst = np.maximum(worst, chance * p_above(statistic - share * loss))
-    return worst
-
-
-def critical_with_hidden(
-    quantile: Callable[[Numbers], Numbers], error: float, loss: float, n: int
-) -> float:
-    """Statistic above which `p_with_hidden` is below `error`.
-
-    Args:
-        quantile: The statistic at which the one-sided p is the one given, shape (k,).
-        error: One-sided, in (0, 0.5).
-        loss, n: As in `p_with_hidden`.
-    """
-    shares, chances = _hidden(n)
-    likely = chances > error
-    return float((quantile(error / chances[likely]) + shares[likely] * loss).max())
-
-
-def _hidden(n: int) -> tuple[Numbers, Numbers]:
-    """Shares from 0 up and the chances that n runs hide them, to the bootstrap's smallest p."""
-    shares = np.linspace(0.0, min(LARGEST_SHARE, 9.4 / n), 48)
-    return shares, np.minimum(1.0, STALL_MARGIN * (1.0 - shares) ** n)
-
-
-def _stalled(p: Numbers) -> NDArray[np.bool_]:
-    return np.asarray(p < SHARE_OF_MEDIAN * np.median(p, axis=-1, keepdims=True))
+        seeds = part.shape[-1]
+        over_trainings, over_seeds = part.mean(axis=-2), part.mean(axis=-1)
+        middle = over_seeds.mean(axis=-1)[..., None, None]
+        residual = part - over_trainings[..., None, :] - over_seeds[..., None] + middle
+        square = over_trainings.var(axis=-1, ddof=1) / seeds
+        error = np.square(residual).sum(axis=(-2, -1)) / ((count - 1) * (seeds - 1))
+        of_seeds = of_seeds + square
+        without_residual = without_residual + square - error / (count * seeds)
+        freedom = freedom + square**2 / (seeds - 1)
+    variance = np.maximum(np.maximum(of_trainings + without_residual, of_trainings), of_seeds)
+    with np.errstate(all="ignore"):
+        df = np.where(freedom > 0.0, np.maximum(variance**2 / freedom, 1.0), np.inf)
+    return np.asarray(by_training.mean(axis=-1)), variance, df

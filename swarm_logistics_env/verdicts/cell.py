@@ -167,8 +167,8 @@ class Cell:
 
 def _mean(values: Sequence[float | None]) -> float | None:
     """Return the mean of what every run has; None: one lacks it, or there is none."""
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known and len(known) == len(values) else None
+    present = [value for value in values if value is not None]
+    return float(np.mean(present)) if present and len(present) == len(values) else None
 
 
 def same_runs(before: Sequence[Outcome], after: Sequence[Outcome]) -> bool:

@@ -188,6 +188,16 @@ VERDICT_COLUMNS: Columns[Verdict] = {
         _of_estimate(lambda estimate: estimate.n_trainings),
         "trainings over these seeds; missing: one",
     ),
+    "collapsed": (
+        float,
+        _of_estimate(lambda estimate: estimate.collapsed and estimate.collapsed.number),
+        "trainings that collapsed under the change; missing: one training",
+    ),
+    "collapsed_upper": (
+        float,
+        _of_estimate(lambda estimate: estimate.collapsed and estimate.collapsed.upper),
+        "95 % upper limit of the share that collapses",
+    ),
     "stopped_at": (
         float,
         lambda verdict: verdict.stopped_at,

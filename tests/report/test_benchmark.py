@@ -70,6 +70,11 @@ def test_ranks_are_as_stable_as_the_scores_allow(
     high, low = benchmark.leaderboard(clear).rows
     assert (high[0], *high[2:]) == ("high", "1 [1, 1]", "100%")
     assert (low[0], *low[2:]) == ("low", "2 [2, 2]", "100%")
+    # Of three trainings no rank is told, and those of all others are among themselves.
+    few = benchmark.leaderboard({**clear, "three": rng.normal(70, 1, (3, 15))}).rows
+    assert [(row[0], row[2]) for row in few] == [
+        ("three", "open"), ("high", "1 [1, 1]"), ("low", "2 [2, 2]"),
+    ]  # fmt: skip
     # Seeds agree, trainings do not: one lucky training is no lead.
     spread = np.repeat(rng.normal(50, 20, 5)[:, None], 15, axis=1)
     shaky = {"one": spread, "other": np.full((5, 15), spread.mean() - 1.0)}

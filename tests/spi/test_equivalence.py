@@ -16,7 +16,7 @@ def poisson(seed: int, change: float, n: int = 80) -> tuple[np.ndarray, np.ndarr
     return rng.poisson(39.0, n) * 1.0, rng.poisson(39.0 * (1 + change), n) * 1.0
 
 
-# `python -m verification.verdict_errors` simulates 3,000 studies of each.
+# `python -m verification.verdict_errors` simulates 2,000 studies of each.
 @pytest.mark.parametrize(("model", "change"), [("poisson", -0.1), ("overdispersed", 0.1)])
 def test_at_the_edge_of_the_margin_at_most_5_percent_are_wrong(model: str, change: float) -> None:
     assert 0.02 < share_equivalent(model, 30, change, 1_500, only_seen=True) <= 0.055
@@ -28,7 +28,7 @@ def test_the_planned_seeds_have_the_promised_power() -> None:
     pilot = spi.equivalence(*draw(np.random.default_rng(0), (1_000,), mean_o))
     n = spi.seeds_for_equivalence(pilot) or 0
     assert 30 <= n <= 60
-    assert 0.74 <= share_equivalent("overdispersed", n, 0.0, 400) <= 0.86
+    assert 0.74 <= share_equivalent("overdispersed", n, 0.0, 400) <= 0.9
 
 
 def test_it_is_the_two_tests_of_the_indicators() -> None:

@@ -56,7 +56,7 @@ def test_one_seed_gives_the_value_and_nothing_else(name: str) -> None:
     assert (found.verdict, found.flags) == ("open", ("single_seed",))
     assert (found.n_seeds, found.threshold, found.mean_denominator) == (1, 0.0, 39)
     assert {found.low, found.high, found.p_value, found.probability} == {None}
-    assert {found.difference_sd, found.degrees_of_freedom, found.pairing_correlation} == {None}
+    assert {found.log_sd, found.degrees_of_freedom, found.pairing_correlation} == {None}
 
 
 @over_indicators
@@ -152,28 +152,6 @@ def test_what_cannot_fail_leaves_holms_family_to_the_others() -> None:
     assert spi.adjust([doubled, clear]) == ("open", "supported")
 
 
-def waits(n: int) -> np.ndarray:
-    """Return exponential differences, whose g is nearly 2, far beyond chance; 25 g^2 is 90."""
-    return np.log((np.arange(n) + 0.5) / n)
-
-
-@pytest.mark.parametrize(
-    ("difference", "skewed"),
-    [
-        # g = 1.341 and 1.439; the standard error of ten is .687 (Cramer), and Cochran's limit .632.
-        ([-1, 1, -1, 1, -1, 1, -1, 1, 0, 4.1], False),
-        ([-1, 1, -1, 1, -1, 1, -1, 1, 0, 4.3], True),
-        (waits(60), True),
-        (waits(200), False),
-    ],
-)
-def test_differences_are_skewed_beyond_chance_and_beyond_cochrans_rule(
-    difference: Any, skewed: bool
-) -> None:
-    p_o = np.full(len(difference), 40.0)
-    assert ("skewed" in spi.robustness(p_o, p_o + difference, n=25, m=1).flags) == skewed
-
-
 MANY = np.array([59.9, 60.0, 59.8, 60.0, 59.8])
 HALF = np.array([30.0, 28, 33, 31, 29])
 FEWER = np.array([40.0, 40.3, 39.7, 40.1, 39.9])
@@ -186,9 +164,9 @@ GREATER = np.array([47.1, 46.9, 47.0, 47.2, 46.8])
         ("R", (MANY, HALF), 0, ("p_o",), "refuted"),  # the true P_o is larger still
         ("R", (MANY, HALF), 0, ("p_f",), "open"),  # the true P_F may be as large as P_o
         ("R", (HALF, MANY), 0, ("p_f",), "supported"),
-        # Of a true P_o of 80 the loss is but .086; of a larger P_S it is larger still.
-        ("FT", (MANY, FEWER, GREATER), -0.1, ("p_o",), "open"),
-        ("FT", (MANY, FEWER, GREATER), -0.1, ("p_s",), "refuted"),
+        # Of a larger true P_o the loss is a smaller share; of a larger P_S it is larger still.
+        ("FT", (MANY, FEWER, GREATER), -0.02, ("p_o",), "open"),
+        ("FT", (MANY, FEWER, GREATER), -0.02, ("p_s",), "refuted"),
         # The sign of FT does not depend on P_o.
         ("FT", (MANY, FEWER, GREATER), 0.0, ("p_o",), "refuted"),
         ("FT", (MANY, GREATER, FEWER), 0.1, ("p_o",), "open"),

@@ -1,4 +1,4 @@
-"""Summaries of P and of times: means, intervals, curves of repair, and runs that stalled."""
+"""Summaries of P and of times: means, intervals, and curves of repair."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import pytest
 from scipy.stats import sem, t, trim_mean
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.questions.specification import looks_up_to
-from verification.verdict_errors import share_equivalent, wrong_verdicts
 
 P = [31.0, 38, 35, 44, 40, 29, 36]
 
@@ -87,50 +85,6 @@ def test_textbook_curve() -> None:
     expected = [0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448]
     assert curve.share == pytest.approx(expected, abs=5e-4)
     assert curve.median() == 23
-
-
-rng = np.random.default_rng(2)
-STEADY = rng.normal(300.0, 6.0, 20).round()
-FAULTY = (STEADY * 0.97 + rng.normal(0.0, 3.0, 20)).round()
-
-
-def test_a_run_below_a_quarter_of_the_median_stalled() -> None:
-    assert spi.share_stalled([40, 41, 39, 9]) == 0.25
-    assert spi.share_stalled([40, 40, 40, 10]) == 0.0
-    # Where most runs deliver nothing, none is an exception.
-    assert spi.share_stalled([0, 0, 0, 40]) == 0.0
-
-
-def test_a_small_effect_waits_for_the_seeds_that_would_show_a_stall() -> None:
-    few: Any = spi.robustness(STEADY, FAULTY, n=25, m=2)
-    assert few.low > 0.0
-    assert (few.verdict, "hidden_stalls" in few.flags) == ("open", True)
-    needed = spi.seeds_against_stalls(few) or 0
-    # Of so many seeds, none stalls in 2 % of studies if the share takes R down to 0.
-    share = few.value * few.mean_denominator / FAULTY.mean()
-    assert (1 - share) ** needed < 0.02 < (1 - share) ** (needed - 1)
-    times = -(-2 * needed // 20)
-    many = spi.robustness(np.tile(STEADY, times), np.tile(FAULTY, times), n=25, m=2)
-    assert (many.verdict, many.flags) == ("supported", ())
-    assert spi.seeds_against_stalls(many) is None
-
-
-def test_clear_effects_keep_their_verdicts_and_so_do_those_that_a_stall_would_add_to() -> None:
-    assert spi.robustness(STEADY, STEADY[::-1] * 0.4, n=25, m=2).verdict == "refuted"
-    # P_F could only be lower still; P_o would have to fall by a third.
-    assert spi.relative_change(STEADY, FAULTY - 100.0).verdict == "refuted"
-    # Where a run stalled, the spread tells.
-    r = spi.robustness(STEADY, np.where(np.arange(20) == 3, 2.0, FAULTY), n=25, m=2)
-    assert (r.at_stake[0], r.verdict, "hidden_stalls" in r.flags) == (0.0, "open", False)
-
-
-# `python -m verification.verdict_errors` simulates 3,000 studies of each.
-@pytest.mark.parametrize(("stalled", "n"), [("3% stall", 30), ("5% stall", 20), ("10% stall", 10)])
-def test_verdicts_hold_their_level_though_some_runs_stall(stalled: str, n: int) -> None:
-    for looks in ([n], looks_up_to(60)):
-        wrong = wrong_verdicts(stalled, looks, 600)
-        assert max(wrong.above, wrong.below) <= 0.06
-    assert share_equivalent(stalled, n, -0.1, 600) <= 0.06
 
 
 RUNS: dict[str, Any] = {"faulty": [[1.0], [2.0]], "reference": [[1.0], [2.0]], "onset": 1_000.0}

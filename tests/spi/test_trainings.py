@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
-from verification.verdict_errors import trainings_coverage
+from verification.verdict_errors import over_trainings
 
 
 def study(
@@ -24,11 +24,11 @@ def study(
     return rng.poisson(p_o), rng.poisson(ratio * p_o * factor((k, 1), spread))
 
 
-@pytest.mark.parametrize("kind", ["poisson", "overdispersed", "geometric"])
+@pytest.mark.parametrize("world", ["sd .1, R sd .1", "sd .3, R sd .05", "sd .1, geometric"])
 @pytest.mark.parametrize("k", [5, 10])
-def test_an_interval_holds_the_truth_in_93_of_100_studies(kind: str, k: int) -> None:
-    # Two standard errors of 400 studies are .02.
-    assert trainings_coverage(kind, k, 10, 0.1, studies=300).share >= 0.93 - 0.02
+def test_an_interval_holds_the_truth_in_93_of_100_studies(world: str, k: int) -> None:
+    # Two standard errors of 500 studies are .02.
+    assert over_trainings(world, k, 10, studies=500).coverage >= 0.93 - 0.02
 
 
 def test_trainings_or_seeds_that_do_not_differ_leave_the_interval_of_the_others() -> None:
@@ -46,7 +46,7 @@ def test_interval_and_verdict_agree_at_any_threshold(
     assert found.low is not None
     assert found.high is not None
     inside = found.low <= threshold <= found.high
-    assert inside == (found.verdict == "open")
+    assert inside == (found.verdict == "open" and "hidden_collapses" not in found.flags)
 
 
 def test_unpaired_seeds_are_of_the_same_trainings() -> None:

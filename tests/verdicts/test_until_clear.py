@@ -142,7 +142,7 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
 
         def poisson(run: Run, _: Outcome, number: int = number) -> Outcome:
             rng = np.random.default_rng([number, run.seed, *map(ord, mode_of(run))])
-            return delivered(rng.poisson(35 if run.case.faults else 40))
+            return delivered(rng.poisson(33 if run.case.faults else 40))
 
         study = until_clear(30)
         study.run(Engine(poisson))
@@ -217,11 +217,11 @@ def test_another_most_is_exploratory_and_shards_are_refused(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("model", MODELS)
 def test_wrong_verdicts_over_all_looks_are_bounded(model: str) -> None:
-    most = 0.08 if model == "geometric" else 0.055
-    # 1,500 studies tell 0.05 to 0.011; `python -m verification.verdict_errors` plays 3,000.
-    assert wrong_verdicts(model, looks_up_to(100), studies=1_000).share < most
+    # 1,000 studies tell 0.05 to 0.014; `python -m verification.verdict_errors` plays 2,000.
+    wrong = wrong_verdicts(model, looks_up_to(100), studies=1_000)
+    assert max(wrong.above, wrong.below) <= 0.035
     seen = wrong_verdicts(model, looks_up_to(100), studies=1_000, only_seen=True).share
-    assert 0.02 < seen < most
+    assert 0.02 < seen < 0.06
 
 
 def noise(seed: int) -> Numbers:
