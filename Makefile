@@ -9,6 +9,7 @@ DEV   := .venvs/dev
 STUDY := .venvs/study
 DOCS  := .venvs/docs
 
+FIT       := .venvs/fit
 BENCHMARK := .venvs/benchmark
 CANARY    := .venvs/canary
 
@@ -30,10 +31,11 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help paper tables test quick check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks docs docs-check dist absolute-links format clean
+.PHONY: help paper paper-fit tables test quick check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
+	@echo "make paper-fit MINUTES=40  fit the constants of swarm-dt to the paper's tables, then confirm them for as long: results/paper_fit"
 	@echo "make tables          play the studies behind docs/results.md (half an hour; with the learners of make interop, if there), write its tables, the README's numbers and the scores of judge --benchmark"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make quick           lint, types and the fastest tests, within a minute: for every commit"
@@ -56,6 +58,11 @@ help:
 
 paper: $(STUDY)/installed
 	$(STUDY)/bin/swarm-logistics study run paper --seeds $(SEEDS) --out $(OUT)
+
+# Of one core, twice. It goes on from what lies in results/paper_fit.
+paper-fit: $(FIT)/installed
+	$(FIT)/bin/python docs/fit_paper.py --minutes $(MINUTES)
+	$(FIT)/bin/python docs/play_paper_fit.py --minutes $(MINUTES)
 
 tables: $(STUDY)/installed
 	$(STUDY)/bin/python docs/play_tables.py
@@ -198,6 +205,9 @@ $(INSTALLED:=/wheel): .venvs/lowest.txt
 	$(@D)/bin/python -m pip uninstall --yes swarm-logistics-env
 	$(@D)/bin/python -m pip install --constraint constraints.txt $(BOUNDS) \
 		"$$(echo build/wheels/*.whl)[study,render,watch]" build hypothesis pytest pytest-xdist setuptools
+
+$(FIT)/installed: EXTRAS := study
+$(FIT)/installed: OTHERS := cma
 
 $(BENCHMARK)/installed: EXTRAS := study,train
 

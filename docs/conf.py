@@ -43,7 +43,12 @@ toc_object_entries_show_parents = "hide"
 CONTENTS = {
     "Use": ("quickstart", "The environment <environment>", "training", "faults"),
     "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
-    "Research": ("results", "research/questions_of_the_field", "research/readings_and_tries"),
+    "Research": (
+        "results",
+        "research/questions_of_the_field",
+        "research/readings_and_tries",
+        "research/paper_fit",
+    ),
     "Look up": ("reference", "Comparison <comparison>"),
 }
 

@@ -80,7 +80,8 @@ in {times[ppo-indicator].text} s, the paper's Swarm D-T in {times[swarm-dt].text
 `swarm-dt-follow` is {s[swarm-dt-follow].text}, of `homing` {s[homing].text}.
 * **Of {n_claims} claims of the paper's text** this re-implementation (constants partly fitted) \
 supports {counts[supported]} and contradicts {counts[contradicted]} ({contradicted}); \
-{counts[open]} are open, {counts[untestable]} cannot fail. FM1 is not reproduced.
+{counts[open]} are open, {counts[untestable]} cannot fail. With these constants FM1 is not \
+reproduced.
 
 95 % intervals: {seeds[policies]} seeds ({seeds[clearing]} for times, {seeds[leans]} for slow \
 lifting), of networks over trainings too."""

@@ -43,6 +43,12 @@ class SwarmDTParameters(Record):
         2.0, description="away from each near robot, in top speeds at distance 0; fitted"
     )
     avoidance_range: NonNegativeFloat = Field(0.5, description="where avoidance begins [m]; fitted")
+    item_avoidance_gain: NonNegativeFloat = Field(
+        2.0, description="the same away from each near item, while it carries one; fitted"
+    )
+    item_avoidance_range: NonNegativeFloat = Field(
+        0.5, description="where the avoidance of items begins [m]; fitted"
+    )
     wall_distance: NonNegativeFloat = Field(
         0.2, description="reflects the stored heading at a wall nearer than this [m]; fitted"
     )
@@ -55,6 +61,11 @@ class SwarmDTParameters(Record):
     heading_follows: bool = Field(
         False, description="whether avoidance and taxis turn the stored heading; fitted"
     )
+    full_speed: bool = Field(
+        False,
+        description="always drives at its top speed, as in the simulator; else it slows where the "
+        "pushes on it cancel each other; fitted",
+    )
 
 
 class StepConstants(NamedTuple):
@@ -63,8 +74,8 @@ class StepConstants(NamedTuple):
     Attributes:
         widest_turn: the largest turn of the stored heading by diffusion [rad].
         drop_probability: the probability to drop an item that is not requested.
-        avoidance_gain, avoidance_range, wall_distance, taxis_gain, heading_follows: the parameters
-            of these names.
+        avoidance_gain, avoidance_range, item_avoidance_gain, item_avoidance_range, wall_distance,
+            taxis_gain, heading_follows, full_speed: the parameters of these names.
         widest_step: the largest turn of a differential robot's body [rad]; 0 if it is holonomic.
     """
 
@@ -72,9 +83,12 @@ class StepConstants(NamedTuple):
     drop_probability: float
     avoidance_gain: float
     avoidance_range: float
+    item_avoidance_gain: float
+    item_avoidance_range: float
     wall_distance: float
     taxis_gain: float
     heading_follows: bool
+    full_speed: bool
     widest_step: float
 
 
@@ -172,6 +186,7 @@ def decide_swarm_dt(
         x += push_x
         y += push_y
         if carries:
+            gain, reach = constants.item_avoidance_gain, constants.item_avoidance_range
             push_x, push_y = avoid(observation, row.ITEMS, row.N_ITEMS_IN_VIEW, gain, reach)
             x += push_x
             y += push_y
@@ -184,7 +199,8 @@ def decide_swarm_dt(
         if constants.heading_follows:
             heading[robot] = math.atan2(y, x)
 
-        norm = max(math.sqrt(x * x + y * y), 1.0)
+        length = math.sqrt(x * x + y * y)
+        norm = length if constants.full_speed and length > 0.0 else max(length, 1.0)
         commands[robot, 0] = x / norm
         commands[robot, 1] = y / norm
         commands[robot, 2] = 0.0

@@ -7,8 +7,7 @@ import math
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
 
-from .demand import is_requested
-from .logistics import is_remembered
+from .logistics import is_known_request, is_remembered
 from .pose import Pose, in_frame
 from .sensor_errors import ROBOT_SEEN, is_missed
 from .structs import Grid, Nearby, Sensed, World
@@ -70,7 +69,7 @@ def describe_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed
         out[column] = 1.0
         out[column + 1] = forward
         out[column + 2] = left
-        out[column + 3] = 1.0 if is_requested(world, item) else 0.0
+        out[column + 3] = 1.0 if is_known_request(world, me, item) else 0.0
         out[column + 4] = 1.0 if is_remembered(robots.memory, me, item) else 0.0
 
 

@@ -23,8 +23,8 @@ class FailureMode:
         ranger_bias: what they read too far [m].
         radio_delay: how late its broadcasts come [s].
         present: False: it is out of the arena.
-        lifts, delivers, sends, hears, honest, obeys, releases_inside, rangers_refresh: see
-            `structs.Capabilities`.
+        lifts, delivers, sends, hears, hears_requests, honest, obeys, releases_inside,
+            rangers_refresh: see `structs.Capabilities`.
     """
 
     description: str
@@ -41,18 +41,34 @@ class FailureMode:
     delivers: bool = True
     sends: bool = True
     hears: bool = True
+    hears_requests: bool = True
     honest: bool = True
     obeys: bool = True
     releases_inside: bool = True
     rangers_refresh: bool = True
 
 
+# Sending and hearing are the robots' own radio, i.e. timers and messages. What the warehouse tells
+# all robots, i.e. the requests and the deliveries, which clear their memories, reaches robots in
+# FM3 as well: the paper's "cannot communicate with their neighbours". `FM3_isolated` loses both.
 FAILURE_MODES: dict[str, FailureMode] = {
     "FM1": FailureMode("always tells timer 0, as if in the delivery area", mark="1", honest=False),
     "FM2": FailureMode("never picks up", mark="2", lifts=False),
-    "FM3": FailureMode("neither sends nor hears", mark="3", sends=False, hears=False),
+    "FM3": FailureMode(
+        "neither sends nor hears, but is told of requests and deliveries",
+        mark="3",
+        sends=False,
+        hears=False,
+    ),
     "FM3_send": FailureMode("does not send", mark="3s", sends=False),
     "FM3_hear": FailureMode("does not hear", mark="3h", hears=False),
+    "FM3_isolated": FailureMode(
+        "as FM3, and is told of no request and no delivery",
+        mark="3i",
+        sends=False,
+        hears=False,
+        hears_requests=False,
+    ),
     "FM4": FailureMode("its entering the delivery area delivers nothing", mark="4", delivers=False),
     "FM4_jam": FailureMode(
         "as FM4, and what it holds inside the delivery area it cannot let go",

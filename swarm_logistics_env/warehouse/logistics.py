@@ -284,12 +284,18 @@ def is_remembered(memory: Integers, robot: int, item: int) -> bool:
     return is_in_memory
 
 
+@inlined_kernel
+def is_known_request(world: World, robot: int, item: int) -> bool:
+    """Return whether `robot` was told of an open request for `item`."""
+    return bool(world.able.hears_requests[robot] and is_requested(world, item))
+
+
 @kernel
 def wanted_item(world: World, robot: int) -> tuple[int, float]:
     """Return the item that `robot` would lift now, or NOBODY, and the square of its distance.
 
-    The nearest requested item in reach comes first, else the nearest that is not in its memory.
-    A robot that lifts goes on with its item, and nobody else takes it.
+    The nearest in reach that it knows to be requested comes first, else the nearest that is not in
+    its memory. A robot that lifts goes on with its item, and nobody else takes it.
     """
     robots, grid, nearby = world.robots, world.item_grid, world.nearby
     if robots.handling[robot, KIND] == LIFTING:
@@ -301,7 +307,7 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
         item, square = grid.members[nearby.slot[index]], nearby.square[index]
         if world.items.status[item] != STORED or is_being_lifted(world, item):
             continue
-        is_asked_for = is_requested(world, item)
+        is_asked_for = is_known_request(world, robot, item)
         is_first = is_asked_for and not is_best_requested
         if not is_first and (square >= best_square or is_asked_for != is_best_requested):
             continue
@@ -355,7 +361,7 @@ def close_grippers(world: World) -> None:
 def deliver(world: World) -> tuple[int, bool]:
     """Deliver the requested items whose carriers can, the oldest request first, then the next.
 
-    A delivery clears every robot's memory; with `restock` the item comes back to the storage.
+    It clears the memory of every robot that is told of it; with `restock` the item comes back.
 
     Returns how many there were, and whether all that came back found room.
     """
@@ -373,7 +379,9 @@ def deliver(world: World) -> tuple[int, bool]:
             continue
         robots.item[robot] = NOBODY
         collide_with(engine, engine.robot_shapes[robot], EMPTY_ROBOT)
-        robots.memory[:, :] = NOBODY
+        for hearer in range(len(robots.memory)):
+            if world.able.hears_requests[hearer]:
+                robots.memory[hearer, :] = NOBODY
         items.status[item] = DELIVERED
         items.carrier[item] = NOBODY
         world.claims.delivered_by[n_delivered] = robot

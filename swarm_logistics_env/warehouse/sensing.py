@@ -13,8 +13,8 @@ from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 
 from .cameras import choose, describe_items, describe_neighbours
-from .demand import is_requested
 from .grid import look_around
+from .logistics import is_known_request
 from .pose import Pose, in_frame
 from .radio import listen
 from .rangers import N_RANGES, full_range, scan_discs, scan_solids
@@ -117,7 +117,8 @@ def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     timer = robots.timer[me]
     runs = not math.isnan(timer)
     out[row.CARRYING] = 1.0 if carried != NOBODY else 0.0
-    out[row.CARRYING_REQUESTED] = 1.0 if carried != NOBODY and is_requested(world, carried) else 0.0
+    knows = carried != NOBODY and is_known_request(world, me, carried)
+    out[row.CARRYING_REQUESTED] = 1.0 if knows else 0.0
     out[row.IN_DELIVERY_AREA] = 1.0 if robots.in_delivery[me] else 0.0
     out[row.TIMER_RUNS] = 1.0 if runs else 0.0
     out[row.TIMER] = timer if runs else parameters.timer_limit

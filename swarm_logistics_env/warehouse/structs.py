@@ -98,6 +98,7 @@ class Capabilities(NamedTuple):
     delivers: Annotated[Flags, "N"]  # False: nothing that it brings counts
     sends: Annotated[Flags, "N"]  # False: nobody hears its timer and message
     hears: Annotated[Flags, "N"]  # False: it hears no timer and no message
+    hears_requests: Annotated[Flags, "N"]  # False: knows no request, and no delivery clears memory
     honest: Annotated[Flags, "N"]  # False: tells timer 0 always
     obeys: Annotated[Flags, "N"]  # False: ignores its commands, the gripper's too
     releases_inside: Annotated[Flags, "N"]  # False: lets nothing go inside the delivery area

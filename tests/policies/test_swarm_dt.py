@@ -102,6 +102,25 @@ def test_it_turns_away_from_a_near_robot_and_from_items_while_it_carries() -> No
     assert straight(drop_rate=0.0).act(sensing(ITEM, CARRYING))[0, 0] < plain[0, 0]
 
 
+def test_items_are_avoided_by_constants_of_their_own() -> None:
+    carrying = sensing(ITEM, CARRYING)
+    plain = straight(drop_rate=0.0, item_avoidance_gain=0.0).act(carrying)
+    pushed = straight(drop_rate=0.0, item_avoidance_gain=1.0, item_avoidance_range=0.4)
+    # Pushed back by 1 - 0.3 / 0.4 = 0.25 top speeds.
+    np.testing.assert_allclose(pushed.act(carrying)[0, :2], plus(plain, -0.25, 0.0), atol=1e-6)
+    robots_alone = straight(drop_rate=0.0, item_avoidance_gain=0.0, avoidance_gain=9.0)
+    np.testing.assert_array_equal(robots_alone.act(carrying)[0, :2], plain[0, :2])
+
+
+def test_at_full_speed_it_keeps_the_direction_and_no_push_slows_it() -> None:
+    plain = straight().act(NOTHING)
+    ahead = neighbour(*(0.3 * plain[0, :2]))  # pushes it straight back, by 0.8 top speeds
+    slowed, fast = straight().act(sensing(ahead)), straight(full_speed=True).act(sensing(ahead))
+    assert np.hypot(*slowed[0, :2]) == pytest.approx(0.2)
+    assert np.hypot(*fast[0, :2]) == pytest.approx(1.0)
+    assert heading_of(fast) == pytest.approx(heading_of(slowed))
+
+
 def test_only_who_carries_the_requested_item_follows_the_lowest_timer() -> None:
     plain = straight().act(NOTHING)
     for things in ((HEARD,), (HEARD, CARRYING)):

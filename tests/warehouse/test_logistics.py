@@ -29,6 +29,11 @@ HANDS: dict[str, tuple[Any, ...]] = {
         [*PAIR, (2.8, 2.0)], [FAR, (2.19, 2.0), (2.605, 2.0), (2.4, 2.24)], [[HOLD] * 3],
         [1, 3, 2]),
     "the requested item before a nearer one": (ONE, [(2.2, 2.0), (1.95, 2.0)], [[HOLD]], [0]),
+    "who is told of no request takes the nearest item": (
+        ONE, [(2.2, 2.0), (1.95, 2.0)], [[HOLD]], [1], [Fault("FM3_isolated", (0,))]),
+    "and not the requested one again": (
+        ONE, [(2.1, 2.0)], AGAIN, [-1], [Fault("FM3_isolated", (0,))]),
+    "which a robot in FM3 does": (ONE, [(2.1, 2.0)], AGAIN, [0], [Fault("FM3", (0,))]),
     "of others the nearest": (ONE, [FAR, (2.2, 2.0), (1.95, 2.0)], [[HOLD]], [2]),
     "of items equally near the lower number": (
         [(2.25, 2.5)], [FAR, (2.25, 2.625), (2.25, 2.375)], [[HOLD]], [1]),
@@ -122,6 +127,25 @@ def test_a_delivery_clears_everybodys_memory(build: Build) -> None:
     steps(world, STAY, STAY, HOLD)
     assert world.state.delivered == 1
     assert (world.state.robot_memory == NOBODY).all()
+
+
+def test_who_is_told_of_nothing_keeps_its_memory_and_sees_no_request_but_can_deliver(
+    build: Build,
+) -> None:
+    # It puts 1 down, then carries 0, which is requested, into the delivery area.
+    isolated, item = [Fault("FM3_isolated", (0,))], row.ITEMS + row.ITEM_FEATURES.index("requested")
+    for faults, knows, memory in (([], 1.0, NOBODY), (isolated, 0.0, 1)):
+        world = build([(7.0, 5.0)], [(7.3, 5.0), (7.1, 5.0), FAR], faults, pickup_range=0.15)
+        rows = steps(world, HOLD)
+        assert rows[0, item] == knows
+        steps(world, OPEN)
+        rows = steps(world, EAST, times=2)
+        rows = steps(world, HOLD)
+        assert world.state.robot_item[0] == 0
+        assert rows[0, row.CARRYING_REQUESTED] == knows
+        steps(world, EAST, times=6)
+        assert world.state.delivered == 1
+        assert world.state.robot_memory[0, 0] == memory
 
 
 def test_an_item_is_delivered_as_soon_as_its_carriers_centre_is_inside(build: Build) -> None:
