@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from tables import ROOT, with_blocks
+from tables import ROOT, table, with_blocks
 
 from swarm_logistics_env.report import drawing, section
 from swarm_logistics_env.spi.summaries import Interval
@@ -32,6 +32,7 @@ _PANELS = {
     "R, FM2, m = 2": "R, FM2\nlifts nothing",
     "R, FM3, m = 2": "R, FM3\nradio dead",
     "R, FM4, m = 2": "R, FM4\ndelivers nothing",
+    "R, FM4_jam, m = 2": "R, FM4_jam\nnor lets go",
 }
 
 
@@ -73,9 +74,12 @@ in {times[ppo-indicator].text} s, the paper's Swarm D-T in {times[swarm-dt].text
 500 s; Swarm D-T {p[swarm-dt].text}.
 * **They lean on lifting that takes no time**: where it takes 1 s, `ppo-indicator` delivers \
 {slow[ppo-indicator].text}, `homing`, a script, {slow[homing].text}.
-* **One collapses under a fault that another bears**: with two robots in FM4 R of `swarm-dt` is \
-{r[swarm-dt].text}, of `ppo-indicator` {r[ppo-indicator].text}, of `ppo-robust` \
-{r[ppo-robust].text}.
+* **One collapses under a fault that another bears, and the reading of the fault decides which**: \
+with two robots that deliver nothing (FM4) R of `swarm-dt` is {fm4[swarm-dt].text}, of `homing`, \
+a script, {fm4[homing].text}, of `ppo-indicator` {fm4[ppo-indicator].text}, of `ppo-robust` \
+{fm4[ppo-robust].text}. If they cannot let go of the item there either, as the paper's "deadlock" \
+may be read (FM4_jam), R is {jam[swarm-dt].text}, {jam[homing].text}, {jam[ppo-indicator].text} \
+and {jam[ppo-robust].text}.
 * **Four times the robots do not deliver four times as much**: from 25 to 100 S of \
 `swarm-dt-follow` is {s[swarm-dt-follow].text}, of `homing` {s[homing].text}.
 * **Of {n_claims} claims of the paper's text** this re-implementation (constants partly fitted) \
@@ -103,13 +107,40 @@ def findings() -> str:
         more=p["ppo-indicator"].interval.value / p["swarm-dt"].interval.value,
         p=p,
         slow=values(estimates, "leans")["lifting takes 1 s"],
-        r=policies["R, FM4, m = 2"],
+        fm4=policies["R, FM4, m = 2"],
+        jam=policies["R, FM4_jam, m = 2"],
         s=policies["S, N 25 -> 100"],
         n_claims=len(claims),
         counts=Counter(claim["verdict"] for claim in claims),
         contradicted=", ".join(f"{n} on {subject}" for subject, n in contradicted.most_common()),
         seeds={line["study"]: line["seeds"] for line in estimates},
     )
+
+
+# How each policy of the first table came about.
+_POLICIES = {
+    "swarm-dt": "the paper's",
+    "homing": "a script",
+    "ppo-delivery": "learned",
+    "ppo-robust": "learned among faults",
+    "ppo-indicator": "the same, paid half as long as no robot fails",
+}
+_CONDITIONS = {
+    "no fault": "no fault",
+    "FM1, m = 2": "FM1: two mislead the others",
+    "FM4, m = 2": "FM4: two deliver nothing",
+    "FM4_jam, m = 2": "FM4_jam: nor let go of the item",
+}
+
+
+def broken() -> str:
+    """Return the table of what two broken robots cost."""
+    estimates = values(read("estimates"), "broken")
+    rows = [
+        (f"`{policy}`, {words}", *(estimates[condition][policy].text for condition in _CONDITIONS))
+        for policy, words in _POLICIES.items()
+    ]
+    return table(("items in 200 s", *_CONDITIONS.values()), rows)
 
 
 def speed() -> str:
@@ -167,7 +198,7 @@ def readme_text() -> str:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     address = project.get("urls", {}).get("Repository")
     readme = README.read_text(encoding="utf-8")
-    text = with_blocks(readme, {"findings": findings(), "speed": speed()})
+    text = with_blocks(readme, {"broken": broken(), "findings": findings(), "speed": speed()})
     return with_address(text, address.rstrip("/")) if address else text
 
 

@@ -44,6 +44,7 @@ PROCESSES = usable_cores()
 # Studies in examples/ that are tables of the page.
 EXAMPLES = (
     "clearing", "ladder", "ladder_restocked", "leans", "shipped_policies", "robust_policy",
+    "broken_robots",
 )  # fmt: skip
 ESTIMATES = ("study", "row", "policy", "value", "low", "high", "threshold", "digits", "seeds")
 COSTS = ("microseconds_per_step", "processor")
@@ -269,9 +270,9 @@ def benchmark_block(studies: Sequence[StudyResults]) -> str:
 
 
 def estimate_rows(
-    policies: StudyResults, clearing: StudyResults, leans: StudyResults
+    policies: StudyResults, clearing: StudyResults, leans: StudyResults, broken: StudyResults
 ) -> Iterator[tuple[object, ...]]:
-    """Yield the numbers of three tables, with the columns ESTIMATES."""
+    """Yield the numbers of four tables, with the columns ESTIMATES."""
 
     def row(
         study: str, label: str, policy: str, interval: Interval, digits: int, threshold: object = ""
@@ -297,6 +298,10 @@ def estimate_rows(
         for policy in leans.policies:
             mean = cells[policy].mean
             yield row("leans", title, policy, mean, section.digits_of(mean.value))
+    n_seeds = len(broken.plan.seeds)
+    for cell in broken.cells:
+        digits = section.digits_of(cell.mean.value)
+        yield row("broken", str(cell.arm.setting), cell.policy, cell.mean, digits)
 
 
 def clearing_interval(cell: Cell) -> Interval:
@@ -312,7 +317,7 @@ def main() -> None:
     """Play, rewrite the page of results and the files beside it, then the README."""
     paper = play(paper_studies(OUT, FIRST_SEED))
     draw_figures(paper, MEDIA)
-    clearing, cleared, restocked, leans, policies, robust = play(
+    clearing, cleared, restocked, leans, policies, robust, broken = play(
         example(OUT, name) for name in EXAMPLES
     )
     draw_ladder(restocked, MEDIA / "ladder.svg")
@@ -326,7 +331,7 @@ def main() -> None:
         "robust": robust_block(robust),
         "benchmark": benchmark_block(play(benchmark_studies(OUT))),
     }
-    estimates = estimate_rows(policies, clearing, leans)
+    estimates = estimate_rows(policies, clearing, leans, broken)
     write_rows(RESULTS / "estimates.csv", ESTIMATES, estimates)
     write_rows(RESULTS / "claims.csv", ("subject", "claim", "verdict"), claim_rows(paper))
     if BENCHMARK.exists():

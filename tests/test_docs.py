@@ -93,9 +93,12 @@ def run(block: str) -> dict[str, Any]:
 def test_readme_runs_as_written(capsys: pytest.CaptureFixture[str]) -> None:
     first, environment = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     run(first)
-    delivered = re.findall(r"^(\S+) +(\d+) items", capsys.readouterr().out, flags=re.MULTILINE)
-    rows = re.findall(r"^\| `(\S+)`.*? \| (\d+) \| (\d+) \| (\d+) \|$", README, flags=re.MULTILINE)
-    assert delivered == [(name, count) for name, *counts in rows for count in counts]
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.partition(" items  ")[2] for line in printed] == [
+        str(faults) for faults in ([], ["FM1:2"], ["FM4:2"], ["FM4_jam:2"])
+    ]
+    interval = r" \| [\d.]+ \[[\d.]+, [\d.]+\]"
+    rows = re.findall(rf"^\| `\S+`, [^|]+(?:{interval}){{4}} \|$", README, re.MULTILINE)
     assert len(rows) == 5
     names = run(environment.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
