@@ -34,7 +34,8 @@ class Decision(NamedTuple):
             indicator cannot lie below the threshold; undefined: a run that it needs failed or is
             missing.
         adjusted: the word after Holm's adjustment over the family; undefined, too, where another
-            comparison of the family is.
+            comparison of the family is, but for what needs no test (unaffected, untestable) and in
+            a study that runs until it is clear, whose family keeps it as one that is open.
     """
 
     plain: Word
@@ -60,7 +61,8 @@ class Verdict:
         margin: the largest change that counts as none, as a share of P_o.
         on_threshold: the decision on "the indicator lies above the threshold".
         on_equivalence: the decision on "P is unchanged"; None: S has no such question.
-        p_adjusted: p of the estimate after Holm; None: nothing to test, or an undefined family.
+        p_adjusted: p of the estimate after Holm; None: nothing to test, or an undefined family
+            outside of a study that runs until it is clear.
         stopped_at: number of seeds at which it was clear, in a study that runs until then; None: it
             is not, or the study is another.
         published: the reference's value of the indicator; None: it has none.
