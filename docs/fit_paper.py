@@ -89,8 +89,8 @@ def conditions(setting: Setting, radio_range: float) -> tuple[Scenario, list[Fau
 
 def policy_of(constants: Constants) -> SwarmDT:
     """Return Swarm D-T with these constants."""
-    own: dict[str, Any] = {name: x for name, x in constants.items() if name != "radio_range"}
-    return SwarmDT(**{**own, "full_speed": bool(own["full_speed"])})
+    parameters: dict[str, Any] = {name: x for name, x in constants.items() if name != "radio_range"}
+    return SwarmDT(**{**parameters, "full_speed": bool(parameters["full_speed"])})
 
 
 def play(settings: Iterable[Setting], constants: Constants, seed: int) -> Performances:
@@ -128,8 +128,8 @@ def largest_error(
     means = np.array([PAPER.performance[setting] for setting in settings])
     papers = np.maximum(draws.poisson(means, (20_000, len(means))), 0.5)
     n = np.array(n_seeds)
-    ours = np.maximum(draws.poisson(means * n, papers.shape) / n, 0.5)
-    return float(np.quantile(np.abs(np.log(ours / papers)).mean(axis=1), 0.95))
+    our_p = np.maximum(draws.poisson(means * n, papers.shape) / n, 0.5)
+    return float(np.quantile(np.abs(np.log(our_p / papers)).mean(axis=1), 0.95))
 
 
 def constants_at(point: Sequence[float]) -> dict[str, float]:
@@ -208,9 +208,9 @@ def search(fit: str, path: Path, is_over: Callable[[], bool] = lambda: True) -> 
     before = [tried for tried in read_tried(path) if tried.fit == fit]
     if fit == "all":  # it may see everything, so it begins where the other one was best
         rows = itertools.takewhile(lambda t: t.fit == "sound", read_tried(path))
-        others = [tried for tried in rows if is_full(tried)]
-        others.sort(key=lambda t: log_error(t.performance, PAPER.cells))
-        start, width = np.mean([point_of(t.constants) for t in others[:10]], axis=0), 0.15
+        remaining_sets = [tried for tried in rows if is_full(tried)]
+        remaining_sets.sort(key=lambda t: log_error(t.performance, PAPER.cells))
+        start, width = np.mean([point_of(t.constants) for t in remaining_sets[:10]], axis=0), 0.15
     options = {"bounds": [0.0, 1.0], "seed": 1, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(start, width, options)
     generation = 0

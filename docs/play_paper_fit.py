@@ -63,9 +63,9 @@ Samples = Mapping[str, NDArray[np.float64]]  # P over seeds
 
 def old_constants() -> dict[str, float]:
     """Return the constants of 2026, which were fitted to all tables by hand."""
-    own: dict[str, Any] = SwarmDT().parameters.model_dump()
-    own |= {"radio_range": Scenario().radio_range}
-    return {name: float(own[name]) for name in CONSTANTS}
+    constants: dict[str, Any] = SwarmDT().parameters.model_dump()
+    constants |= {"radio_range": Scenario().radio_range}
+    return {name: float(constants[name]) for name in CONSTANTS}
 
 
 def sets_to_confirm(tried: Path) -> dict[str, dict[str, float]]:
@@ -93,7 +93,7 @@ def by_set(rows: Sequence[Tried]) -> dict[tuple[float, ...], list[Tried]]:
     sets: dict[tuple[float, ...], list[Tried]] = {}
     for row in rows:
         sets.setdefault(tuple(row.constants.values()), []).append(row)
-    return {key: found for key, found in sets.items() if any(map(is_full, found))}
+    return {key: trials for key, trials in sets.items() if any(map(is_full, trials))}
 
 
 def samples(rows: Sequence[Tried]) -> dict[str, NDArray[np.float64]]:
@@ -172,11 +172,11 @@ def holds(question: Question, cells: Means) -> bool:
     return (value > question.threshold) == PAPER.claims[question]
 
 
-def word(held: int, n: int) -> str:
+def word(n_holding: int, n: int) -> str:
     """Return what it says of a claim that it holds under so many of n sets."""
-    if held >= DECIDED * n:
+    if n_holding >= DECIDED * n:
         return "supported"
-    return "contradicted" if n - held >= DECIDED * n else "open"
+    return "contradicted" if n - n_holding >= DECIDED * n else "open"
 
 
 def claim_rows(folder: Path) -> list[tuple[str, int, int]]:

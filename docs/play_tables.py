@@ -302,6 +302,7 @@ def estimate_rows(
     for cell in broken.cells:
         digits = section.digits_of(cell.mean.value)
         yield row("broken", str(cell.arm.setting), cell.policy, cell.mean, digits)
+        yield row("broken", f"contacts, {cell.arm.setting}", cell.policy, cell.contacts, 1)
 
 
 def clearing_interval(cell: Cell) -> Interval:

@@ -98,7 +98,7 @@ def test_readme_runs_as_written(capsys: pytest.CaptureFixture[str]) -> None:
         str(faults) for faults in ([], ["FM1:2"], ["FM4:2"], ["FM4_jam:2"])
     ]
     interval = r" \| [\d.]+ \[[\d.]+, [\d.]+\]"
-    rows = re.findall(rf"^\| `\S+`, [^|]+(?:{interval}){{4}} \|$", README, re.MULTILINE)
+    rows = re.findall(rf"^\| `\S+`, [^|]+(?:{interval}){{5}} \|$", README, re.MULTILINE)
     assert len(rows) == 5
     names = run(environment.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
