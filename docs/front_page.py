@@ -62,6 +62,8 @@ def values(estimates: Sequence[Mapping[str, str]], study: str) -> Rows:
             interval = Interval(float(line["value"]), low, high)
             thresholds = [float(line["threshold"])] if line["threshold"] else []
             text = section.bracketed(interval, int(line["digits"]), thresholds)
+            if line["collapsed"]:
+                text += f"; {line['collapsed']}"
             rows.setdefault(line["row"], {})[line["policy"]] = Value(interval, text)
     return rows
 
@@ -88,7 +90,7 @@ fail under nine in ten of [{n_sets} sets of constants](docs/research/paper_fit.m
 cells without faults; {sets[open]} hang on constants that it does not give. With those of \
 `swarm-dt` alone, partly fitted to all of its tables, {counts[supported]} are supported and \
 {counts[contradicted]} contradicted ({contradicted}); {counts[open]} are open, \
-{counts[untestable]} cannot fail.
+{counts[untestable]} are untestable.
 
 95 % intervals: {seeds[policies]} seeds ({seeds[clearing]} for times, {seeds[leans]} for slow \
 lifting), of networks over trainings too."""

@@ -46,7 +46,9 @@ EXAMPLES = (
     "clearing", "ladder", "ladder_restocked", "leans", "shipped_policies", "robust_policy",
     "broken_robots",
 )  # fmt: skip
-ESTIMATES = ("study", "row", "policy", "value", "low", "high", "threshold", "digits", "seeds")
+ESTIMATES = (
+    "study", "row", "policy", "value", "low", "high", "threshold", "digits", "seeds", "collapsed",
+)  # fmt: skip
 COSTS = ("microseconds_per_step", "processor")
 
 
@@ -275,10 +277,16 @@ def estimate_rows(
     """Yield the numbers of four tables, with the columns ESTIMATES."""
 
     def row(
-        study: str, label: str, policy: str, interval: Interval, digits: int, threshold: object = ""
+        study: str,
+        label: str,
+        policy: str,
+        interval: Interval,
+        digits: int,
+        threshold: object = "",
+        collapsed: object = "",
     ) -> tuple[object, ...]:
         name = policy.partition(", ")[0]  # without how many trainings it stands for
-        return study, label, name, *interval, threshold, digits, n_seeds
+        return study, label, name, *interval, threshold, digits, n_seeds, collapsed
 
     n_seeds = len(policies.plan.seeds)
     for cell in varied_cells(policies):
@@ -288,7 +296,8 @@ def estimate_rows(
         if test.interval:
             label = f"{test.compared.indicator}, {test.compared.label}"
             policy, threshold = test.compared.policy, test.compared.threshold
-            yield row("policies", label, policy, test.interval, 3, threshold)
+            collapsed = (test.estimate and test.estimate.collapsed) or ""
+            yield row("policies", label, policy, test.interval, 3, threshold, collapsed)
     n_seeds = len(clearing.plan.seeds)
     for cell in clearing.cells:
         if cell.n_seeds:

@@ -44,6 +44,9 @@ def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
         yield "exploratory", {}
     if results.late_margin:
         yield "late_margin", {}
+    collapses = [v.estimate.collapsed for v in verdicts if v.estimate and v.estimate.collapsed]
+    if collapses:
+        yield "collapsed", {"collapsed": max(collapses, key=lambda collapsed: collapsed.number)}
     if any(verdict.saturated for verdict in verdicts):
         yield "capped", {"mark": section.SATURATED}
     if any(cell.stalled for cell in results.cells):

@@ -184,13 +184,19 @@ def mean_p(cell: Cell) -> str:
 def ratio(verdict: Verdict, level: float = CONFIDENCE) -> str:
     """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]".
 
+    Of several trainings it also says how many collapsed.
+
     Args:
         level: that the heading names; another one of the interval stands behind it.
     """
-    text = bracketed(verdict.estimate, 3)
-    if verdict.saturated and verdict.estimate is not None:
+    estimate = verdict.estimate
+    text = bracketed(estimate, 3)
+    if verdict.saturated and estimate is not None:
         text += SATURATED
-    return text + other_levels([verdict], level)
+    text += other_levels([verdict], level)
+    if estimate is not None and estimate.collapsed is not None:
+        text += f"; {estimate.collapsed}"
+    return text
 
 
 def conclusion_text(*verdicts: Verdict) -> str:

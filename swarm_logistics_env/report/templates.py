@@ -83,6 +83,7 @@ NOTES = {
     "damage": "{damage}",
     "exploratory": "exploratory: other seeds than were declared, whose report this replaces",
     "late_margin": "equivalence is exploratory: another margin was declared",
+    "collapsed": "of the trainings at worst {collapsed}",
     "capped": "{mark} P is capped: --clearing or --restock has no cap",
     "stalled": "some runs stalled (P below a quarter of the median; --full names them)",
     "open": "so many more {runs} would tell such a value from the threshold in 4 of 5 studies",

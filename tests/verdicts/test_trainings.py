@@ -50,6 +50,12 @@ def test_a_study_judges_all_trainings_together(recipe: str, tmp_path: Path) -> N
     assert means == pytest.approx([np.mean(p_o), np.mean(p_f)], rel=1e-12)
     (page,) = (path.read_text() for path in study.report() if path.suffix == ".html")
     assert "mine, 5 trainings" in page
+    # How many collapsed stands beside the value, in the table and in the notes of the answer.
+    collapsed = verdict.estimate.collapsed
+    assert collapsed is not None
+    assert collapsed.of == 5
+    assert f"[{same.low:.3f}, {same.high:.3f}]; {collapsed}" in page
+    assert f"of the trainings at worst {collapsed}" in page
     with pytest.raises(StudyError, match="--all-seeds"):
         Study(until_clear=True, **asked).plan()
 
