@@ -262,6 +262,8 @@ def _tested(
     n_seeds, paired, threshold = untested.n_seeds, untested.paired, untested.threshold
     terms, null = list(weighted.values()), threshold - offset
     over_trainings = untested.n_trainings is not None
+    # Of a policy without trainings all rows are equal, and two recipes share no training.
+    is_of_one_recipe = over_trainings and not two_recipes and np.ptp(terms[0].sample, axis=0).any()
     correlation = None
     if paired and not over_trainings:
         correlation = pairing_correlation(terms[0].sample, terms[1].sample)
@@ -309,7 +311,7 @@ def _tested(
             hidden_of_side(terms, hidden, null, 1),
             hidden_of_side(terms, hidden, null, -1),
         ),
-        collapsed=collapsed(hidden[0]) if over_trainings and hidden[0] else None,
+        collapsed=collapsed(terms[0].sample, terms[-1].sample) if is_of_one_recipe else None,
         degrees_of_freedom=test.degrees_of_freedom,
         flags=tuple(flag for flag, holds in flags.items() if holds),
     )

@@ -24,8 +24,9 @@ SHARE_OF_MEDIAN = 0.25
 # The assumption of verdicts over seeds: at most so many runs of a condition stall, if fewer do in
 # the runs seen. A larger share would take small effects from verdicts at any usual number of seeds.
 STALL_SHARE = 0.05
-# A training has collapsed under a change if it keeps less than half of the share of P that the
-# median training keeps. Trainings are too few to assume how many collapse: any share may.
+# A training has collapsed under a change if it keeps less than half of its own P; to stand out from
+# the others, which p has to hold for, it keeps less than half of what the median training keeps.
+# Trainings are too few to assume how many collapse: any share may.
 COLLAPSED_BELOW = 0.5
 COLLAPSE_CONFIDENCE = 0.95  # of the upper limit of the share that collapses
 # Studies that show fewer than their share err a little too, which the chance that they show none
@@ -52,7 +53,7 @@ class Collapsed(NamedTuple):
     """Trainings that collapsed under a change, with the exact limit of their share.
 
     Attributes:
-        number: Trainings that collapsed.
+        number: Trainings that keep less than half of their own P.
         of: Trainings played.
         upper: One-sided 95 % upper limit of the share that collapses (Clopper and Pearson 1934).
     """
@@ -118,11 +119,17 @@ def _collapses(sample: Numbers, reference: Numbers) -> Hidden:
     return Hidden(seen.astype(np.float64), changed.shape[-1], 1.0)
 
 
-def collapsed(hidden: Hidden) -> Collapsed:
-    """Return the trainings that collapsed with the limit of their share."""
+def collapsed(changed: Numbers, reference: Numbers) -> Collapsed:
+    """Return the trainings that collapsed under a change with the limit of their share.
+
+    Args:
+        changed: Their P under the change, shape (K, S), row k being one training.
+        reference: Their P without it, shape (K, S).
+    """
     from scipy.special import betaincinv
 
-    number, of = int(hidden.seen), hidden.of
+    has_collapsed = changed.mean(axis=-1) < COLLAPSED_BELOW * reference.mean(axis=-1)
+    number, of = int(has_collapsed.sum()), len(changed)
     upper = 1.0 if number == of else float(betaincinv(number + 1, of - number, COLLAPSE_CONFIDENCE))
     return Collapsed(number, of, upper)
 

@@ -82,14 +82,14 @@ def test_studies_until_clear_hold_their_level_though_some_runs_stall(stalled: st
 
 @pytest.mark.parametrize(("k", "n", "upper"), [(0, 3, 0.63), (0, 5, 0.45), (0, 10, 0.26)])
 def test_the_share_that_collapses_has_an_exact_limit(k: int, n: int, upper: float) -> None:
-    found = collapsed(stalls(np.full(n, 40.0)))
+    found = collapsed(np.full((n, 2), 40.0), np.full((n, 2), 40.0))
     assert found[:2] == (k, n)
     assert found.upper == pytest.approx(upper, abs=0.005)
-    some = collapsed(stalls(np.array([1.0] + [40.0] * 9)))
+    some = collapsed(np.array([[1.0]] + [[40.0]] * 9), np.full((10, 1), 40.0))
     assert some.upper == pytest.approx(beta.ppf(0.95, 2, 9))
 
 
-def test_a_training_collapses_that_keeps_less_than_half_of_what_the_median_keeps() -> None:
+def test_a_training_collapses_that_keeps_less_than_half_of_its_own_p() -> None:
     p_o, p_f = TRAINED_O.copy(), TRAINED_F.copy()
     p_f[3] *= 0.4
     p_o[5] *= 0.3  # one that is bad in both conditions did not collapse under the fault
@@ -98,6 +98,8 @@ def test_a_training_collapses_that_keeps_less_than_half_of_what_the_median_keeps
     assert r.collapsed == spi.Collapsed(1, 20, float(beta.ppf(0.95, 2, 19)))
     assert "1 of 20 collapsed (at most 22%)" in str(r)
     assert spi.robustness(p_o[0], p_f[0], n=25, m=3).collapsed is None
+    # Where all do, none stands out, and all are counted.
+    assert spi.robustness(p_o, 0.1 * p_f, n=25, m=3).collapsed == spi.Collapsed(20, 20, 1.0)
 
 
 def test_only_of_two_recipes_the_reference_collapses_alone() -> None:
