@@ -164,7 +164,7 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
         (
             "Score: mean P of the held-out cells, over trainings and seeds.",
             f"Limits of a rank, and how often it is the same: of {RESAMPLES} resamples of both.",
-            f"Open: of two to {LEAST_TRAININGS - 1} trainings, which are too few for a rank.",
+            f"Open: of fewer than {LEAST_TRAININGS} trainings, too few for a rank.",
         ),
     )
 
