@@ -63,7 +63,7 @@ def values(estimates: Sequence[Mapping[str, str]], study: str) -> Rows:
             thresholds = [float(line["threshold"])] if line["threshold"] else []
             text = section.bracketed(interval, int(line["digits"]), thresholds)
             if line["collapsed"]:
-                text += f"; {line['collapsed']}"
+                text += f" ({line['collapsed']})"
             rows.setdefault(line["row"], {})[line["policy"]] = Value(interval, text)
     return rows
 
@@ -78,11 +78,12 @@ in {times[ppo-indicator].text} s, the paper's Swarm D-T in {times[swarm-dt].text
 * **They lean on lifting that takes no time**: where it takes 1 s, `ppo-indicator` delivers \
 {slow[ppo-indicator].text}, `homing`, a script, {slow[homing].text}.
 * **One collapses under a fault that another bears, and the reading of the fault decides which**: \
-with two robots that deliver nothing (FM4) R of `swarm-dt` is {fm4[swarm-dt].text}, of `homing`, \
-a script, {fm4[homing].text}, of `ppo-indicator` {fm4[ppo-indicator].text}, of `ppo-robust` \
-{fm4[ppo-robust].text}. If they cannot let go of the item there either, as the paper's "deadlock" \
-may be read (FM4_jam), R is {jam[swarm-dt].text}, {jam[homing].text}, {jam[ppo-indicator].text} \
-and {jam[ppo-robust].text}.
+with two robots that deliver nothing (FM4) R is {fm4[swarm-dt].text} of `swarm-dt`, \
+{fm4[homing].text} of `homing`, a script, {fm4[ppo-indicator].text} of `ppo-indicator`, and \
+{fm4[ppo-robust].text} of `ppo-robust`. If they cannot let go of the item there either, as the \
+paper's "deadlock" may be read (FM4_jam), it is {jam[swarm-dt].text} of `swarm-dt`, \
+{jam[homing].text} of `homing`, {jam[ppo-indicator].text} of `ppo-indicator`, and \
+{jam[ppo-robust].text} of `ppo-robust`.
 * **Four times the robots do not deliver four times as much**: from 25 to 100 S of \
 `swarm-dt-follow` is {s[swarm-dt-follow].text}, of `homing` {s[homing].text}.
 * **Of {n_claims} claims of the paper's text** {sets[supported]} hold and {sets[contradicted]} \

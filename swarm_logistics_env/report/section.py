@@ -195,7 +195,7 @@ def ratio(verdict: Verdict, level: float = CONFIDENCE) -> str:
         text += SATURATED
     text += other_levels([verdict], level)
     if estimate is not None and estimate.collapsed is not None:
-        text += f"; {estimate.collapsed}"
+        text += f" ({estimate.collapsed})"
     return text
 
 

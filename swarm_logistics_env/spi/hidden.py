@@ -63,8 +63,8 @@ class Collapsed(NamedTuple):
     upper: float
 
     def __str__(self) -> str:
-        """Return both in words, e.g. "0 of 5 collapsed (at most 45 %)"."""
-        return f"{self.number} of {self.of} collapsed (at most {self.upper:.0%})"
+        """Return both in words, e.g. "0 of 5 collapsed, at most 45 %"."""
+        return f"{self.number} of {self.of} collapsed, at most {100 * self.upper:.0f} %"
 
 
 def share_stalled(p: ArrayLike) -> float:

@@ -96,7 +96,7 @@ def test_a_training_collapses_that_keeps_less_than_half_of_its_own_p() -> None:
     p_f[5] *= 0.3
     r = spi.robustness(p_o, p_f, n=25, m=3)
     assert r.collapsed == spi.Collapsed(1, 20, float(beta.ppf(0.95, 2, 19)))
-    assert "1 of 20 collapsed (at most 22%)" in str(r)
+    assert "1 of 20 collapsed, at most 22 %" in str(r)
     assert spi.robustness(p_o[0], p_f[0], n=25, m=3).collapsed is None
     # Where all do, none stands out, and all are counted.
     assert spi.robustness(p_o, 0.1 * p_f, n=25, m=3).collapsed == spi.Collapsed(20, 20, 1.0)

@@ -54,7 +54,7 @@ def test_a_study_judges_all_trainings_together(recipe: str, tmp_path: Path) -> N
     collapsed = verdict.estimate.collapsed
     assert collapsed is not None
     assert collapsed.of == 5
-    assert f"[{same.low:.3f}, {same.high:.3f}]; {collapsed}" in page
+    assert f"[{same.low:.3f}, {same.high:.3f}] ({collapsed})" in page
     assert f"of the trainings at worst {collapsed}" in page
     with pytest.raises(StudyError, match="--all-seeds"):
         Study(until_clear=True, **asked).plan()
