@@ -212,12 +212,27 @@ def draw_claims(rows: Sequence[tuple[str, int, int]]) -> None:
     figure.savefig(PICTURE, dpi=110)
 
 
-def distances(p: Samples, chosen: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return how far R and FT of each fault cell are from the paper's, with these seeds."""
-    cells = {name: float(values[chosen].mean()) for name, values in p.items() if len(values)}
-    our_p, paper_p = of_cells(cells), published
-    questions = [Question(i, NO_FAULT, s, 0.0) for i in ("R", "FT") for s in FAULTY]
-    return np.array([abs(indicator(q, our_p) - indicator(q, paper_p)) for q in questions])
+def r_and_ft(setting: Setting, p: Callable[[Setting], Any]) -> NDArray[np.float64]:
+    """Return R and FT of a fault cell by P of each setting, shape (2, ...)."""
+    p_o, p_f = p(NO_FAULT), p(setting)
+    p_s = p(Setting("fault", "removed", setting.value))
+    share = setting.value / Scenario().n_robots
+    return np.array([p_f / p_o - 1.0 + share, (p_f - p_s) / p_o])
+
+
+def distances(p: Samples, draws: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return how far R and FT of the fault cells are from the paper's on average, in each draw.
+
+    Args:
+        p: P of each cell over the seeds.
+        draws: seeds of each draw, shape (k, n).
+    """
+    means = {name: values[draws].mean(axis=-1) for name, values in p.items()}
+    errors = [
+        np.abs(r_and_ft(s, lambda t: means[cell_name(t)]) - r_and_ft(s, published)[:, None])
+        for s in FAULTY
+    ]
+    return np.asarray(np.mean(errors, axis=(0, 1)))
 
 
 def rule(confirmed: Mapping[str, Sequence[Tried]]) -> tuple[float, float, float]:
@@ -225,12 +240,12 @@ def rule(confirmed: Mapping[str, Sequence[Tried]]) -> tuple[float, float, float]
     p = {fit: _of_faults(confirmed[fit]) for fit in ("sound", "all")}
     n = min(len(values) for fit in p.values() for values in fit.values())
     draws = generator(1, "bootstrap of common seeds").integers(n, size=(1000, n))
-
-    def farther(chosen: NDArray[np.int64]) -> float:
-        return float((distances(p["sound"], chosen) - distances(p["all"], chosen)).mean())
-
-    low, high = np.quantile([farther(chosen) for chosen in draws], [0.025, 0.975])
-    return farther(np.arange(n)), float(low), float(high)
+    (value,), farther = (
+        distances(p["sound"], seeds) - distances(p["all"], seeds)
+        for seeds in (np.arange(n)[None], draws)
+    )
+    low, high = np.quantile(farther, [0.025, 0.975])
+    return float(value), float(low), float(high)
 
 
 def _of_faults(rows: Sequence[Tried]) -> dict[str, NDArray[np.float64]]:

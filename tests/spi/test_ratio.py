@@ -96,6 +96,7 @@ def test_verdict_and_interval_agree(pairs: list[tuple[int, int]], threshold: flo
         ([40, 41], [37, 38], {}, ("too_few_seeds",)),
         # P_F = 18/25 P_o in every seed: R = 0 up to rounding, not a hair above it with certainty.
         ([25, 50, 75, 150], [18, 36, 54, 108], {}, ("degenerate",)),
+        ([25.1, 50.3, 74.9, 150.7], [18.072, 36.216, 53.928, 108.504], {}, ("degenerate",)),
     ],
 )
 def test_no_spread_two_seeds_and_rounding_errors_are_no_evidence(
