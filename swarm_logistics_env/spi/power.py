@@ -134,7 +134,7 @@ def seeds_against_stalls(estimate: Estimate) -> int | None:
 
 
 def trainings_against_collapses(estimate: Estimate) -> int | None:
-    """Trainings that would exclude, at the value hidden, so many collapses as turn the verdict.
+    """Trainings that would exclude, at the value found, so many collapses as turn the verdict.
 
     So many of which as large a share collapses as of those seen. None where the verdict is not
     withheld for hidden collapses.
