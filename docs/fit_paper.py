@@ -22,6 +22,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -187,16 +188,14 @@ def is_full(tried: Tried) -> bool:
     return len(tried.performance) == len(PAPER.cells)
 
 
-def evaluate(fit: str, generation: int, constants: Constants, path: Path) -> Tried:
+def evaluate(fit: str, generation: int, constants: Constants) -> Tried:
     """Play a set: the sound cells of up to 60 robots, and if it may fit, all others."""
     seed = FIRST_SEED + 1000 * (fit == "all") + generation
     cheap = tuple(setting for setting in SOUND if setting not in LARGE)
     performance = play(cheap, constants, seed)
     if log_error(performance, cheap) <= largest_error(1, cheap):
         performance |= play((*FAULTY, *LARGE), constants, seed)
-    tried = Tried(fit, generation, seed, constants, performance)
-    append(tried, path)
-    return tried
+    return Tried(fit, generation, seed, constants, performance)
 
 
 def search(fit: str, path: Path, is_over: Callable[[], bool] = lambda: True) -> dict[str, float]:
@@ -216,17 +215,16 @@ def search(fit: str, path: Path, is_over: Callable[[], bool] = lambda: True) -> 
     generation = 0
     while not is_over() or any(tried.generation >= generation for tried in before):
         points = strategy.ask()
-        errors = []
-        for point in points:
-            if before:  # a call that goes on: the same points, as the seed is the same
-                tried = before.pop(0)
-            elif is_over():
-                break
-            else:
-                tried = evaluate(fit, generation, constants_at(point), path)
-            errors.append(log_error(tried.performance, settings))
-        if len(errors) < len(points):
+        # A call that goes on asks for the same points, as the seed is the same.
+        sets, before = before[: len(points)], before[len(points) :]
+        untried = [constants_at(point) for point in points[len(sets) :]]
+        if untried and is_over():
             break
+        with ProcessPoolExecutor() as processes:  # append() as they come: a kill loses few sets
+            for tried in processes.map(functools.partial(evaluate, fit, generation), untried):
+                append(tried, path)
+                sets.append(tried)
+        errors = [log_error(tried.performance, settings) for tried in sets]
         strategy.tell(points, errors)
         generation += 1
         mean = constants_at(strategy.result.xfavorite)

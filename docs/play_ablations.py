@@ -1,18 +1,27 @@
-"""What the recipe of `ppo-robust` owes to its parts: `python docs/play_ablations.py`.
+"""What the recipes owe to their parts: `python docs/play_ablations.py`.
 
-Trains the recipe at half of its agent-steps, whole and without one part at a time, three times
-each (two hours of one core), plays all of them, and writes a table into docs/training.md. What is
-trained and played is kept in results/ablations, and the same command goes on after an interruption.
+Two ablations, three trainings of each variant (three hours and a half of one core):
+
+* `parts`: the recipe of `ppo-robust` at half of its agent-steps, whole and without one part.
+* `half-reward`: the recipe of `ppo-indicator`, but a delivery always pays the team half. It tells
+  what that recipe owes to R from what it owes to a smaller pay.
+
+Plays all of them and writes two tables into docs/training.md. What is trained and played stays in
+results/ablations, and the same command goes on after an interruption. `--only half-reward` does
+one of the two.
 """
 
 import multiprocessing
 import os
 import re
 import shutil
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
+from typing import Any, NamedTuple
 
 import torch
+import typer
 from stable_baselines3.common.callbacks import BaseCallback
 from tables import ROOT, rewrite, seeds_from, table
 
@@ -25,16 +34,41 @@ from swarm_logistics_env.train.training import load_training
 from swarm_logistics_env.verdicts.results import StudyResults
 
 OUT = ROOT / "results" / "ablations"
-AGENT_STEPS, TRAININGS = 16_000_000, 3
+TRAININGS = 3
 FAULT_INPUTS = ("failed", "stuck", "cannot_deliver", "cannot_lift", "delivering_in_vain")
 MEMORY = (
     *FAULT_INPUTS, "requested_recently_held", "home_along", "home_aside", "home_certainty",
     "kept_home_along", "kept_home_aside", "kept_home_distance",
 )  # fmt: skip
-WITHOUT: dict[str, tuple[str, ...]] = {
-    "whole": (), "without-memory": MEMORY, "without-fault-inputs": FAULT_INPUTS,
-    "without-stocking": (),
-}  # fmt: skip
+
+
+class Variant(NamedTuple):
+    """A recipe with one part changed."""
+
+    recipe: str = "robust"
+    agent_steps: int = 16_000_000  # half of the recipe's
+    inputs_without: tuple[str, ...] = ()
+    changes: Mapping[str, Any] = {}  # of the training's fields
+    rewards: Mapping[str, float] = {}  # of the task reward's weights
+
+
+PARTS = {
+    "whole": Variant(),
+    "without-memory": Variant(inputs_without=MEMORY),
+    "without-fault-inputs": Variant(inputs_without=FAULT_INPUTS),
+    "without-stocking": Variant(rewards={"stocking": 0.0}),
+}
+# ppo-indicator pays the team .25 for a delivery of a sound swarm, .5 with a failed robot.
+HALF_REWARD = {
+    "half-reward": Variant(
+        "indicator", 32_000_000, changes={"indicators": None}, rewards={"delivery": 0.25}
+    )
+}
+VARIANTS = {**PARTS, **HALF_REWARD}
+CONDITIONS = [
+    {"modes": ["FM1", "FM2", "FM3", "FM4", "FM4_jam"], "robots": [3]},
+    {"modes": ["dead"], "robots": [2], "onsets": [250.0], "title": "dies after 250 s"},
+]
 
 
 class WithoutInputs(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
@@ -58,35 +92,36 @@ class WithoutInputs(BaseCallback):  # type: ignore[misc]  # not in the environme
         return True
 
 
-def train_one(seed: int, name: str) -> None:
-    """Train one variant from one seed, or go on with it, into OUT/NAME@SEED.safetensors."""
-    recipe = load_training("robust")
-    rewards = {"stocking": 0.0} if name == "without-stocking" else {}
+def train_variant(seed: int, name: str) -> None:
+    """Train a variant from a seed, or go on with it, into OUT/NAME@SEED.safetensors."""
+    variant = VARIANTS[name]
+    recipe = load_training(variant.recipe)
     training = recipe.replace(
         name=f"{name}-{seed}",
-        agent_steps=AGENT_STEPS,
+        agent_steps=variant.agent_steps,
         seed=seed,
         threads=1,
-        rewards=recipe.rewards | rewards,
+        rewards=recipe.rewards | dict(variant.rewards),
         scores=recipe.scores.replace(seeds=0),
+        **variant.changes,
     )
-    path = train(training, OUT / training.name, callbacks=[WithoutInputs(WITHOUT[name])])
+    callbacks = [WithoutInputs(variant.inputs_without)]
+    path = train(training, OUT / training.name, callbacks=callbacks)
     shutil.copyfile(path, OUT / f"{name}@{seed}.safetensors")
 
 
-def study() -> Study:
-    """Return the study of all variants: every training over the same seeds."""
+def study(ablation: str) -> Study:
+    """Return the study of an ablation's variants: every training over the same seeds."""
+    trained = [f"{OUT / name}@all.safetensors" for name in ABLATIONS[ablation]]
+    shipped = ["ppo-robust@all", "ppo-indicator@all"] if ablation == "half-reward" else []
     return Study(
-        name="ablations",
-        policies=[f"{OUT / name}@all.safetensors" for name in WITHOUT],
+        name=ablation,
+        policies=[*shipped, *trained],
         seeds=10,
         first_seed=430_000,
         scenario=Scenario(restock=True),
-        faults=[
-            {"modes": ["FM1", "FM2", "FM3", "FM4"], "robots": [3]},
-            {"modes": ["dead"], "robots": [2], "onsets": [250.0], "title": "dies after 250 s"},
-        ],
-        out=OUT / "study",
+        faults=CONDITIONS,
+        out=OUT / f"study-{ablation}",
     )
 
 
@@ -103,16 +138,22 @@ def block(results: StudyResults) -> str:
     return table(("", *shown), rows, f"{seeds_from(results)}, of each training.")
 
 
-def main() -> None:
-    """Train what is missing, a training a core, then play all and write the table."""
+ABLATIONS = {"parts": PARTS, "half-reward": HALF_REWARD}
+
+
+def main(only: str | None = None) -> None:
+    """Train what is missing, a training a core, then play all and write the tables."""
     cores = len(os.sched_getaffinity(0))
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(cores, mp_context=context) as pool:
-        list(pool.map(train_one, *zip(*product(range(TRAININGS), WITHOUT))))
-    ablations = study()
-    ablations.run(processes=cores)
-    rewrite(ROOT / "docs" / "training.md", {"ablations": block(ablations.findings())})
+    for ablation, variants in ABLATIONS.items():
+        if only in (None, ablation):
+            with ProcessPoolExecutor(cores, mp_context=context) as pool:
+                list(pool.map(train_variant, *zip(*product(range(TRAININGS), variants))))
+            variants_study = study(ablation)
+            variants_study.run(processes=cores)
+            blocks = {f"ablation {ablation}": block(variants_study.findings())}
+            rewrite(ROOT / "docs" / "training.md", blocks)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

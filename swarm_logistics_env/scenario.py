@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from swarm_logistics_env.errors import ScenarioError, suggest
+from swarm_logistics_env.floor import (
+    PLAN_SIZES,
+    FloorPlan,
+    floor_plan,
+    floor_title,
+    with_plan_sizes,
+)
 from swarm_logistics_env.records import Record
 
 # Discs may cover this part of the floor; random sequential addition ends at 0.547.
@@ -83,6 +90,12 @@ class Scenario(Record):
 
     n_robots: Count = Field(25, description="swarm size N [robots]; source: paper")
     n_items: Count = Field(60, description="items in storage at the start; source: paper")
+    floor: str | None = Field(
+        None,
+        description="plan with walls, racks and docks: a shipped name, a file, or its rows; none: "
+        "an empty room with one delivery area; off",
+    )
+    cell_size: Positive = Field(0.5, description="side of a plan's cell [m]; chosen")
     warehouse_width: Positive = Field(10.0, description="along x [m]; source: paper")
     warehouse_height: Positive = Field(10.0, description="along y [m]; source: paper")
     delivery_width: Positive = Field(
@@ -218,25 +231,50 @@ class Scenario(Record):
         """Whether robots can move sideways."""
         return self.drive == "holonomic"
 
+    @property
+    def plan(self) -> FloorPlan | None:
+        """The floor plan, checked; None: an empty room."""
+        if self.floor is None:
+            return None
+        return floor_plan(self.floor, self.cell_size, 2.0 * self.robot_radius)
+
+    def replace(self, **fields: Any) -> Self:
+        """Return a copy with `fields` changed; with a plan the sizes are those of the plan."""
+        values = dict(self)
+        if self.floor is not None or fields.get("floor") is not None:
+            values = {name: value for name, value in values.items() if name not in PLAN_SIZES}
+        return type(self)(**{**values, **fields})
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_plan(cls, fields: object) -> object:
+        if not isinstance(fields, dict) or not isinstance(fields.get("floor"), str):
+            return fields
+        defaults = {name: field.default for name, field in cls.model_fields.items()}
+        return with_plan_sizes({**defaults, **fields}, given=fields)
+
     @model_validator(mode="after")
     def _possible(self) -> Self:
         self._check_periods()
         self._check_storage()
         self._check_requests()
-        area = self.storage_width * self.warehouse_height
+        storage = starts = self.storage_width * self.warehouse_height
+        place = f"a storage of {self.storage_width:g} x {self.warehouse_height:g} m"
+        if self.plan is not None:
+            storage, starts = self.plan.storage_area, self.plan.start_area
+            place = "the cells that the plan has for them"
         obstacle_cover = self.n_obstacles * self.obstacle_radius**2
-        for count, name, radius in (
-            (self.n_obstacles, "n_obstacles", self.obstacle_radius),
-            (self.n_robots, "n_robots", self.robot_radius),
-            (self.n_items, "n_items", self.item_radius),
+        for count, name, radius, area in (
+            (self.n_obstacles, "n_obstacles", self.obstacle_radius, storage),
+            (self.n_robots, "n_robots", self.robot_radius, starts),
+            (self.n_items, "n_items", self.item_radius, storage),
         ):
             cover = 0.0 if name == "n_obstacles" else obstacle_cover
             most = int((DENSEST_COVER * area / math.pi - cover) / radius**2)
             if count > most:
                 raise ValueError(
-                    f"{name} = {count} of radius {radius} m do not fit into a storage of "
-                    f"{self.storage_width:g} x {self.warehouse_height:g} m: should be at most "
-                    f"{max(most, 0)} (discs may cover {DENSEST_COVER:.0%} of it)"
+                    f"{name} = {count} of radius {radius} m do not fit into {place}: should be "
+                    f"at most {max(most, 0)} (discs may cover {DENSEST_COVER:.0%} of it)"
                 )
         return self
 
@@ -271,6 +309,8 @@ class Scenario(Record):
             )
 
     def _check_storage(self) -> None:
+        if self.floor is not None:
+            return  # the plan was checked
         if self.delivery_width >= self.warehouse_width:
             raise ValueError(
                 f"delivery_width = {self.delivery_width} m leaves no storage: should be less than "
@@ -323,7 +363,7 @@ class Scenario(Record):
 
 
 def _as_text(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:g}" if isinstance(value, float) else floor_title(str(value))
 
 
 SCENARIO_PRESETS: dict[str, Scenario] = {

@@ -19,7 +19,7 @@ from swarm_logistics_env.spi import REMOVED
 PACKAGE = "swarm_logistics_env"
 ROOT = Path(__file__).parents[1]
 
-FOUNDATION = {"errors", "records", "streams", "kernels", "numba_fence", "scenario"}
+FOUNDATION = {"errors", "records", "streams", "kernels", "numba_fence", "floor", "scenario"}
 WORLD = FOUNDATION | {"warehouse", "observations"}
 RUNS = WORLD | {"motion", "policies", "episode"}
 ENVIRONMENT = WORLD | {"environment", "rendering", "swarm_logistics_v0"}
@@ -34,7 +34,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "fast_kernels": {"numba_fence"},
     "kernels": {"fast_kernels", "numba_fence"},
     "records": {"errors", "spi"},
-    "scenario": {"errors", "records", "streams"},
+    "floor": set(),
+    "scenario": {"errors", "floor", "records", "streams"},
     "code_files": set(),
     "fingerprint": {"code_files"},
     "observations": FOUNDATION,

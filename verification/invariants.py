@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import Warehouse
 from swarm_logistics_env import observations as row
+from swarm_logistics_env.floor.floor_plan import RACK
+from swarm_logistics_env.warehouse.commands import IDLE, LIFTING
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.logistics import IDLE, LIFTING
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED, WarehouseState
 
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
@@ -27,7 +28,7 @@ class BrokenPromiseError(AssertionError):
 class Watch:
     """Looks at one world, which has been reset, now and after every step.
 
-    `depth` is how deep each robot (row) stands in every robot, obstacle, wall and item now [m], in
+    `depth` is how deep each robot (row) stands in every robot, obstacle, wall, rack, item [m], in
     this order, -inf: it may not or need not touch it; `deepest` the greatest overlap seen [m].
     """
 
@@ -106,6 +107,7 @@ class Watch:
             self._demand(gaps >= 1.0 / self._dock - 1e-6, "the dock takes too many")
         here = state.item_position[status == STORED]
         self._demand((here > 0.0) & (here < self._far), "an item lies outside")
+        self._demand(self.world.floor.is_free(here), "an item lies inside a rack")
 
     def _deliveries(self) -> None:
         state, before = self.world.state, self._before
@@ -176,7 +178,9 @@ class Watch:
         solid = (state.item_status == STORED) & ~self._covered
         in_items[~((state.robot_item != NOBODY)[:, None] & solid)] = -np.inf
         in_obstacles = radius + scenario.obstacle_radius - to_obstacles
-        self.depth = depth = np.hstack([in_robots, in_obstacles, radius - to_walls, in_items])
+        in_racks = radius - self._to_racks(at)
+        depths = [in_robots, in_obstacles, radius - to_walls, in_racks, in_items]
+        self.depth = depth = np.hstack(depths)
         depth[~here] = -np.inf
         # The speed of the last step is that before or after a change.
         fastest = max(self._scenario.max_speed, scenario.max_speed)
@@ -188,6 +192,7 @@ class Watch:
             "close in one substep, beyond the depth of a jam",
         )
         self._demand(to_walls[here] > 0.0, "a robot is outside the walls")
+        self._demand(self.world.floor.is_free(at[here]), "a robot is inside a rack")
         self.deepest = max(self.deepest, deepest)
         # A crowd presses deeper in where robots drive far between two collision checks.
         allowed = max(SUSTAINED, 0.25 * closing)
@@ -200,6 +205,15 @@ class Watch:
             lasting == 0.0,
             f"bodies overlap by more than {allowed:.4f} m for {JAM} s, now by {lasting:.4f} m",
         )
+
+    def _to_racks(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return how far each robot's centre is from each solid cell of the plan [m], (N, M)."""
+        plan = self.world.scenario.plan
+        if plan is None:
+            return np.zeros((len(at), 0))
+        low = np.argwhere(plan.kind <= RACK)[:, ::-1] * plan.cell_size
+        nearest = np.clip(at[:, None], low, low + plan.cell_size)
+        return np.asarray(np.linalg.norm(at[:, None] - nearest, axis=2))
 
     def _timers(self) -> None:
         state, limit = self.world.state, self.world.scenario.timer_limit

@@ -17,9 +17,11 @@ from typing import Any
 import numpy as np
 import typer
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import ScenarioError
+from swarm_logistics_env.floor import PLAN_SIZES
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.scenario import LONGEST_STRIDE
 from swarm_logistics_env.warehouse import FAILURE_MODES
@@ -111,7 +113,38 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "message_size": rarely(source.randint(1, 4), 0),
         "control_period": control_period,
         "physics_period": physics_period,
+        "floor": None,
     }
+
+
+def some_planned_scenario(source: random.Random) -> Scenario:
+    """Return a scenario with a random floor plan, drawn again until one can be."""
+    while True:
+        fields = _fields(source)
+        sizes = {name: fields.pop(name) for name in PLAN_SIZES}
+        cell_size = source.uniform(1.0, 5.0) * fields["robot_radius"]
+        shape = [max(3, int(sizes[name] / cell_size)) for name in PLAN_SIZES[:2]]
+        with contextlib.suppress(ScenarioError):
+            return Scenario(
+                **fields | {"floor": random_plan(source, *shape), "cell_size": cell_size}
+            )
+
+
+def random_plan(source: random.Random, n_columns: int, n_rows: int) -> str:
+    """Return the rows of a plan of that size: solid cells anywhere, one dock or more."""
+    share = source.choice([0.0, 0.1, 0.2, 0.3])
+    free = source.choice([":", ":.", ":.+"])
+    kinds = np.array([["#="[source.random() < 0.5] if source.random() < share
+                       else source.choice(free) for _ in range(n_columns)]
+                      for _ in range(n_rows)])  # fmt: skip
+    for letter in "ABC"[: source.randint(1, 3)]:
+        row, column = source.randrange(n_rows), source.randrange(n_columns)
+        kinds[row : row + 2, column : column + 2] = letter
+    # What no way leads to becomes solid.
+    parts, _ = ndimage.label(~np.isin(kinds, ["#", "="]))
+    docks = np.unique(parts[np.isin(kinds, list("ABC"))])
+    kinds[~np.isin(parts, [part for part in docks if (kinds[parts == part] == ":").any()])] = "#"
+    return "\n".join("".join(row) for row in kinds.tolist())
 
 
 def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> list[Fault]:
@@ -132,7 +165,8 @@ def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> l
 
 def play(source: random.Random, steps: int, tally: Tally) -> None:
     """Play one random world and look at it after every step."""
-    scenario = some_scenario(source)
+    draw = some_planned_scenario if source.random() < 0.4 else some_scenario
+    scenario = draw(source)
     seconds, seed = steps * scenario.control_period, source.randrange(2**32)
     world = Warehouse(scenario)
     tally.worlds += 1
@@ -168,7 +202,8 @@ def _disturb(source: random.Random, world: Warehouse, seconds: float) -> None:
     fields = _fields(source)
     fields["delivery_width"] = world.scenario.warehouse_width * source.uniform(0.05, 0.6)
     fields["max_speed"] = world.scenario.max_speed * source.uniform(0.3, 1.0)
-    names = source.sample(CHANGEABLE, source.randint(1, 2))
+    changeable = [n for n in CHANGEABLE if world.scenario.floor is None or n not in PLAN_SIZES]
+    names = source.sample(changeable, source.randint(1, 2))
     with contextlib.suppress(ScenarioError):
         world.change(**{name: fields[name] for name in names})
 

@@ -67,8 +67,8 @@ class Before:
         self.delivered = len(state.delivery_times)
         self.requested = state.item_requested
         self.carriers = state.item_carrier.copy()
-        self.item_x = state.item_position[:, 0].copy()
-        self.robot_x = state.robot_position[:, 0].copy()
+        self.item_position = state.item_position.copy()
+        self.robot_position = state.robot_position.copy()
 
     def keeps(self, state: WarehouseState, robots: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which of these robots carried what they carry already, and it was requested."""
@@ -119,18 +119,18 @@ def lift_requested(world: Warehouse, before: Before) -> Earned:
 
 
 def approach(world: Warehouse, before: Before) -> Earned:
-    """Metres that the carrier of a requested item came nearer to the delivery area.
+    """Metres that the carrier of a requested item came nearer to a delivery area, on free floor.
 
     Privileged: no robot can sense it, so it may shape a reward but not an observation.
     """
-    state, edge = world.state, world.scenario.storage_width
+    state, floor = world.state, world.floor
     robots = np.flatnonzero(state.carries_requested)
     robots = robots[before.keeps(state, robots)]
     if not robots.size:
         return None
     reward = np.zeros(state.n_robots)
-    reward[robots] = np.minimum(state.robot_position[robots, 0], edge)
-    reward[robots] -= np.minimum(before.robot_x[robots], edge)
+    reward[robots] = np.minimum(floor.along(state.robot_position[robots]), floor.edge)
+    reward[robots] -= np.minimum(floor.along(before.robot_position[robots]), floor.edge)
     return reward
 
 
@@ -140,15 +140,15 @@ def stocking(world: Warehouse, before: Before) -> Earned:
     The way counts from where the item lay, so no circle earns: carrying it back costs as much.
     What lies nearer is delivered sooner once it is requested. Privileged: as `approach`.
     """
-    state, edge = world.state, world.scenario.storage_width
+    state, floor = world.state, world.floor
     # The step in which a robot lets go still moves the item; one that was delivered lies elsewhere.
     carriers = np.where(state.item_carrier == NOBODY, before.carriers, state.item_carrier)
     delivered = np.isin(before.carriers, state.delivered_by[before.delivered :])
     items = np.flatnonzero((carriers != NOBODY) & ~delivered)
     if not items.size:
         return None
-    metres = np.minimum(state.item_position[items, 0], edge)
-    metres -= np.minimum(before.item_x[items], edge)
+    metres = np.minimum(floor.along(state.item_position[items]), floor.edge)
+    metres -= np.minimum(floor.along(before.item_position[items]), floor.edge)
     reward = np.zeros(state.n_robots)
     np.add.at(reward, carriers[items], metres)  # who lets go of one may lift another at once
     return reward
@@ -165,15 +165,16 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
     A metre into the delivery area counts `SECONDS_A_METRE`, and the way out gives them back: an
     item that is let go there is found by nobody. Privileged: as `approach`.
     """
-    state, edge = world.state, world.scenario.storage_width
+    state, floor = world.state, world.floor
     robots = np.flatnonzero(state.carries_requested & ~state.delivers)
     if not robots.size:
         return None
     reward = np.zeros(state.n_robots)
     reward[robots] = world.scenario.control_period
     robots = robots[before.keeps(state, robots)]
-    depth = np.maximum(state.robot_position[robots, 0], edge)
-    reward[robots] += SECONDS_A_METRE * (depth - np.maximum(before.robot_x[robots], edge))
+    depth = np.maximum(floor.along(state.robot_position[robots]), floor.edge)
+    depth_before = np.maximum(floor.along(before.robot_position[robots]), floor.edge)
+    reward[robots] += SECONDS_A_METRE * (depth - depth_before)
     return reward
 
 

@@ -7,6 +7,7 @@ import math
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel
 
+from .floor_cells import is_in_sight
 from .logistics import is_known_request, is_remembered
 from .pose import Pose, in_frame
 from .sensor_errors import ROBOT_SEEN, is_missed
@@ -14,7 +15,7 @@ from .structs import Grid, Nearby, Sensed, World
 
 
 @inlined_kernel
-def choose(me: int, world: World, grid: Grid, n_found: int, purpose: int) -> int:
+def choose(me: int, pose: Pose, world: World, grid: Grid, n_found: int, purpose: int) -> int:
     """List in `nearby.chosen` what `me` sees, and of robots whom it hears; returns how many."""
     nearby = world.nearby
     view_range = world.able.view_range[me]
@@ -27,6 +28,11 @@ def choose(me: int, world: World, grid: Grid, n_found: int, purpose: int) -> int
         other, square = grid.members[nearby.slot[index]], nearby.square[index]
         is_heard = purpose == ROBOT_SEEN and nearby.is_heard[index]
         is_seen = square <= limit
+        if world.floor.n_columns > 0 and is_seen:
+            slot = nearby.slot[index]
+            is_seen = is_in_sight(
+                world, pose.x, pose.y, grid.position[slot, 0], grid.position[slot, 1]
+            )
         if dropout > 0.0 and is_seen:
             is_seen = not is_missed(world.robots.sensor_key[me], other, step, purpose, dropout)
         nearby.chosen[n_chosen], nearby.chosen_square[n_chosen] = other, square

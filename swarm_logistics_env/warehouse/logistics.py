@@ -1,4 +1,4 @@
-"""The rules of the warehouse: from commands to motion, to loads, deliveries and the next request.
+"""The rules of the warehouse: from grippers to loads, deliveries and the next request.
 
 Items are no obstacles until no laden robot stands above them: the item collision mask.
 
@@ -21,70 +21,15 @@ import math
 
 from swarm_logistics_env.kernels import engine_kernel, inlined_kernel, kernel
 
+from .commands import DELIVERING, GRIPPER, IDLE, ITEM, KIND, LAST_STEP, LIFTING, PUTTING_DOWN
 from .demand import ask, close_request, is_requested
+from .floor_cells import dock_at, is_in_sight
 from .grid import look_around
 from .layout import place_restocked
 from .physics import EMPTY_ROBOT, FREE_ITEM, LADEN_ROBOT, NO_ONE, collide_with, put_item
 from .structs import CARRIED, DELIVERED, NOBODY, STORED, Integers, World
 
-FORWARD, LEFT, TURN, GRIPPER, MESSAGE = range(5)  # columns of a command row; messages are the rest
-# Columns of `Robots.handling`, and the kinds that the first one holds.
-KIND, ITEM, LAST_STEP = range(3)
-IDLE, LIFTING, PUTTING_DOWN, DELIVERING = range(4)
 _GRACE = 1e-6  # [s]; times are sums of periods
-
-
-@kernel
-def refused_command(world: World) -> int:
-    """Return the place, row by row, of the first command that is not finite; NOBODY if all are.
-
-    Rows of robots that ignore their commands may hold anything.
-    """
-    commands = world.commands.now
-    n_columns = commands.shape[1]
-    for robot in range(len(commands)):
-        if world.robots.present[robot] and world.able.obeys[robot]:
-            for column in range(n_columns):
-                if not math.isfinite(commands[robot, column]):
-                    return int(robot * n_columns + column)
-    return NOBODY
-
-
-@kernel
-def drive(world: World) -> None:
-    """Turn the robots and fill their wanted velocities for one control period.
-
-    Commands beyond [-1, 1] are cut, and the speed to the top speed whatever the direction. A robot
-    turns as commanded and by its heading drift, unless its motor is dead, and drives along its mean
-    direction; one that is not holonomic ignores `left`. Rows of robots that ignore their commands,
-    or stand to handle an item, are ignored.
-    """
-    commands, robots, able = world.commands.now, world.robots, world.able
-    parameters, wanted_velocity = world.parameters, world.engine.wanted_velocity
-    for robot in range(len(commands)):
-        wanted_velocity[robot, 0] = 0.0
-        wanted_velocity[robot, 1] = 0.0
-        if (
-            not (robots.present[robot] and able.obeys[robot])
-            or robots.handling[robot, KIND] != IDLE
-        ):
-            continue
-        forward = min(max(commands[robot, FORWARD], -1.0), 1.0)
-        left = min(max(commands[robot, LEFT], -1.0), 1.0) if parameters.is_holonomic else 0.0
-        norm = math.sqrt(forward * forward + left * left)
-        speed = able.max_speed[robot] / max(norm, 1.0)
-        turn = min(max(commands[robot, TURN], -1.0), 1.0)
-        max_turn_rate = able.max_turn_rate[robot]
-        drift = robots.heading_drift[robot] if max_turn_rate > 0.0 else 0.0
-        angle = (turn * max_turn_rate + drift) * parameters.control_period
-        heading = robots.heading[robot]
-        cosine, sine = math.cos(heading + 0.5 * angle), math.sin(heading + 0.5 * angle)
-        wanted_velocity[robot, 0] = speed * (forward * cosine - left * sine)
-        wanted_velocity[robot, 1] = speed * (forward * sine + left * cosine)
-        if angle != 0.0:
-            new_heading = heading + angle
-            n_turns = round(new_heading / (2.0 * math.pi))
-            robots.heading[robot] = new_heading - 2.0 * math.pi * n_turns
 
 
 @inlined_kernel
@@ -209,11 +154,12 @@ def carry_along(world: World) -> None:
     robots, items = world.robots, world.items
     for robot in range(len(robots.item)):
         x = robots.position[robot, 0]
-        robots.in_delivery[robot] = robots.present[robot] and x >= world.parameters.storage_width
+        y = robots.position[robot, 1]
+        robots.in_delivery[robot] = robots.present[robot] and dock_at(world, x, y) != NOBODY
         item = robots.item[robot]
         if item != NOBODY:
             items.position[item, 0] = x
-            items.position[item, 1] = robots.position[robot, 1]
+            items.position[item, 1] = y
 
 
 @engine_kernel
@@ -306,6 +252,9 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
     for index in range(n_found):
         item, square = grid.members[nearby.slot[index]], nearby.square[index]
         if world.items.status[item] != STORED or is_being_lifted(world, item):
+            continue
+        position = world.items.position[item]
+        if not is_in_sight(world, x, y, position[0], position[1]):
             continue
         is_asked_for = is_known_request(world, robot, item)
         is_first = is_asked_for and not is_best_requested

@@ -121,7 +121,7 @@ def collide_with(engine: EngineArrays, shape: int, categories: int) -> None:
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
 _BIAS = 1e-4  # share of an overlap that is left after a second; the engine's default: 0.0018
 _WALL = 0.5  # [m], half the thickness of a wall
-N_WALLS = 4
+N_WALLS, N_CORNERS = 4, 4
 
 
 @engine_kernel
@@ -142,7 +142,7 @@ def build(address: int) -> None:
 
 @engine_kernel
 def build_solids(world: World, static: int) -> None:
-    """Make walls and obstacles."""
+    """Make walls, obstacles and racks."""
     engine, parameters, obstacles = world.engine, world.parameters, world.obstacles
     call = engine.functions
     width, height = parameters.warehouse_width, parameters.warehouse_height
@@ -161,6 +161,11 @@ def build_solids(world: World, static: int) -> None:
         centre = (obstacles[obstacle, 0], obstacles[obstacle, 1])
         shape = made_at(call.cpCircleShapeNew, (static, parameters.obstacle_radius, centre))
         engine.solid_shapes[N_WALLS + obstacle] = shape
+    corners = world.floor.corners
+    for box in range(len(corners) // N_CORNERS):
+        first = corners[N_CORNERS * box :]
+        shape = made_at(call.cpPolyShapeNewRaw, (static, N_CORNERS, first.ctypes.data, 0.0))
+        engine.solid_shapes[N_WALLS + len(obstacles) + box] = shape
     for shape in engine.solid_shapes:
         collide_with(engine, shape, SOLID_THING)
         made_at(call.cpSpaceAddShape, (engine.space[0], shape))
@@ -226,12 +231,13 @@ class Physics:
     Args:
         scenario: the conditions of the episode.
         robot_places: (N, 2) [m] where the robots' bodies are made, also those of ghosts.
+        n_boxes: rectangles of solid cells that the floor has.
 
     Attributes:
         engine: what compiled code knows of it.
     """
 
-    def __init__(self, scenario: Scenario, robot_places: Numbers) -> None:
+    def __init__(self, scenario: Scenario, robot_places: Numbers, n_boxes: int) -> None:
         n = scenario.n_robots
         # A batch call reads and writes every body: of N robots, and the static one.
         self._batches = [
@@ -247,7 +253,7 @@ class Physics:
             robot_bodies=np.zeros(n, np.int64),
             robot_shapes=np.zeros(n, np.int64),
             item_shapes=np.zeros(scenario.n_items, np.int64),
-            solid_shapes=np.zeros(N_WALLS + scenario.n_obstacles, np.int64),
+            solid_shapes=np.zeros(N_WALLS + scenario.n_obstacles + n_boxes, np.int64),
             bodies=bodies,
             velocities=velocities,
             forces=forces,

@@ -6,7 +6,7 @@ import math
 
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 
-from .logistics import MESSAGE
+from .commands import MESSAGE
 from .sensor_errors import RADIO, is_missed
 from .structs import NOBODY, World
 

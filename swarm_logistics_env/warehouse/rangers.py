@@ -9,8 +9,9 @@ import numpy as np
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 
+from .floor_cells import free_way, is_all_free
 from .pose import Pose, in_frame
-from .structs import Grid, Nearby, Sensed, World
+from .structs import Floor, Grid, Nearby, Sensed, World
 
 N_RANGES = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
 _N_BEAMS = row.N_BEAMS
@@ -32,9 +33,11 @@ def full_range(world: World, robot: int) -> float:
 
 @inlined_kernel
 def scan_solids(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
-    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, or obstacles within `reach`."""
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, racks or obstacles."""
     parameters, obstacles = world.parameters, world.obstacles
     scan_walls(pose, parameters.warehouse_width, parameters.warehouse_height, scan)
+    if world.floor.n_columns > 0:
+        scan_cells(pose, reach, world.floor, scan)
     radius = parameters.obstacle_radius
     for obstacle in range(len(obstacles)):
         forward, left = in_frame(pose, obstacles[obstacle, 0], obstacles[obstacle, 1])
@@ -61,6 +64,27 @@ def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
             # Without a branch: all beams together are a few vector instructions.
             distance = np.float32((front if towards > 0.0 else back) / abs(towards))
             scan[beam] = distance if distance < scan[beam] else scan[beam]
+
+
+@kernel
+def scan_cells(pose: Pose, reach: float, floor: Floor, scan: Sensed) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall or a rack of the plan."""
+    if is_all_free(floor, pose.x, pose.y, reach):
+        return
+    for beam in range(_N_BEAMS):
+        step_x = _BEAM_X[beam] * pose.cosine - _BEAM_Y[beam] * pose.sine
+        step_y = _BEAM_X[beam] * pose.sine + _BEAM_Y[beam] * pose.cosine
+        scan[beam] = free_way(floor, pose.x, pose.y, step_x, step_y, scan[beam])
+
+
+@inlined_kernel
+def hide_behind_solids(scans: Sensed, full: float) -> None:
+    """Lengthen to `full` [m] those beams to robots and items that something solid stops before."""
+    for beam in range(_N_BEAMS):
+        wall = scans[row.RANGE_WALLS + beam]
+        for first in (row.RANGE_ROBOTS, row.RANGE_ITEMS):
+            if scans[first + beam] > wall:
+                scans[first + beam] = full
 
 
 @kernel

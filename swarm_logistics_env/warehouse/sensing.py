@@ -17,7 +17,7 @@ from .grid import look_around
 from .logistics import is_known_request
 from .pose import Pose, in_frame
 from .radio import listen
-from .rangers import N_RANGES, full_range, scan_discs, scan_solids
+from .rangers import N_RANGES, full_range, hide_behind_solids, scan_discs, scan_solids
 from .sensor_errors import ITEM_SEEN, ROBOT_SEEN, disturb, fail_rangers
 from .structs import NOBODY, Sensed, World
 from .touch import TOUCHING_GAP, touches_items, touches_robots, touches_solid
@@ -49,6 +49,8 @@ def sense(world: World, rows: Sensed) -> int:
             scan_solids(pose, reach, world, scan)
         n_anchored += int(sense_robots(me, pose, world, rows[me]))
         sense_items(me, pose, world, rows[me])
+        if reach > 0.0 and world.floor.n_columns > 0:
+            hide_behind_solids(scans, full_range(world, me))
         robots.contact[me] |= touches_solid(pose, world)
         feel_itself(me, pose, world, rows[me])
         disturb(me, world, rows[me])
@@ -82,7 +84,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
         out[row.LOWEST_TIMER + 1] = forward
         out[row.LOWEST_TIMER + 2] = left
         out[row.LOWEST_TIMER + 3] = timer
-    n_chosen = choose(me, world, grid, n_found, ROBOT_SEEN)
+    n_chosen = choose(me, pose, world, grid, n_found, ROBOT_SEEN)
     describe_neighbours(pose, world, n_chosen, out)
     return is_anchored
 
@@ -101,7 +103,7 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
         scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     if world.robots.item[me] != NOBODY:
         world.robots.contact[me] |= touches_items(world, n_found)
-    n_chosen = choose(me, world, grid, n_found, ITEM_SEEN)
+    n_chosen = choose(me, pose, world, grid, n_found, ITEM_SEEN)
     describe_items(me, pose, world, n_chosen, out)
 
 

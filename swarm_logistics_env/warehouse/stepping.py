@@ -5,6 +5,7 @@ from __future__ import annotations
 from swarm_logistics_env.kernels import engine_kernel, kernel
 
 from .addresses import unpacked_at
+from .commands import drive, refused_command
 from .contacts import count_motion, count_step
 from .demand import ask
 from .grid import fill
@@ -12,10 +13,8 @@ from .logistics import (
     carry_along,
     close_grippers,
     deliver,
-    drive,
     end_handling,
     open_grippers,
-    refused_command,
     take_out,
     unmask_left,
 )

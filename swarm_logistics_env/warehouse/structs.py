@@ -25,6 +25,7 @@ NOBODY = -1
 Numbers: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
 Flags: TypeAlias = NDArray[np.bool_]
+Bytes: TypeAlias = NDArray[np.int8]
 Keys: TypeAlias = NDArray[np.uint64]
 Sensed: TypeAlias = NDArray[np.float32]  # observations: rows (N, D), one row or its scan
 
@@ -160,6 +161,20 @@ class Grid(NamedTuple):
     position: Annotated[Numbers, "points", 2]  # [m], in the same order
 
 
+class Floor(NamedTuple):
+    """The cells of a floor plan; none in an empty room, see `floor_cells`."""
+
+    cell: float  # side of a cell [m]
+    n_columns: int  # cells along x; 0: an empty room
+    n_rows: int  # cells along y
+    is_solid: Annotated[Flags, "rows", "columns"]  # walls and racks
+    gap: Annotated[Bytes, "rows", "columns"]  # cells to the nearest solid one, askew counts as 1
+    dock: Annotated[Bytes, "rows", "columns"]  # number of the dock, or NOBODY
+    storage: Annotated[Integers, "cells", 2]  # column and row of each cell where items lie
+    start: Annotated[Integers, "cells", 2]  # of each cell where robots start
+    corners: Annotated[Numbers, "4 boxes", 2]  # [m] of rectangles of solid cells, anticlockwise
+
+
 class Nearby(NamedTuple):
     """What stands near one robot: working space, filled anew for every robot and sense."""
 
@@ -207,6 +222,7 @@ class Functions(NamedTuple):
     cpBodySetVelocity: int
     cpCircleShapeNew: int
     cpSegmentShapeNew: int
+    cpPolyShapeNewRaw: int
     cpSpaceAddBody: int
     cpSpaceAddShape: int
     cpSpaceFree: int
@@ -231,7 +247,7 @@ class EngineArrays(NamedTuple):
     robot_bodies: Annotated[Integers, "N"]
     robot_shapes: Annotated[Integers, "N"]
     item_shapes: Annotated[Integers, "I"]
-    solid_shapes: Annotated[Integers, "4 + n_obstacles"]  # walls, then obstacles
+    solid_shapes: Annotated[Integers, "solids"]  # walls, obstacles, then racks
     bodies: Batch  # (N + 1, 4) x, y [m] and velocity [m/s]
     velocities: Batch  # (N + 1, 2) [m/s]
     forces: Batch  # (N + 1, 2) [N], written to the bodies for one substep
@@ -264,6 +280,7 @@ class World(NamedTuple):
     able: Capabilities
     items: Items
     obstacles: Annotated[Numbers, "n_obstacles", 2]  # [m]
+    floor: Floor
     progress: Progress
     contacts: ContactCounts
     outcome: StepResult

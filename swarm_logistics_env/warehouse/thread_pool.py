@@ -28,10 +28,10 @@ from swarm_logistics_env.numba_fence import IS_PLAIN
 
 from . import stepping
 from .addresses import add, exchange, load_word, pointer_at, replace, unpacked_at
-from .logistics import refused_command
+from .commands import not_finite, refused_command
 from .one_thread import holding
 from .structs import NOBODY, Numbers, Sensed, World
-from .warehouse import Warehouse, not_finite
+from .warehouse import Warehouse
 
 carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
 

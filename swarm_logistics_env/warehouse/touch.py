@@ -5,6 +5,7 @@ from __future__ import annotations
 from swarm_logistics_env.kernels import inlined_kernel
 
 from .contacts import count_overlap
+from .floor_cells import is_near_solid
 from .pose import Pose
 from .structs import World
 
@@ -13,12 +14,14 @@ TOUCHING_GAP = 0.01  # [m], gap below which two things touch
 
 @inlined_kernel
 def touches_solid(pose: Pose, world: World) -> bool:
-    """Return whether a robot touches a wall or an obstacle."""
+    """Return whether a robot touches a wall, an obstacle or a rack."""
     parameters, obstacles = world.parameters, world.obstacles
     reach = parameters.robot_radius + TOUCHING_GAP
     away_x = min(pose.x, parameters.warehouse_width - pose.x)
     away_y = min(pose.y, parameters.warehouse_height - pose.y)
     touches = min(away_x, away_y) < reach
+    if world.floor.n_columns > 0:
+        touches |= is_near_solid(world.floor, pose.x, pose.y, reach)
     limit = (reach + parameters.obstacle_radius) ** 2
     for obstacle in range(len(obstacles)):
         dx, dy = obstacles[obstacle, 0] - pose.x, obstacles[obstacle, 1] - pose.y

@@ -12,17 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
+from swarm_logistics_env.floor import FloorMap
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 from swarm_logistics_env.streams import key, row_keys
 
 from . import layout, stepping
+from .commands import MESSAGE, not_finite
 from .faults import GRACE, Fault, FaultLike, Occurrence, apply_faults, checked_faults
+from .floor_cells import floor_map, floor_of
 from .grid import blank_grid
-from .logistics import MESSAGE
 from .one_thread import in_one_thread, used_elsewhere
 from .packing import blank, packed
-from .physics import Physics
+from .physics import N_CORNERS, Physics
 from .state import NOBODY, WarehouseState
 from .structs import Claims, Commands, Nearby, Parameters, Sensed, StepResult, World, lengths_of
 
@@ -199,6 +201,11 @@ class Warehouse:
         return self._rows
 
     @property
+    def floor(self) -> FloorMap:
+        """What is where on the floor: `is_free(points)`, and the way home."""
+        return floor_map(self.scenario)
+
+    @property
     def faults(self) -> tuple[Fault, ...]:
         """What affects whom in this episode."""
         return tuple(occurrence.fault for occurrence in self._occurrences)
@@ -286,17 +293,16 @@ class Warehouse:
 
     def _make_room_to_work(self) -> None:
         scenario = self.scenario
-        n, n_items = scenario.n_robots, scenario.n_items
-        width, height = scenario.warehouse_width, scenario.warehouse_height
+        n, width, height = scenario.n_robots, scenario.warehouse_width, scenario.warehouse_height
         sees = max(scenario.ranger_range + scenario.robot_radius, scenario.view_range)
         hears = max(sees, scenario.radio_range)
         # Cells have half the side of the square that robots search, so that few rows are searched
         # and few of them in vain.
         self._robot_grid = blank_grid(width, height, hears / 2, n)
-        self._item_grid = blank_grid(width, height, sees / 2, n_items)
+        self._item_grid = blank_grid(width, height, sees / 2, scenario.n_items)
         self._command_shape = (n, MESSAGE + scenario.message_size)
-        size = math.prod(self._command_shape)
-        self._longest_log = max(min(_LOGGED_NUMBERS // size, _LONGEST_LOG), _SHORTEST_LOG)
+        most_steps = _LOGGED_NUMBERS // math.prod(self._command_shape)
+        self._longest_log = max(min(most_steps, _LONGEST_LOG), _SHORTEST_LOG)
 
     def _remember(self) -> None:
         """Note everything a pickle needs, and rebuild the bodies from it as unpickling will.
@@ -356,7 +362,8 @@ class Warehouse:
         n, n_columns = self._command_shape
         state.progress.last_step[0] = scenario.n_steps
         lengths = lengths_of(scenario)
-        self._physics = Physics(scenario, self._robot_places)
+        floor = floor_of(scenario)
+        self._physics = Physics(scenario, self._robot_places, len(floor.corners) // N_CORNERS)
         self._world = World(
             parameters=Parameters(*(getattr(scenario, name) for name in Parameters._fields)),
             commands=Commands(
@@ -368,6 +375,7 @@ class Warehouse:
             able=state.able,
             items=state.items,
             obstacles=state.obstacle_position,
+            floor=floor,
             progress=state.progress,
             contacts=state.contacts,
             outcome=blank(StepResult, lengths),
@@ -381,12 +389,6 @@ class Warehouse:
         self._words = packed(self._world)
         self._address: int = self._words.ctypes.data
         self._physics.begin(self._address)
-
-
-def not_finite(commands: NDArray[np.float64], index: int) -> CommandError:
-    """Return the error about the command at that place, row by row."""
-    row, column = divmod(index, commands.shape[1])
-    return CommandError(f"commands[{row}, {column}] = {commands[row, column]}: should be finite")
 
 
 def _occurrences(faults: Sequence[FaultLike], seed: int, n_robots: int) -> list[Occurrence]:

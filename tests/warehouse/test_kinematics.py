@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.warehouse.logistics import drive
+from swarm_logistics_env.warehouse.commands import drive
 
 
 @given(

@@ -1,0 +1,175 @@
+"""Ways home: how far every point of a floor is from the docks, along free floor."""
+
+from __future__ import annotations
+
+import functools
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .floor_plan import DOCK, RACK, FloorPlan, Mask, floor_plan
+
+Numbers = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+class FloorMap(Protocol):
+    """What is where on a floor, for points (n, 2) [m].
+
+    Attributes:
+        edge: what `along` is at the border of a dock [m].
+    """
+
+    edge: float
+
+    def is_free(self, points: ArrayLike) -> Mask:
+        """Return whether points lie inside the warehouse and outside of walls and racks (n,)."""
+
+    def along(self, points: ArrayLike) -> Numbers:
+        """Return how far along the way into the nearest dock points are (n,) [m].
+
+        It grows by a metre with each metre of the way, `edge` at the dock's border.
+        """
+
+
+class OpenFloor:
+    """An empty room whose delivery area is a strip at the highest x.
+
+    Args:
+        width, height: of the room [m].
+        edge: where the delivery area begins along x [m].
+    """
+
+    def __init__(self, width: float, height: float, edge: float) -> None:
+        self._size = np.array([width, height])
+        self.edge = edge
+
+    def is_free(self, points: ArrayLike) -> Mask:
+        """Return whether points lie inside the room (n,)."""
+        xy = _points(points)
+        return np.asarray(((xy >= 0.0) & (xy <= self._size)).all(axis=1))
+
+    def along(self, points: ArrayLike) -> Numbers:
+        """Return x (n,) [m]."""
+        return _points(points)[:, 0]
+
+
+class PlannedFloor:
+    """A floor with racks and walls; lengths of ways are those over cells' centres.
+
+    A way goes from a cell to any of its eight neighbours, and past no rack's corner, so it is up to
+    8 % longer than the shortest one.
+
+    Args:
+        plan: of the floor.
+    """
+
+    edge = 0.0
+
+    def __init__(self, plan: FloorPlan) -> None:
+        self._plan = plan
+        self._is_open = plan.kind > RACK
+        is_dock = plan.kind == DOCK
+        # A dock begins half a cell before the centre of its first cell.
+        self._half = 0.5 * plan.cell_size
+        self._to_dock = _distances(self._is_open, is_dock, plan.cell_size)
+        self._to_outside = _distances(self._is_open, self._is_open & ~is_dock, plan.cell_size)
+
+    def is_free(self, points: ArrayLike) -> Mask:
+        """Return whether points lie inside the plan and outside of walls and racks (n,)."""
+        xy = _points(points)
+        size = self._plan.width, self._plan.height
+        inside = ((xy >= 0.0) & (xy <= size)).all(axis=1)
+        rows, columns = self._cells(xy)
+        free: Mask = inside & (self._plan.kind[rows, columns] > RACK)
+        return free
+
+    def along(self, points: ArrayLike) -> Numbers:
+        """Return the depth in a dock, or less than 0, the way to the nearest one (n,) [m]."""
+        xy = _points(points)
+        rows, columns = self._cells(xy)
+        is_inside = self._plan.dock[rows, columns] >= 0
+        depth, way = (
+            _at_points(far, self._is_open, xy, rows, columns, self._plan.cell_size) - self._half
+            for far in (self._to_outside, self._to_dock)
+        )
+        return np.where(is_inside, np.maximum(depth, 0.0), -np.maximum(way, 0.0))
+
+    def _cells(self, xy: Numbers) -> tuple[Indices, Indices]:
+        n_rows, n_columns = self._plan.kind.shape
+        cells = (xy / self._plan.cell_size).astype(np.int64)
+        return np.clip(cells[:, 1], 0, n_rows - 1), np.clip(cells[:, 0], 0, n_columns - 1)
+
+
+@functools.lru_cache(maxsize=64)
+def planned_floor(text: str, cell_size: float, robot_diameter: float) -> PlannedFloor:
+    """Return the floor of a plan, computed once; see `floor_plan` for the arguments."""
+    return PlannedFloor(floor_plan(text, cell_size, robot_diameter))
+
+
+def _points(points: ArrayLike) -> Numbers:
+    return np.asarray(points, np.float64).reshape(-1, 2)
+
+
+_ALL, _FIRST, _LAST = slice(None), slice(None, -1), slice(1, None)
+# Pairs of neighbours as parts of a grid: up, right, and the two askew.
+_PAIRS = (
+    ((_FIRST, _ALL), (_LAST, _ALL)),
+    ((_ALL, _FIRST), (_ALL, _LAST)),
+    ((_FIRST, _FIRST), (_LAST, _LAST)),
+    ((_FIRST, _LAST), (_LAST, _FIRST)),
+)
+
+
+def _distances(may_pass: Mask, is_goal: Mask, cell_size: float) -> Numbers:
+    """Return how far each cell's centre is from the nearest goal's, along cells that may be passed.
+
+    Infinite where no way leads to one.
+    """
+    from scipy.sparse import csr_array  # late: an empty room needs none of scipy
+    from scipy.sparse.csgraph import dijkstra
+
+    numbers = np.arange(may_pass.size).reshape(may_pass.shape)
+    starts, ends, lengths = [], [], []
+    for (rows, columns), (next_rows, next_columns) in _PAIRS:
+        is_way = may_pass[rows, columns] & may_pass[next_rows, next_columns]
+        length = cell_size
+        if _ALL not in (rows, columns):  # past no corner: both cells beside are open
+            is_way &= may_pass[rows, next_columns] & may_pass[next_rows, columns]
+            length *= 2.0**0.5
+        starts.append(numbers[rows, columns][is_way])
+        ends.append(numbers[next_rows, next_columns][is_way])
+        lengths.append(np.full(len(starts[-1]), length))
+    graph = csr_array(
+        (np.concatenate(lengths), (np.concatenate(starts), np.concatenate(ends))),
+        shape=(may_pass.size, may_pass.size),
+    )
+    goals = np.flatnonzero(is_goal)
+    if not len(goals):
+        return np.full(may_pass.shape, np.inf)
+    far = dijkstra(graph, directed=False, indices=goals, min_only=True)
+    return np.asarray(far).reshape(may_pass.shape)
+
+
+def _at_points(
+    far: Numbers, is_open: Mask, xy: Numbers, rows: Indices, columns: Indices, cell_size: float
+) -> Numbers:
+    """Return the distances of points, by those of the cells around them that they reach straight.
+
+    Args:
+        far: of each cell's centre [m].
+        is_open: which cells are no racks.
+        xy: the points (n, 2) [m], in the cells of these rows and columns.
+    """
+    n_rows, n_columns = far.shape
+    least = np.full(len(xy), np.inf)
+    for down in (-1, 0, 1):
+        for right in (-1, 0, 1):
+            row = np.clip(rows + down, 0, n_rows - 1)
+            column = np.clip(columns + right, 0, n_columns - 1)
+            centres = (np.stack([column, row], axis=1) + 0.5) * cell_size
+            distance = far[row, column] + np.hypot(*(xy - centres).T)
+            is_straight = is_open[rows, column] & is_open[row, columns]
+            least = np.where(is_straight, np.minimum(least, distance), least)
+    return least

@@ -1,0 +1,50 @@
+"""Ways home: distances along free floor, in a dock and outside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Scenario, Warehouse
+
+
+def world_of(**fields: object) -> Warehouse:
+    world = Warehouse(Scenario(n_items=2, n_robots=2, **fields))  # type: ignore[arg-type]
+    world.reset(0)
+    return world
+
+
+def test_an_empty_room_has_its_strip_and_its_sides() -> None:
+    floor = world_of().floor
+    assert floor.edge == 8.0
+    assert floor.along([[1.0, 5.0], [9.0, 5.0]]).tolist() == [1.0, 9.0]
+    inside = floor.is_free([[0.0, 0.0], [10.0, 10.0], [10.1, 5.0], [5.0, -0.1]])
+    assert inside.tolist() == [True, True, False, False]
+
+
+def test_racks_and_the_outside_are_not_free() -> None:
+    floor = world_of(floor="A::\n:=:\n:::").floor
+    points = [[0.75, 0.75], [0.25, 0.25], [1.49, 1.49], [1.51, 0.2]]
+    assert floor.is_free(points).tolist() == [False, True, True, False]
+
+
+def test_a_way_goes_around_a_rack() -> None:
+    # A rack of two cells between the item at the left and the dock at the right.
+    floor = world_of(floor=":=A\n:=A\n:::").floor
+    (straight, around) = -floor.along([[1.25, 0.25], [0.25, 1.25]])
+    assert straight == pytest.approx(0.25, abs=0.13)  # half a cell below the dock
+    # Down two cells and across two, half a cell of it in the dock.
+    assert around == pytest.approx(2 * 0.5 + 2 * 0.5 + 0.25, rel=0.1)
+
+
+def test_the_way_grows_by_what_a_robot_drives_and_so_does_the_depth() -> None:
+    floor = world_of(floor="::::AAAA\n::::AAAA\n::::AAAA").floor
+    x = np.linspace(0.3, 3.4, 40)
+    along = floor.along(np.stack([x, np.full(40, 0.75)], axis=1))
+    assert np.diff(along) == pytest.approx(np.diff(x), abs=1e-9)
+    assert along[x < 2.0].max() <= 0.0 <= along[x > 2.0].min()
+
+
+def test_a_hall_of_forty_metres_has_ways() -> None:
+    rows = ["A" + ":" * 79] * 80
+    assert -world_of(floor="\n".join(rows)).floor.along([[39.9, 20.0]])[0] == pytest.approx(39.4, abs=0.1)
