@@ -131,8 +131,10 @@ def _posterior(
 
 
 STORE = "runs.sqlite"
-# A removed robot is the reference of the others; motor_wear leaves more speed than motor_slow.
-MODES = tuple(mode for mode in FAILURE_MODES if mode not in ("removed", "motor_wear"))
+# A removed robot is the reference of the others; motor_wear leaves more speed than motor_slow, and
+# a late robot stands as a dead one does.
+_NOT_TRIED = ("removed", "motor_wear", "late")
+MODES = tuple(mode for mode in FAILURE_MODES if mode not in _NOT_TRIED)
 _ONSETS = (0.0, 0.2, 0.4, 0.6)  # shares of an episode
 _DURATIONS = (None, 0.2, 0.4)  # shares of an episode; None: for good
 _NAMED_SEEDS = 5  # runs of each named mode, from which the worst is chosen

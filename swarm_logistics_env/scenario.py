@@ -192,6 +192,13 @@ class Scenario(Record):
         return self.warehouse_width - self.delivery_width
 
     @property
+    def longest_way(self) -> float:
+        """No way to a delivery area is longer [m]."""
+        if self.plan is None:
+            return self.warehouse_width
+        return float(self.plan.kind.size * 2.0**0.5 * self.cell_size)  # over all cells, askew
+
+    @property
     def n_steps(self) -> int:
         """Control steps in an episode."""
         return math.ceil(self.duration / self.control_period - 1e-9)

@@ -112,6 +112,10 @@ GOLDEN |= {
         Fault("FM3", 3, 2.0, 9.0, None, (1.0, 1.0)),
     ),
     "without drift": _small(heading_drift=0.0),
+    "aisles": GoldenTrajectory(Scenario(floor="aisles", n_robots=40, restock=True), steps=300),
+    "two docks and obstacles": GoldenTrajectory(
+        Scenario(floor="two_docks", n_obstacles=3, ranger_noise=0.02), (Fault("removed", 2, 10.0),)
+    ),
     "changes during the run": _small(
         delivery_width=0.5,
         events={

@@ -22,7 +22,7 @@ from .requests import gather_commands
 
 ROBOT_FEATURES = (
     "present", "x", "y", "cos_heading", "sin_heading", "velocity_x", "velocity_y",
-    "carrying", "carrying_requested", "timer",
+    "carrying", "carrying_requested", "timer", "to_delivery",
 )  # fmt: skip
 ITEM_COLUMNS = ("stored", "carried", "x", "y", "requested")
 
@@ -32,7 +32,8 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
 
     First `ROBOT_FEATURES` for each of `n_robots` rows, then `ITEM_FEATURES` for each of `n_items`
     rows, then the time. Positions [m] and velocities [m/s] in the warehouse's frame, timers [s]
-    (the limit when silent), time [s]; rows of what is absent or delivered are zeros.
+    (the limit when silent), the way to the nearest dock [m], 0 inside, and time [s]; rows of what
+    is absent or delivered are zeros.
     """
     state = world.state
     robots = np.zeros((n_robots, len(ROBOT_FEATURES)), np.float32)
@@ -46,6 +47,8 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
     robot_rows[:, 7] = state.robot_item != NOBODY
     robot_rows[:, 8] = robot_rows[:, 7] * state.carries_requested
     robot_rows[:, 9] = np.nan_to_num(state.robot_timer, nan=world.scenario.timer_limit)
+    floor = world.floor
+    robot_rows[:, 10] = np.maximum(floor.edge - floor.along(state.robot_position), 0.0)
     robot_rows[~state.robot_present] = 0.0
     items = np.zeros((n_items, len(ITEM_COLUMNS)), np.float32)
     item_rows = items[: len(state.item_status)]
@@ -62,6 +65,7 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
 # These fields bound the state: an episode may have at most the largest value declared.
 _BOUND_THE_STATE = (
     "n_items", "warehouse_width", "warehouse_height", "max_speed", "timer_limit", "duration",
+    "longest_way",
 )  # fmt: skip
 
 
@@ -106,9 +110,9 @@ class Spaces:
 
     def state(self, n_robots: int) -> Box:
         """Return the space of the state with rows for `n_robots` and the most items."""
-        n_items, width, height, speed, limit, duration = self.most.values()
-        robot_low = [0, 0, 0, -1, -1, -speed, -speed, 0, 0, 0]
-        robot_high = [1, width, height, 1, 1, speed, speed, 1, 1, limit]
+        n_items, width, height, speed, limit, duration, way = self.most.values()
+        robot_low = [0, 0, 0, -1, -1, -speed, -speed, 0, 0, 0, 0]
+        robot_high = [1, width, height, 1, 1, speed, speed, 1, 1, limit, way]
         low = [*(robot_low * n_robots), *([0] * len(ITEM_COLUMNS) * n_items), 0]
         high = [*(robot_high * n_robots), *([1, 1, width, height, 1] * n_items), duration + 1.0]
         return Box(np.array(low, np.float32), np.array(high, np.float32))

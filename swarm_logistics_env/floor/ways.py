@@ -59,7 +59,7 @@ class PlannedFloor:
     """A floor with racks and walls; lengths of ways are those over cells' centres.
 
     A way goes from a cell to any of its eight neighbours, and past no rack's corner, so it is up to
-    8 % longer than the shortest one.
+    8 % longer than the shortest one. Within half a cell of a rack it does not change towards it.
 
     Args:
         plan: of the floor.
@@ -81,25 +81,26 @@ class PlannedFloor:
         xy = _points(points)
         size = self._plan.width, self._plan.height
         inside = ((xy >= 0.0) & (xy <= size)).all(axis=1)
-        rows, columns = self._cells(xy)
+        rows, columns = self._cells(xy / self._plan.cell_size)
         free: Mask = inside & (self._plan.kind[rows, columns] > RACK)
         return free
 
     def along(self, points: ArrayLike) -> Numbers:
         """Return the depth in a dock, or less than 0, the way to the nearest one (n,) [m]."""
-        xy = _points(points)
-        rows, columns = self._cells(xy)
+        cells = _points(points) / self._plan.cell_size
+        rows, columns = self._cells(cells)
         is_inside = self._plan.dock[rows, columns] >= 0
         depth, way = (
-            _at_points(far, self._is_open, xy, rows, columns, self._plan.cell_size) - self._half
+            _at_points(far, self._is_open, cells) - self._half
             for far in (self._to_outside, self._to_dock)
         )
         return np.where(is_inside, np.maximum(depth, 0.0), -np.maximum(way, 0.0))
 
-    def _cells(self, xy: Numbers) -> tuple[Indices, Indices]:
+    def _cells(self, cells: Numbers) -> tuple[Indices, Indices]:
+        """Return rows and columns of points, given in cells; outside counts as the edge."""
         n_rows, n_columns = self._plan.kind.shape
-        cells = (xy / self._plan.cell_size).astype(np.int64)
-        return np.clip(cells[:, 1], 0, n_rows - 1), np.clip(cells[:, 0], 0, n_columns - 1)
+        columns, rows = np.clip(cells.astype(np.int64), 0, (n_columns - 1, n_rows - 1)).T
+        return rows, columns
 
 
 @functools.lru_cache(maxsize=64)
@@ -125,7 +126,7 @@ _PAIRS = (
 def _distances(may_pass: Mask, is_goal: Mask, cell_size: float) -> Numbers:
     """Return how far each cell's centre is from the nearest goal's, along cells that may be passed.
 
-    Infinite where no way leads to one.
+    Where no way leads to one, as far as the farthest cell.
     """
     from scipy.sparse import csr_array  # late: an empty room needs none of scipy
     from scipy.sparse.csgraph import dijkstra
@@ -146,30 +147,34 @@ def _distances(may_pass: Mask, is_goal: Mask, cell_size: float) -> Numbers:
         shape=(may_pass.size, may_pass.size),
     )
     goals = np.flatnonzero(is_goal)
-    if not len(goals):
-        return np.full(may_pass.shape, np.inf)
-    far = dijkstra(graph, directed=False, indices=goals, min_only=True)
-    return np.asarray(far).reshape(may_pass.shape)
+    far = np.asarray(dijkstra(graph, directed=False, indices=goals, min_only=True))
+    farthest = far[np.isfinite(far)].max()
+    return np.minimum(far, farthest).reshape(may_pass.shape)
 
 
-def _at_points(
-    far: Numbers, is_open: Mask, xy: Numbers, rows: Indices, columns: Indices, cell_size: float
-) -> Numbers:
-    """Return the distances of points, by those of the cells around them that they reach straight.
+def _at_points(far: Numbers, is_open: Mask, cells: Numbers) -> Numbers:
+    """Return the distances of points, bilinear between the centres of the cells around them.
+
+    Beside a rack they are those of the cell itself, so that nothing leaks through.
 
     Args:
-        far: of each cell's centre [m].
+        far: distance of each cell's centre [m].
         is_open: which cells are no racks.
-        xy: the points (n, 2) [m], in the cells of these rows and columns.
+        cells: x and y of the points (n, 2) in cells.
     """
-    n_rows, n_columns = far.shape
-    least = np.full(len(xy), np.inf)
-    for down in (-1, 0, 1):
-        for right in (-1, 0, 1):
-            row = np.clip(rows + down, 0, n_rows - 1)
-            column = np.clip(columns + right, 0, n_columns - 1)
-            centres = (np.stack([column, row], axis=1) + 0.5) * cell_size
-            distance = far[row, column] + np.hypot(*(xy - centres).T)
-            is_straight = is_open[rows, column] & is_open[row, columns]
-            least = np.where(is_straight, np.minimum(least, distance), least)
-    return least
+    shape = np.array(far.shape[::-1])
+    own = np.clip(cells.astype(np.int64), 0, shape - 1)
+    aside = np.clip(cells, 0.0, shape) - own - 0.5  # from the cell's centre, within +-0.5
+    weight_x, weight_y = np.abs(aside).T
+    column, row = own.T
+    next_column, next_row = np.clip(own + np.where(aside < 0.0, -1, 1), 0, shape - 1).T
+    may_x, may_y = is_open[row, next_column], is_open[next_row, column]
+    here = far[row, column]
+    along_x = np.where(may_x, far[row, next_column], here)
+    along_y = np.where(may_y, far[next_row, column], here)
+    may_both = may_x & may_y & is_open[next_row, next_column]
+    askew = np.where(may_both, far[next_row, next_column], along_x + along_y - here)
+    near_y = (1.0 - weight_x) * here + weight_x * along_x
+    return np.asarray(
+        (1.0 - weight_y) * near_y + weight_y * ((1.0 - weight_x) * along_y + weight_x * askew)
+    )

@@ -46,17 +46,21 @@ PRIVILEGED = (
 
 @engine_kernel
 def fill_privileged(
-    address: int, turned: NDArray[np.float64], privileged: NDArray[np.float32]
+    address: int,
+    turned: NDArray[np.float64],
+    to_delivery: NDArray[np.float64],
+    privileged: NDArray[np.float32],
 ) -> None:
     """Fill `privileged` (rows, len(PRIVILEGED)); rows without a robot stay as they are.
 
     Args:
         address: of the world (`Warehouse.address`).
         turned: how far each row's frame is turned from its robot's body (rows,) [rad].
+        to_delivery: the way of each robot to the nearest dock, in one less than 0 (N,) [m].
     """
     world = unpacked_at(World, address)
     robots, able, items = world.robots, world.able, world.items
-    edge, height = world.parameters.storage_width, world.parameters.warehouse_height
+    height = world.parameters.warehouse_height
     for robot in range(len(robots.position)):
         row = privileged[robot]
         x, y = robots.position[robot, 0], robots.position[robot, 1]
@@ -64,7 +68,7 @@ def fill_privileged(
         carrier = NOBODY if requested == NOBODY else items.carrier[requested]
         frame = robots.heading[robot] + turned[robot]
         cos, sin = math.cos(frame), math.sin(frame)
-        row[0], row[1] = (edge - x) / 10.0, (y - 0.5 * height) / 10.0
+        row[0], row[1] = to_delivery[robot] / 10.0, (y - 0.5 * height) / 10.0
         row[2], row[3] = cos, sin
         row[4] = 10.0 * robots.heading_drift[robot]
         row[5] = math.log(len(robots.position)) / 5.0
@@ -80,7 +84,7 @@ def fill_privileged(
             row[11] = max(0.0, 1.0 - distance / 2.0)
         if carrier != NOBODY:
             row[12] = 1.0
-            row[13] = (edge - robots.position[carrier, 0]) / 10.0
+            row[13] = to_delivery[carrier] / 10.0
             row[14] = 1.0 if able.delivers[carrier] else 0.0
 
 
@@ -175,8 +179,10 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         inputs = self.frame.read(observations)
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
-            address, turned = world.warehouse.address, self.frame.turned[rows]
-            fill_privileged(address, turned, self._privileged[rows])
+            warehouse, turned = world.warehouse, self.frame.turned[rows]
+            floor = warehouse.floor
+            to_delivery = floor.edge - floor.along(warehouse.state.robot_position)
+            fill_privileged(warehouse.address, turned, to_delivery, self._privileged[rows])
         return np.hstack([inputs, self._privileged])
 
     def _keys(self) -> NDArray[np.uint64]:

@@ -114,6 +114,18 @@ FAILURE_MODES: dict[str, FailureMode] = {
         hears=False,
         obeys=False,
     ),
+    "late": FailureMode(
+        "has not begun to work: stands as a dead robot does until the fault ends",
+        mark="L",
+        speed=0.0,
+        view=0.0,
+        rangers=False,
+        lifts=False,
+        delivers=False,
+        sends=False,
+        hears=False,
+        obeys=False,
+    ),
     "removed": FailureMode(
         "out of the arena, what it carried is put down where it was", present=False
     ),

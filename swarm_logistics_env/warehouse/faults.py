@@ -58,6 +58,7 @@ class Fault(Record):
             same robots and the sets of m = 1, 2, 3 are nested; or the robots' numbers.
         onset: when it begins [s], from the start of the episode.
         duration: for how long it holds [s]; None: for good. A removed robot does not come back.
+            Robots that are `late` begin to work when it ends.
         factor: for `motor_slow`, `motor_wear` and `view_reduced`: what is left, in [0, 1).
         intermittent: for how long [s] it holds, and for how long not, both on average, in turn
             from its onset on; each robot's times are drawn from its own stream (exponential).
@@ -190,6 +191,9 @@ def fault_of(text: str) -> Fault:
             "with ROBOTS a whole number and ONSET and DURATION in seconds"
         )
     parts: dict[str, Any] = match.groupdict()
+    if parts["mode"] == "late" and parts["onset"] and not parts["duration"]:
+        start = f"late:{parts['robots'] or 1}@0+{parts['onset']}"
+        raise FaultError(f"fault {text!r}: late robots begin when it ends: should be {start}")
     return Fault(**{name: text for name, text in parts.items() if text is not None})
 
 
@@ -200,6 +204,8 @@ def text_of(fault: Fault) -> str | None:
     lasts = f"+{digits(fault.duration)}" if fault.duration else ""
     onset = f"@{digits(fault.onset)}{lasts}" if fault.onset or lasts else ""
     text = f"{fault.mode}:{fault.robots}{role}{onset}"
+    if fault.mode == "late" and onset and not lasts:
+        return None
     return text if _FAULT.fullmatch(text) and fault_of(text) == fault else None
 
 

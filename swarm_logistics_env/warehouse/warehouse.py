@@ -320,9 +320,7 @@ class Warehouse:
         return log.reshape(-1, *now.shape)[: n_logged.item()]
 
     def _save(self) -> None:
-        attributes = {
-            name: value for name, value in self.__dict__.items() if name not in _NOT_PICKLED
-        }
+        attributes = {name: x for name, x in vars(self).items() if name not in _NOT_PICKLED}
         self._memory = pickle.dumps(attributes)
 
     @in_one_thread

@@ -135,7 +135,7 @@ def test_a_name_among_many_is_told() -> None:
         ({"n_robot": 3}, ScenarioError, "did you mean 'n_robots'"),
         ({"render_mode": "hologram"}, SetupError, "render_mode = 'hologram': should be"),
         ({"scenario": {"n_robots": 3}}, SetupError, "scenario = .*: should be a Scenario"),
-        ({"num_agents": 3}, ArgumentError, "'num_agents'; known: control_period, "),
+        ({"num_agents": 3}, ArgumentError, "'num_agents'; known: cell_size, "),
         ({"max_robots": 24}, SetupError, "max_robots = 24: should be .* of at least 25"),
         ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be a whole number"),
         ({"rewards": ["delivery"]}, SetupError, r"rewards = \[.*\]: should be None or a dict"),
@@ -298,7 +298,7 @@ def test_the_state_tells_nothing_of_robots_that_are_gone_nor_of_items_that_were_
 
     def told() -> tuple[NDArray[Any], NDArray[Any]]:
         state = env.state()
-        return state[:30].reshape(3, 10), state[30:40].reshape(2, 5)
+        return state[:33].reshape(3, 11), state[33:43].reshape(2, 5)
 
     assert told()[0][:, 0].tolist() == [0.0, 1.0, 1.0]
     delivered = env.warehouse.state.requested

@@ -18,6 +18,12 @@ from swarm_logistics_env.train.learner import PRIVILEGED, NetworkView, fill_priv
 from swarm_logistics_env.warehouse.state import CARRIED
 
 
+def fill(env: SwarmLogisticsEnv, turned: Any, privileged: Any) -> None:
+    floor = env.warehouse.floor
+    to_delivery = floor.edge - floor.along(env.warehouse.state.robot_position)
+    fill_privileged(env.warehouse.address, turned, to_delivery, privileged)
+
+
 def test_the_critic_knows_where_the_requested_item_is() -> None:
     env = SwarmLogisticsEnv(n_robots=3, n_items=5)
     env.reset_arrays(seed=0)
@@ -26,7 +32,7 @@ def test_the_critic_knows_where_the_requested_item_is() -> None:
     state.item_position[state.requested] = (4.0, 6.0)
     turned, privileged = np.zeros(3), np.zeros((4, len(PRIVILEGED)), np.float32)
     turned[0] = 0.5 * math.pi  # so that the frame looks along -x
-    fill_privileged(env.warehouse.address, turned, privileged)
+    fill(env, turned, privileged)
     told = dict(zip(PRIVILEGED, privileged[0].tolist()))
     expected = {
         "to_delivery": 0.4, "frame_cos": -1.0, "frame_sin": 0.0, "requested_along": 0.0,
@@ -37,7 +43,7 @@ def test_the_critic_knows_where_the_requested_item_is() -> None:
 
     state.item_status[state.requested], state.item_carrier[state.requested] = CARRIED, 1
     state.robot_position[1] = (7.0, 5.0)
-    fill_privileged(env.warehouse.address, turned, privileged)
+    fill(env, turned, privileged)
     told = dict(zip(PRIVILEGED, privileged[0].tolist()))
     assert (told["is_carried"], told["carrier_delivers"]) == (1.0, 1.0)
     assert told["carrier_to_delivery"] == pytest.approx(0.1)
@@ -50,10 +56,10 @@ def test_of_several_requests_the_critic_knows_the_nearest() -> None:
     state.robot_position[:], state.robot_heading[:] = [(4.0, 5.0), (1.0, 1.0)], 0.0
     state.item_position[state.open_requests] = [(7.0, 9.0), (4.0, 6.0), (1.0, 3.0)]
     privileged = np.zeros((2, len(PRIVILEGED)), np.float32)
-    fill_privileged(env.warehouse.address, np.zeros(2), privileged)
+    fill(env, np.zeros(2), privileged)
     assert privileged[:, PRIVILEGED.index("requested_distance")] == pytest.approx([0.1, 0.2])
     state.item_carrier[state.open_requests[1]] = 0
-    fill_privileged(env.warehouse.address, np.zeros(2), privileged)
+    fill(env, np.zeros(2), privileged)
     assert privileged[:, PRIVILEGED.index("is_carried")].tolist() == [1.0, 0.0]
 
 

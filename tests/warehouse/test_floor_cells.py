@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,17 +20,17 @@ from swarm_logistics_env.warehouse.floor_cells import (
 from swarm_logistics_env.warehouse.state import NOBODY
 
 
-def world_of(floor: str, n_robots: int = 1, n_items: int = 1, **fields: object) -> Warehouse:
-    world = Warehouse(Scenario(floor=floor, n_robots=n_robots, n_items=n_items, **fields))  # type: ignore[arg-type]
+def world_of(floor: str, n_robots: int = 1, n_items: int = 1, **fields: Any) -> Warehouse:
+    world = Warehouse(Scenario(floor=floor, n_robots=n_robots, n_items=n_items, **fields))
     world.reset(0)
     return world
 
 
 def put(world: Warehouse, robots: list[list[float]], items: list[list[float]]) -> None:
     """Put robots and items there, all robots looking along x, and sense anew."""
-    world.state.robot_position = robots
-    world.state.robot_heading = 0.0
-    world.state.item_position = items
+    world.state.robot_position = np.array(robots)
+    world.state.robot_heading = np.zeros(len(robots))
+    world.state.item_position = np.array(items)
     world.change()  # makes the bodies anew
     world.step(np.zeros((len(robots), 4)))
 
@@ -56,7 +58,7 @@ def test_beams_stop_at_a_rack_and_hide_what_is_behind() -> None:
 
 
 def test_cameras_and_grippers_do_not_reach_through_a_rack_but_the_radio_does() -> None:
-    fields = {"view_range": 2.0, "pickup_range": 1.0, "heading_drift": 0.0}
+    fields: dict[str, Any] = {"view_range": 2.0, "pickup_range": 1.0, "heading_drift": 0.0}
     world = world_of(WALLED, n_robots=2, **fields)
     put(world, [[0.8, 1.25], [1.75, 1.25]], [[1.65, 1.25]])
     world.step(np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0]]))
