@@ -91,9 +91,7 @@ class Scenario(Record):
     n_robots: Count = Field(25, description="swarm size N [robots]; source: paper")
     n_items: Count = Field(60, description="items in storage at the start; source: paper")
     floor: str | None = Field(
-        None,
-        description="plan with walls, racks and docks: a shipped name, a file, or its rows; none: "
-        "an empty room with one delivery area; off",
+        None, description="plan of walls, racks and docks: a shipped name, a file, or its rows; off"
     )
     cell_size: Positive = Field(0.5, description="side of a plan's cell [m]; chosen")
     warehouse_width: Positive = Field(10.0, description="along x [m]; source: paper")
@@ -115,10 +113,13 @@ class Scenario(Record):
         "request is a uniform draw of its own; zipf: as that, but item i is (i + 1) times as rare "
         "as item 0; source: simulator",
     )
+    request_docks: Literal["any", "random"] = Field(
+        "any", description="random: each request names a dock, which alone takes its item; off"
+    )
     dock_capacity: Positive | None = Field(
         None,
-        description="deliveries that the delivery area takes [1/s], the oldest request first; the "
-        "others wait; none: any number at once; off",
+        description="deliveries that are taken in all [1/s], the oldest request first; the others "
+        "wait; none: any number at once; off",
     )
     handling_time: NonNegative = Field(
         0.0, description="a robot stands so long to lift, to put down and to deliver [s]; off"
@@ -222,6 +223,11 @@ class Scenario(Record):
     def is_independent(self) -> bool:
         """Whether each request is drawn for itself."""
         return self.demand != "closed"
+
+    @property
+    def names_docks(self) -> bool:
+        """Whether each request names its dock."""
+        return self.request_docks == "random"
 
     @property
     def popularity_exponent(self) -> float:
@@ -341,6 +347,8 @@ class Scenario(Record):
             raise ValueError(
                 f"n_requests = {self.n_requests}: should be at most n_items = {self.n_items}"
             )
+        if self.names_docks and (self.plan is None or len(self.plan.dock_names) < 2):
+            raise ValueError("request_docks = random: should have a floor of two docks or more")
         most = 1.0 / self.control_period
         if self.dock_capacity is not None and self.dock_capacity > most * (1.0 + 1e-9):
             raise ValueError(

@@ -122,6 +122,7 @@ def some_planned_scenario(source: random.Random) -> Scenario:
     while True:
         fields = _fields(source)
         sizes = {name: fields.pop(name) for name in PLAN_SIZES}
+        fields["request_docks"] = source.choice(["any", "random"])
         cell_size = source.uniform(1.0, 5.0) * fields["robot_radius"]
         shape = [max(3, int(sizes[name] / cell_size)) for name in PLAN_SIZES[:2]]
         with contextlib.suppress(ScenarioError):

@@ -116,6 +116,11 @@ GOLDEN |= {
     "two docks and obstacles": GoldenTrajectory(
         Scenario(floor="two_docks", n_obstacles=3, ranger_noise=0.02), (Fault("removed", 2, 10.0),)
     ),
+    "named docks": GoldenTrajectory(
+        Scenario(floor="two_docks", request_docks="random", n_requests=3, restock=True),
+        policy="homing",
+        steps=650,
+    ),
     "changes during the run": _small(
         delivery_width=0.5,
         events={

@@ -119,7 +119,9 @@ def lift_requested(world: Warehouse, before: Before) -> Earned:
 
 
 def approach(world: Warehouse, before: Before) -> Earned:
-    """Metres that the carrier of a requested item came nearer to a delivery area, on free floor.
+    """Metres that the carrier of a requested item came nearer to the dock, on free floor.
+
+    To the one that the request names, or else to the nearest.
 
     Privileged: no robot can sense it, so it may shape a reward but not an observation.
     """
@@ -129,8 +131,9 @@ def approach(world: Warehouse, before: Before) -> Earned:
     if not robots.size:
         return None
     reward = np.zeros(state.n_robots)
-    reward[robots] = np.minimum(floor.along(state.robot_position[robots]), floor.edge)
-    reward[robots] -= np.minimum(floor.along(before.robot_position[robots]), floor.edge)
+    docks = state.item_docks[state.robot_item[robots]]
+    reward[robots] = np.minimum(floor.along(state.robot_position[robots], docks), floor.edge)
+    reward[robots] -= np.minimum(floor.along(before.robot_position[robots], docks), floor.edge)
     return reward
 
 
@@ -147,8 +150,9 @@ def stocking(world: Warehouse, before: Before) -> Earned:
     items = np.flatnonzero((carriers != NOBODY) & ~delivered)
     if not items.size:
         return None
-    metres = np.minimum(floor.along(state.item_position[items]), floor.edge)
-    metres -= np.minimum(floor.along(before.item_position[items]), floor.edge)
+    docks = state.item_docks[items]
+    metres = np.minimum(floor.along(state.item_position[items], docks), floor.edge)
+    metres -= np.minimum(floor.along(before.item_position[items], docks), floor.edge)
     reward = np.zeros(state.n_robots)
     np.add.at(reward, carriers[items], metres)  # who lets go of one may lift another at once
     return reward

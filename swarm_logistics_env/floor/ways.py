@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .floor_plan import DOCK, RACK, FloorPlan, Mask, floor_plan
+from .floor_plan import NO_DOCK, RACK, FloorPlan, Mask, floor_plan
 
 Numbers = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -26,10 +26,13 @@ class FloorMap(Protocol):
     def is_free(self, points: ArrayLike) -> Mask:
         """Return whether points lie inside the warehouse and outside of walls and racks (n,)."""
 
-    def along(self, points: ArrayLike) -> Numbers:
-        """Return how far along the way into the nearest dock points are (n,) [m].
+    def along(self, points: ArrayLike, docks: ArrayLike = NO_DOCK) -> Numbers:
+        """Return how far along the way into a dock points are (n,) [m].
 
         It grows by a metre with each metre of the way, `edge` at the dock's border.
+
+        Args:
+            docks: the numbers of the docks (n,), or one for all; `NO_DOCK`: the nearest one.
         """
 
 
@@ -50,8 +53,8 @@ class OpenFloor:
         xy = _points(points)
         return np.asarray(((xy >= 0.0) & (xy <= self._size)).all(axis=1))
 
-    def along(self, points: ArrayLike) -> Numbers:
-        """Return x (n,) [m]."""
+    def along(self, points: ArrayLike, docks: ArrayLike = NO_DOCK) -> Numbers:
+        """Return x (n,) [m], as there is one dock."""
         return _points(points)[:, 0]
 
 
@@ -70,11 +73,7 @@ class PlannedFloor:
     def __init__(self, plan: FloorPlan) -> None:
         self._plan = plan
         self._is_open = plan.kind > RACK
-        is_dock = plan.kind == DOCK
-        # A dock begins half a cell before the centre of its first cell.
-        self._half = 0.5 * plan.cell_size
-        self._to_dock = _distances(self._is_open, is_dock, plan.cell_size)
-        self._to_outside = _distances(self._is_open, self._is_open & ~is_dock, plan.cell_size)
+        self._fields: dict[int, tuple[Numbers, Numbers]] = {}
 
     def is_free(self, points: ArrayLike) -> Mask:
         """Return whether points lie inside the plan and outside of walls and racks (n,)."""
@@ -85,16 +84,38 @@ class PlannedFloor:
         free: Mask = inside & (self._plan.kind[rows, columns] > RACK)
         return free
 
-    def along(self, points: ArrayLike) -> Numbers:
-        """Return the depth in a dock, or less than 0, the way to the nearest one (n,) [m]."""
+    def along(self, points: ArrayLike, docks: ArrayLike = NO_DOCK) -> Numbers:
+        """Return the depth in a dock, or less than 0, the way to it (n,) [m]; see `FloorMap`."""
         cells = _points(points) / self._plan.cell_size
+        numbers = np.broadcast_to(np.asarray(docks), len(cells))
+        along = np.empty(len(cells))
+        for dock in np.unique(numbers).tolist():
+            is_for_dock = numbers == dock
+            along[is_for_dock] = self._along(cells[is_for_dock], dock)
+        return along
+
+    def _along(self, cells: Numbers, dock: int) -> Numbers:
         rows, columns = self._cells(cells)
-        is_inside = self._plan.dock[rows, columns] >= 0
-        depth, way = (
-            _at_points(far, self._is_open, cells) - self._half
-            for far in (self._to_outside, self._to_dock)
-        )
+        is_dock = self._is_dock(dock)
+        # A dock begins half a cell before the centre of its first cell.
+        half = 0.5 * self._plan.cell_size
+        way, depth = (_at_points(far, self._is_open, cells) - half for far in self._far(dock))
+        is_inside = is_dock[rows, columns]
         return np.where(is_inside, np.maximum(depth, 0.0), -np.maximum(way, 0.0))
+
+    def _is_dock(self, dock: int) -> Mask:
+        return self._plan.dock >= 0 if dock == NO_DOCK else self._plan.dock == dock
+
+    def _far(self, dock: int) -> tuple[Numbers, Numbers]:
+        """Return how far each cell is from a dock, and from what is outside of it [m]."""
+        if dock not in self._fields:
+            is_dock = self._is_dock(dock)
+            goals = is_dock, self._is_open & ~is_dock
+            to_dock, to_outside = (
+                _distances(self._is_open, goal, self._plan.cell_size) for goal in goals
+            )
+            self._fields[dock] = to_dock, to_outside
+        return self._fields[dock]
 
     def _cells(self, cells: Numbers) -> tuple[Indices, Indices]:
         """Return rows and columns of points, given in cells; outside counts as the edge."""
@@ -149,7 +170,7 @@ def _distances(may_pass: Mask, is_goal: Mask, cell_size: float) -> Numbers:
     goals = np.flatnonzero(is_goal)
     far = np.asarray(dijkstra(graph, directed=False, indices=goals, min_only=True))
     farthest = far[np.isfinite(far)].max()
-    return np.minimum(far, farthest).reshape(may_pass.shape)
+    return np.asarray(np.minimum(far, farthest).reshape(may_pass.shape))
 
 
 def _at_points(far: Numbers, is_open: Mask, cells: Numbers) -> Numbers:

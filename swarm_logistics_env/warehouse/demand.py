@@ -3,6 +3,7 @@
 `n_requests` of them are open at a time, oldest first. A delivery closes one, and the next is drawn:
 in cycles of all items, or each by itself from a keyed stream of its own. An item may be asked for
 twice at a time where delivered items come back; else it is asked for once, as it leaves for good.
+With `request_docks` "random" each request names the dock that takes its item, from a stream.
 """
 
 from __future__ import annotations
@@ -31,23 +32,47 @@ def ask(world: World) -> None:
     for index in range(len(requested)):
         if requested[index] == NOBODY:
             requested[index] = next_item(world)
+            world.progress.requested_dock[index] = next_dock(world)
 
 
 @kernel
-def close_request(world: World, item: int) -> None:
-    """Close the oldest request for an item that was delivered; all of them if it left for good."""
-    requested = world.progress.requested
-    n_kept = 0
-    n_closed = 0
-    n_to_close = len(requested) if world.items.status[item] == DELIVERED else 1
+def close_request(world: World, closed: int) -> None:
+    """Close a request, by its place, whose item was delivered; all for it if it left for good."""
+    requested, docks = world.progress.requested, world.progress.requested_dock
+    item = requested[closed]
+    has_left = world.items.status[item] == DELIVERED
+    n_open = 0
     for index in range(len(requested)):
-        open_item = requested[index]
-        if open_item == item and n_closed < n_to_close:
-            n_closed += 1
-        else:
-            requested[n_kept] = open_item
-            n_kept += 1
-    requested[n_kept:] = NOBODY
+        if index != closed and not (has_left and requested[index] == item):
+            requested[n_open], docks[n_open] = requested[index], docks[index]
+            n_open += 1
+    requested[n_open:] = NOBODY
+    docks[n_open:] = NOBODY
+
+
+@kernel
+def next_dock(world: World) -> int:
+    """Return the dock that the next request names, or NOBODY: any takes it."""
+    progress = world.progress
+    if not world.parameters.names_docks:
+        return NOBODY
+    number = uniform(world.items.dock_key[0], progress.n_docks_drawn[0])
+    progress.n_docks_drawn[0] += 1
+    return int(number * world.floor.n_docks)
+
+
+@inlined_kernel
+def takes(world: World, dock: int, item: int) -> bool:
+    """Return whether a dock takes an item, or NOBODY: all but those that are wanted elsewhere."""
+    if not world.parameters.names_docks or item == NOBODY:
+        return True
+    progress = world.progress
+    is_taken, is_wanted = False, False
+    for index in range(len(progress.requested)):
+        if progress.requested[index] == item:
+            is_wanted = True
+            is_taken |= progress.requested_dock[index] == dock
+    return is_taken or not is_wanted
 
 
 @kernel

@@ -55,6 +55,7 @@ def _cells_of(text: str, cell_size: float, robot_diameter: float) -> Floor:
         dock=np.ascontiguousarray(plan.dock),
         storage=_columns_and_rows((plan.kind == STORAGE) & plan.reachable),
         start=_columns_and_rows(plan.start_cells),
+        n_docks=len(plan.dock_names),
         corners=np.ascontiguousarray(corners),
     )
 
@@ -72,6 +73,7 @@ _EMPTY_ROOM = Floor(
     dock=np.zeros((0, 0), np.int8),
     storage=np.zeros((0, 2), np.int64),
     start=np.zeros((0, 2), np.int64),
+    n_docks=1,
     corners=np.zeros((0, 2)),
 )
 

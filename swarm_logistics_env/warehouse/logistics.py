@@ -22,7 +22,7 @@ import math
 from swarm_logistics_env.kernels import engine_kernel, inlined_kernel, kernel
 
 from .commands import DELIVERING, GRIPPER, IDLE, ITEM, KIND, LAST_STEP, LIFTING, PUTTING_DOWN
-from .demand import ask, close_request, is_requested
+from .demand import ask, close_request, is_requested, takes
 from .floor_cells import dock_at, is_in_sight
 from .grid import look_around
 from .layout import place_restocked
@@ -155,8 +155,9 @@ def carry_along(world: World) -> None:
     for robot in range(len(robots.item)):
         x = robots.position[robot, 0]
         y = robots.position[robot, 1]
-        robots.in_delivery[robot] = robots.present[robot] and dock_at(world, x, y) != NOBODY
-        item = robots.item[robot]
+        item, dock = robots.item[robot], dock_at(world, x, y)
+        is_there = robots.present[robot] and dock != NOBODY
+        robots.in_delivery[robot] = is_there and takes(world, dock, item)
         if item != NOBODY:
             items.position[item, 0] = x
             items.position[item, 1] = y
@@ -306,6 +307,16 @@ def close_grippers(world: World) -> None:
             return
 
 
+@inlined_kernel
+def is_at_named_dock(world: World, request: int, robot: int) -> bool:
+    """Return whether a robot is in the dock that a request names, if it names any."""
+    dock = world.progress.requested_dock[request]
+    if dock == NOBODY:
+        return True
+    position = world.robots.position[robot]
+    return bool(dock_at(world, position[0], position[1]) == dock)
+
+
 @engine_kernel
 def deliver(world: World) -> tuple[int, bool]:
     """Deliver the requested items whose carriers can, the oldest request first, then the next.
@@ -319,10 +330,12 @@ def deliver(world: World) -> tuple[int, bool]:
     is_room = True
     index = 0
     while index < len(progress.requested) and progress.requested[index] != NOBODY:
-        item = progress.requested[index]
+        request, item = index, progress.requested[index]
         robot = items.carrier[item]
         index += 1
         if robot == NOBODY or not robots.in_delivery[robot] or not world.able.delivers[robot]:
+            continue
+        if not is_at_named_dock(world, request, robot):
             continue
         if not may_deliver(world, robot) or not is_done(world, robot, DELIVERING, item):
             continue
@@ -343,7 +356,7 @@ def deliver(world: World) -> tuple[int, bool]:
                 put_item(engine, item, items.position)
             else:
                 is_room = False
-        close_request(world, item)
+        close_request(world, request)
         ask(world)
         index = 0  # what is asked for now may have waited here
     return n_delivered, is_room

@@ -67,6 +67,7 @@ class WarehouseState:
     item_covered: Integers
 
     open_requests: Integers
+    requested_docks: Integers
 
     def __init__(self, scenario: Scenario) -> None:
         lengths = lengths_of(scenario)
@@ -88,6 +89,8 @@ class WarehouseState:
         self.failed = self.robots.failed
         self.last_in_delivery = self.robots.last_in_delivery
         self.open_requests = self.progress.requested
+        self.requested_docks = self.progress.requested_dock
+        self.requested_docks[:] = NOBODY
         self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
         # Per robot, the failure modes that hold.
         self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * scenario.n_robots
@@ -121,6 +124,14 @@ class WarehouseState:
         is_requested = np.zeros(len(self.item_status), np.bool_)
         is_requested[self.open_requests[self.open_requests != NOBODY]] = True
         return is_requested
+
+    @property
+    def item_docks(self) -> Integers:
+        """The dock that the oldest request for each item names (I,), or NOBODY."""
+        docks = np.full(len(self.item_status), NOBODY)
+        is_open = self.open_requests != NOBODY
+        docks[self.open_requests[is_open][::-1]] = self.requested_docks[is_open][::-1]
+        return docks
 
     @property
     def carries_requested(self) -> Flags:

@@ -58,6 +58,7 @@ class Parameters(NamedTuple):
     dock_period: float
     popularity_exponent: float
     is_independent: bool
+    names_docks: bool
     restock: bool
     is_gossip: bool
     is_holonomic: bool
@@ -72,7 +73,7 @@ class Robots(NamedTuple):
     heading_drift: Annotated[Numbers, "N"]  # [rad/s] at which its body turns unasked
     present: Annotated[Flags, "N"]  # False once it was removed
     failed: Annotated[Flags, "N"]  # any failure mode holds
-    in_delivery: Annotated[Flags, "N"]  # its centre is in the delivery area
+    in_delivery: Annotated[Flags, "N"]  # its centre is in a dock that takes what it carries
     last_in_delivery: Annotated[Integers, "N"]  # the last step in which it was, or NOBODY
     contact: Annotated[Flags, "N"]  # touches something solid to it
     item: Annotated[Integers, "N"]  # item carried, or NOBODY
@@ -117,6 +118,7 @@ class Items(NamedTuple):
     covered: Annotated[Integers, "I"]  # 1: stored, yet no obstacle; or 0
     request_key: Annotated[Keys, "I"]  # of the streams that decide the order of every cycle
     demand_key: Annotated[Keys, 1]  # of the stream of requests that are drawn independently
+    dock_key: Annotated[Keys, 1]  # of the stream of docks that requests name
     restock_key: Annotated[Keys, 1]  # of the streams that decide where delivered items come back
 
 
@@ -126,6 +128,8 @@ class Progress(NamedTuple):
     step: Annotated[Integers, 1]  # control steps since the start
     time: Annotated[Numbers, 1]  # [s] since the start
     requested: Annotated[Integers, "n_requests"]  # items asked for, oldest first, then NOBODY
+    requested_dock: Annotated[Integers, "n_requests"]  # docks that these name; NOBODY: any
+    n_docks_drawn: Annotated[Integers, 1]  # requests so far that named one
     cycle: Annotated[Integers, 1]  # how often all items were asked for
     asked_last: Annotated[Integers, 1]  # the item that was asked for last in this cycle, or NOBODY
     n_drawn: Annotated[Integers, 1]  # requests drawn independently so far
@@ -172,6 +176,7 @@ class Floor(NamedTuple):
     dock: Annotated[Bytes, "rows", "columns"]  # number of the dock, or NOBODY
     storage: Annotated[Integers, "cells", 2]  # column and row of each cell where items lie
     start: Annotated[Integers, "cells", 2]  # of each cell where robots start
+    n_docks: int
     corners: Annotated[Numbers, "4 boxes", 2]  # [m] of rectangles of solid cells, anticlockwise
 
 

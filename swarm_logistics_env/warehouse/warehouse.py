@@ -274,6 +274,7 @@ class Warehouse:
         items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
         items.demand_key[0] = key(seed, "demand")
         items.restock_key[0] = key(seed, "restock")
+        items.dock_key[0] = key(seed, "docks")
         state.open_requests[:] = NOBODY
 
     def _as_commands(self, commands: ArrayLike) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env import observations as row
+from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.warehouse.floor_cells import (
     floor_of,
     free_way,
@@ -165,3 +166,30 @@ def test_a_pickle_goes_on_with_the_same_bits() -> None:
     for _ in range(30):
         commands = rng.uniform(-1, 1, (20, 4))
         assert (world.step(commands) == copy.step(commands)).all()
+
+
+def test_a_request_that_names_a_dock_is_delivered_in_that_dock_alone() -> None:
+    fields: dict[str, Any] = {"request_docks": "random", "restock": True, "heading_drift": 0.0}
+    world = world_of("A:::B\nA:::B", n_items=3, **fields)
+    named = []
+    for _ in range(12):
+        item, dock = world.state.requested, int(world.state.requested_docks[0])
+        named.append(dock)
+        assert world.state.item_docks[item] == dock
+        for number, x in ((1 - dock, 0.25 + 2.0 * (1 - dock)), (dock, 0.25 + 2.0 * dock)):
+            delivered = world.state.delivered
+            items = world.state.item_position.copy()
+            items[item] = (x, 0.25)
+            world.state.robot_item[0] = NOBODY
+            world.state.item_status[item], world.state.item_carrier[item] = 0, NOBODY
+            put(world, [[x, 0.25]], items.tolist())
+            for _ in range(2):
+                world.step(np.array([[0.0, 0.0, 0.0, 1.0]]))
+            assert world.state.delivered - delivered == int(number == dock)
+    assert set(named) == {0, 1}
+
+
+def test_requests_name_docks_only_where_there_are_two() -> None:
+    for floor in (None, "aisles"):
+        with pytest.raises(ScenarioError, match="should have a floor of two docks or more"):
+            Scenario(floor=floor, request_docks="random")
