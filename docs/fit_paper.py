@@ -152,7 +152,18 @@ def point_of(constants: Constants) -> list[float]:
     ]
 
 
-MIDDLE = constants_at([0.5] * len(RANGES))
+# Where a search of 32 generations ended that began in the middle of the ranges: the start of ours.
+START = {
+    "diffusion": 0.08176,
+    "avoidance_gain": 0.4469,
+    "avoidance_range": 0.3461,
+    "item_avoidance_gain": 0.3128,
+    "item_avoidance_range": 0.9376,
+    "wall_distance": 0.1887,
+    "taxis_gain": 0.6486,
+    "drop_rate": 0.7229,
+    "radio_range": 2.668,
+}
 
 
 def read_tried(path: Path) -> list[Tried]:
@@ -208,16 +219,17 @@ def search(fit: str, path: Path, is_over: Callable[[], bool] = lambda: True) -> 
     cma: Any = importlib.import_module("cma")  # in this script's environment alone
 
     settings = PAPER.cells if fit == "all" else SOUND
-    # The radio's range is the last constant.
-    fixed = point_of({**MIDDLE, "radio_range": Scenario().radio_range})[-1:]
-    fixed = fixed if fit == "shipped" else []
-    start, width = [0.5] * (len(RANGES) - len(fixed)), 0.25
-    before = [tried for tried in read_tried(path) if tried.fit == fit]
+    start, fixed, width = point_of(START), [], 0.1
+    if fit == "shipped":  # the radio's range is the last constant
+        *start, default_range = point_of({**START, "radio_range": Scenario().radio_range})
+        fixed = [default_range]
+    rows = read_tried(path)
+    before = [tried for tried in rows if tried.fit == fit]
     if fit == "all":  # it may see everything, so it begins where the other one was best
-        rows = itertools.takewhile(lambda t: t.fit == "sound", read_tried(path))
-        remaining_sets = [tried for tried in rows if is_full(tried)]
+        rows_before = itertools.takewhile(lambda t: t.fit != "all", rows)
+        remaining_sets = [tried for tried in rows_before if tried.fit == "sound" and is_full(tried)]
         remaining_sets.sort(key=lambda t: log_error(t.performance, PAPER.cells))
-        start, width = np.mean([point_of(t.constants) for t in remaining_sets[:10]], axis=0), 0.15
+        start, width = np.mean([point_of(t.constants) for t in remaining_sets[:10]], axis=0), 0.1
     options = {"bounds": [0.0, 1.0], "seed": 1, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(start, width, options)
     generation = 0

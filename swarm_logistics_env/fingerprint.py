@@ -22,7 +22,7 @@ from swarm_logistics_env.code_files import PACKAGE, is_users_own, names_in, sour
 EPISODE_CODE = (
     "episode.py", "fast_kernels.py", "kernels.py", "numba_fence.py", "observations.py",
     "scenario.py", "streams.py",
-    "motion/*.py", "policies/*.py", "warehouse/*.py",
+    "floor/*.py", "floor/plans/*.txt", "motion/*.py", "policies/*.py", "warehouse/*.py",
 )  # fmt: skip
 UNSTABLE = "unstable "  # begins the fingerprint of a value that is another one each time
 
