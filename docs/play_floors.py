@@ -1,0 +1,192 @@
+"""How swarms scale in racks: `python docs/play_floors.py` (an hour of one core).
+
+Plays scripts and networks with 10 to 150 robots on the open floor and on the shipped plans, writes
+the tables of docs/floors.md and the picture of P over the number of robots. What is played stays
+in results/floors, and the same command goes on after an interruption.
+
+Declared before the first run: a run collapses if it delivers less than half of what the same policy
+delivers on the same floor at the best of the smaller sizes, on average. Of two policies the order
+turns if the 95 % intervals of their difference (Welch's) lie on different sides of 0.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from more_itertools import map_reduce
+from numpy.typing import NDArray
+from scipy.stats import binomtest, ttest_ind
+from tables import ROOT, rewrite, seeds_from, table
+
+from swarm_logistics_env.report import section
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.results import StudyResults
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+PAGE = ROOT / "docs" / "floors.md"
+PICTURE = ROOT / "docs" / "media" / "floors-scaling.png"
+FLOORS = {"open": None, "aisles": "aisles", "two_docks": "two_docks"}
+POLICIES = ("swarm-dt", "homing", "homing-stock", "ppo-robust@all", "ppo-indicator@all")
+SIZES = (10, 25, 50, 100, 150)
+COMPARED_AT = (25, 100)
+COLLAPSED_BELOW = 0.5  # of P of the best smaller size: a run below it has collapsed
+Results = Mapping[str, StudyResults]  # by floor
+Numbers = NDArray[np.float64]
+
+
+def study(floor: str) -> Study:
+    """Return the study of one floor."""
+    return Study(
+        name=floor,
+        policies=list(POLICIES),
+        seeds=10,
+        first_seed=540_000,
+        scenario=Scenario(floor=FLOORS[floor], restock=True, duration=300.0),
+        sizes=[{"values": SIZES}],
+        out=ROOT / "results" / "floors" / floor,
+    )
+
+
+def cells_of(results: StudyResults) -> dict[tuple[str, int], Cell]:
+    """Return the cells by policy and number of robots."""
+    return {(cell.policy, int(cell.arm.setting.value)): cell for cell in results.cells}
+
+
+def p_block(results: Results) -> str:
+    """Return P of each policy and size on each floor."""
+    rows = []
+    for floor, of_floor in results.items():
+        cells = cells_of(of_floor)
+        for policy in of_floor.policies:
+            rows.append((floor, f"`{policy}`", *(section.mean_p(cells[policy, n]) for n in SIZES)))
+    first = next(iter(results.values()))
+    return table(
+        ("floor", "policy", *(f"N = {n}" for n in SIZES)),
+        rows,
+        f"Mean P in 300 s with its 95 % interval, {seeds_from(first)}, of each training; restock.",
+    )
+
+
+def scalability_block(results: Results) -> str:
+    """Return S of each step from a size to the next."""
+    rows = []
+    for floor, of_floor in results.items():
+        by_policy = map_reduce(of_floor.verdicts, lambda verdict: verdict.compared.policy)
+        for policy, verdicts in by_policy.items():
+            rows.append((floor, f"`{policy}`", *map(section.ratio, verdicts)))
+    return table(
+        ("floor", "policy", *(f"{n} -> {larger}" for n, larger in pairwise(SIZES))),
+        rows,
+        "S of the step with its 95 % interval; of several trainings also how many collapsed.",
+    )
+
+
+def collapses_block(results: Results) -> str:
+    """Return how many runs of each size collapse, with the interval of their share."""
+    rows = [
+        (floor, f"`{policy}`", *collapses(cells_of(of_floor), policy))
+        for floor, of_floor in results.items()
+        for policy in of_floor.policies
+    ]
+    return table(
+        ("floor", "policy", *(f"N = {n}" for n in SIZES[1:])),
+        rows,
+        "Runs that deliver less than half of the mean of the best smaller size, and the exact 95 % "
+        "interval of their share.",
+    )
+
+
+def collapses(cells: Mapping[tuple[str, int], Cell], policy: str) -> Iterator[str]:
+    """Yield how many runs of each size but the first collapsed, with the interval of the share."""
+    best = 0.0
+    for n, larger in pairwise(SIZES):
+        best = max(best, cells[policy, n].mean.value)
+        p = cells[policy, larger].by_seed.ravel()
+        n_collapsed = int((p < COLLAPSED_BELOW * best).sum())
+        low, high = binomtest(n_collapsed, len(p)).proportion_ci()
+        yield f"{n_collapsed} of {len(p)} [{100 * low:.0f}, {100 * high:.0f}] %"
+
+
+def samples(cell: Cell) -> Numbers:
+    """Return P of each training, or of each seed of a policy without trainings."""
+    return cell.by_seed.mean(axis=1) if cell.by_seed.ndim == 2 else cell.by_seed
+
+
+def difference(
+    cells: Mapping[tuple[str, int], Cell], pair: Sequence[str], n: int
+) -> tuple[float, float]:
+    """Return the 95 % interval of P of the first policy less that of the second."""
+    first, second = (samples(cells[policy, n]) for policy in pair)
+    low, high = ttest_ind(first, second, equal_var=False).confidence_interval(0.95)
+    return float(low), float(high)
+
+
+def turns_block(results: Results) -> str:
+    """Return the pairs of policies whose order on the open floor turns on a plan."""
+    cells = {floor: cells_of(of_floor) for floor, of_floor in results.items()}
+    rows = []
+    for pair in combinations(results["open"].policies, 2):
+        for n in COMPARED_AT:
+            intervals = {floor: difference(cells[floor], pair, n) for floor in FLOORS}
+            signs = {floor: side(interval) for floor, interval in intervals.items()}
+            if any(signs[floor] * signs["open"] < 0 for floor in FLOORS):
+                texts = (f"[{low:.0f}, {high:.0f}]" for low, high in intervals.values())
+                rows.append((f"`{pair[0]}` less `{pair[1]}`", n, *texts))
+    n_compared = len(COMPARED_AT) * len(list(combinations(results["open"].policies, 2)))
+    line = f"{len(rows)} of {n_compared} comparisons turn; no correction for their number."
+    return table(("P of", "N", *FLOORS), rows, line)
+
+
+def side(interval: tuple[float, float]) -> int:
+    """Return on which side of 0 an interval lies; 0: on both."""
+    low, high = interval
+    return int(low > 0.0) - int(high < 0.0)
+
+
+def draw(results: Results) -> None:
+    """Draw P over the number of robots, a panel for each floor."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 3.2), layout="constrained")
+    panels: Sequence[Axes] = figure.subplots(1, len(results), sharey=True)
+    for panel, (floor, of_floor) in zip(panels, results.items(), strict=True):
+        cells = cells_of(of_floor)
+        for policy in of_floor.policies:
+            means = [cells[policy, n].mean for n in SIZES]
+            p = [mean.value for mean in means]
+            (line,) = panel.plot(SIZES, p, marker="o", markersize=3, label=policy)
+            low, high = ([getattr(mean, end) for mean in means] for end in ("low", "high"))
+            panel.fill_between(SIZES, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
+        panel.set(title=floor, xlabel="robots N")
+    panels[0].set(ylabel="P in 300 s", ylim=(0.0, None))
+    panels[0].legend(fontsize=7)
+    figure.savefig(PICTURE, dpi=130)
+
+
+def main() -> None:
+    """Play what is missing, then write tables and picture."""
+    results: dict[str, StudyResults] = {}
+    for floor in FLOORS:
+        of_floor = study(floor)
+        of_floor.run(processes=len(os.sched_getaffinity(0)))
+        results[floor] = of_floor.findings()
+    draw(results)
+    blocks = {
+        "floors p": p_block,
+        "floors s": scalability_block,
+        "floors collapses": collapses_block,
+        "floors turns": turns_block,
+    }
+    rewrite(PAGE, {name: block(results) for name, block in blocks.items()})
+
+
+if __name__ == "__main__":
+    main()
