@@ -31,6 +31,8 @@ from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 REPLAN = 0.3  # [s]
 NEAR = 0.3  # [m] from here on the worker drives straight to its item
 PATIENCE = 2.0  # [s] without getting nearer, until another robot is sent
+STUCK = 0.6  # [s] without getting nearer, until a laden worker steps over an item
+STEP = 0.2  # [s] without its item
 DISTRUST = 30.0  # [s]
 PERSONAL_SPACE = 0.6  # [m] between centres, which waiting robots try to keep
 
@@ -58,6 +60,7 @@ class Central:
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode; nothing here is random."""
+        self._ground = ground_of(self._scenario)  # obstacles stand elsewhere
         self._trusted_from = np.full(n_robots, -np.inf)  # [s]
         self._waits_under = np.full(n_robots, NOBODY)  # the item of each robot
         self._resting_places = self._ground.resting_places(n_robots)
@@ -66,6 +69,10 @@ class Central:
         self._least_distance = np.inf  # [m] to the goal of the worker's task
         self._least_distance_at = 0.0  # [s]
         self._planned_at = -np.inf
+        self._stepping = NOBODY  # who last stepped over an item
+        self._stepped_from = np.zeros(2)  # [m]
+        self._stepped_at = -np.inf  # [s]
+        self._step_velocity = np.zeros(2)  # in top speeds
 
     def act(
         self, observations: NDArray[np.float32], state: WarehouseState | None = None
@@ -96,6 +103,8 @@ class Central:
             # Of several items in reach the requested one comes first, so no other gets lifted.
             may_hold = self._task[1] or self._to_item(state) <= self._scenario.pickup_range
             gripper[worker] = 1.0 if may_hold else 0.0
+            if self._scenario.floor is not None:
+                self._step_over(state, worker, velocity, gripper)
         return self._steer(state, velocity, gripper)
 
     def _stock(
@@ -231,6 +240,29 @@ class Central:
         obstacles = np.vstack(discs)
         obstacles[:, 2] += scenario.robot_radius + CLEARANCE
         return self._ground.costs(obstacles)
+
+    def _step_over(
+        self,
+        state: WarehouseState,
+        worker: int,
+        velocity: NDArray[np.float64],
+        gripper: NDArray[np.float64],
+    ) -> None:
+        """Change what the worker does, where racks and items close the way for its load.
+
+        It puts its item down, drives on above what is in the way, and lifts its item again. What it
+        stands above then is no obstacle to it. It does not try twice from the same place.
+        """
+        position = state.robot_position[worker]
+        is_stuck = self._task[1] and state.time > self._least_distance_at + STUCK
+        has_tried = worker == self._stepping and math.dist(position, self._stepped_from) < 0.1
+        if is_stuck and not has_tried:
+            self._stepping, self._stepped_from = worker, position.copy()
+            self._stepped_at, self._step_velocity = state.time, velocity[worker].copy()
+            gripper[worker] = -1.0
+        elif worker == self._stepping and state.time < self._stepped_at + STEP - 1e-6:
+            velocity[worker] = self._step_velocity
+            gripper[worker] = 0.0
 
     # -- how -----------------------------------------------------------------------------------
 

@@ -35,6 +35,7 @@ from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 from swarm_logistics_env.warehouse.structs import Floor
 
 SOLID = 1e6  # times the cost of an open cell: finite, so that a way leads out of it
+BESIDE = 400.0  # nearer to racks than a robot's radius: rather through items, see `Central`
 NEAR = 0.3  # [m] from here on a robot drives straight to its goal
 ENTRY = 0.25  # [m] beyond a dock's border for which a robot heads
 RESTING_GAP = 0.6  # [m] between the centres of resting robots, so that others get through
@@ -51,7 +52,7 @@ def ground_of(scenario: Scenario) -> Ground:
 class _PlanCells(NamedTuple):
     """What follows from a plan, for each cell of the route grid."""
 
-    cost: Numbers  # `SOLID` in walls and racks, `BLOCKED` nearer to them than a robot's radius
+    cost: Numbers  # `SOLID` in walls and racks, `BESIDE` close to them
     dock: NDArray[np.int8]  # number of the dock, or NOBODY
     along: Numbers  # [m] on the way into the nearest dock; from 0 on it lies inside
     centres: Numbers  # (rows, columns, 2) [m]
@@ -74,11 +75,13 @@ class PlannedGround:
         """Return the cost of each cell among discs."""
         scenario = self._scenario
         width, height = scenario.warehouse_width, scenario.warehouse_height
-        return np.maximum(costmap(width, height, scenario.robot_radius, discs), self._cells.cost)
+        among_discs = costmap(width, height, scenario.robot_radius, discs)
+        return np.asarray(np.maximum(among_discs, self._cells.cost))
 
     def dock_cells(self, dock: int) -> Mask:
         """Return the cells of a dock; `NOBODY`: of all."""
-        return self._cells.dock != NOBODY if dock == NOBODY else self._cells.dock == dock
+        docks = self._cells.dock
+        return np.asarray(docks != NOBODY if dock == NOBODY else docks == dock)
 
     def holding_cells(self, depth: float) -> Mask:
         """Return the cells of each dock that lie so deep, or as deep as it goes."""
@@ -121,7 +124,8 @@ class PlannedGround:
         far = self._ways_to_cell(state, goal)
         columns, rows = (state.robot_position / CELL).astype(np.int64).T
         n_rows, n_columns = far.shape
-        return CELL * far[np.clip(rows, 0, n_rows - 1), np.clip(columns, 0, n_columns - 1)]
+        cells = np.clip(rows, 0, n_rows - 1), np.clip(columns, 0, n_columns - 1)
+        return np.asarray(CELL * far[cells])
 
     def resting_places(self, n_robots: int) -> Numbers:
         """Return positions far from the docks, with gaps if there is room for them (N, 2) [m]."""
@@ -201,12 +205,12 @@ def fill_cells(floor: Floor, radius: float, cost: Numbers, dock: NDArray[np.int8
             if floor.is_solid[plan_row, plan_column]:
                 cost[row, column] = SOLID
             elif is_near_solid(floor, x, y, radius):
-                cost[row, column] = BLOCKED
+                cost[row, column] = BESIDE
 
 
 def _spaced(candidates: Numbers, gap: float, most: int) -> Numbers:
     """Return at most so many candidates (n, 2), the first ones, each `gap` [m] from the others."""
-    chosen = []
+    chosen: list[Numbers] = []
     while len(candidates) and len(chosen) < most:
         chosen.append(candidates[0])
         from_chosen = np.linalg.norm(candidates - candidates[0], axis=1)
