@@ -129,7 +129,8 @@ class PlannedGround:
 
     def resting_places(self, n_robots: int) -> Numbers:
         """Return positions far from the docks, with gaps if there is room for them (N, 2) [m]."""
-        cost, dock, along, centres = self._cells
+        _, dock, along, centres = self._cells
+        cost = self.costs(np.zeros((0, 4)))
         is_candidate = (cost == 1.0) & (dock == NOBODY)
         if not is_candidate.any():
             is_candidate = cost < SOLID
