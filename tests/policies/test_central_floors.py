@@ -36,7 +36,7 @@ def begun(policy_name: str, **fields: Any) -> tuple[Warehouse, Any]:
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize(("floor", "least"), [("aisles", 9), ("two_docks", 22), (HALL.strip(), 14)])
 def test_it_delivers_around_racks(policy: str, floor: str, least: int) -> None:
-    size = {} if floor.isidentifier() else {"n_robots": 6, "n_items": 12}
+    size: dict[str, Any] = {} if floor.isidentifier() else {"n_robots": 6, "n_items": 12}
     scenario = Scenario(floor=floor, restock=True, duration=60.0, **size)
     for seed in range(2):
         assert run_episode(scenario, load(policy), seed).delivered >= least
