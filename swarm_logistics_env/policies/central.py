@@ -15,21 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.policies.planned_ground import ground_of
 from swarm_logistics_env.policies.routes import (
     BLOCKED,
     CELL,
+    CLEARANCE,
     CROWDED,
     cell_at,
     cost_to_go,
-    costmap,
     lookahead,
 )
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
-CLEARANCE = 0.03  # [m] kept from what a laden robot must not touch
 REPLAN = 0.3  # [s]
+NEAR = 0.3  # [m] from here on the worker drives straight to its item
 PATIENCE = 2.0  # [s] without getting nearer, until another robot is sent
+STUCK = 0.6  # [s] without getting nearer, until a laden worker steps over an item
+STEP = 0.2  # [s] without its item
 DISTRUST = 30.0  # [s]
 PERSONAL_SPACE = 0.6  # [m] between centres, which waiting robots try to keep
 
@@ -47,22 +50,29 @@ class Central:
     laden_wait = True  # whether robots that carry an item wait as well
 
     def __init__(self) -> None:
-        self._scenario = Scenario()
+        self.configure(Scenario())
         self.reset(0, 0)
 
     def configure(self, scenario: Scenario) -> None:
-        """Take the sizes of the warehouse and of the robots."""
+        """Take the sizes of the warehouse and of the robots, and the floor plan."""
         self._scenario = scenario
+        self._ground = ground_of(scenario)
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode; nothing here is random."""
+        self._ground = ground_of(self._scenario)  # obstacles stand elsewhere
         self._trusted_from = np.full(n_robots, -np.inf)  # [s]
         self._waits_under = np.full(n_robots, NOBODY)  # the item of each robot
+        self._resting_places = self._ground.resting_places(n_robots)
         self._worker = NOBODY
         self._task: tuple[int, bool] = (NOBODY, False)
         self._least_distance = np.inf  # [m] to the goal of the worker's task
         self._least_distance_at = 0.0  # [s]
         self._planned_at = -np.inf
+        self._stepping = NOBODY  # who last stepped over an item
+        self._stepped_from = np.zeros(2)  # [m]
+        self._stepped_at = -np.inf  # [s]
+        self._step_velocity = np.zeros(2)  # in top speeds
 
     def act(
         self, observations: NDArray[np.float32], state: WarehouseState | None = None
@@ -83,6 +93,8 @@ class Central:
         if worker != NOBODY:
             is_idle[worker] = False
         goals = self._waiting_places(state, is_idle)
+        for robot in np.flatnonzero(is_idle).tolist():
+            goals[robot] = self._ground.point_to(state, robot, goals[robot])
         gripper = np.where(state.robot_item == NOBODY, 0.0, -1.0)  # nobody hoards
         self._stock(state, is_idle, goals, gripper)
         velocity = self._drift(state, goals, worker)
@@ -91,6 +103,8 @@ class Central:
             # Of several items in reach the requested one comes first, so no other gets lifted.
             may_hold = self._task[1] or self._to_item(state) <= self._scenario.pickup_range
             gripper[worker] = 1.0 if may_hold else 0.0
+            if self._scenario.floor is not None:
+                self._step_over(state, worker, velocity, gripper)
         return self._steer(state, velocity, gripper)
 
     def _stock(
@@ -108,7 +122,7 @@ class Central:
         """Return where each robot should wait (N, 2) [m], and note under which item.
 
         They are spread out. Unladen robots drive under items, which laden ones have to go around
-        anyway. Who has no item waits at the wall.
+        anyway. Who has no item waits far from the docks.
 
         Args:
             is_idle: which robots have no request to work on (N,).
@@ -127,8 +141,7 @@ class Central:
                 break
             item[robot] = _loneliest(state, robot, candidates, is_taken)
             is_taken[item[robot]] = True
-        at_the_wall = _rank_and_file(len(item), self._scenario)
-        return np.where((item != NOBODY)[:, None], state.item_position[item], at_the_wall)
+        return np.where((item != NOBODY)[:, None], state.item_position[item], self._resting_places)
 
     # -- who -----------------------------------------------------------------------------------
 
@@ -158,7 +171,7 @@ class Central:
         if not free.any():
             return NOBODY
         is_candidate = free & is_trusted if (free & is_trusted).any() else free
-        distance = np.linalg.norm(state.robot_position - state.item_position[item], axis=1)
+        distance = self._ground.ways_to(state, state.item_position[item])
         if self._worker != NOBODY and is_candidate[self._worker]:
             distance[self._worker] -= 0.5  # no dithering between two that are as near
         return int(np.where(is_candidate, distance, np.inf).argmin())
@@ -174,7 +187,7 @@ class Central:
 
     def _distance_to_goal(self, state: WarehouseState) -> float:
         if not self._task[1]:
-            return self._to_item(state)
+            return self._way_to_item(state)
         if self._planned_at < 0:
             return np.inf
         x, y = state.robot_position[self._worker].tolist()
@@ -184,37 +197,41 @@ class Central:
         """Return how far the worker is from the item of its task [m]."""
         return math.dist(state.robot_position[self._worker], state.item_position[self._task[0]])
 
+    def _way_to_item(self, state: WarehouseState) -> float:
+        """Return how long the worker's way to the item of its task is [m]."""
+        item_position = state.item_position[self._task[0]]
+        return float(self._ground.ways_to(state, item_position)[self._worker])
+
     # -- where to ------------------------------------------------------------------------------
 
     def _worker_velocity(
         self, state: WarehouseState, worker: int, is_idle: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
-        scenario = self._scenario
         item, carries = self._task
         x, y = state.robot_position[worker].tolist()
-        if carries and x >= scenario.storage_width:
-            return np.array([1.0, 0.0])  # the area may have become narrower
-        if not carries and self._to_item(state) < 0.3:
+        dock = int(state.requested_docks[0])
+        inwards = self._ground.velocity_inside(x, y, dock) if carries else None
+        if inwards is not None:
+            return inwards
+        if not carries and self._way_to_item(state) < NEAR:
             return self._towards(state.robot_position[worker], state.item_position[item])
         if state.time >= self._planned_at + REPLAN - 1e-6:
-            target = NOBODY if carries else item
-            self._cost, self._cost_to_go = self._costs_among(state, is_idle, target)
+            self._cost = self._costs_among(state, is_idle, carries)
+            goal = self._ground.dock_cells(dock)
+            if not carries:
+                goal = np.zeros_like(goal)
+                goal[cell_at(self._cost, *state.item_position[item].tolist())] = True
+            self._cost_to_go = cost_to_go(self._cost, goal)
             self._planned_at = state.time
-        waypoint = lookahead(self._cost, self._cost_to_go, x, y)
-        if carries and waypoint[0] >= scenario.storage_width - CELL:
-            waypoint = (waypoint[0] + 1.0, waypoint[1])  # no braking at the edge
+        find_point = self._ground.point_home if carries else lookahead
+        waypoint = find_point(self._cost, self._cost_to_go, x, y)
         return self._towards(state.robot_position[worker], np.array(waypoint))
 
     def _costs_among(
-        self, state: WarehouseState, robots: NDArray[np.bool_], item: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the cost of each cell, and of the cheapest way from it, among `robots`.
-
-        Args:
-            item: to which an unladen robot drives; NOBODY: a laden one drives home.
-        """
+        self, state: WarehouseState, robots: NDArray[np.bool_], carries: bool
+    ) -> NDArray[np.float64]:
+        """Return the cost of each cell among `robots`, for one that carries an item or not."""
         scenario = self._scenario
-        carries = item == NOBODY
         discs = [_discs(state.robot_position[robots], scenario.robot_radius, CROWDED)]
         discs += [_discs(state.obstacle_position, scenario.obstacle_radius, BLOCKED)]
         if carries:
@@ -222,18 +239,30 @@ class Central:
             discs += [_discs(stored, scenario.item_radius, BLOCKED)]
         obstacles = np.vstack(discs)
         obstacles[:, 2] += scenario.robot_radius + CLEARANCE
-        cost = costmap(
-            scenario.warehouse_width,
-            scenario.warehouse_height,
-            scenario.robot_radius,
-            obstacles,
-        )
-        goal: NDArray[np.bool_] = np.zeros_like(cost, np.bool_)
-        if carries:
-            goal[:, int(scenario.storage_width / CELL) :] = True
-        else:
-            goal[cell_at(cost, *state.item_position[item].tolist())] = True
-        return cost, cost_to_go(cost, goal)
+        return self._ground.costs(obstacles)
+
+    def _step_over(
+        self,
+        state: WarehouseState,
+        worker: int,
+        velocity: NDArray[np.float64],
+        gripper: NDArray[np.float64],
+    ) -> None:
+        """Change what the worker does, where racks and items close the way for its load.
+
+        It puts its item down, drives on above what is in the way, and lifts its item again. What it
+        stands above then is no obstacle to it. It does not try twice from the same place.
+        """
+        position = state.robot_position[worker]
+        is_stuck = self._task[1] and state.time > self._least_distance_at + STUCK
+        has_tried = worker == self._stepping and math.dist(position, self._stepped_from) < 0.1
+        if is_stuck and not has_tried:
+            self._stepping, self._stepped_from = worker, position.copy()
+            self._stepped_at, self._step_velocity = state.time, velocity[worker].copy()
+            gripper[worker] = -1.0
+        elif worker == self._stepping and state.time < self._stepped_at + STEP - 1e-6:
+            velocity[worker] = self._step_velocity
+            gripper[worker] = 0.0
 
     # -- how -----------------------------------------------------------------------------------
 
@@ -298,15 +327,6 @@ def _loneliest(
         return int(candidates[distances.argmin()])
     gaps = np.linalg.norm(positions[:, None] - state.item_position[is_taken], axis=2).min(axis=1)
     return int(candidates[(gaps - 0.5 * distances).argmax()])
-
-
-def _rank_and_file(n_robots: int, scenario: Scenario) -> NDArray[np.float64]:
-    """Return positions along the wall opposite the delivery area (N, 2) [m]."""
-    pitch = 2 * scenario.robot_radius + 0.1
-    per_file = max(int((scenario.warehouse_height - 0.1) / pitch), 1)
-    file, rank = np.divmod(np.arange(n_robots), per_file)
-    positions = np.stack([(file + 0.5) * pitch, (rank + 0.5) * pitch + 0.05], axis=1)
-    return np.minimum(positions, [scenario.warehouse_width - pitch / 2, np.inf])
 
 
 def _discs(centres: NDArray[np.float64], radius: float, cost: float) -> NDArray[np.float64]:

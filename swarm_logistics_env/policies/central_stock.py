@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.policies.central import REPLAN, Central
-from swarm_logistics_env.policies.routes import CELL, lookahead
+from swarm_logistics_env.policies.routes import cost_to_go
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.warehouse.floor_cells import floor_map
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 # Lengths in m.
@@ -39,6 +41,12 @@ class CentralStock(Central):
 
     laden_wait = False
 
+    def configure(self, scenario: Scenario) -> None:
+        """Take the sizes of the warehouse and of the robots, and the floor plan."""
+        super().configure(scenario)
+        self._floor = floor_map(scenario)
+        self._slots = self._ground.slots(ROWS, SLOT_PITCH)
+
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode without stock; nothing here is random."""
         super().reset(n_robots, seed)
@@ -54,28 +62,30 @@ class CentralStock(Central):
     ) -> None:
         """Let waiting robots lift items, and laden ones take theirs to a slot or hold it inside."""
         position = state.robot_position
-        edge = self._scenario.storage_width
         # Who carries the requested item without being trusted to deliver it lets it go.
         laden = is_idle & (state.robot_item != NOBODY) & (state.robot_item != state.requested)
         self._slot[~laden] = NOBODY
-        slots = self._slots()
+        slots = self._slots
         is_free = self._are_free(state, slots)
         most_held = int(HELD_SHARE * state.n_robots)
         n_held = int((laden & (self._slot == NOBODY)).sum())
 
         item = self._waits_under
+        along = self._floor.along(state.item_position)
+        is_far = along < self._floor.edge - ROWS[-1] - SLOT_PITCH
         room = int(is_free.sum()) + most_held - n_held
         for robot in np.flatnonzero(is_idle & (item != NOBODY)).tolist():
             item_position = state.item_position[item[robot]]
-            is_far = item_position[0] < edge - ROWS[-1] - SLOT_PITCH
             has_arrived = np.linalg.norm(item_position - position[robot]) < ARRIVAL_RADIUS
-            if room > 0 and is_far and has_arrived:
+            if room > 0 and is_far[item[robot]] and has_arrived:
                 gripper[robot] = 1.0
                 room -= 1
 
         if laden.any() and state.time >= self._home_planned_at + REPLAN - 1e-6:
             unladen = state.robot_present & ~laden
-            self._home_cost, self._home_cost_to_go = self._costs_among(state, unladen, NOBODY)
+            self._home_cost = self._costs_among(state, unladen, carries=True)
+            holding = self._ground.holding_cells(HOLDING_DEPTH)
+            self._home_cost_to_go = cost_to_go(self._home_cost, holding)
             self._home_planned_at = state.time
         for robot in np.flatnonzero(laden).tolist():
             gripper[robot] = 0.0
@@ -84,20 +94,17 @@ class CentralStock(Central):
                 self._slot[robot] = np.where(is_free, distances, np.inf).argmin()
                 is_free[self._slot[robot]] = False
                 n_held -= 1
-            goals[robot] = self._next_waypoint(position[robot])
+            x, y = position[robot].tolist()
+            goals[robot] = self._ground.point_to_hold(
+                self._home_cost, self._home_cost_to_go, x, y, HOLDING_DEPTH
+            )
             if self._slot[robot] != NOBODY:
                 slot = slots[self._slot[robot]]
                 distance = np.linalg.norm(slot - position[robot])
                 if distance < SLOT_IN_SIGHT:
-                    goals[robot] = slot
+                    goals[robot] = self._ground.point_to(state, robot, slot)
                 if distance < ARRIVAL_RADIUS:
                     gripper[robot] = -1.0
-
-    def _slots(self) -> NDArray[np.float64]:
-        """Return the positions of the slots (S, 2) [m]; one row stands in the other's gaps."""
-        along = np.arange(0.5 * SLOT_PITCH, self._scenario.warehouse_height - 0.3, SLOT_PITCH)
-        x = self._scenario.storage_width - np.repeat(ROWS, len(along))
-        return np.column_stack([x, np.concatenate([along, along + 0.5 * SLOT_PITCH])])
 
     def _are_free(self, state: WarehouseState, slots: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which slots have no item and no robot on its way with one (S,)."""
@@ -106,12 +113,3 @@ class CentralStock(Central):
         is_free: NDArray[np.bool_] = (distance > SLOT_RADIUS).all(axis=1)
         is_free[self._slot[self._slot != NOBODY]] = False
         return is_free
-
-    def _next_waypoint(self, position: NDArray[np.float64]) -> tuple[float, float]:
-        """Return where a laden robot drives next [m]."""
-        edge = self._scenario.storage_width
-        x, y = position.tolist()
-        if x >= edge:
-            return min(edge + HOLDING_DEPTH, self._scenario.warehouse_width), y
-        next_x, next_y = lookahead(self._home_cost, self._home_cost_to_go, x, y)
-        return next_x + (HOLDING_DEPTH if next_x > edge - CELL else 0.0), next_y

@@ -13,6 +13,7 @@ CELL = 0.125  # [m]
 LOOKAHEAD = 16  # cells
 BLOCKED = 40.0  # times the cost of an open cell: a way through is better than none
 CROWDED = 4.0
+CLEARANCE = 0.03  # [m] kept from what a laden robot must not touch
 
 
 @kernel
