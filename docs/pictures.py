@@ -85,8 +85,9 @@ if __name__ == "__main__":
     failed = [Fault("FM1", 2), Fault("FM4", [0, 5])]
     scene("faults.png", run("swarm-dt", SMALL, 4, failed), 60.0)
     scene("stock.png", run("ppo-delivery", RESTOCKED, 4), 300.0)
-    for name, rest in (("aisles", {}), ("two_docks", {"request_docks": "random", "n_requests": 3})):
-        plan = Scenario(floor=name, restock=True, **rest)
-        scene(f"floor-{name.replace('_', '-')}.png", run("homing", plan, 1), 40.0)
+    aisles = Scenario(floor="aisles", restock=True)
+    two_docks = Scenario(floor="two_docks", restock=True, request_docks="random", n_requests=3)
+    scene("floor-aisles.png", run("homing", aisles, 1), 40.0)
+    scene("floor-two-docks.png", run("homing", two_docks, 1), 40.0)
     films()
     browser_view("watch.png")

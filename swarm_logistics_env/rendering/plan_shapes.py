@@ -43,9 +43,15 @@ class PlanShapes(NamedTuple):
 
 def plan_shapes(plan: FloorPlan) -> PlanShapes:
     """Return the shapes of a plan."""
-    kinds = (WALL, RACK, STORAGE, START)
-    boxes = [merged_boxes(plan.kind == kind) * plan.cell_size for kind in kinds]
-    return PlanShapes(*boxes, docks=_dock_parts(plan))
+    kind = plan.kind
+    walls, racks, storage, start = (
+        _boxes(plan, kind == drawn) for drawn in (WALL, RACK, STORAGE, START)
+    )
+    return PlanShapes(walls, racks, storage, start, _dock_parts(plan))
+
+
+def _boxes(plan: FloorPlan, mask: NDArray[np.bool_]) -> Boxes:
+    return np.asarray(merged_boxes(mask) * plan.cell_size, np.float64)
 
 
 def dock_hue(dock: int) -> str:
@@ -60,7 +66,7 @@ def _dock_parts(plan: FloorPlan) -> tuple[DockPart, ...]:
     for dock, letter in enumerate(plan.dock_names):
         labels, n_parts = ndimage.label(plan.dock == dock)
         for label in range(1, n_parts + 1):
-            boxes = merged_boxes(labels == label) * plan.cell_size
+            boxes = _boxes(plan, labels == label)
             sides = boxes[:, 2:] - boxes[:, :2]
             widest = np.lexsort((sides.max(axis=1), sides.min(axis=1)))[-1]
             parts.append(DockPart(letter, dock_hue(dock), boxes, boxes[widest]))

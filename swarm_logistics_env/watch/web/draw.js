@@ -242,7 +242,7 @@ function drawArena(canvas, number, now, next, share, options) {
     target(pen, x, y, 1.9 * radius + 1);
     item(pen, x, y, isCarried ? 0.5 * radius : 1.4 * half, true);
     const [, , , letter, hue] = place, high = Math.max(15, 1.3 * radius), away = 1.3 * radius + high / 2;
-    if (letter) dockBadge(pen, x + away, y + away, high, letter, hue);
+    if (letter) dockBadge(pen, Math.min(x + away, width - high / 2), Math.min(y + away, height - high / 2), high, letter, hue);
   }
   const tall = Math.max(13, 1.2 * radius);
   poses.forEach((pose, robot) => {
