@@ -36,8 +36,9 @@ def scene(file: str, play: Play, seconds: float) -> None:
         play.step()
     renderer = Renderer(play.world.scenario, "rgb_array", 560)
     picture = renderer.frame(play.world.state, play.world.scenario)
+    colours = film_colours(has_plan=play.world.scenario.floor is not None)
     palette = Image.new("P", (1, 1))
-    palette.putpalette([part for colour in film_colours() for part in colour])
+    palette.putpalette([part for colour in colours for part in colour])
     few = Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
     few.save(MEDIA / file, optimize=True)
 
@@ -84,5 +85,9 @@ if __name__ == "__main__":
     failed = [Fault("FM1", 2), Fault("FM4", [0, 5])]
     scene("faults.png", run("swarm-dt", SMALL, 4, failed), 60.0)
     scene("stock.png", run("ppo-delivery", RESTOCKED, 4), 300.0)
+    aisles = Scenario(floor="aisles", restock=True)
+    two_docks = Scenario(floor="two_docks", restock=True, request_docks="random", n_requests=3)
+    scene("floor-aisles.png", run("homing", aisles, 1), 40.0)
+    scene("floor-two-docks.png", run("homing", two_docks, 1), 40.0)
     films()
     browser_view("watch.png")

@@ -185,10 +185,11 @@ def _write_film(out: Path, runs: list[tuple[str, Play]], until: float, speed: fl
     from swarm_logistics_env.watch.film import Film, Take
 
     film = Film([Take(*run) for run in runs], until, speed, FRAME_RATE)
+    has_plan = any(play.world.scenario.floor is not None for _, play in runs)
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as progress:
         frames = progress.track(film.frames(), total=film.n_frames, description=out.name)
-        count = write_film(out, frames, FRAME_RATE)
+        count = write_film(out, frames, FRAME_RATE, has_plan)
     size = out.stat().st_size / 1e6
     echo(f"{out}: {count} frames, {count / FRAME_RATE:.1f} s, {size:.2f} MB")
 

@@ -42,6 +42,15 @@ TRAIL: RGB = (150, 150, 150)
 ROBOT_COLOURS: dict[str, RGB] = {
     name: colour for name, colour in dict(globals()).items() if isinstance(colour, tuple)
 }
+
+# Of floor plans; apart, so that films of empty rooms keep the colours that they have.
+PLAN_COLOURS: dict[str, RGB] = {
+    "STORAGE": (247, 248, 250), "START": (238, 240, 244), "START_CROSS": (184, 190, 200),
+    "WALL": (78, 84, 92), "RACK": (238, 229, 211), "RACK_SLAT": (211, 197, 170),
+    "RACK_EDGE": (146, 126, 94), "SHADOW": (222, 223, 226),
+}  # fmt: skip
+# Of docks A, B and so on; further ones begin anew.
+DOCK_HUES = ("TIMER", "LINK", "BEAM", "SHUFFLING")
 ACTIVITIES = {"searching": SEARCHING, "shuffling": SHUFFLING, "delivering": DELIVERING}
 
 # The same for a page on a dark screen: what lies behind is dark, what moves keeps its hue.
@@ -50,7 +59,9 @@ DARK_COLOURS: dict[str, RGB] = {
     "FLOOR_LINE": (46, 50, 55), "DELIVERY_AREA": (28, 54, 47), "DELIVERY_HATCH": (40, 74, 64),
     "DELIVERY_WORD": (128, 170, 156), "OBSTACLE": (120, 124, 130), "SHUFFLING": (38, 134, 204),
     "LINK": (214, 120, 172), "ITEM": (96, 101, 108), "ITEM_EDGE": (160, 164, 170),
-    "TRAIL": (120, 124, 130),
+    "TRAIL": (120, 124, 130), "STORAGE": (38, 42, 47), "START": (46, 51, 58),
+    "START_CROSS": (92, 100, 112), "WALL": (136, 142, 150), "RACK": (92, 82, 64),
+    "RACK_SLAT": (116, 104, 82), "RACK_EDGE": (160, 142, 110), "SHADOW": (20, 22, 25),
 }  # fmt: skip
 
 # Curves of runs side by side, and how thick they are [px].
@@ -64,12 +75,28 @@ _BEHIND = (FLOOR, DELIVERY_AREA, INK)
 _BEFORE = (INK, SEARCHING, SHUFFLING, DELIVERING, TIMER, REQUESTED, LINK)
 
 
-def film_colours() -> list[RGB]:
-    """Return the colours of pictures that may have only a few: under 128, each once."""
+def film_colours(has_plan: bool) -> list[RGB]:
+    """Return the colours of pictures that may have only a few, with a plan or not: under 128."""
     edges = [np.linspace(behind, before, 6)[1:-1] for behind in _BEHIND for before in _BEFORE]
     smooth = np.rint(np.concatenate(edges)).astype(int).tolist()
     colours = [*ROBOT_COLOURS.values(), *((red, green, blue) for red, green, blue in smooth)]
+    if has_plan:
+        colours += PLAN_COLOURS.values()
+        colours += [colour for hue in DOCK_HUES for colour in dock_colours(hue)]
     return list(dict.fromkeys(colours))
+
+
+def dock_colours(hue: str) -> tuple[RGB, RGB, RGB]:
+    """Return the colours of a dock: its floor, the hatching on it, and its letter."""
+    colour = ROBOT_COLOURS[hue]
+    return _mixed(colour, FLOOR, 0.13), _mixed(colour, FLOOR, 0.28), _mixed(colour, INK, 0.75)
+
+
+def _mixed(colour: RGB, other: RGB, share: float) -> RGB:
+    red, green, blue = (
+        round(share * one + (1.0 - share) * two) for one, two in zip(colour, other, strict=True)
+    )
+    return red, green, blue
 
 
 def mark(modes: tuple[str, ...]) -> str:

@@ -14,6 +14,8 @@ from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
+from .plan_picture import PlanPicture
+from .plan_shapes import dock_hue
 from .sprites import new_canvas, words
 
 PixelPoint = tuple[int, int]  # [px]
@@ -61,6 +63,7 @@ class Picture:
             if state.item_carrier[number] == NOBODY:
                 self._stamp(sprites.item(1.4 * self._item_half, True), items[number])
             self._stamp(sprites.target(1.9 * self._robot_radius + 1.0), items[number])
+        self._draw_named_docks(state, items)
         self._draw_badges(state, robots)
         self._write_caption(state)
         return self._canvas
@@ -96,11 +99,21 @@ class Picture:
         picture.fill(palette.SURROUNDINGS)
         picture.fill(palette.INK, floor.inflate(2 * wall, 2 * wall))
         picture.fill(palette.FLOOR, floor)
+        plan = scenario.plan
+        plan_picture = None if plan is None else PlanPicture(plan, floor, scale)
+        if plan_picture is not None:
+            plan_picture.draw_areas(picture)
         for x in range(1, math.ceil(scenario.warehouse_width)):
             picture.fill(palette.FLOOR_LINE, (floor.left + scale * x, floor.top, 1, floor.height))
         for y in range(1, math.ceil(scenario.warehouse_height)):
             picture.fill(palette.FLOOR_LINE, (floor.left, floor.bottom - scale * y, floor.width, 1))
-        area = floor.move(round(scale * scenario.storage_width), 0).clip(floor)
+        if plan_picture is None:
+            self._draw_delivery_area(floor.move(round(scale * scenario.storage_width), 0), wall)
+        else:
+            plan_picture.draw_docks_and_solids(picture)
+
+    def _draw_delivery_area(self, area: Rect, wall: int) -> None:
+        picture, area = self._background, area.clip(self.floor)
         picture.set_clip(area)
         picture.fill(palette.DELIVERY_AREA)
         for x in range(area.left, area.right + area.height, max(8, self._margin)):
@@ -181,6 +194,21 @@ class Picture:
             sprite = sprites.badge(palette.mark(state.failure_modes[robot]), height)
             x, y = robots[robot]
             box = sprite.get_rect(center=(x + away, y - away))
+            self._canvas.blit(sprite, box.clamp(self._canvas.get_rect()))
+
+    def _draw_named_docks(self, state: WarehouseState, items: list[PixelPoint]) -> None:
+        """Draw the letter of the dock that a request names, below its item."""
+        plan = self._scenario.plan
+        if plan is None or not self._scenario.names_docks:
+            return
+        height = max(12, round(1.3 * self._robot_radius))
+        away = round(1.3 * self._robot_radius + 0.5 * height)
+        for number in np.flatnonzero(state.item_requested).tolist():
+            dock = int(state.item_docks[number])
+            _, _, colour = palette.dock_colours(dock_hue(dock))
+            sprite = sprites.badge(plan.dock_names[dock], height, colour)
+            x, y = items[number]
+            box = sprite.get_rect(center=(x + away, y + away))
             self._canvas.blit(sprite, box.clamp(self._canvas.get_rect()))
 
     def _write_caption(self, state: WarehouseState) -> None:

@@ -181,13 +181,16 @@ def check_film(path: Path) -> None:
     _ffmpeg()
 
 
-def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
+def write_film(
+    path: Path, frames: Iterable[Frame], frame_rate: float, has_plan: bool = False
+) -> int:
     """Write frames of one size as a film and return how many; if it fails, no file is left.
 
     Args:
         path: a file name that ends in .mp4 or .gif; an older file is replaced when the film is
             complete.
         frame_rate: the number of frames per second [1/s].
+        has_plan: whether the frames show a floor plan, which takes further colours.
 
     Raises:
         SetupError: as `check_film` raises it; or there are no frames, or ffmpeg fails.
@@ -198,15 +201,15 @@ def write_film(path: Path, frames: Iterable[Frame], frame_rate: float) -> int:
             return _encode(frames, frame_rate, [*_MP4, str(partial)])
         with tempfile.TemporaryDirectory() as folder:
             palette = Path(folder, "palette")
-            palette.write_bytes(_palette())
+            palette.write_bytes(_palette(has_plan))
             side = f"{_PALETTE_SIDE}x{_PALETTE_SIDE}"
             source = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", side, "-i", str(palette)]
             return _encode(frames, frame_rate, [*source, *_GIF, str(partial)])
 
 
-def _palette() -> bytes:
+def _palette(has_plan: bool) -> bytes:
     pixels = np.zeros((_PALETTE_SIDE**2, 4), np.uint8)
-    colours = film_colours()
+    colours = film_colours(has_plan)
     pixels[: len(colours), :3] = colours
     pixels[: len(colours), 3] = 255
     # The last colour is transparent and stands for what did not change.

@@ -145,8 +145,8 @@ def words(text: str, height: int, colour: RGB = INK) -> Surface:
 
 
 @lru_cache(maxsize=256)
-def badge(mark: str, height: int) -> Surface:
-    """Return a mark in white on a black pill of that height [px]."""
+def badge(mark: str, height: int, colour: RGB = INK) -> Surface:
+    """Return a mark in white on a pill of that height [px] and colour."""
     text = _render_text(mark, 1.25 * height, FLOOR)
     letters = text.get_bounding_rect()
     tall = _LARGER * height
@@ -154,6 +154,6 @@ def badge(mark: str, height: int) -> Surface:
     sheet = Surface((pill.width + 2 * _LARGER, pill.height + 2 * _LARGER), pygame.SRCALPHA, 32)
     sheet.fill((*FLOOR, 0))
     pygame.draw.rect(sheet, FLOOR, sheet.get_rect(), border_radius=tall)
-    pygame.draw.rect(sheet, INK, pill, border_radius=tall)
+    pygame.draw.rect(sheet, colour, pill, border_radius=tall)
     sheet.blit(text, letters.move(Vector2(pill.center) - letters.center).topleft, letters)
     return _shrink(sheet)

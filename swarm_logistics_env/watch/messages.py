@@ -20,6 +20,8 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.observations import columns, unflatten
 from swarm_logistics_env.rendering import palette
+from swarm_logistics_env.rendering.plan_shapes import dock_hue, plan_shapes
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.state import STORED
 
@@ -36,11 +38,12 @@ _TIMER_STEPS = 8  # shades of the timer's halo
 
 
 def fixed_data(session: Session) -> Message:
-    """Return what never changes: colours, failure modes, speeds, policies to choose from."""
+    """Return what never changes: colours, failure modes, speeds, policies, and the floor plan."""
+    light = palette.ROBOT_COLOURS | palette.PLAN_COLOURS
     return {
         "colours": {
             theme: {name: f"#{bytes(colour).hex()}" for name, colour in colours.items()}
-            for theme, colours in (("light", palette.ROBOT_COLOURS), ("dark", palette.DARK_COLOURS))
+            for theme, colours in (("light", light), ("dark", palette.DARK_COLOURS))
         },
         "curves": palette.RUN_NAMES,
         "modes": [
@@ -49,6 +52,28 @@ def fixed_data(session: Session) -> Message:
         ],
         "speeds": SPEEDS,
         "choices": session.choices,
+        "plan": _plan_message(session.scenario),
+    }
+
+
+def _plan_message(scenario: Scenario) -> Message | None:
+    """Return boxes [mm] of each kind of cell and of each dock's connected parts, if any."""
+    if scenario.plan is None:
+        return None
+    shapes = plan_shapes(scenario.plan)
+    kinds = ("walls", "racks", "storage", "start")
+    return {
+        **{kind: _millimetres(getattr(shapes, kind)) for kind in kinds},
+        "cell": round(1000 * scenario.cell_size),
+        "docks": [
+            {
+                "letter": part.letter,
+                "hue": part.hue,
+                "boxes": _millimetres(part.boxes),
+                "letter_box": np.rint(1000 * part.letter_box).astype(int).tolist(),
+            }
+            for part in shapes.docks
+        ],
     }
 
 
@@ -58,7 +83,8 @@ def frame_message(session: Session) -> Message:
     For each of the two runs, with its number 0 or 1 behind the name: `poses` (3 N numbers: x, y,
     heading of each robot, or None where it is absent), `robots` ([activity, age of its timer in 1/8
     of the limit or None, mark, robot it follows] of each), `items` (x, y of each that is stored),
-    `requested` ([x, y, carrier] of each that is asked for) and `deliveries` (their times).
+    `requested` ([x, y, carrier] of each that is asked for; where requests name docks, also the
+    dock's letter and the name of its colour) and `deliveries` (their times).
     """
     message: Message = {
         **{name: getattr(session, name) for name in _SESSION_FIELDS},
@@ -163,15 +189,24 @@ def _arena(play: Play) -> Message:
     stored = state.item_status == STORED
     requested_positions = _millimetres(state.item_position[requested])
     carriers = state.item_carrier[requested].tolist()
+    labels = _dock_labels(scenario, state.item_docks[requested].tolist())
     return {
         "poses": poses,
         "robots": robots,
         "items": _millimetres(state.item_position[stored & ~requested]),
         "requested": [
-            [*position, carrier] for position, carrier in zip(requested_positions, carriers)
+            [*position, carrier, *label]
+            for position, carrier, label in zip(requested_positions, carriers, labels, strict=True)
         ],
         "deliveries": [round(time, 1) for time in state.delivery_times],
     }
+
+
+def _dock_labels(scenario: Scenario, docks: list[int]) -> list[tuple[str, ...]]:
+    """Return letter and colour of each dock; nothing where requests name none."""
+    if scenario.plan is None or not scenario.names_docks:
+        return [()] * len(docks)
+    return [(scenario.plan.dock_names[dock], dock_hue(dock)) for dock in docks]
 
 
 def _selected(session: Session) -> Message | None:
@@ -257,6 +292,7 @@ def recorded_page(session: Session, until: float) -> str:
 FILES = {
     "page.html": "text/html",
     "page.css": "text/css",
+    "plan.js": "text/javascript",
     "draw.js": "text/javascript",
     "panel.js": "text/javascript",
     "page.js": "text/javascript",

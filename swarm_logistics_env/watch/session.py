@@ -13,6 +13,7 @@ from pathlib import Path
 from swarm_logistics_env import policies
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError, SwarmLogisticsError, suggest, users_line
+from swarm_logistics_env.floor import floor_title
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
@@ -217,8 +218,18 @@ class Session:
         self.note = f"swarm size {n_robots}: a swarm cannot grow in a run, so it began again"
 
     def set_delivery_width(self, width: float) -> None:
-        """Make the delivery area that wide [m], in both runs, at once."""
+        """Make the delivery area that wide [m], in both runs, at once.
+
+        Raises:
+            ScenarioError: it leaves no storage.
+            SetupError: a floor plan fixes the delivery area.
+        """
         width = round(width, 6)
+        if self.scenario.floor is not None:
+            raise SetupError(
+                f"delivery_width = {width:g}: should stay as it is, as the floor plan "
+                f"{floor_title(self.scenario.floor)} has the docks"
+            )
         for play in (self.run, self.beside):
             play.world.change(delivery_width=width)
         self.note = f"delivery area {width:g} m wide"

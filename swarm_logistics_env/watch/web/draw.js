@@ -150,9 +150,11 @@ function floorOf(canvas, now, number, ratio) {
   pen.beginPath();
   pen.rect(left, top, across, down);
   pen.clip();
+  if (fixed.plan) planAreas(pen, fixed.plan, at);
   for (let x = 1; x < scenario.warehouse_width; x++) line(pen, [at([1000 * x, 0]), at([1000 * x, 1000 * scenario.warehouse_height])], 1, colours.FLOOR_LINE);
   for (let y = 1; y < scenario.warehouse_height; y++) line(pen, [at([0, 1000 * y]), at([1000 * scenario.warehouse_width, 1000 * y])], 1, colours.FLOOR_LINE);
-  deliveryArea(pen, left + across - scale * scenario.delivery_width, top, left + across, bottom);
+  if (fixed.plan) docksAndSolids(pen, fixed.plan, at);
+  else deliveryArea(pen, left + across - scale * scenario.delivery_width, top, left + across, bottom);
   for (const obstacle of obstacles) {
     disc(pen, ...at(obstacle), scale * scenario.obstacle_radius, colours.INK);
     disc(pen, ...at(obstacle), scale * scenario.obstacle_radius - 2, colours.OBSTACLE);
@@ -239,6 +241,8 @@ function drawArena(canvas, number, now, next, share, options) {
     const [x, y] = at(isCarried ? poses[place[2]] : place);
     target(pen, x, y, 1.9 * radius + 1);
     item(pen, x, y, isCarried ? 0.5 * radius : 1.4 * half, true);
+    const [, , , letter, hue] = place, high = Math.max(15, 1.3 * radius), away = 1.3 * radius + high / 2;
+    if (letter) dockBadge(pen, Math.min(x + away, width - high / 2), Math.min(y + away, height - high / 2), high, letter, hue);
   }
   const tall = Math.max(13, 1.2 * radius);
   poses.forEach((pose, robot) => {

@@ -171,6 +171,8 @@ function fill(list, entries) {
 
 function begin(message) {
   fixed = message;
+  element("delivery_width").disabled = Boolean(fixed.plan);
+  if (fixed.plan) element("delivery_width").title = "The floor plan has the docks.";
   fill(element("speed"), fixed.speeds.map((speed) => [speed, `${speed}×`]));
   fill(element("mode"), fixed.modes.map(({ name, mark }) => [name, mark ? `${name} (${mark})` : name]));
   fill(element("policy"), fixed.choices.map((name) => [name, name]));
