@@ -62,11 +62,11 @@ def cells_of(results: StudyResults) -> dict[tuple[str, int], Cell]:
 
 def p_block(results: Results) -> str:
     """Return P of each policy and size on each floor."""
-    rows = []
-    for floor, of_floor in results.items():
-        cells = cells_of(of_floor)
-        for policy in of_floor.policies:
-            rows.append((floor, f"`{policy}`", *(section.mean_p(cells[policy, n]) for n in SIZES)))
+    rows = [
+        (floor, f"`{policy}`", *(section.mean_p(cells_of(of_floor)[policy, n]) for n in SIZES))
+        for floor, of_floor in results.items()
+        for policy in of_floor.policies
+    ]
     first = next(iter(results.values()))
     return table(
         ("floor", "policy", *(f"N = {n}" for n in SIZES)),

@@ -22,6 +22,7 @@ import typer
 from fit_paper import (
     CONSTANTS,
     FAULTY,
+    FITS,
     LARGE,
     SOUND,
     Tried,
@@ -70,12 +71,12 @@ def old_constants() -> dict[str, float]:
 
 def sets_to_confirm(tried: Path) -> dict[str, dict[str, float]]:
     """Return the sets of constants that are set side by side."""
-    fits = {fit: search(fit, tried) for fit in ("sound", "all")}
+    fits = {fit: search(fit, tried) for fit in FITS}
     return {"2026": old_constants(), **fits}
 
 
 def confirm(folder: Path, is_over: Callable[[], bool]) -> None:
-    """Play the two fits and the old constants on common seeds that nothing was fitted on."""
+    """Play the fits and the old constants on common seeds that nothing was fitted on."""
     path = folder / "confirmed.csv"
     played = {(row.fit, row.seed) for row in read_tried(path)}
     sets = sets_to_confirm(folder / "tried.csv")
