@@ -41,7 +41,14 @@ toc_object_entries_show_parents = "hide"
 # The pages in the order of the site's menu. They stand here, because GitHub would show a list of
 # contents in a page as it is written.
 CONTENTS = {
-    "Use": ("quickstart", "The environment <environment>", "floors", "training", "faults"),
+    "Use": (
+        "quickstart",
+        "The environment <environment>",
+        "floors",
+        "bodies",
+        "training",
+        "faults",
+    ),
     "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
     "Research": (
         "results",

@@ -47,9 +47,9 @@ def study(floor: str) -> Study:
     return Study(
         name=floor,
         policies=list(POLICIES),
-        seeds=10,
+        seeds=6,
         first_seed=540_000,
-        scenario=Scenario(floor=FLOORS[floor], restock=True, duration=300.0),
+        scenario=Scenario(floor=FLOORS[floor], restock=True, duration=200.0),
         sizes=[{"values": SIZES}],
         out=ROOT / "results" / "floors" / floor,
     )
@@ -71,7 +71,7 @@ def p_block(results: Results) -> str:
     return table(
         ("floor", "policy", *(f"N = {n}" for n in SIZES)),
         rows,
-        f"Mean P in 300 s with its 95 % interval, {seeds_from(first)}, of each training; restock.",
+        f"Mean P in 200 s with its 95 % interval, {seeds_from(first)}, of each training; restock.",
     )
 
 
@@ -166,7 +166,7 @@ def draw(results: Results) -> None:
             low, high = ([getattr(mean, end) for mean in means] for end in ("low", "high"))
             panel.fill_between(SIZES, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
         panel.set(title=floor, xlabel="robots N")
-    panels[0].set(ylabel="P in 300 s", ylim=(0.0, None))
+    panels[0].set(ylabel="P in 200 s", ylim=(0.0, None))
     panels[0].legend(fontsize=7)
     figure.savefig(PICTURE, dpi=130)
 

@@ -13,6 +13,7 @@ import contextlib
 import functools
 import hashlib
 import importlib.util
+import operator
 import site
 import sys
 import sysconfig
@@ -35,9 +36,15 @@ from pathlib import Path
 from types import CodeType, FrameType, ModuleType
 from typing import Any
 
+from swarm_logistics_env.errors import suggest
+
 PACKAGE = Path(__file__).parent
 _lock = threading.RLock()
 _loaded: dict[Path, tuple[Mapping[Path, object], ModuleType]] = {}  # by file, with its sources
+
+
+class MissingNameError(LookupError):
+    """A module that lacks what a text names in it."""
 
 
 def import_file(path: Path) -> ModuleType:
@@ -57,6 +64,33 @@ def import_file(path: Path) -> ModuleType:
         if path not in _loaded or _loaded[path][0] != sources:
             _loaded[path] = sources, _Folder(_import_root(path)).execute(path)
         return _loaded[path][1]
+
+
+def import_named(text: str) -> Any:
+    """Return what "package.module:NAME" or "my.py:NAME" names, in a module that is executed for it.
+
+    Raises:
+        MissingNameError: the module has no such name.
+        Exception: what its code raises.
+    """
+    module, _, attribute = text.rpartition(":")
+    if not module.endswith(".py"):
+        allow_import(module)
+    file = file_of_name(text)
+    code = importlib.import_module(module) if file is None else import_file(file)
+    try:
+        return operator.attrgetter(attribute)(code)
+    except AttributeError:
+        hint = suggest(attribute, vars(code))
+        raise MissingNameError(f"{module} has no {attribute}{hint}") from None
+
+
+def file_of_name(text: str) -> Path | None:
+    """Return the user's own Python file that "my.py:NAME" or "package.module:NAME" names."""
+    module, colon, _ = text.rpartition(":")
+    if not colon:
+        return None
+    return Path(module) if module.endswith(".py") else file_of_module(module)
 
 
 def file_of_module(name: str) -> Path | None:

@@ -40,6 +40,10 @@ class PolicyError(SwarmLogisticsError):
     """A policy that cannot be found, built or trusted, or whose output is wrong."""
 
 
+class BodiesError(SwarmLogisticsError):
+    """Bodies that cannot be loaded, that a scenario cannot have, or whose poses cannot be."""
+
+
 class TrainingError(SwarmLogisticsError):
     """A training whose specification, directory or request cannot be."""
 

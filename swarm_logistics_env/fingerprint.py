@@ -21,7 +21,7 @@ from swarm_logistics_env.code_files import PACKAGE, is_users_own, names_in, sour
 # What decides an episode. The other files hold messages, validation, statistics and pictures.
 EPISODE_CODE = (
     "episode.py", "fast_kernels.py", "kernels.py", "numba_fence.py", "observations.py",
-    "scenario.py", "streams.py",
+    "scenario.py", "scenario_checks.py", "streams.py", "bodies/*.py",
     "floor/*.py", "floor/plans/*.txt", "motion/*.py", "policies/*.py", "warehouse/*.py",
 )  # fmt: skip
 UNSTABLE = "unstable "  # begins the fingerprint of a value that is another one each time

@@ -16,15 +16,7 @@ from swarm_logistics_env.floor import (
     with_plan_sizes,
 )
 from swarm_logistics_env.records import Record
-
-# Discs may cover this part of the floor; random sequential addition ends at 0.547.
-DENSEST_COVER = 0.4
-# In a physics step a robot may drive this part of its radius; a crowd presses a faster one
-# through walls.
-LONGEST_STRIDE = 0.8
-# The longest physics step [s]; with a longer one, robots that press together overlap.
-LONGEST_PHYSICS_PERIOD = 0.02
-MOST_SUBSTEPS = 1000
+from swarm_logistics_env.scenario_checks import check
 
 # The public addresses of the sources that defaults were taken from.
 SOURCES = {
@@ -33,6 +25,8 @@ SOURCES = {
     "descendant": "https://github.com/suet-lee/swarm-warehouse",
     "DOTS": "https://arxiv.org/abs/2203.13809",
 }
+
+CHIPMUNK = "chipmunk"  # the engine of the package, which pymunk brings
 
 # Where `demand` is "zipf", item i is asked for with a weight of 1 / (i + 1) ** ZIPF_EXPONENT.
 ZIPF_EXPONENT = 1.0
@@ -126,6 +120,11 @@ class Scenario(Record):
     )
     n_obstacles: Annotated[int, Field(ge=0, le=LARGEST)] = Field(0, description="static discs; off")
     obstacle_radius: Positive = Field(0.3, description="[m], if there are any; off")
+    bodies: str = Field(
+        CHIPMUNK,
+        description="what moves the robots: chipmunk, the engine of the package; mujoco; "
+        "package.module:Class or my.py:Class, which runs its code; chosen",
+    )
 
     robot_radius: Positive = Field(0.125, description="[m]; source: DOTS, simulator")
     robot_mass: Positive = Field(3.0, description="[kg]; source: DOTS")
@@ -268,93 +267,8 @@ class Scenario(Record):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
-        self._check_periods()
-        self._check_storage()
-        self._check_requests()
-        storage = starts = self.storage_width * self.warehouse_height
-        place = f"a storage of {self.storage_width:g} x {self.warehouse_height:g} m"
-        if self.plan is not None:
-            storage, starts = self.plan.storage_area, self.plan.start_area
-            place = "the cells that the plan has for them"
-        obstacle_cover = self.n_obstacles * self.obstacle_radius**2
-        for count, name, radius, area in (
-            (self.n_obstacles, "n_obstacles", self.obstacle_radius, storage),
-            (self.n_robots, "n_robots", self.robot_radius, starts),
-            (self.n_items, "n_items", self.item_radius, storage),
-        ):
-            cover = 0.0 if name == "n_obstacles" else obstacle_cover
-            most = int((DENSEST_COVER * area / math.pi - cover) / radius**2)
-            if count > most:
-                raise ValueError(
-                    f"{name} = {count} of radius {radius} m do not fit into {place}: should be "
-                    f"at most {max(most, 0)} (discs may cover {DENSEST_COVER:.0%} of it)"
-                )
+        check(self)
         return self
-
-    def _check_periods(self) -> None:
-        if self.physics_period > LONGEST_PHYSICS_PERIOD:
-            raise ValueError(
-                f"physics_period = {self.physics_period} s: should be at most "
-                f"{LONGEST_PHYSICS_PERIOD} s, or robots in a crowd press each other through walls"
-            )
-        ratio = self.control_period / self.physics_period
-        if ratio > MOST_SUBSTEPS:
-            raise ValueError(
-                f"physics_period = {self.physics_period} s makes {ratio:g} physics steps of a "
-                f"control_period: should be at most {MOST_SUBSTEPS}"
-            )
-        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
-            raise ValueError(
-                f"control_period = {self.control_period} s should be a whole multiple of "
-                f"physics_period = {self.physics_period} s"
-            )
-        longest = LONGEST_STRIDE * self.robot_radius / self.max_speed
-        if self.physics_period > longest * (1.0 + 1e-9):
-            raise ValueError(
-                f"physics_period = {self.physics_period} s lets a robot cross "
-                f"{self.max_speed * self.physics_period:g} m between two collision checks: should "
-                f"be at most {LONGEST_STRIDE} robot_radius / max_speed = {longest:g} s"
-            )
-        if self.duration < self.control_period:
-            raise ValueError(
-                f"duration = {self.duration} s should be at least one control_period "
-                f"({self.control_period} s)"
-            )
-
-    def _check_storage(self) -> None:
-        if self.floor is not None:
-            return  # the plan was checked
-        if self.delivery_width >= self.warehouse_width:
-            raise ValueError(
-                f"delivery_width = {self.delivery_width} m leaves no storage: should be less than "
-                f"warehouse_width = {self.warehouse_width} m"
-            )
-        widest = max(
-            self.robot_radius, self.item_radius, self.obstacle_radius if self.n_obstacles else 0.0
-        )
-        for name, side in (
-            ("warehouse_width - delivery_width", self.storage_width),
-            ("warehouse_height", self.warehouse_height),
-        ):
-            if side < 2 * widest:
-                raise ValueError(
-                    f"{name} = {side:g} m is narrower than what has to stand in it: should be at "
-                    f"least {2 * widest:g} m"
-                )
-
-    def _check_requests(self) -> None:
-        if self.n_requests > self.n_items:
-            raise ValueError(
-                f"n_requests = {self.n_requests}: should be at most n_items = {self.n_items}"
-            )
-        if self.names_docks and (self.plan is None or len(self.plan.dock_names) < 2):
-            raise ValueError("request_docks = random: should have a floor of two docks or more")
-        most = 1.0 / self.control_period
-        if self.dock_capacity is not None and self.dock_capacity > most * (1.0 + 1e-9):
-            raise ValueError(
-                f"dock_capacity = {self.dock_capacity}: should be at most one in a control_period, "
-                f"{most:g} per second, or None"
-            )
 
     @classmethod
     def preset(cls, name: str) -> Scenario:

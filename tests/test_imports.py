@@ -20,7 +20,7 @@ PACKAGE = "swarm_logistics_env"
 ROOT = Path(__file__).parents[1]
 
 FOUNDATION = {"errors", "records", "streams", "kernels", "numba_fence", "floor", "scenario"}
-WORLD = FOUNDATION | {"warehouse", "observations"}
+WORLD = FOUNDATION | {"bodies", "warehouse", "observations"}
 RUNS = WORLD | {"motion", "policies", "episode"}
 ENVIRONMENT = WORLD | {"environment", "rendering", "swarm_logistics_v0"}
 
@@ -35,11 +35,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "kernels": {"fast_kernels", "numba_fence"},
     "records": {"errors", "spi"},
     "floor": set(),
-    "scenario": {"errors", "floor", "records", "streams"},
-    "code_files": set(),
+    "scenario": {"errors", "floor", "records", "scenario_checks", "streams"},
+    "scenario_checks": set(),
+    "code_files": {"errors"},
     "fingerprint": {"code_files"},
     "observations": FOUNDATION,
-    "warehouse": FOUNDATION | {"observations"},
+    "bodies": FOUNDATION | {"code_files"},
+    "warehouse": FOUNDATION | {"bodies", "observations"},
     "rendering": FOUNDATION | {"warehouse"},
     "environment": WORLD | {"rendering"},
     "swarm_logistics_v0": WORLD | {"environment"},

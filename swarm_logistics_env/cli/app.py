@@ -15,10 +15,11 @@ from typing import Annotated, Any, TypeAlias
 import typer
 from typer import Exit, Option, echo
 
+from swarm_logistics_env.bodies import BODIES
 from swarm_logistics_env.code_files import search_current_folder
 from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
 from swarm_logistics_env.records import plain, read_table
-from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
+from swarm_logistics_env.scenario import CHIPMUNK, SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.warehouse.faults import Fault, fault_of
 
 from .output import prepare_output
@@ -149,6 +150,13 @@ ScenarioOption = Annotated[
 SetOption = Annotated[
     Repeated, Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated.")
 ]
+BodiesOption = Annotated[
+    str | None,
+    Option(
+        help=f"What moves the robots: {', '.join([CHIPMUNK, *BODIES])}, module:Class or "
+        "my.py:Class; as --set bodies=.."
+    ),
+]
 FaultOption = Annotated[
     Repeated,
     Option(
@@ -170,8 +178,10 @@ TrustOption = Annotated[
 ]
 
 
-def scenario_of(preset: str, file: Path | None, changes: Repeated) -> Scenario:
-    """Return the scenario that `--preset`, `--scenario` and `--set` describe.
+def scenario_of(
+    preset: str, file: Path | None, changes: Repeated, bodies: str | None = None
+) -> Scenario:
+    """Return the scenario that `--preset`, `--scenario`, `--set` and `--bodies` describe.
 
     A file changes fields of the preset, and `--set` those of both.
 
@@ -188,6 +198,8 @@ def scenario_of(preset: str, file: Path | None, changes: Repeated) -> Scenario:
             fields[name] = json.loads(value)
         except (json.JSONDecodeError, RecursionError):
             fields[name] = value
+    if bodies is not None:
+        fields["bodies"] = bodies
     return Scenario.preset(preset).replace(**fields)
 
 

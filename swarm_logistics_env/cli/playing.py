@@ -20,6 +20,7 @@ from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import ROLES
 
 from .app import (
+    BodiesOption,
     FaultOption,
     PolicyOption,
     PresetOption,
@@ -48,6 +49,7 @@ def run_command(
     preset: PresetOption = "paper",
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
+    bodies: BodiesOption = None,
     faults: FaultOption = None,
     film: Annotated[
         Path | None,
@@ -66,7 +68,7 @@ def run_command(
     trust_code: TrustOption = False,
 ) -> None:
     """Play one episode and print what it delivered, or write a film."""
-    scenario = scenario_of(preset, scenario_file, changes)
+    scenario = scenario_of(preset, scenario_file, changes, bodies)
     scheduled = faults_of(faults, scenario)
     names = policies or ["swarm-dt"]
     if film is not None:
@@ -117,6 +119,7 @@ def watch_command(
     preset: PresetOption = "paper",
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
+    bodies: BodiesOption = None,
     faults: FaultOption = None,
     speed: Annotated[float, Option(help="How many times real time it plays.")] = 8.0,
     port: Annotated[
@@ -141,7 +144,7 @@ def watch_command(
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
     if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
         raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
-    scenario = scenario_of(preset, scenario_file, changes)
+    scenario = scenario_of(preset, scenario_file, changes, bodies)
     typed = {display_name(name): name for name in filter(None, (policy, against))}
     session = Session(
         scenario,

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import copy
 import functools
-import importlib
 import inspect
 import json
-import operator
 import re
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -18,7 +16,7 @@ from typing import Any, Self
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
-from swarm_logistics_env.code_files import allow_import, file_of_module, import_file
+from swarm_logistics_env.code_files import MissingNameError, file_of_name, import_named
 from swarm_logistics_env.errors import (
     RAISED_BY_OTHERS,
     PolicyError,
@@ -283,7 +281,7 @@ class PolicySpec(Record):
         return text
 
     def _identity_of(self, policy: Policy) -> str:
-        file = _code_file(self.name) if self.made is None else None
+        file = file_of_name(self.name) if self.made is None else None
         parts = identity_parts(policy, [file] if file else ())
         # Two functions may make objects of one class; a class need not keep its parameters.
         if self.made is None and ":" in self.name:
@@ -363,31 +361,16 @@ def _entry_point_maker(name: str) -> Callable[..., Policy] | None:
     return None
 
 
-def _code_file(name: str) -> Path | None:
-    """Return the user's own Python file that a text names: "my.py:Class" or "module:Class"."""
-    module, colon, _ = name.rpartition(":")
-    if not colon:
-        return None
-    return Path(module) if module.endswith(".py") else file_of_module(module)
-
-
 def _import_maker(name: str) -> Callable[..., Policy] | None:
-    module, colon, attribute = name.rpartition(":")
-    if not colon:
+    if ":" not in name:
         return None
-    if not module.endswith(".py"):
-        allow_import(module)
     try:
-        file = _code_file(name)
-        code = importlib.import_module(module) if file is None else import_file(file)
+        maker: Callable[..., Policy] = import_named(name)
+    except MissingNameError as error:
+        raise PolicyError(f"policy {name!r}: {error}") from None
     except RAISED_BY_OTHERS as error:  # of code that is not ours, too
         kind = type(error).__name__
         raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
-    try:
-        maker: Callable[..., Policy] = operator.attrgetter(attribute)(code)
-    except AttributeError:
-        hint = suggest(attribute, vars(code))
-        raise PolicyError(f"policy {name!r}: {module} has no {attribute}{hint}") from None
     if not callable(maker):
         raise PolicyError(f"policy {name!r} is a {type(maker).__name__}: should be a class")
     return maker

@@ -307,7 +307,10 @@ def read_study_file(path: Path, *, trust_code: bool = False) -> Specification:
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise StudyError(f"{path}: {error}") from error
     named = (*specification.policies, *(ablation.policy for ablation in specification.ablations))
-    refuse_untrusted(path, None, named, trust_code=trust_code)
+    factors = (*specification.sizes, *specification.faults, *specification.parameters)
+    scenarios = [specification.scenario.model_dump(), *(factor.scenario for factor in factors)]
+    bodies = [fields["bodies"] for fields in scenarios if "bodies" in fields]
+    refuse_untrusted(path, None, named, bodies, trust_code=trust_code)
     return specification.trusting() if trust_code else specification
 
 

@@ -8,7 +8,7 @@ import json
 import math
 import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -334,17 +334,23 @@ def task_of(source: object) -> Task:
 
 
 def refuse_untrusted(
-    path: Path, task: str | None, policies: tuple[PolicySpec, ...] = (), *, trust_code: bool
+    path: Path,
+    task: str | None,
+    policies: tuple[PolicySpec, ...] = (),
+    bodies: Iterable[object] = (),
+    *,
+    trust_code: bool,
 ) -> None:
     """Raise StudyError if what a file names would run code when it is loaded.
 
     Args:
         path: of the file.
-        task, policies: that it names.
+        task, policies, bodies: that it names.
         trust_code: whether they may.
     """
     names_of_code = [f"task {task!r}"] if isinstance(task, str) and ":" in task else []
     names_of_code += [f"policy {policy.name!r}" for policy in policies if policy.runs_code]
+    names_of_code += [f"bodies {name!r}" for name in bodies if ":" in str(name)]
     if names_of_code and not trust_code:
         raise StudyError(
             f"{path}: {names_of_code[0]} is code, which runs when it is loaded: should be a name "

@@ -13,10 +13,11 @@ import numpy as np
 from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.kernels import gaussian, inlined_kernel, kernel, pair_key, uniform
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.streams import key, row_keys
 
 from .floor_cells import draw_in_cells, floor_of, is_near_solid
-from .structs import STORED, Floor, Integers, Keys, Numbers, World
+from .state import WarehouseState
+from .structs import NOBODY, STORED, Floor, Integers, Keys, Numbers, World
 
 _ARRANGEMENTS = 100  # of all discs anew, where the first ones left no room for the last
 _ATTEMPTS = 5_000  # to place a disc among those that stand
@@ -33,6 +34,23 @@ class Discs(NamedTuple):
     cells: Integers  # (n, 2) of a plan in which they may lie
     rack_gap: float = 0.0  # [m] at least between a disc and a rack or side of a plan
     gap: float = 0.0  # [m] at least between two of them
+
+
+def lay_out(state: WarehouseState, scenario: Scenario, seed: int) -> None:
+    """Place everything and give it its random streams."""
+    state.obstacle_position = place_obstacles(scenario, seed)
+    state.item_position = place_items(scenario, seed, state.obstacle_position)
+    state.robot_position, state.robot_heading = place_robots(
+        scenario, seed, state.obstacle_position
+    )
+    state.robot_heading_drift = heading_drifts(scenario, seed)
+    state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
+    items = state.items
+    items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
+    items.demand_key[0] = key(seed, "demand")
+    items.restock_key[0] = key(seed, "restock")
+    items.dock_key[0] = key(seed, "docks")
+    state.open_requests[:] = NOBODY
 
 
 def place_obstacles(scenario: Scenario, seed: int) -> Numbers:

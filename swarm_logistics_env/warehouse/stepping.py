@@ -5,7 +5,7 @@ from __future__ import annotations
 from swarm_logistics_env.kernels import engine_kernel, kernel
 
 from .addresses import unpacked_at
-from .commands import drive, refused_command
+from .commands import drive, list_motions, refused_command
 from .contacts import count_motion, count_step
 from .demand import ask
 from .grid import fill
@@ -21,7 +21,7 @@ from .logistics import (
 from .physics import advance
 from .radio import run_timers, send_messages
 from .sensing import sense
-from .structs import NOBODY, STORED, Commands, Sensed, World
+from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
 
 
 @engine_kernel
@@ -63,14 +63,55 @@ def step(address: int, rows: Sensed) -> bool:
     command that is refused, which leaves the world as it was.
     """
     world = unpacked_at(World, address)
-    commands, progress, outcome = world.commands, world.progress, world.outcome
+    if not begin_step(world):
+        return True
+    drive(world)
+    unmask_left(world)
+    advance(world)
+    return end_step(address, world, rows)
+
+
+@engine_kernel
+def command_bodies(address: int, motions: Numbers) -> bool:
+    """Begin a control step whose bodies others move; returns whether the commands are refused.
+
+    Args:
+        motions: (N, 3) filled with forward and left velocity [m/s] and turn rate [rad/s].
+    """
+    world = unpacked_at(World, address)
+    if not begin_step(world):
+        return True
+    list_motions(world, motions)
+    return False
+
+
+@engine_kernel
+def follow_bodies(address: int, rows: Sensed) -> bool:
+    """End a control step whose bodies others moved, as `step` does.
+
+    Before, positions and velocities stand in `EngineArrays.bodies`, headings in `Robots.heading`.
+    """
+    return end_step(address, unpacked_at(World, address), rows)
+
+
+@kernel
+def begin_step(world: World) -> bool:
+    """Note the commands and go on with time, unless a command is refused: then return False."""
+    progress, outcome = world.progress, world.outcome
     outcome.refused[0] = refused_command(world)
     if outcome.refused[0] != NOBODY:
-        return True
-    log_command(commands)
+        return False
+    log_command(world.commands)
     progress.step[0] += 1
     progress.time[0] = progress.step[0] * world.parameters.control_period
-    move(world)
+    return True
+
+
+@engine_kernel
+def end_step(address: int, world: World, rows: Sensed) -> bool:
+    """Do what follows the bodies' motion; returns what `step` returns."""
+    commands, progress, outcome = world.commands, world.progress, world.outcome
+    take_motion(world)
     send_messages(world)
     n_delivered, is_room = handle_items(world)
     is_paused = progress.step[0] == progress.pause_step[0]
@@ -98,12 +139,9 @@ def log_command(commands: Commands) -> None:
     commands.n_logged[0] += 1
 
 
-@engine_kernel
-def move(world: World) -> None:
-    """Turn and move the robots as commanded and as far as bodies let them."""
-    drive(world)
-    unmask_left(world)
-    advance(world)
+@kernel
+def take_motion(world: World) -> None:
+    """Take over where the bodies are after their motion, and how fast; absent robots are at 0."""
     count_motion(world)
     robots, bodies = world.robots, world.engine.bodies.numbers
     for robot in range(len(robots.item)):

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.kernels import engine_kernel, inlined_kernel
 from swarm_logistics_env.numba_fence import IS_PLAIN
+from swarm_logistics_env.scenario import CHIPMUNK
 
 from . import stepping
 from .addresses import add, exchange, load_word, pointer_at, replace, unpacked_at
@@ -111,7 +112,20 @@ class WorldThreadPool:
             SetupError: a world was never reset, or another thread is using it.
         """
         with holding([world.lock for world in self._worlds]):
-            self._step(commands, rows, arrived)
+            if all(world.scenario.bodies == CHIPMUNK for world in self._worlds):
+                self._step(commands, rows, arrived)
+            else:
+                self._step_in_turn(commands, rows, arrived)
+
+    def _step_in_turn(
+        self, commands: NDArray[np.float64], rows: Sensed, arrived: Callable[[int, Sensed], None]
+    ) -> None:
+        """Step worlds of which others move the bodies; they need the interpreter."""
+        for index, (world, first) in enumerate(zip(self._worlds, self._firsts, strict=True)):
+            last = first + world.scenario.n_robots
+            rows[first:last] = world.step(commands[first:last])
+            if world.is_eventful or self.is_watched[index]:
+                arrived(index, rows[first:last])
 
     def _step(
         self, commands: NDArray[np.float64], rows: Sensed, arrived: Callable[[int, Sensed], None]

@@ -11,17 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError, ScenarioError, SetupError
+from swarm_logistics_env.bodies import load_bodies
+from swarm_logistics_env.errors import ScenarioError, SetupError
 from swarm_logistics_env.floor import FloorMap
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
-from swarm_logistics_env.streams import key, row_keys
 
-from . import layout, stepping
-from .commands import MESSAGE, not_finite
+from . import stepping
+from .commands import MESSAGE, as_array, not_finite
 from .faults import GRACE, Fault, FaultLike, Occurrence, apply_faults, checked_faults
 from .floor_cells import floor_map, floor_of
 from .grid import blank_grid
+from .layout import lay_out
+from .moved_elsewhere import MovedElsewhere
 from .one_thread import in_one_thread, used_elsewhere
 from .packing import blank, packed
 from .physics import N_CORNERS, Physics
@@ -30,7 +32,7 @@ from .structs import Claims, Commands, Nearby, Parameters, Sensed, StepResult, W
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
-_NOT_PICKLED = ("_physics", "_world", "_words", "_address", "_memory", "lock")
+_NOT_PICKLED = ("_physics", "_world", "_words", "_address", "_memory", "_elsewhere", "lock")
 
 
 class Warehouse:
@@ -61,6 +63,7 @@ class Warehouse:
         self._occurrences: list[Occurrence] = []
         self.is_eventful = False
         self._seed: int | None = None
+        self._elsewhere: MovedElsewhere | None = None  # the package's own engine moves robots
 
     @in_one_thread
     def reset(
@@ -77,16 +80,22 @@ class Warehouse:
         Raises:
             FaultError: `faults` are none, or a fault names robots that are not there.
             ScenarioError: it is none, or items or robots found no room.
+            BodiesError: there are no bodies as the scenario's, or they cannot be so.
         """
         scenario = _scenario(scenario, self.scenario)
+        bodies = load_bodies(scenario.bodies)
         occurrences = _occurrences(faults, seed, scenario.n_robots)
         state = WarehouseState(scenario)
-        self._lay_out(state, scenario, seed)
+        lay_out(state, scenario, seed)
         self.scenario, self.state, self._seed = scenario, state, seed
         self._occurrences = occurrences
         self._make_room_to_work()
         self._robot_places = state.robot_position.copy()
         self._build()
+        if bodies is None:
+            self._elsewhere = None
+        else:
+            self._elsewhere = MovedElsewhere(bodies, scenario, seed, self._world)
         stepping.begin(self._address)
         self._apply_faults()
         self._rows = np.empty((state.n_robots, n_columns(scenario)), np.float32)
@@ -110,14 +119,20 @@ class Warehouse:
         Raises:
             CommandError: wrong shape, not numbers, or not finite; the world is as it was.
             SetupError: the world was never reset, or another thread is using it.
+            BodiesError: the bodies' poses cannot be.
         """
         lock = self.lock
         if not lock.acquire(False):  # as `in_one_thread`, within a tenth of a microsecond
             raise used_elsewhere()
         try:
-            self._world.commands.now[...] = self._as_commands(commands)
+            self._seed_of_episode("step")
+            self._world.commands.now[...] = as_array(commands, self._command_shape)
             rows = np.empty_like(self._rows)  # what was handed out stays as it was
-            self.take(rows, stepping.step(self._address, rows))
+            if self._elsewhere is None:
+                is_eventful = stepping.step(self._address, rows)
+            else:
+                is_eventful = self._elsewhere.step(self._address, self._world, self.state, rows)
+            self.take(rows, is_eventful)
             return rows
         finally:
             lock.release()
@@ -167,12 +182,11 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         self._seed_of_episode("change")
-        for name in fields:
-            if name not in CHANGES_DURING_RUN and name in Scenario.model_fields:
-                raise ScenarioError(
-                    f"Scenario.{name} cannot change during a run: should be set at a reset; "
-                    f"these can change: {', '.join(sorted(CHANGES_DURING_RUN))}"
-                )
+        for name in (fields.keys() & Scenario.model_fields) - CHANGES_DURING_RUN:
+            raise ScenarioError(
+                f"Scenario.{name} cannot change during a run: should be set at a reset; these can "
+                f"change: {', '.join(sorted(CHANGES_DURING_RUN))}"
+            )
         self.scenario = self.scenario.replace(**fields)
         self._apply_faults()
         self._remember()
@@ -261,44 +275,12 @@ class Warehouse:
             raise SetupError(f"{caller} before reset: call reset(seed) first")
         return self._seed
 
-    def _lay_out(self, state: WarehouseState, scenario: Scenario, seed: int) -> None:
-        """Place everything and give it its random streams."""
-        state.obstacle_position = layout.place_obstacles(scenario, seed)
-        state.item_position = layout.place_items(scenario, seed, state.obstacle_position)
-        state.robot_position, state.robot_heading = layout.place_robots(
-            scenario, seed, state.obstacle_position
-        )
-        state.robot_heading_drift = layout.heading_drifts(scenario, seed)
-        state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
-        items = state.items
-        items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
-        items.demand_key[0] = key(seed, "demand")
-        items.restock_key[0] = key(seed, "restock")
-        items.dock_key[0] = key(seed, "docks")
-        state.open_requests[:] = NOBODY
-
-    def _as_commands(self, commands: ArrayLike) -> NDArray[np.float64]:
-        self._seed_of_episode("step")
-        try:
-            array = np.asarray(commands)
-        except (TypeError, ValueError) as error:
-            raise CommandError(f"commands should be an array of numbers: {error}") from None
-        if array.dtype.kind not in "fiub":  # NumPy makes numbers of texts and times, too
-            raise CommandError(f"commands should be numbers: real ones, not {array.dtype}")
-        n, n_columns = self._command_shape
-        if array.shape == self._command_shape:
-            return array
-        if array.shape == (n, MESSAGE):
-            return np.pad(array, ((0, 0), (0, n_columns - MESSAGE)))
-        raise CommandError(f"commands of shape {array.shape}: should be {self._command_shape}")
-
     def _make_room_to_work(self) -> None:
         scenario = self.scenario
         n, width, height = scenario.n_robots, scenario.warehouse_width, scenario.warehouse_height
         sees = max(scenario.ranger_range + scenario.robot_radius, scenario.view_range)
         hears = max(sees, scenario.radio_range)
-        # Cells have half the side of the square that robots search, so that few rows are searched
-        # and few of them in vain.
+        # Cells have half the side of the square that robots search: few rows, few of them in vain.
         self._robot_grid = blank_grid(width, height, hears / 2, n)
         self._item_grid = blank_grid(width, height, sees / 2, scenario.n_items)
         self._command_shape = (n, MESSAGE + scenario.message_size)
@@ -328,10 +310,16 @@ class Warehouse:
     def __getstate__(self) -> dict[str, Any]:
         if self._seed is None:
             return {name: value for name, value in self.__dict__.items() if name != "lock"}
+        if self._elsewhere is not None:
+            raise SetupError(
+                f"a world with bodies = {self.scenario.bodies} cannot be copied during an episode, "
+                "as nobody can copy what moves them: should be played again from its seed"
+            )
         return {"_memory": self._memory, "_log": self._logged().copy()}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self.lock = threading.RLock()
+        self._elsewhere = None
         if "_memory" not in saved:
             self.__dict__.update(saved)
             return
