@@ -33,8 +33,8 @@ def test_the_first_line_is_the_side_of_the_highest_y() -> None:
 def test_a_shipped_plan_keeps_its_name_and_gives_the_sizes(name: str) -> None:
     scenario = Scenario(floor=name)
     assert scenario.floor == name
-    assert (scenario.warehouse_width, scenario.warehouse_height) == (10.0, 10.0)
-    assert scenario.delivery_width == 2.0
+    size = (40.0, 20.0) if name == "large" else (10.0, 10.0)
+    assert (scenario.warehouse_width, scenario.warehouse_height) == size
     assert Scenario.from_json(scenario.to_json()) == scenario
 
 
@@ -59,7 +59,10 @@ def test_sizes_follow_from_the_plan_and_are_refused_otherwise() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("aisels", "should be a shipped plan (aisles, two_docks), a file, or rows of a plan"),
+        (
+            "aisels",
+            "should be a shipped plan (aisles, bottleneck, large, two_docks), a file",
+        ),
         ("A::\n:?:", "line 2, column 2: '?' is no cell: should be one of # = . : + or a letter"),
         ("A::\n::", "line 2 has 2 cells: should have as many as line 1, 3"),
         (":::\n:::", "the plan has no dock (a letter from A to Z)"),

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.kernels import uniform
 from swarm_logistics_env.streams import row_keys
-from swarm_logistics_env.warehouse import layout, warehouse
+from swarm_logistics_env.warehouse import layout
 
 Build = Callable[..., Warehouse]
 Command = tuple[float, float, float, float]
@@ -65,7 +65,7 @@ def build(monkeypatch: pytest.MonkeyPatch) -> Build:
             layout, "place_robots", lambda *_: (robot_positions.copy(), np.zeros(n))
         )
         monkeypatch.setattr(layout, "place_items", lambda *_: item_positions.copy())
-        monkeypatch.setattr(warehouse, "row_keys", ascending)
+        monkeypatch.setattr(layout, "row_keys", ascending)
         counts = {"n_robots": n, "n_items": len(item_positions)}
         world = Warehouse(Scenario(**{"heading_drift": 0.0, **counts, **fields}))
         world.reset(0, faults)
