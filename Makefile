@@ -177,7 +177,7 @@ clean:
 	rm -rf .venvs build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,onnx
+$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,mujoco,onnx
 $(STUDY)/installed: EXTRAS := study
 $(NEWER)/installed: EXTRAS := study
 $(NEWER)/installed: OTHERS := hypothesis pytest
