@@ -38,7 +38,7 @@ from swarm_logistics_env.verdicts.reference import PAPER
 
 FITS = ("sound", "all", "shipped")
 FIRST_SEED = 5_300_000  # nothing else uses the seeds from here to 5,399,999
-# The range of each constant, searched by its logarithm from the middle on: those of
+# The range of each constant, searched by its logarithm: those of
 # examples/tune_swarm_dt.py, and a radio from the cameras' range to the warehouse's width.
 RANGES = {
     "diffusion": (0.05, 3.0),

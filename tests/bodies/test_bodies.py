@@ -83,8 +83,8 @@ class Vague(Exact):
 
 
 def scenario(name: str = "Exact", **fields: Any) -> Scenario:
-    own = {"bodies": f"{__name__}:{name}", "n_robots": 3, "n_items": 5, "duration": 5.0}
-    return Scenario(**{**own, **fields})
+    defaults = {"bodies": f"{__name__}:{name}", "n_robots": 3, "n_items": 5, "duration": 5.0}
+    return Scenario(**{**defaults, **fields})
 
 
 def test_a_robot_drives_as_its_bodies_do_and_carries_its_item_along() -> None:
