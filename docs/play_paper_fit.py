@@ -6,8 +6,8 @@
 Declared before the first run: what ships as `swarm-dt` is the fit without any failed robot, if it
 predicts R and FT as well as the fit `all`, i.e. if the 95 % interval of its mean distance from the
 paper's R and FT, less that of `all`, over common seeds, does not lie above 0. The fit
-`shipped`, with the radio of the default scenario, was added after `sound` was seen, which delivers a
-quarter too much with that radio; the same rule holds for it. A
+`shipped`, with the default radio, was added after `sound` was seen, which delivers a
+quarter too much with that radio; the rule is the same. A
 claim is contradicted (supported) only if it holds under at most (at least) one (nine) in ten of the
 sets that fit.
 """
