@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from shlex import quote
+from shlex import join
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -24,7 +24,15 @@ from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.warehouse.faults import text_of
 
-from .app import PresetOption, Repeated, ScenarioOption, SetOption, TrustOption, scenario_of
+from .app import (
+    BodiesOption,
+    PresetOption,
+    Repeated,
+    ScenarioOption,
+    SetOption,
+    TrustOption,
+    scenario_of,
+)
 from .judge_trials import judge_trials
 from .study_commands import (
     ClearingOption,
@@ -34,6 +42,7 @@ from .study_commands import (
     run_study,
     say_what_a_pilot_shows,
     study_of,
+    switch_bodies,
     switch_to_clearing,
 )
 from .terminal import say, say_what_was_played, show, show_report, show_table
@@ -72,6 +81,7 @@ def judge_command(
         float | None, Option(help="Play for so long; the same command goes on.")
     ] = None,
     clearing: ClearingOption = False,
+    bodies: BodiesOption = None,
     as_benchmark: Annotated[
         bool,
         Option(
@@ -122,7 +132,7 @@ def judge_command(
     }  # fmt: skip
     policy_options = {
         "--seeds": seeds, "--minutes": minutes, "--clearing": clearing,
-        "--benchmark": as_benchmark, "--run-limit": run_limit,
+        "--bodies": bodies, "--benchmark": as_benchmark, "--run-limit": run_limit,
     }  # fmt: skip
     if not names_policy(policy_or_trials):
         _refuse(policy_options, policy_or_trials, "a file of trials")
@@ -138,8 +148,8 @@ def judge_command(
         )
         return
     _refuse(trials_options, policy_or_trials, "a policy")
-    if as_benchmark and (seeds or clearing):
-        option = "--seeds" if seeds else "--clearing"
+    if as_benchmark and (seeds or clearing or bodies):
+        option = "--seeds" if seeds else "--clearing" if clearing else "--bodies"
         raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
     engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
     tally = judge_policy(
@@ -149,6 +159,7 @@ def judge_command(
         until_clear=until_clear,
         minutes=minutes,
         clearing=clearing,
+        bodies=bodies,
         as_benchmark=as_benchmark,
         engine=engine,
         full=full,
@@ -173,6 +184,7 @@ def judge_policy(
     until_clear: bool,
     minutes: float | None,
     clearing: bool,
+    bodies: str | None,
     as_benchmark: bool,
     engine: Engine,
     full: bool,
@@ -194,11 +206,14 @@ def judge_policy(
         study = study_of(benchmark.STUDY, directory, None, [policy_text], trust_code)
     else:
         ending = "-clearing" if clearing else ""
+        ending += f"-{slug(bodies)}" if bodies else ""
         directory = out or Path("results", "judged", slug(policy.title) + ending)
         looks = until_clear and most_seeds > FIRST_LOOK
         study = study_of(STUDY, directory, most_seeds, [policy_text], trust_code, until_clear=looks)
     if clearing:
         switch_to_clearing(study)
+    if bodies:
+        switch_bodies(study, bodies)
     say(f"{study.plan()}, kept in {directory}")
     echo()
     say_what_a_pilot_shows(study)
@@ -214,18 +229,17 @@ def judge_policy(
         say(f"{reason}; the same command goes on:", command)
     # Several trainings and untrusted code need options that the suggested command does not have.
     elif is_open and not (tally.left or as_benchmark or policy.trainings or trust_code):
-        _suggest_more_seeds(policy_text, directory, max(JUDGE_SEEDS, 2 * most_seeds), clearing)
+        options = [policy_text, *(["--clearing"] if clearing else [])]
+        options += ["--bodies", bodies] if bodies else []
+        _suggest_more_seeds(options, directory, max(JUDGE_SEEDS, 2 * most_seeds))
     say_what_was_played(tally)
     return tally
 
 
-def _suggest_more_seeds(policy_text: str, directory: Path, seeds: int, clearing: bool) -> None:
-    option = " --clearing" if clearing else ""
-    say(
-        "What is open needs more seeds, from the start:",
-        f"swarm-logistics judge {quote(policy_text)}{option} --seeds {seeds} "
-        f"--out {quote(f'{directory}-{seeds}')}",
-    )
+def _suggest_more_seeds(options: Sequence[str], directory: Path, seeds: int) -> None:
+    options = [*options, "--seeds", str(seeds), "--out", f"{directory}-{seeds}"]
+    command = f"swarm-logistics judge {join(options)}"
+    say("What is open needs more seeds, from the start:", command)
 
 
 def names_policy(policy_or_trials: str) -> bool:

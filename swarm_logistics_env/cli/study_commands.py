@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer import Argument, Exit, Option, echo
 
+from swarm_logistics_env.bodies.bodies import load_bodies
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.files import SB3_SUFFIX
@@ -23,7 +25,7 @@ from swarm_logistics_env.tasks.task import Run
 from swarm_logistics_env.verdicts.gate import SUBJECTS, Gate, GateAnswer, answers, match
 from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 
-from .app import Repeated, TrustOption
+from .app import BodiesOption, Repeated, TrustOption
 from .terminal import say, say_what_was_played, show_power, show_report, show_table
 
 StudyArgument = Annotated[
@@ -95,6 +97,7 @@ def run_command(
         bool, Option("--restock", help="Delivered items come back, so that P has no cap.")
     ] = False,
     clearing: ClearingOption = False,
+    bodies: BodiesOption = None,
     processes: ProcessesOption = None,
     engine: Annotated[
         str | None, Option(help="local (this process), process, or ray; process if not given.")
@@ -120,10 +123,11 @@ def run_command(
     if clearing:
         switch_to_clearing(study)
     if restock:
-        specification = study.specification
-        scenario = specification.played.vary(specification.scenario, {"restock": True})
-        study.specification = specification.replace(scenario=scenario)
-    out = out or _default_directory(study, clearing, restock, has_own_policies=bool(policies))
+        study.specification = study.specification.varying({"restock": True})
+    if bodies:
+        switch_bodies(study, bodies)
+    changes = ["clearing"] * clearing + ["restock"] * restock + ([slug(bodies)] if bodies else [])
+    out = out or _default_directory(study, changes, has_own_policies=bool(policies))
     study.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address, run_limit)
@@ -149,15 +153,9 @@ def run_command(
     raise Exit(1 if tally.failed else 0)
 
 
-def _default_directory(
-    study: Study, clearing: bool, restock: bool, *, has_own_policies: bool
-) -> Path:
+def _default_directory(study: Study, changes: Sequence[str], *, has_own_policies: bool) -> Path:
     """Return results/NAME; what the options change in a preset gets a directory of its own."""
-    parts = [study.specification.name]
-    if clearing:
-        parts.append("clearing")
-    if restock:
-        parts.append("restock")
+    parts = [study.specification.name, *changes]
     if has_own_policies:
         titles = "-".join(policy.title for policy in study.specification.policies)
         parts.append(slug(titles)[:40])
@@ -369,6 +367,17 @@ def switch_to_clearing(study: Study) -> None:
     scenario = task.vary(specification.scenario, changes)
     # What is published is of another P.
     study.specification = specification.replace(task="clearing", scenario=scenario, reference=None)
+
+
+def switch_bodies(study: Study, bodies: str) -> None:
+    """Let other bodies move the robots in every condition of a study.
+
+    Raises:
+        BodiesError: there are no such bodies, or the package that they need is not installed.
+        SwarmLogisticsError: the study's task has no bodies.
+    """
+    load_bodies(bodies)  # what is wrong with them is said before anything is written
+    study.specification = study.specification.varying({"bodies": bodies})
 
 
 def run_study(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -83,6 +83,9 @@ def _ascending(values: tuple[int, ...]) -> tuple[int, ...]:
     if list(values) != sorted(set(values)):
         raise ValueError("should be ascending, each size once")
     return values
+
+
+FactorT = TypeVar("FactorT", bound=Factor)
 
 
 class Sizes(Factor):
@@ -240,6 +243,30 @@ class Specification(Record):
             for ablation in self.ablations
         )
         return self.replace(policies=tuple(policies), ablations=tuple(ablations))
+
+    def varying(self, fields: Mapping[str, Any]) -> Self:
+        """Return the specification with fields of its scenario changed in every condition.
+
+        Raises:
+            SwarmLogisticsError: a field is unknown or cannot be.
+        """
+
+        def vary_all(factors: Iterable[FactorT]) -> tuple[FactorT, ...]:
+            # A table that starts from a preset of its own does not have the fields of the base.
+            return tuple(
+                factor.replace(scenario={**factor.scenario, **fields})
+                if "preset" in factor.scenario
+                else factor
+                for factor in factors
+            )
+
+        return self.replace(
+            scenario=self.played.vary(self.scenario, fields),
+            sizes=vary_all(self.sizes),
+            faults=vary_all(self.faults),
+            parameters=vary_all(self.parameters),
+            ablations=vary_all(self.ablations),
+        )
 
     @field_validator("scenario", mode="before")
     @classmethod

@@ -179,3 +179,11 @@ def test_for_p_s_of_faults_by_role_those_of_the_role_are_removed() -> None:
     assert {fault for case in plan.cases for fault in case.faults} == {
         Fault(mode, m, onset=50.0, role="carrier") for mode in ("FM4", "removed") for m in (1, 2)
     }
+
+
+def test_a_change_of_the_scenario_reaches_tables_with_a_preset_of_their_own() -> None:
+    study = Study.preset("paper")
+    study.specification = study.specification.varying({"restock": True})
+    scenarios = [case.scenario for case in study.plan().cases]
+    assert {scenario.n_items for scenario in scenarios} == {60, 70, 100}  # type: ignore[attr-defined]
+    assert all(scenario.restock for scenario in scenarios)  # type: ignore[attr-defined]
