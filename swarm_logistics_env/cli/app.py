@@ -190,6 +190,16 @@ def scenario_of(
     """
     fields = {} if file is None else read_table(file, "file of --scenario", ScenarioError)
     preset = str(fields.pop("preset", preset))
+    return Scenario.preset(preset).replace(**{**fields, **changed_fields(changes, bodies)})
+
+
+def changed_fields(changes: Repeated, bodies: str | None) -> dict[str, Any]:
+    """Return the fields that `--set` and `--bodies` change, with their values.
+
+    Raises:
+        ScenarioError: a change is not FIELD=VALUE.
+    """
+    fields: dict[str, Any] = {}
     for change in changes or []:
         name, equals, value = change.partition("=")
         if not equals:
@@ -200,7 +210,7 @@ def scenario_of(
             fields[name] = value
     if bodies is not None:
         fields["bodies"] = bodies
-    return Scenario.preset(preset).replace(**fields)
+    return fields
 
 
 def faults_of(texts: Repeated, scenario: Scenario) -> list[Fault]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import join
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -31,9 +31,11 @@ from .app import (
     ScenarioOption,
     SetOption,
     TrustOption,
+    changed_fields,
     scenario_of,
 )
 from .judge_trials import judge_trials
+from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .study_commands import (
     ClearingOption,
     FullOption,
@@ -41,9 +43,6 @@ from .study_commands import (
     ProcessesOption,
     run_study,
     say_what_a_pilot_shows,
-    study_of,
-    switch_bodies,
-    switch_to_clearing,
 )
 from .terminal import say, say_what_was_played, show, show_report, show_table
 
@@ -81,6 +80,7 @@ def judge_command(
         float | None, Option(help="Play for so long; the same command goes on.")
     ] = None,
     clearing: ClearingOption = False,
+    changes: SetOption = None,
     bodies: BodiesOption = None,
     as_benchmark: Annotated[
         bool,
@@ -132,7 +132,8 @@ def judge_command(
     }  # fmt: skip
     policy_options = {
         "--seeds": seeds, "--minutes": minutes, "--clearing": clearing,
-        "--bodies": bodies, "--benchmark": as_benchmark, "--run-limit": run_limit,
+        "--set": changes, "--bodies": bodies, "--benchmark": as_benchmark,
+        "--run-limit": run_limit,
     }  # fmt: skip
     if not names_policy(policy_or_trials):
         _refuse(policy_options, policy_or_trials, "a file of trials")
@@ -148,9 +149,11 @@ def judge_command(
         )
         return
     _refuse(trials_options, policy_or_trials, "a policy")
-    if as_benchmark and (seeds or clearing or bodies):
-        option = "--seeds" if seeds else "--clearing" if clearing else "--bodies"
-        raise StudyError(f"{option}: the benchmark has the same conditions for everybody")
+    conditions = {
+        "--seeds": seeds, "--clearing": clearing, "--set": changes, "--bodies": bodies,
+    }  # fmt: skip
+    if as_benchmark and (options := [option for option, value in conditions.items() if value]):
+        raise StudyError(f"{options[0]}: the benchmark has the same conditions for everybody")
     engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
     tally = judge_policy(
         policy_or_trials,
@@ -159,7 +162,7 @@ def judge_command(
         until_clear=until_clear,
         minutes=minutes,
         clearing=clearing,
-        bodies=bodies,
+        fields=changed_fields(changes, bodies),
         as_benchmark=as_benchmark,
         engine=engine,
         full=full,
@@ -184,7 +187,7 @@ def judge_policy(
     until_clear: bool,
     minutes: float | None,
     clearing: bool,
-    bodies: str | None,
+    fields: Mapping[str, Any],
     as_benchmark: bool,
     engine: Engine,
     full: bool,
@@ -195,6 +198,7 @@ def judge_policy(
 
     Args:
         policy_text: the policy as it was typed.
+        fields: of the scenario that are changed in all conditions.
         out: directory of the study; None: results/judged/NAME or results/benchmark/NAME.
         command: the command line, which goes on where it was stopped.
     """
@@ -205,15 +209,13 @@ def judge_policy(
         directory = out or Path("results", "benchmark", slug(policy.title))
         study = study_of(benchmark.STUDY, directory, None, [policy_text], trust_code)
     else:
-        ending = "-clearing" if clearing else ""
-        ending += f"-{slug(bodies)}" if bodies else ""
-        directory = out or Path("results", "judged", slug(policy.title) + ending)
+        parts = [slug(policy.title), *["clearing"] * clearing, *changes_in_words(fields)]
+        directory = out or Path("results", "judged", "-".join(parts))
         looks = until_clear and most_seeds > FIRST_LOOK
         study = study_of(STUDY, directory, most_seeds, [policy_text], trust_code, until_clear=looks)
     if clearing:
         switch_to_clearing(study)
-    if bodies:
-        switch_bodies(study, bodies)
+    change_scenario(study, fields)
     say(f"{study.plan()}, kept in {directory}")
     echo()
     say_what_a_pilot_shows(study)
@@ -230,7 +232,8 @@ def judge_policy(
     # Several trainings and untrusted code need options that the suggested command does not have.
     elif is_open and not (tally.left or as_benchmark or policy.trainings or trust_code):
         options = [policy_text, *(["--clearing"] if clearing else [])]
-        options += ["--bodies", bodies] if bodies else []
+        for name, value in fields.items():
+            options += ["--set", f"{name}={value if isinstance(value, str) else json.dumps(value)}"]
         _suggest_more_seeds(options, directory, max(JUDGE_SEEDS, 2 * most_seeds))
     say_what_was_played(tally)
     return tally

@@ -10,10 +10,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Exit, Option, echo
 
-from swarm_logistics_env.bodies.bodies import load_bodies
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.policies import PolicySpec
-from swarm_logistics_env.policies.files import SB3_SUFFIX
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.section import NOTHING, bracketed, percent, slug
@@ -25,7 +22,8 @@ from swarm_logistics_env.tasks.task import Run
 from swarm_logistics_env.verdicts.gate import SUBJECTS, Gate, GateAnswer, answers, match
 from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 
-from .app import BodiesOption, Repeated, TrustOption
+from .app import BodiesOption, Repeated, SetOption, TrustOption, changed_fields
+from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .terminal import say, say_what_was_played, show_power, show_report, show_table
 
 StudyArgument = Annotated[
@@ -97,6 +95,7 @@ def run_command(
         bool, Option("--restock", help="Delivered items come back, so that P has no cap.")
     ] = False,
     clearing: ClearingOption = False,
+    changes: SetOption = None,
     bodies: BodiesOption = None,
     processes: ProcessesOption = None,
     engine: Annotated[
@@ -117,6 +116,7 @@ def run_command(
     if until_clear and seeds is None:
         seeds = MOST_SEEDS_UNTIL_CLEAR
     looks = until_clear or None
+    fields = changed_fields(changes, bodies)
     study = study_of(
         study_name, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
     )
@@ -124,10 +124,9 @@ def run_command(
         switch_to_clearing(study)
     if restock:
         study.specification = study.specification.varying({"restock": True})
-    if bodies:
-        switch_bodies(study, bodies)
-    changes = ["clearing"] * clearing + ["restock"] * restock + ([slug(bodies)] if bodies else [])
-    out = out or _default_directory(study, changes, has_own_policies=bool(policies))
+    change_scenario(study, fields)
+    words = ["clearing"] * clearing + ["restock"] * restock + changes_in_words(fields)
+    out = out or _default_directory(study, words, has_own_policies=bool(policies))
     study.out = out / part.directory if part else out
     engine = engine or ("ray" if address else "local" if processes == 1 else "process")
     player = engine_named(engine, processes, address, run_limit)
@@ -153,9 +152,9 @@ def run_command(
     raise Exit(1 if tally.failed else 0)
 
 
-def _default_directory(study: Study, changes: Sequence[str], *, has_own_policies: bool) -> Path:
+def _default_directory(study: Study, words: Sequence[str], *, has_own_policies: bool) -> Path:
     """Return results/NAME; what the options change in a preset gets a directory of its own."""
-    parts = [study.specification.name, *changes]
+    parts = [study.specification.name, *words]
     if has_own_policies:
         titles = "-".join(policy.title for policy in study.specification.policies)
         parts.append(slug(titles)[:40])
@@ -318,66 +317,6 @@ def export_command(
     if damage:
         echo(plain(damage), err=True)
         raise Exit(1)
-
-
-def study_of(
-    study_name: str,
-    out: Path | None,
-    seeds: int | None,
-    policies: Repeated,
-    trust_code: bool,
-    **fields: object,
-) -> Study:
-    """Return the study of a file or a preset with the options and fields that are given, not None.
-
-    Raises:
-        StudyError: there is no such file or preset, or it cannot be.
-    """
-    options = {"seeds": seeds, **fields}
-    fields = {name: value for name, value in options.items() if value is not None}
-    if policies:
-        policy_specs = [PolicySpec.of(name) for name in policies]
-        fields["policies"] = tuple(policy.replace(trusted=trust_code) for policy in policy_specs)
-        for name in policies:
-            # What is typed names a class on purpose; a file may look like any other.
-            if name.endswith(SB3_SUFFIX) and not trust_code:
-                raise StudyError(
-                    f"--policy {name}: reading a model of stable-baselines3 executes the code in "
-                    "it: should be allowed by --trust-code"
-                )
-    if study_name.endswith(".toml") or Path(study_name).is_file():
-        return Study.from_file(study_name, out=out, trust_code=trust_code, **fields)
-    return Study.preset(study_name, out=out, **fields)
-
-
-def switch_to_clearing(study: Study) -> None:
-    """Let P be the rate at which the items of a study's warehouse are cleared.
-
-    Raises:
-        StudyError: the study plays another task.
-    """
-    from swarm_logistics_env.tasks.task import DEFAULT, task_of
-
-    specification = study.specification
-    if specification.task != DEFAULT:
-        task_name = specification.task
-        raise StudyError(f"--clearing: should be for the task {DEFAULT!r}, not {task_name!r}")
-    task = task_of("clearing")
-    changes = {"restock": False, "duration": task.default.duration}
-    scenario = task.vary(specification.scenario, changes)
-    # What is published is of another P.
-    study.specification = specification.replace(task="clearing", scenario=scenario, reference=None)
-
-
-def switch_bodies(study: Study, bodies: str) -> None:
-    """Let other bodies move the robots in every condition of a study.
-
-    Raises:
-        BodiesError: there are no such bodies, or the package that they need is not installed.
-        SwarmLogisticsError: the study's task has no bodies.
-    """
-    load_bodies(bodies)  # what is wrong with them is said before anything is written
-    study.specification = study.specification.varying({"bodies": bodies})
 
 
 def run_study(

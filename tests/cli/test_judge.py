@@ -172,13 +172,17 @@ def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(command: Command
     assert "items delivered per minute" in report
 
 
-def test_a_policy_is_judged_on_other_bodies(command: Command) -> None:
+def test_a_policy_is_judged_on_other_bodies_and_floors(command: Command) -> None:
     printed = command("judge homing --bodies mujoco --seeds 3 --processes 1")
-    assert "homing --bodies mujoco --seeds 60 --out results/judged/homing-mujoco-60" in printed
-    report = Path("results", "judged", "homing-mujoco", "report.md").read_text()
+    folder = "results/judged/homing-bodies-mujoco"
+    assert f"homing --set bodies=mujoco --seeds 60 --out {folder}-60" in printed
+    report = Path(folder, "report.md").read_text()
     assert "| bodies | mujoco (default chipmunk) |" in report
     refused = command("judge homing --benchmark --bodies mujoco", code=2)
     assert "--bodies: the benchmark has" in refused
+    plan = "--set floor=two_docks --set n_robots=3 --set duration=5"
+    command(f"judge homing {plan} --seeds 3 --processes 1 --out floor")
+    assert "| floor | two_docks (default None) |" in Path("floor", "report.md").read_text()
 
 
 def test_the_benchmark_gives_a_table_and_a_place_and_goes_on(command: Command) -> None:

@@ -145,7 +145,7 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     assert Study.stored("results/mine-restock").specification.scenario.restock  # type: ignore[attr-defined]
     assert "did you mean 'mujoco'" in command(f"{RUN} --bodies mujoko", code=2)
     command(f"{RUN} --bodies mujoco --seeds 1")
-    moved = Study.stored("results/mine-mujoco")
+    moved = Study.stored("results/mine-bodies-mujoco")
     assert {case.scenario.bodies for case in moved.plan().cases} == {"mujoco"}  # type: ignore[attr-defined]
     file.write_text(FILE.replace("n_items = 8, duration = 2", "n_items = 1, duration = 60"))
     printed = command(f"{RUN} --policy homing --seeds 1")

@@ -10,7 +10,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
-from swarm_logistics_env.cli.study_commands import study_of
+from swarm_logistics_env.cli.study_choice import study_of
 from swarm_logistics_env.errors import PolicyError, StudyError
 from swarm_logistics_env.policies import Policy, PolicySpec
 from swarm_logistics_env.questions.specification import read_study_file

@@ -1,0 +1,96 @@
+"""The study that a command line means: a file or a preset, with what its options change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from more_itertools import partition
+
+from swarm_logistics_env.bodies.bodies import load_bodies
+from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.floor.floor_plan import PLAN_SIZES
+from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.policies.files import SB3_SUFFIX
+from swarm_logistics_env.report.section import slug
+from swarm_logistics_env.studies import Study
+
+from .app import Repeated
+from .terminal import say
+
+
+def study_of(
+    study_name: str,
+    out: Path | None,
+    seeds: int | None,
+    policies: Repeated,
+    trust_code: bool,
+    **fields: object,
+) -> Study:
+    """Return the study of a file or a preset with the options and fields that are given, not None.
+
+    Raises:
+        StudyError: there is no such file or preset, or it cannot be.
+    """
+    options = {"seeds": seeds, **fields}
+    fields = {name: value for name, value in options.items() if value is not None}
+    if policies:
+        policy_specs = [PolicySpec.of(name) for name in policies]
+        fields["policies"] = tuple(policy.replace(trusted=trust_code) for policy in policy_specs)
+        for name in policies:
+            # What is typed names a class on purpose; a file may look like any other.
+            if name.endswith(SB3_SUFFIX) and not trust_code:
+                raise StudyError(
+                    f"--policy {name}: reading a model of stable-baselines3 executes the code in "
+                    "it: should be allowed by --trust-code"
+                )
+    if study_name.endswith(".toml") or Path(study_name).is_file():
+        return Study.from_file(study_name, out=out, trust_code=trust_code, **fields)
+    return Study.preset(study_name, out=out, **fields)
+
+
+def switch_to_clearing(study: Study) -> None:
+    """Let P be the rate at which the items of a study's warehouse are cleared.
+
+    Raises:
+        StudyError: the study plays another task.
+    """
+    from swarm_logistics_env.tasks.task import DEFAULT, task_of
+
+    specification = study.specification
+    if specification.task != DEFAULT:
+        task_name = specification.task
+        raise StudyError(f"--clearing: should be for the task {DEFAULT!r}, not {task_name!r}")
+    task = task_of("clearing")
+    changes = {"restock": False, "duration": task.default.duration}
+    scenario = task.vary(specification.scenario, changes)
+    # What is published is of another P.
+    study.specification = specification.replace(task="clearing", scenario=scenario, reference=None)
+
+
+def changes_in_words(fields: Mapping[str, Any]) -> list[str]:
+    """Return what names the directory of a study with these fields changed."""
+    return [slug(name, value)[:40] for name, value in fields.items()]
+
+
+def change_scenario(study: Study, fields: Mapping[str, Any]) -> None:
+    """Change fields of the scenario in every condition of a study.
+
+    Raises:
+        SwarmLogisticsError: the task's scenario has no such field, its value cannot be, or a
+            package that it needs is not installed.
+    """
+    if not fields:
+        return
+    if "bodies" in fields:
+        load_bodies(fields["bodies"])  # what is wrong with them is said before anything is written
+    specification = study.specification
+    if fields.get("floor") is not None:
+        from_plan, others = partition(
+            lambda parameter: parameter.name not in PLAN_SIZES, specification.parameters
+        )
+        for parameter in from_plan:
+            say(f"No question of {parameter.name}, which follows from the floor plan.")
+        specification = specification.replace(parameters=tuple(others))
+    study.specification = specification.varying(fields)
