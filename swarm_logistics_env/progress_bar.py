@@ -47,6 +47,10 @@ class ProgressBar:
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
+    def extend(self, total: int) -> None:
+        """Show that there is so much to do in all."""
+        self._bar.update(self._task, total=total)
+
     def reach(self, done: int, note: str = "") -> None:
         """Show that so much is done.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import time
 import warnings
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -142,6 +142,7 @@ class Study:
         shard: Shard | None = None,
         minutes: float | None = None,
         run_limit: float | None = None,
+        after_look: Callable[[StudyResults], None] | None = None,
     ) -> Tally:
         """Play the runs that are missing, and those that failed before; each is kept at once.
 
@@ -156,6 +157,9 @@ class Study:
             minutes: begin no further run after this time; the same call goes on. None: no end.
             run_limit: wall-clock time after which a worker process ends a run, which has failed
                 then [s]; None: an hour.
+            after_look: called with the results so far when all runs of a look are played, and
+                before, when P of the condition that most comparisons share has the seeds of the
+                first look; in a study that runs until it is clear.
 
         Raises:
             StudyError: the store or the engine cannot be used, or the store is another study's.
@@ -175,7 +179,8 @@ class Study:
             raise StudyError(
                 "shard: should not be with until_clear, where all runs decide the next"
             )
-        all_runs, errors = self._runs(shard), list[str | None]()
+        all_runs = self._runs(shard)
+        errors: list[str | None] = []
         start, left = time.monotonic(), 0
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
@@ -186,18 +191,27 @@ class Study:
             note(store, plan, self._declared(store))
             n_before = len({run.key for run in all_runs} & store.succeeded())
             tried: set[str] = set()
-            # A run that failed in this call is not tried again.
-            while missing := self._missing(all_runs, store, tried):
-                if not tried:
-                    refuse_changed_policies(missing)
-                works = bool(n_before) or None in errors
-                finished = play(
-                    missing, engine, store, self.specification.name, end, has_worked=works
+
+            def next_runs() -> list[Run]:
+                # A run that failed in this call is not tried again.
+                missing = self._missing(all_runs, store, tried, in_stages=True)
+                tried.update(run.key for run in missing)
+                if after_look:
+                    after_look(judge(plan, store.outcomes(plan.runs), self._declared(store)))
+                return missing
+
+            if missing := self._missing(all_runs, store, tried, in_stages=True):
+                tried.update(run.key for run in missing)
+                refuse_changed_policies(missing)
+                errors, left = play(
+                    missing,
+                    engine,
+                    store,
+                    self.specification.name,
+                    end,
+                    has_worked=bool(n_before),
+                    more=next_runs if self.specification.until_clear else tuple,
                 )
-                errors += finished
-                tried |= {run.key for run in missing}
-                if left := len(missing) - len(finished):
-                    break
         failed = [error for error in errors if error is not None]
         is_late = end is not None and time.monotonic() > end
         return Tally(
@@ -214,13 +228,21 @@ class Study:
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs
 
-    def _missing(self, runs: Sequence[Run], store: Runs, tried: Collection[str]) -> list[Run]:
-        """Return what is to be played next, but for what was tried already."""
+    def _missing(
+        self, runs: Sequence[Run], store: Runs, tried: Collection[str], *, in_stages: bool = False
+    ) -> list[Run]:
+        """Return what is to be played next, but for what was tried already.
+
+        Args:
+            in_stages: whether what the first look needs is what most comparisons share, then the
+                rest, so that P stands early.
+        """
         done = store.succeeded() | set(tried)
         if not self.specification.until_clear:
             return [run for run in runs if run.key not in done]
         outcomes = store.outcomes(run for run in runs if run.key in done)
-        return list(latest_look(self.plan(), outcomes).next_runs)
+        look = latest_look(self.plan(), outcomes)
+        return list((in_stages and look.shared_runs) or look.next_runs)
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.

@@ -24,7 +24,14 @@ from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 
 from .app import BodiesOption, Repeated, SetOption, TrustOption, changed_fields
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
-from .terminal import say, say_what_was_played, show_power, show_report, show_table
+from .terminal import (
+    AnswerSoFar,
+    say,
+    say_what_was_played,
+    show_power,
+    show_report,
+    show_table,
+)
 
 StudyArgument = Annotated[
     str,
@@ -87,7 +94,7 @@ def run_command(
         bool,
         Option(
             "--until-clear",
-            help="Look at 20, 30, .. seeds, and play on only what is not decided yet.",
+            help="Look at 10, 20, .. seeds, and play on only what is not decided yet.",
         ),
     ] = False,
     first_seed: FirstSeedOption = None,
@@ -322,9 +329,10 @@ def export_command(
 def run_study(
     study: Study, engine: Engine, shard: Shard | None = None, minutes: float | None = None
 ) -> Tally:
-    """Run a study; Ctrl-C ends the command and says how to go on."""
+    """Run a study and show the answer so far; Ctrl-C ends the command, and it says how to go on."""
+    after_look = AnswerSoFar().show if study.specification.until_clear else None
     try:
-        return study.run(engine, shard=shard, minutes=minutes)
+        return study.run(engine, shard=shard, minutes=minutes, after_look=after_look)
     except KeyboardInterrupt:
         n_finished, n_runs = study.finished(shard)
         missing = f"the other {n_runs - n_finished}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
@@ -88,6 +89,32 @@ def show_report(results: StudyResults, out: Path, *, full: bool, is_finished: bo
         echo(f"Tables: {out / 'tables.tex'}")
     if is_finished and any(verdict.estimate for verdict in results.verdicts):
         say(f"For a paper: {plain(in_a_sentence(results))}")
+
+
+class AnswerSoFar:
+    """Shows on standard error what is known of a study that runs until it is clear.
+
+    P as soon as it has an interval, the whole answer after the first look, a line after the others.
+    """
+
+    def __init__(self) -> None:
+        self._start = time.monotonic()
+        self._looked = False
+
+    def show(self, results: StudyResults) -> None:
+        """Show these results."""
+        now = f"After {time.monotonic() - self._start:.0f} s"
+        so_far, verdicts = answer(results), results.verdicts
+        seeds = [verdict.estimate.n_seeds for verdict in verdicts if verdict.estimate]
+        if not seeds:
+            lines = f"{now}: {so_far.performance}"
+        elif not self._looked:
+            lines = f"{now}, a first look:\n{digest(so_far, _PLAIN_WIDTH, MOST_LINES)}\n"
+            self._looked = True
+        else:
+            n_clear = sum(verdict.stopped_at is not None for verdict in verdicts)
+            lines = f"{now}, {max(seeds)} seeds: {n_clear} of {len(verdicts)} questions are clear."
+        echo("\n".join(map(plain, lines.split("\n"))), err=True)
 
 
 def show_power(study_name: str, results: StudyResults, effect: float | None) -> None:

@@ -11,7 +11,6 @@ import sys
 import threading
 import time
 import traceback
-from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.tasks.task import Outcome, Run
 
 from .store import Runs
-from .worker_processes import Played, in_processes, pickled, play_pickled
+from .worker_processes import Played, RunQueue, in_processes, pickled, play_pickled
 
 Engine = Callable[[Iterable[Run]], Played]
 ENGINES = ("local", "process", "ray")
@@ -110,21 +109,24 @@ def play(
     end: float | None = None,
     *,
     has_worked: bool = True,
-) -> list[str | None]:
+    more: Callable[[], Sequence[Run]] = tuple,
+) -> tuple[list[str | None], int]:
     """Play runs and keep each in the store at once; show a progress bar.
 
     Args:
+        more: what is called when all are played, and returns the runs that they make necessary.
         end: when to stop (`time.monotonic`) [s]; None: when all are played.
         has_worked: whether a run of the study has succeeded. While none has, it stops as soon as
             every condition has failed, at more than one seed, in as many runs as a condition has.
 
     Returns:
-        What each run raised, as they finished; None: it succeeded.
+        What each run raised, as they finished; None: it succeeded. And how many runs are left.
     """
+    queue = RunQueue(runs)
     errors: list[str | None] = []
     failed: list[Run] = []
     # Closed at once where this stops early, so that no worker outlives it.
-    with closing(engine(runs)) as finished, ProgressBar(title, len(runs), "runs") as progress:
+    with closing(engine(queue)) as finished, ProgressBar(title, len(runs), "runs") as progress:
         for run, outcome in finished:
             store.add(run, outcome)
             errors.append(outcome.error)
@@ -137,7 +139,10 @@ def play(
                 break
             if end is not None and time.monotonic() > end:
                 break
-    return errors
+            if len(errors) == queue.total:
+                queue.extend(more())
+                progress.extend(queue.total)
+    return errors, queue.total - len(errors)
 
 
 def _is_hopeless(runs: Sequence[Run], failed: Sequence[Run]) -> bool:
@@ -231,7 +236,7 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
     Raises:
         StudyError: ray is not installed, or there is no cluster at that address.
     """
-    waiting = deque(runs)
+    waiting = runs if isinstance(runs, RunQueue) else RunQueue(runs)
     ray, started_here = _connected(address, cores)
     pending: dict[Hashable, Run] = {}
     try:
@@ -240,8 +245,8 @@ def _on_ray(address: str | None, cores: int | None, runs: Iterable[Run]) -> Play
         limit = QUEUED_PER_CORE * max(1, int(ray.cluster_resources().get("CPU", 1)))
         while pending or waiting:
             while waiting and len(pending) < limit:
-                message = pickled(waiting[0])
-                pending[sent.remote(message, current_folder_modules())] = waiting.popleft()
+                run = next(waiting)
+                pending[sent.remote(pickled(run), current_folder_modules())] = run
             for task in ray.wait(list(pending), num_returns=1)[0]:
                 run = pending.pop(task)
                 try:

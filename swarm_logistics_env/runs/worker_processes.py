@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Self
 from unittest.mock import patch
 
 import cloudpickle
@@ -29,6 +30,40 @@ from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.tasks.task import Outcome, Run
 
 Played = Generator[tuple[Run, Outcome], None, None]
+
+
+class RunQueue:
+    """Runs to be played, first come, first served; an iterator that goes on after `extend`.
+
+    An engine asks for the next run again after each outcome that it yields, so what the outcomes so
+    far make necessary is played by the same workers.
+
+    Attributes:
+        total: how many runs there were in all.
+    """
+
+    def __init__(self, runs: Iterable[Run]) -> None:
+        self._waiting = deque[Run]()
+        self.total = 0
+        self.extend(runs)
+
+    def extend(self, runs: Iterable[Run]) -> None:
+        """Let further runs wait."""
+        n_before = len(self._waiting)
+        self._waiting.extend(runs)
+        self.total += len(self._waiting) - n_before
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> Run:
+        if not self._waiting:
+            raise StopIteration
+        return self._waiting.popleft()
+
 
 # Environment of workers. One thread each: n workers with n threads would wait for each other. And
 # Python looks for none of its own modules in the current folder before it gets this process's path.
@@ -85,31 +120,31 @@ def in_processes(count: int, run_limit: float, runs: Iterable[Run]) -> Played:
     Raises:
         StudyError: a run cannot be sent to another process, or no worker comes up.
     """
-    waiting = deque(runs)
+    waiting = runs if isinstance(runs, RunQueue) else RunQueue(runs)
     with TemporaryDirectory() as reports:
         watch = _Watch(run_limit, Path(reports))
         while waiting:
-            with workers(min(count, len(waiting))) as pool:
+            with workers(count if waiting is runs else min(count, len(waiting))) as pool:
                 interrupted = yield from _played(pool, waiting, count, watch)
             for run in interrupted:
                 error, died = watch.error(run), [run]
                 if error is None:
                     with workers(1) as alone:
-                        died = yield from _played(alone, deque([run]), 1, watch)
+                        died = yield from _played(alone, RunQueue([run]), 1, watch)
                     error = watch.error(run) or "WorkerDied: two worker processes ended in this run"
                 if died:
                     yield run, Outcome(error=error)
 
 
 def _played(
-    pool: ProcessPoolExecutor, waiting: deque[Run], at_once: int, watch: _Watch
+    pool: ProcessPoolExecutor, waiting: RunQueue, at_once: int, watch: _Watch
 ) -> Generator[tuple[Run, Outcome], None, list[Run]]:
     """Yield runs with their outcomes until none waits; return those that a dead worker played."""
     playing: dict[Future[Outcome], Run] = {}
     interrupted: list[Run] = []
     while playing or (waiting and not interrupted):
         while waiting and not interrupted and len(playing) < at_once:
-            first = waiting.popleft()
+            first = next(waiting)
             message = pickled(first)
             try:
                 playing[pool.submit(play_pickled, message, current_folder_modules(), watch)] = first

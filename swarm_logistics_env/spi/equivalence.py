@@ -123,7 +123,7 @@ def equivalence(
     if p_s is not None:
         terms = {"p_new": (p_new, 1.0), "p_s": (p_s, -1.0), "p_o": (p_o, 0.0)}
 
-    def against(threshold: float) -> Estimate:
+    def against(threshold: float, limits: tuple[float, float] | None = None) -> Estimate:
         return estimate_ratio(
             "change",
             terms,
@@ -132,7 +132,10 @@ def equivalence(
             paired=paired,
             saturated=saturated,
             identical=identical,
+            limits=limits,
         )
 
-    change, above, below = against(0.0), against(-margin), against(margin)
+    change = against(0.0)
+    limits = None if change.low is None or change.high is None else (change.low, change.high)
+    above, below = against(-margin, limits), against(margin, limits)
     return Equivalence(margin=margin, alpha=alpha, change=change, above=above, below=below)

@@ -198,6 +198,7 @@ def estimate_ratio(
     saturated: Collection[str] = (),
     identical: bool = False,
     two_recipes: bool = False,
+    limits: tuple[float, float] | None = None,
 ) -> Estimate:
     """Estimate one ratio of means and judge it against `threshold`; see `Options`.
 
@@ -210,6 +211,7 @@ def estimate_ratio(
         offset: Added to the ratio of means.
         two_recipes: Whether row k of the first and of the last performance are two trainings, not
             one: the last may then collapse by itself.
+        limits: Of the interval, where the estimate against another threshold had them.
 
     Raises:
         IndicatorError: Performances empty, negative or not finite, unequal seed sets, mean
@@ -240,7 +242,9 @@ def estimate_ratio(
     if n_seeds == 1:
         estimate = replace(untested, flags=("single_seed",))
     else:
-        estimate = _tested(untested, weighted, offset, saturated, two_recipes=two_recipes)
+        estimate = _tested(
+            untested, weighted, offset, saturated, two_recipes=two_recipes, limits=limits
+        )
     # D is a sum of weighted P, and no P is below 0.
     if min(term.weight(threshold - offset) for term in weighted.values()) >= 0.0:
         of_interval = [flag for flag in estimate.flags if flag in _OF_INTERVAL]
@@ -257,6 +261,7 @@ def _tested(
     saturated: Collection[str],
     *,
     two_recipes: bool,
+    limits: tuple[float, float] | None,
 ) -> Estimate:
     """Return the estimate with the test that its seeds allow, and what is to be said of it."""
     n_seeds, paired, threshold = untested.n_seeds, untested.paired, untested.threshold
@@ -277,6 +282,7 @@ def _tested(
         offset=offset,
         threshold=threshold,
         confidence=untested.confidence,
+        limits=limits and (np.array(limits[0]), np.array(limits[1])),
     )
     test = RatioTest(*map(float, tests))
     degenerate = test.log_sd == 0.0

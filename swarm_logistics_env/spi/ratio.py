@@ -135,10 +135,8 @@ class Balance(NamedTuple):
         below = np.asarray(sum(np.maximum(-mean, 0.0) for mean in means))
         raised = RAISED * (above + below)
         with np.errstate(all="ignore"):  # where nothing is delivered at all
-            units = [
-                np.nan_to_num(weight / (np.where(weight > 0.0, above, below) + raised))
-                for weight in weights
-            ]
+            sizes = [np.where(weight > 0.0, above, below) + raised for weight in weights]
+            units = [np.where(size > 0.0, w / size, 0.0) for w, size in zip(weights, sizes)]
         parts = [design.scaled(term.sample, unit) for term, unit in zip(terms, units)]
         variance, df = design.scatter(parts)
         return cls(above, below, np.sqrt(variance), df)
@@ -163,7 +161,7 @@ def log_ratio(more: Numbers, less: Numbers) -> Numbers:
     """Logarithm of the ratio of two means, both raised so that neither is 0."""
     raised = RAISED * (more + less)
     with np.errstate(all="ignore"):
-        return np.nan_to_num(np.log((more + raised) / (less + raised)))
+        return np.where(raised > 0.0, np.log((more + raised) / (less + raised)), 0.0)
 
 
 def statistic(log_ratio: Numbers, s: Numbers) -> Numbers:
@@ -177,8 +175,9 @@ def paired_ratio(
 ) -> RatioTest[Numbers]:
     """Interval and test over paired seeds, for one study or many at once: samples (..., n)."""
     hidden = [stalls(term.sample) for term in terms]
-    asking = {"offset": offset, "threshold": threshold, "confidence": confidence}
-    return ratio_test(terms, Design(), hidden, **asking)
+    return ratio_test(
+        terms, Design(), hidden, offset=offset, threshold=threshold, confidence=confidence
+    )
 
 
 def ratio_test(
@@ -189,6 +188,7 @@ def ratio_test(
     offset: float,
     threshold: float,
     confidence: float,
+    limits: tuple[Numbers, Numbers] | None = None,
 ) -> RatioTest[Numbers]:
     """Interval and test of theta = mean(num) / mean(den) + offset.
 
@@ -199,6 +199,7 @@ def ratio_test(
         offset: Added to the ratio of means.
         threshold: The theta that the test compares with.
         confidence: Of the interval, in (0, 1).
+        limits: Those of the interval, where another threshold gave them: they depend on none.
 
     Returns:
         Arrays of shape (...). The interval excludes `threshold` exactly where
@@ -223,12 +224,15 @@ def ratio_test(
     value = sum(term.in_num * design.mean(term.sample) for term in terms) / design.mean(
         terms[-1].sample
     )
-    low, high = _limits(terms, design, np.asarray(value), 0.5 + confidence / 2)
+    if limits is None:
+        low, high = _limits(terms, design, np.asarray(value), 0.5 + confidence / 2)
+        limits = low + offset, high + offset
+    low, high = limits
     n = min(term.sample.shape[-1] for term in terms)
     return RatioTest(
         value=np.asarray(value + offset),
-        low=np.where(degenerate, -np.inf, low + offset),
-        high=np.where(degenerate, np.inf, high + offset),
+        low=np.where(degenerate, -np.inf, low),
+        high=np.where(degenerate, np.inf, high),
         mean_difference=balance.above - balance.below,
         # Seeds without spread between them are no evidence: equal counts come about by chance.
         p_value=np.where(degenerate, 1.0, p),

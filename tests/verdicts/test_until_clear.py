@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -11,8 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.cli.terminal import AnswerSoFar
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.specification import looks_up_to
 from swarm_logistics_env.report.answer import answer
@@ -21,7 +24,8 @@ from swarm_logistics_env.runs.engines import Shard
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcome, Run
-from swarm_logistics_env.verdicts.until_clear import SPENDING
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.until_clear import SPENDING, predictive_power
 from swarm_logistics_env.verdicts.verdict import Verdict
 from tests.made_up import decided, delivered
 from verification.verdict_errors import MODELS, wrong_verdicts
@@ -66,7 +70,7 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     assert (doubled.on_threshold.plain, doubled.on_threshold.adjusted, doubled.conclusion) == (
         "untestable",
     ) * 3
-    assert (doubled.p_adjusted, doubled.stopped_at) == (None, 20)
+    assert (doubled.p_adjusted, doubled.stopped_at) == (None, 10)
     assert (half.conclusion, half.p_adjusted is None) == ("supported", False)
     (line, _), last = answer(study.findings())[2:]
     assert line.verdict_text == "untestable: it cannot be below 0"
@@ -74,6 +78,34 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     told = sentence(study.findings(), doubled).text
     assert "it cannot lie below the threshold, so it is not tested" in told
     assert "djusted" not in told
+
+
+def test_p_stands_before_the_rest_of_the_first_look_and_the_same_engine_plays_all(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    study, engine, stages = until_clear(30), Engine(), list[StudyResults]()
+    calls = []
+
+    def counted(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        calls.append(len(engine.played))
+        yield from engine(runs)
+
+    study.run(counted, after_look=stages.append)
+    assert calls == [0]
+    assert {mode_of(run) for run in engine.played[:10]} == {""}
+    played = [len(results.outcomes) for results in stages]
+    assert played[:2] == [10, 40]
+    assert played[-1] == len(engine.played)
+    so_far = AnswerSoFar()
+    for results in stages:
+        so_far.show(results)
+    printed = re.sub(r"After \d+ s", "After T s", capsys.readouterr().err)
+    first_line, first_look, *_ = printed.split("\n")
+    mean = stages[0].cells[0].mean.value
+    assert first_line.startswith("After T s: P [95 %], items in 500 s, at N = 25")
+    assert f" {mean:.1f} [" in first_line
+    assert first_look == "After T s, a first look:"
+    assert printed.splitlines()[-1] == "After T s, 30 seeds: 1 of 3 questions are clear."
 
 
 def verdicts_of(study: Study) -> dict[str, Verdict]:
@@ -105,13 +137,16 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
 ) -> None:
     study, engine = whole
     found = told(study)
-    assert found["FM4"][:3] == (20, 20, "refuted")
-    assert 20 < found["FM3"][1] < 60
-    assert found["FM2"][:3] == (None, 60, "open")
+    assert found["FM4"][:3] == (10, 10, "refuted")
+    assert 10 < found["FM3"][1] < 60
+    stopped_at, n_seeds, verdict, _ = found["FM2"]
+    # It is no longer played once the seeds to come would hardly decide it.
+    assert (stopped_at, verdict) == (None, "open")
+    assert 10 < n_seeds < 60
     modes = [mode_of(run) for run in engine.played]
     seeds = {mode: modes.count(mode) for mode in MEANS}
     assert seeds == {mode: found[mode][1] for mode in MEANS}
-    assert len(engine.played) == sum(seeds.values()) + 60
+    assert len(engine.played) == sum(seeds.values()) + max(seeds.values())
     # Each is judged by its own seeds and its repeated interval.
     looks = looks_up_to(60)
     for test in study.findings().verdicts:
@@ -170,11 +205,11 @@ def test_interrupted_at_any_moment_it_goes_on_to_the_same_result(
 ) -> None:
     study, engine = whole
     interrupted, played = until_clear(60, tmp_path), 0
-    for most in (25, 7, 30, 1):
+    for most in (25, 7, 5, 1):
         tally = interrupted.run(Engine(most=most))
         assert (tally.kept, tally.played) == (played, most)
         played += most
-        assert interrupted.finished() == (played, 20 * 4)  # the runs of its next look
+        assert interrupted.finished() == (played, 10 * 4)  # the runs of its next look
     until_clear(60, tmp_path).run(Engine())
     stored = Study.stored(tmp_path)
     assert stored.finished() == (len(engine.played),) * 2
@@ -201,8 +236,8 @@ def test_a_failed_run_blocks_its_comparison_and_no_other() -> None:
     study = until_clear(30)
     assert study.run(Engine(fails_once)).failed == 1
     tests = verdicts_of(study)
-    assert "1 of 20 runs failed" in str(tests["FM3"].problem)
-    assert tests["FM4"].stopped_at == 20
+    assert "1 of 10 runs failed" in str(tests["FM3"].problem)
+    assert tests["FM4"].stopped_at == 10
     study.run(Engine())  # what failed is tried again
     assert not any(test.problem for test in verdicts_of(study).values())
 
@@ -227,7 +262,7 @@ def test_wrong_verdicts_over_all_looks_are_bounded(model: str) -> None:
 def noise(seed: int) -> Numbers:
     """Return errors of 60 seeds, of variance 1, which cancel out at every look."""
     drawn = np.random.default_rng(seed).uniform(-math.sqrt(3.0), math.sqrt(3.0), 60)
-    return np.concatenate([part - part.mean() for part in np.split(drawn, [20, 30, 40, 50])])
+    return np.concatenate([part - part.mean() for part in np.split(drawn, [10, 20, 30, 40, 50])])
 
 
 P_O = 100.0 + noise(0)
@@ -261,19 +296,19 @@ def family(most: int, p_f: dict[str, Numbers]) -> tuple[dict[str, Verdict], Engi
 
 def test_every_step_of_holm_at_a_look_has_a_level_of_its_own() -> None:
     def p_of_r(p_f: Numbers) -> float | None:
-        return spi.robustness(P_O[:20], p_f, n=100, m=1).p_value
+        return spi.robustness(P_O[:10], p_f, n=100, m=1).p_value
 
     def sampled(seed: int) -> Sampled:
-        return lambda scatter: P_O[:20] + 25.0 + scatter * noise(seed)[:20]
+        return lambda scatter: P_O[:10] + 25.0 + scatter * noise(seed)[:10]
 
     # Below 0.05, 0.05 / 2 and 0.05 / 3; in the plan the largest comes first.
     wanted = {"FM2": 0.042, "FM3": 0.021, "FM4": 0.012}
     found, _ = family(
-        20, {mode: with_p(p_of_r, sampled(n), p) for n, (mode, p) in enumerate(wanted.items(), 1)}
+        10, {mode: with_p(p_of_r, sampled(n), p) for n, (mode, p) in enumerate(wanted.items(), 1)}
     )
     assert {
         mode: (test.on_threshold.adjusted, test.stopped_at) for mode, test in found.items()
-    } == dict.fromkeys(wanted, ("supported", 20))
+    } == dict.fromkeys(wanted, ("supported", 10))
 
 
 @pytest.mark.parametrize(
@@ -308,10 +343,22 @@ def test_equivalences_step_down_too_each_at_the_level_of_its_own_look(
     } == equivalent
 
 
+def test_predictive_power_is_the_share_of_studies_that_the_last_look_decides() -> None:
+    rng, n_seeds, most, alpha = np.random.default_rng(0), 20, 60, 0.01
+    p = 0.05
+    # A flat prior: the mean is that of the seeds so far, with their error.
+    first = norm.isf(p) * math.sqrt(n_seeds)
+    mean = rng.normal(first / n_seeds, 1.0 / math.sqrt(n_seeds), 200_000)
+    rest = rng.normal(mean * (most - n_seeds), math.sqrt(most - n_seeds))
+    decided = (first + rest) / math.sqrt(most) > norm.isf(alpha)
+    assert predictive_power(p, n_seeds, most, alpha) == pytest.approx(decided.mean(), abs=0.005)
+    assert predictive_power(p, most, most, alpha) == 0.0
+
+
 def test_a_comparison_of_the_same_runs_stops_at_the_first_look() -> None:
     found, engine = family(60, {"FM2": P_O})
-    assert (found["FM2"].on_threshold.adjusted, found["FM2"].stopped_at) == ("unaffected", 20)
-    assert len(engine.played) == 40
+    assert (found["FM2"].on_threshold.adjusted, found["FM2"].stopped_at) == ("unaffected", 10)
+    assert len(engine.played) == 20
 
 
 def test_all_seeds_after_looks_were_declared_are_exploratory(tmp_path: Path) -> None:
