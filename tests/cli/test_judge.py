@@ -144,7 +144,7 @@ def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
     told = "no fault: 0 (at most 0.30 at 95 %, as none of 10 runs delivered anything)."
     assert told in " ".join(printed.split())
     assert "undefined: it delivers nothing" in printed
-    assert "80 runs played" in printed.splitlines()[-1]
+    assert "40 runs played" in printed.splitlines()[-1]
     assert "120 runs played" in command(f"{words} all --all-seeds").splitlines()[-1]
 
 
