@@ -29,6 +29,8 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
+from .layers import in_blocks, padded, run_network
+
 Width = Annotated[int, Field(ge=1, le=4096)]
 
 
@@ -128,98 +130,6 @@ class PolicyCard(_Part):
     scored_with: dict[str, str] = Field(default_factory=dict)
 
 
-@kernel
-def hyperbolic_tangent(x: np.float32) -> np.float32:
-    """Return tanh(x) to 3e-7: the rational function of Eigen's `ptanh` (float, [13/6]).
-
-    Several at once, and the same bits on every machine, which a C library does not promise.
-    """
-    x = min(max(x, np.float32(-7.9053111)), np.float32(7.9053111))
-    x2 = x * x
-    numerator = np.float32(-2.76076847742355e-16)
-    numerator = numerator * x2 + np.float32(2.00018790482477e-13)
-    numerator = numerator * x2 + np.float32(-8.60467152213735e-11)
-    numerator = numerator * x2 + np.float32(5.12229709037114e-08)
-    numerator = numerator * x2 + np.float32(1.48572235717979e-05)
-    numerator = numerator * x2 + np.float32(6.37261928875436e-04)
-    numerator = numerator * x2 + np.float32(4.89352455891786e-03)
-    denominator = np.float32(1.19825839466702e-06)
-    denominator = denominator * x2 + np.float32(1.18534705686654e-04)
-    denominator = denominator * x2 + np.float32(2.26843463243900e-03)
-    denominator = denominator * x2 + np.float32(4.89352518554385e-03)
-    return x * numerator / denominator
-
-
-@kernel
-def add_columns(
-    values: NDArray[np.float32],
-    weights: NDArray[np.float32],
-    indices: NDArray[np.int64],
-    total: NDArray[np.float32],
-) -> None:
-    """Add to `total` (n_out,) each value (n_in,) times its n_out weights, in the order of values.
-
-    Four at a time in one pass over `total`; the sums have the bits of one after the other.
-    """
-    n_out, count = len(total), 0
-    for index in range(len(values)):
-        # Most inputs are zero, because most things are not in view.
-        if values[index] != np.float32(0.0):
-            indices[count] = index
-            count += 1
-    done = 0
-    while done + 4 <= count:
-        p, q, r, s = indices[done], indices[done + 1], indices[done + 2], indices[done + 3]
-        a, b, c, d = values[p], values[q], values[r], values[s]
-        first, second = weights[p * n_out : (p + 1) * n_out], weights[q * n_out : (q + 1) * n_out]
-        third, fourth = weights[r * n_out : (r + 1) * n_out], weights[s * n_out : (s + 1) * n_out]
-        for out in range(n_out):
-            summed = total[out] + a * first[out]
-            summed += b * second[out]
-            summed += c * third[out]
-            total[out] = summed + d * fourth[out]
-        done += 4
-    for number in range(done, count):
-        index = indices[number]
-        value, column = values[index], weights[index * n_out : (index + 1) * n_out]
-        for out in range(n_out):
-            total[out] += value * column[out]
-
-
-@kernel
-def run_network(
-    inputs: NDArray[np.float32],
-    weights: NDArray[np.float32],
-    biases: NDArray[np.float32],
-    widths: NDArray[np.int64],
-    outputs: NDArray[np.float32],
-) -> None:
-    """Fill `outputs` (N, widths[-1]); layer l has widths[l] inputs.
-
-    Loops rather than numpy's matrix product, whose bits differ with the number of rows: so a
-    robot's command does not depend on how many others there are.
-    """
-    n_layers = len(widths) - 1
-    widest = widths.max()
-    layer_in, layer_out = np.empty(widest, np.float32), np.empty(widest, np.float32)
-    indices = np.empty(widest, np.int64)
-    for row in range(inputs.shape[0]):
-        layer_in[: widths[0]] = inputs[row]
-        weight, bias = 0, 0
-        for layer in range(n_layers):
-            n_in, n_out = widths[layer], widths[layer + 1]
-            total = layer_out[:n_out]
-            total[:] = biases[bias : bias + n_out]
-            add_columns(layer_in[:n_in], weights[weight : weight + n_in * n_out], indices, total)
-            weight += n_in * n_out
-            bias += n_out
-            if layer < n_layers - 1:
-                for out in range(n_out):
-                    total[out] = hyperbolic_tangent(total[out])
-            layer_in, layer_out = layer_out, layer_in
-        outputs[row] = layer_in[: widths[n_layers]]
-
-
 STREAM = "trained policy"
 
 
@@ -244,9 +154,8 @@ class LearnedPolicy:
         self.tensors = dict(tensors)
         network = card.network
         layers = range(len(network.hidden) + 1)
-        # Transposed, so that a layer's outputs, over which the inner loop runs, lie side by side.
-        self._weights = np.concatenate([tensors[f"layers.{n}.weight"].T.ravel() for n in layers])
-        self._biases = np.concatenate([tensors[f"layers.{n}.bias"] for n in layers])
+        self._weights = np.concatenate([in_blocks(tensors[f"layers.{n}.weight"].T) for n in layers])
+        self._biases = np.concatenate([padded(tensors[f"layers.{n}.bias"]) for n in layers])
         self._widths = np.array(network.widths)
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = {
@@ -278,7 +187,9 @@ class LearnedPolicy:
     def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the network's outputs (N, k) for rows of its inputs, without noise."""
         outputs = np.empty((len(inputs), self._widths[-1]), np.float32)
-        run_network(inputs, self._weights, self._biases, self._widths, outputs)
+        run_network(
+            np.ascontiguousarray(inputs), self._weights, self._biases, self._widths, outputs
+        )
         return outputs
 
 
