@@ -25,7 +25,7 @@ import typer
 from stable_baselines3.common.callbacks import BaseCallback
 from tables import ROOT, rewrite, seeds_from, table
 
-from swarm_logistics_env.motion.frame import INPUTS
+from swarm_logistics_env.motion import INPUTS
 from swarm_logistics_env.report import section
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study

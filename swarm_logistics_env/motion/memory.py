@@ -115,6 +115,7 @@ def remember_observation(
     rows: NDArray[np.float32], period: float, memories: NDArray[np.float64]
 ) -> None:
     """Take what the rows (N, D) tell into the memories, once a control period [s]."""
+    home_fades, kept_fades = math.exp(-period / HOME_TIME), math.exp(-period / KEPT_TIME)
     for robot in range(rows.shape[0]):
         sensed, memory = rows[robot], memories[robot]
         x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
@@ -134,9 +135,9 @@ def remember_observation(
             memory[STANDING], memory[CLEARING] = 0.0, CLEARING_TIME
 
         watch_walls(sensed, period, memory)
-        for column, time in ((HOME_X, HOME_TIME), (KEPT_X, KEPT_TIME)):
-            memory[column] *= math.exp(-period / time)
-            memory[column + 1] *= math.exp(-period / time)
+        for column, fades in ((HOME_X, home_fades), (KEPT_X, kept_fades)):
+            memory[column] *= fades
+            memory[column + 1] *= fades
         if is_inside != (memory[WAS_INSIDE] > 0.5) and speed > MOVES:
             inwards = 1.0 if is_inside else -1.0
             memory[HOME_X] += inwards * x / speed

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.code_files import allow_all_imports
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError, how_to_install
-from swarm_logistics_env.motion.frame import LEAD, OUTPUTS
+from swarm_logistics_env.motion.frame import OUTPUTS
+from swarm_logistics_env.motion.network_inputs import LEAD
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy

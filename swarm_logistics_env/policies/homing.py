@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.frame import MotionView, random_heading
+from swarm_logistics_env.motion.frame import MotionView
 from swarm_logistics_env.motion.memory import length_of, set_velocity
+from swarm_logistics_env.motion.network_inputs import random_heading
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -44,13 +45,13 @@ def decide_homing(
     rows: NDArray[np.float32],
     memories: NDArray[np.float64],
     keys: NDArray[np.uint64],
-    random_headings: NDArray[np.int64],
+    counts: NDArray[np.int64],
     period: float,
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4), in the robots' own frames, from rows (N, D) and memories.
 
-    `random_headings` (N,) are the numbers of the random directions in use.
+    `counts` (N,) are the decisions of each robot, this one among them.
     """
     for robot in range(rows.shape[0]):
         observation, memory = rows[robot], memories[robot]
@@ -64,7 +65,7 @@ def decide_homing(
                 gripper = LIFT
             speed = 0.0 if is_inside and gripper == LIFT else 1.0
             if memory[column.STUCK] > 0.0:
-                angle = random_heading(keys[robot], random_headings[robot])
+                angle = random_heading(keys[robot], counts[robot] - 1, period)
                 x, y = math.cos(angle), math.sin(angle)
             elif not is_inside:
                 x, y = home_direction(observation, memory, x, y)
@@ -243,8 +244,7 @@ class Homing:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
         frame = self._frame
-        headings = frame.random_headings()
-        frame.read(observations)
-        commands = np.zeros((len(observations), 4))
-        self._decide(observations, frame.memory, frame.keys, headings, self._period, commands)
-        return frame.command(frame.outputs_for(commands))
+        frame.remember(observations)
+        wanted = np.zeros((len(observations), 4))
+        self._decide(observations, frame.memory, frame.keys, frame.counts, self._period, wanted)
+        return frame.command_directions(wanted)

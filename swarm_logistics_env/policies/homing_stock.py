@@ -27,8 +27,12 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.frame import RANDOM_HEADING_TIME, random_heading
 from swarm_logistics_env.motion.memory import length_of, set_velocity
+from swarm_logistics_env.motion.network_inputs import (
+    RANDOM_HEADING_TIME,
+    random_heading,
+    random_heading_number,
+)
 from swarm_logistics_env.policies.homing import (
     AVOID_GAIN,
     AVOID_RANGE,
@@ -68,17 +72,17 @@ def decide_homing_stock(
     rows: NDArray[np.float32],
     memories: NDArray[np.float64],
     keys: NDArray[np.uint64],
-    random_headings: NDArray[np.int64],
+    counts: NDArray[np.int64],
     period: float,
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill the commands (N, 4) from rows (N, D), memories and the numbers of random headings."""
+    """Fill the commands (N, 4) from rows (N, D), memories and counts, see `decide_homing`."""
     for robot in range(rows.shape[0]):
         observation, memory = rows[robot], memories[robot]
         is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
         carries = observation[row.CARRYING] > 0.5
         carries_requested = observation[row.CARRYING_REQUESTED] > 0.5
-        role = role_of(keys[robot], random_headings[robot])
+        role = role_of(keys[robot], random_heading_number(counts[robot] - 1, period))
         holds = role < HOLDERS and memory[column.CANNOT_DELIVER] < 0.5
         forget_if_lost(memory, is_inside)
         home = column.kept_home(memory)
@@ -86,7 +90,7 @@ def decide_homing_stock(
         # A robot stands in the area to deliver: that is not to be stuck.
         is_stuck = memory[column.STUCK] > STUCK and not (is_inside and carries_requested)
         if carries and is_stuck:
-            angle = random_heading(keys[robot], random_headings[robot])
+            angle = random_heading(keys[robot], counts[robot] - 1, period)
             motion = break_free(observation, memory, home, push, angle)
         elif carries_requested:
             motion = drive_home(observation, memory, home, push, is_inside)
@@ -101,12 +105,12 @@ def decide_homing_stock(
 
 
 @kernel
-def role_of(key: np.uint64, random_heading_number: int) -> float:
+def role_of(key: np.uint64, heading_number: int) -> float:
     """Return the number in [0, 1) that decides a robot's role at present.
 
     Robots change their roles at different times.
     """
-    n_roles = random_heading_number * RANDOM_HEADING_TIME / ROLE_TIME
+    n_roles = heading_number * RANDOM_HEADING_TIME / ROLE_TIME
     role = int(n_roles + uniform(key, FIRST_ROLE))
     return uniform(key, FIRST_ROLE + 1 + role)
 

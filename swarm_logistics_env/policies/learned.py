@@ -24,7 +24,8 @@ from pydantic import (
 
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
+from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
+from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys

@@ -44,7 +44,8 @@ def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float |
     _check_power(estimate, power)
     if estimate.untestable:
         return None
-    if estimate.base is None or not _spread_limit(estimate, PLANNED_LIMIT):
+    # Without a base, nothing was delivered on one side, and no distance is small or large.
+    if not estimate.base or not _spread_limit(estimate, PLANNED_LIMIT):
         return None
     n, lowest = estimate.n_seeds, estimate.base / estimate.mean_denominator
 

@@ -26,8 +26,9 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.kernels import engine_kernel, kernel
-from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS, MotionView
+from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.motion.memory import body_of, length_of, to_frame
+from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.streams import key, row_keys

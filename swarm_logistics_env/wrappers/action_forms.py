@@ -15,7 +15,8 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import numbers_of
 from swarm_logistics_env.environment.spaces import ArrayStep
 from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.motion.frame import INPUTS, OUTPUTS
+from swarm_logistics_env.motion.frame import OUTPUTS
+from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.streams import row_keys
 
 from .wrapper import Wrapper

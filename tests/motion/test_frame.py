@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.frame import INPUTS, LEAD, MotionView
+from swarm_logistics_env.motion.frame import MotionView
+from swarm_logistics_env.motion.network_inputs import INPUTS, LEAD
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -68,13 +69,16 @@ def test_how_the_body_stands_does_not_matter() -> None:
     )
 
 
-def test_outputs_and_commands_are_each_others_inverse_within_their_limits() -> None:
+def test_commands_are_outputs_in_the_robots_own_frames_within_their_limits() -> None:
     frame, rng = frame_of(30), np.random.default_rng(0)
     frame.read(np.tile(amid(), (30, 1)))
     outputs = rng.uniform(-0.7, 0.7, (30, 3))
     commands = frame.command(outputs)
-    np.testing.assert_allclose(frame.outputs_for(commands), outputs, atol=1e-12)
     assert (commands[:, 2] == 0.0).all()
+    # In the robots' own frames they ask for the same.
+    np.testing.assert_allclose(frame.command_directions(commands), commands, atol=1e-12)
+    turned = np.exp(-1j * frame.turned) * (commands[:, 0] + 1j * commands[:, 1])
+    np.testing.assert_allclose(turned, outputs[:, 0] + 1j * outputs[:, 1], atol=1e-12)
     commands = frame.command(rng.normal(0, 9, (30, 3)))
     assert (np.hypot(commands[:, 0], commands[:, 1]) <= 1.0 + 1e-12).all()
     assert (np.abs(commands) <= 1.0 + 1e-12).all()

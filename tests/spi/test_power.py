@@ -63,6 +63,12 @@ def test_minimum_detectable_effect_is_found_in_80_percent() -> None:
     assert loss > gain > 0.0
 
 
+def test_no_effect_is_detectable_where_one_side_delivered_nothing() -> None:
+    estimate = spi.fault_tolerance([0, 1], [0, 1], [0, 0])
+    assert estimate.base == 0.0
+    assert spi.minimum_detectable_effect(estimate) is None
+
+
 def test_textbook_sample_sizes() -> None:
     # d = 0.5, two-sided .05, power .8: 34 pairs (Cohen 1988; G*Power).
     # Large samples: (1.960 + 0.842)^2 / d^2 pairs.

@@ -12,8 +12,8 @@ pytest.importorskip("stable_baselines3")
 import torch
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.motion.frame import INPUTS
 from swarm_logistics_env.motion.memory import BODY, HELD, body_of
+from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.train.learner import PRIVILEGED, NetworkView, fill_privileged, make_learner
 from swarm_logistics_env.warehouse.state import CARRIED
 

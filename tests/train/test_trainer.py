@@ -21,7 +21,7 @@ from stable_baselines3.common.callbacks import ConvertCallback
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
-from swarm_logistics_env.motion.frame import INPUTS, MotionView
+from swarm_logistics_env.motion import INPUTS, MotionView
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
 from swarm_logistics_env.train import trainer
