@@ -13,7 +13,7 @@ WITHIN_A_SECOND = 10  # periods
 
 
 class Watched:
-    """A robot that drives along x, and what its guard is told; robot 1 never has any trouble."""
+    """A robot that drives along x, and what its guard hears; robot 1 never has any trouble."""
 
     def __init__(self) -> None:
         self.guard = PoseGuard(np.array([[0.0, 0.0], [0.0, 1.0]]), np.zeros(2), PERIOD, SPEED)
