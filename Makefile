@@ -18,6 +18,7 @@ BENCHMARL := .venvs/benchmarl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
 TASKS     := .venvs/tasks
+DOTBOTS   := .venvs/dotbots
 
 INSTALLED := .venvs/lowest .venvs/newest
 
@@ -31,7 +32,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help paper paper-fit tables test quick check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks docs docs-check dist absolute-links format clean
+.PHONY: help paper paper-fit tables test quick check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -50,6 +51,7 @@ help:
 	@echo "make interop         four learners of other people's code, three trainings each (1.4 core-hours): results/interop"
 	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
+	@echo "make dotbots         bodies in the DotBots' simulator: the tests, and 20 DotBots for 20 s (half a minute, once pydotbot is installed)"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make docs-check      every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
@@ -140,6 +142,10 @@ interop-calls: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed $(RL
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py
 
+dotbots: $(DOTBOTS)/installed
+	$(DOTBOTS)/bin/python -m pytest tests/bodies/test_pose_guard.py tests/bodies/test_dotbots_bodies.py
+	$(DOTBOTS)/bin/swarm-logistics run --policy homing --preset dotbots --bodies dotbots --set duration=20
+
 # study: autodoc reads the package. -W: a warning is an error.
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python docs/generate.py
@@ -188,6 +194,8 @@ $(RLLIB)/installed: OTHERS := hypothesis pytest torch "ray[rllib]"
 # shimmy: the Gymnasium door of VMAS asks for it.
 $(TASKS)/installed: OTHERS := hypothesis pytest mpe2 rware shimmy vmas
 $(SUPERSUIT)/installed: OTHERS := hypothesis pytest supersuit
+$(DOTBOTS)/installed: EXTRAS := dotbots
+$(DOTBOTS)/installed: OTHERS := hypothesis pytest
 
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
 .venvs/lowest.txt: pyproject.toml verification/lowest.py

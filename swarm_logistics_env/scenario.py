@@ -122,7 +122,7 @@ class Scenario(Record):
     obstacle_radius: Positive = Field(0.3, description="[m], if there are any; off")
     bodies: str = Field(
         CHIPMUNK,
-        description="what moves the robots: chipmunk, the engine of the package; mujoco; "
+        description="what moves the robots: chipmunk, the engine of the package; mujoco; dotbots; "
         "package.module:Class or my.py:Class, which runs its code; chosen",
     )
 
@@ -310,5 +310,30 @@ SCENARIO_PRESETS: dict[str, Scenario] = {
         radio_loss=0.1,
         heading_drift=0.05,
         handling_time=1.0,
+    ),
+    # DotBots, third version. Published: radius (pydotbot, dotbot.sim.collisions), cruise speed and
+    # the spin at 200 mm/s a wheel (DotBot-libs, drv/steering.h). Chosen: all else; ranges are the
+    # paper's, smaller as the robots are, and so many requests that a trial has deliveries to count.
+    "dotbots": Scenario(
+        n_robots=20,
+        n_items=20,
+        warehouse_width=2.0,
+        warehouse_height=2.0,
+        delivery_width=0.4,
+        duration=120.0,
+        restock=True,
+        n_requests=5,
+        drive="differential",
+        robot_radius=0.05,
+        robot_mass=0.2,
+        max_speed=0.3,
+        max_acceleration=2.0,
+        max_turn_rate=4.9,
+        ranger_range=0.8,
+        view_range=0.4,
+        radio_range=1.6,
+        pickup_range=0.1,
+        heading_drift=0.0,
+        item_radius=0.05,
     ),
 }

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env import Scenario, Warehouse, run_episode
 from swarm_logistics_env.errors import ScenarioError
+from swarm_logistics_env.policies import load
 from swarm_logistics_env.scenario import SOURCES
 
 
@@ -90,6 +91,12 @@ def test_conditions_list_every_field_with_its_value_unit_and_source() -> None:
     assert rows["n_robots"][1] == "7 (default 25)"
     assert rows["max_speed"][1] == "1.25 (default 2)"
     assert rows["n_items"][1] == "60"
+
+
+def test_the_preset_of_dotbots_delivers_with_the_packages_own_bodies_too() -> None:
+    scenario = Scenario.preset("dotbots")
+    assert (scenario.bodies, scenario.drive, scenario.n_robots) == ("chipmunk", "differential", 20)
+    assert run_episode(scenario.replace(duration=60.0), load("homing"), seed=0).delivered > 0
 
 
 def test_presets_and_that_an_episode_has_enough_steps_for_its_duration() -> None:

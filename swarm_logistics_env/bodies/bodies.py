@@ -98,6 +98,7 @@ class Bodies(Protocol):
 # By name: module, class, and the package of which extra it needs.
 BODIES = {
     "mujoco": ("mujoco_bodies", "MujocoBodies", "mujoco"),
+    "dotbots": ("dotbots_bodies", "DotbotsBodies", "dotbots"),
 }
 
 

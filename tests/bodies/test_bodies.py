@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +156,15 @@ def test_poses_that_cannot_be_are_refused(name: str, message: str) -> None:
 def test_bodies_that_there_are_not_are_named(name: str, message: str) -> None:
     with pytest.raises(BodiesError, match=message):
         load_bodies(name)
+
+
+def test_bodies_whose_package_is_missing_say_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delitem(sys.modules, "swarm_logistics_env.bodies.dotbots_bodies", raising=False)
+    monkeypatch.setitem(sys.modules, "dotbot.dotbot_simulator", None)
+    with pytest.raises(BodiesError, match=r"bodies 'dotbots' .*pip install .*'\.\[dotbots\]'"):
+        load_bodies("dotbots")
 
 
 def test_a_world_with_other_bodies_is_not_copied_in_mid_episode() -> None:
