@@ -165,20 +165,10 @@ class Study:
             StudyError: the store or the engine cannot be used, or the store is another study's.
         """
         plan = self.plan()
-        if plan.code != (code := self.specification.played.code()):
-            raise StudyError(
-                f"this study was played under code version {plan.code}, this is "
-                f"{code}: plan it anew, and all of it runs again"
-            )
-        if plan.origin is not None:
-            raise StudyError(f"the study in {self.out} was imported: run into a new directory")
+        self._check_playable(shard)
         if engine is None or isinstance(engine, str):
             usual = "process" if (processes or 1) > 1 else "local"
             engine = engine_named(engine or usual, processes, address, run_limit)
-        if self.specification.until_clear and shard:
-            raise StudyError(
-                "shard: should not be with until_clear, where all runs decide the next"
-            )
         all_runs = self._runs(shard)
         errors: list[str | None] = []
         start, left = time.monotonic(), 0
@@ -224,6 +214,20 @@ class Study:
             gave_up=bool(left) and not (is_late or n_before or None in errors),
             changes=changed,
         )
+
+    def _check_playable(self, shard: Shard | None) -> None:
+        plan, code = self.plan(), self.specification.played.code()
+        if plan.code != code:
+            raise StudyError(
+                f"this study was played under code version {plan.code}, this is "
+                f"{code}: plan it anew, and all of it runs again"
+            )
+        if plan.origin is not None:
+            raise StudyError(f"the study in {self.out} was imported: run into a new directory")
+        if self.specification.until_clear and shard:
+            raise StudyError(
+                "shard: should not be with until_clear, where all runs decide the next"
+            )
 
     def _runs(self, shard: Shard | None) -> Sequence[Run]:
         return shard.of(self.plan().runs) if shard else self.plan().runs
