@@ -29,6 +29,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+def _changes(store: Runs, plan: Plan) -> tuple[str, ...]:
+    """Return why runs that were stored do not count any more; discard damaged ones."""
+    stored, damage = StoredStudy.of(store), store.discard_damaged()
+    changed = tuple(stored.changes(plan)) if stored and len(store) else ()
+    return (*changed, damage) if damage else changed
+
+
 class Study:
     """A study of how a swarm copes: conditions, paired seeds, indicators with their verdicts.
 
@@ -174,10 +181,7 @@ class Study:
         start, left = time.monotonic(), 0
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
-            stored = StoredStudy.of(store)
-            damage = store.discard_damaged()
-            changed = tuple(stored.changes(plan)) if stored and len(store) else ()
-            changed += (damage,) if damage else ()
+            changed = _changes(store, plan)
             note(store, plan, self._declared(store))
             n_before = len({run.key for run in all_runs} & store.succeeded())
             tried: set[str] = set()
