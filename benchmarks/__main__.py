@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from benchmarks.ours import contestants, start_up
+from benchmarks.policies import judge_answers
 from benchmarks.results import in_turns, rows, save, shown
 
 if __name__ == "__main__":
@@ -20,7 +21,7 @@ if __name__ == "__main__":
         contestant.seconds.clear()
     in_turns(found, given.repeats)
     print(f"Medians of {given.repeats} interleaved runs; N = 25 unless said\n{shown(rows(found))}")
-    seconds = start_up()
+    seconds = {**start_up(), **judge_answers()}
     for what, took in seconds.items():
         print(f"{what}: {took:.2f} s")
     if given.out:

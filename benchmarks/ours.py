@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.floor import ForceFloor, Recording, record
+from benchmarks.policies import deciders
 from benchmarks.results import Contestant
 from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 
-FLOOR, ARRAYS = "force floor", "env.step_arrays"
+FLOOR, WORLD, ARRAYS = "force floor", "Warehouse.step", "env.step_arrays"
 SENSES = "all sensors, logistics, timers"
 _STEPS, _AGENT_STEPS_OF_MANY, _WORLDS = 1000, 40_000, 8
 
@@ -37,7 +38,8 @@ def contestants() -> list[Contestant]:
     one, two = (vec_env(threads) for threads in (1, 2))
     two.base = one.name
     many = [each for n_robots in (1_000, 10_000) for each in many_robots(n_robots)]
-    return [*paths(record(Scenario(restock=True), _STEPS)), one, two, *many]
+    ways = paths(record(Scenario(restock=True), _STEPS))
+    return [*ways, *deciders(WORLD), one, two, *many]
 
 
 def paths(recording: Recording) -> Iterator[Contestant]:
@@ -68,7 +70,7 @@ def paths(recording: Recording) -> Iterator[Contestant]:
 
     for name, includes, run, base in (
         (FLOOR, "bodies alone, no sensing", floor, None),
-        ("Warehouse.step", SENSES, world, FLOOR),
+        (WORLD, SENSES, world, FLOOR),
         (ARRAYS, f"{SENSES}, rewards, ends", arrays, FLOOR),
         ("env.step", "the same, as PettingZoo's dicts", dicts, ARRAYS),
     ):
