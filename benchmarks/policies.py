@@ -51,7 +51,7 @@ def judge_answers() -> dict[str, float]:
     seconds = {}
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()
-        command = [_COMMAND, "judge", "homing", "--out", Path(folder, "judged")]
+        command = [str(_COMMAND), "judge", "homing", "--out", str(Path(folder, "judged"))]
         with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL) as judge:
             assert judge.stderr is not None
             for line in judge.stderr:
