@@ -48,7 +48,7 @@ def judge_answers() -> dict[str, float]:
 
     In an empty directory, with compiled kernels, on all cores that this process may use.
     """
-    seconds = {}
+    seconds: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:
         begin = time.perf_counter()
         command = [str(_COMMAND), "judge", "homing", "--out", str(Path(folder, "judged"))]
