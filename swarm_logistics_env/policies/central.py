@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.policies.crowd import drift, share_items
 from swarm_logistics_env.policies.planned_ground import ground_of
 from swarm_logistics_env.policies.routes import (
     BLOCKED,
@@ -34,7 +35,6 @@ PATIENCE = 2.0  # [s] without getting nearer, until another robot is sent
 STUCK = 0.6  # [s] without getting nearer, until a laden worker steps over an item
 STEP = 0.2  # [s] without its item
 DISTRUST = 30.0  # [s]
-PERSONAL_SPACE = 0.6  # [m] between centres, which waiting robots try to keep
 
 
 class Central:
@@ -93,8 +93,9 @@ class Central:
         if worker != NOBODY:
             is_idle[worker] = False
         goals = self._waiting_places(state, is_idle)
-        for robot in np.flatnonzero(is_idle).tolist():
-            goals[robot] = self._ground.point_to(state, robot, goals[robot])
+        if self._scenario.floor is not None:
+            for robot in np.flatnonzero(is_idle).tolist():
+                goals[robot] = self._ground.point_to(state, robot, goals[robot])
         gripper = np.where(state.robot_item == NOBODY, 0.0, -1.0)  # nobody hoards
         self._stock(state, is_idle, goals, gripper)
         velocity = self._drift(state, goals, worker)
@@ -127,21 +128,15 @@ class Central:
         Args:
             is_idle: which robots have no request to work on (N,).
         """
-        free = state.item_status == STORED
-        if state.requested != NOBODY:
-            free[state.requested] = False
         waits = is_idle & (self.laden_wait | (state.robot_item == NOBODY))
-        item = self._waits_under
-        item[~waits | ~free[item]] = NOBODY
-        is_taken = np.zeros(len(free), np.bool_)
-        is_taken[item[item != NOBODY]] = True
-        for robot in np.flatnonzero(waits & (item == NOBODY)).tolist():
-            candidates = np.flatnonzero(free & ~is_taken)
-            if not len(candidates):
-                break
-            item[robot] = _loneliest(state, robot, candidates, is_taken)
-            is_taken[item[robot]] = True
-        return np.where((item != NOBODY)[:, None], state.item_position[item], self._resting_places)
+        is_free = state.item_status == STORED
+        if state.requested != NOBODY:
+            is_free[state.requested] = False
+        goals = self._resting_places.copy()
+        share_items(
+            state.robot_position, state.item_position, is_free, waits, self._waits_under, goals
+        )
+        return goals
 
     # -- who -----------------------------------------------------------------------------------
 
@@ -237,7 +232,7 @@ class Central:
         if carries:
             stored = state.item_position[state.item_status == STORED]
             discs += [_discs(stored, scenario.item_radius, BLOCKED)]
-        obstacles = np.vstack(discs)
+        obstacles = np.concatenate(discs)
         obstacles[:, 2] += scenario.robot_radius + CLEARANCE
         return self._ground.costs(obstacles)
 
@@ -273,23 +268,13 @@ class Central:
         worker: int,
     ) -> NDArray[np.float64]:
         """Return velocities (N, 2), in top speeds, of robots on their way to where they wait."""
-        position = state.robot_position
-        velocity = self._towards(position, goals)
-        from_others = position[:, None] - position  # (robot, other, 2)
-        distance = np.linalg.norm(from_others, axis=2)
-        distance[:, ~state.robot_present] = np.inf
-        np.fill_diagonal(distance, np.inf)
-        push = np.clip(1.0 - distance / PERSONAL_SPACE, 0.0, None) / np.maximum(distance, 1e-6)
-        if worker != NOBODY:
-            push[:, worker] *= 3.0
-        shove = np.einsum("ij,ijk->ik", push, from_others)
-        is_at_goal = np.linalg.norm(position - goals, axis=1) < 0.1
-        # A robot that waits under an item blocks nobody whom the item does not block as well.
-        shove[is_at_goal & (self._waits_under != NOBODY)] = 0.0
-        # Pass on the right, so that two who meet get past each other.
-        velocity += shove + 0.5 * np.stack([shove[:, 1], -shove[:, 0]], axis=1)
-        norm = np.linalg.norm(velocity, axis=1, keepdims=True)
-        return np.asarray(velocity / np.maximum(norm, 1.0))
+        stride = self._scenario.max_speed * self._scenario.control_period
+        velocity = np.empty((state.n_robots, 2))
+        drift(
+            state.robot_position, state.robot_present, goals, self._waits_under, worker, stride,
+            velocity,
+        )  # fmt: skip
+        return velocity
 
     def _towards(
         self, position: NDArray[np.float64], goal: NDArray[np.float64]
@@ -306,28 +291,19 @@ class Central:
         gripper: NDArray[np.float64],
     ) -> NDArray[np.float64]:
         cosine, sine = np.cos(state.robot_heading), np.sin(state.robot_heading)
-        forward = cosine * velocity[:, 0] + sine * velocity[:, 1]
-        left = cosine * velocity[:, 1] - sine * velocity[:, 0]
-        turn = np.zeros(len(forward))
+        commands = np.empty((len(velocity), 4))
+        forward, left, turn = commands[:, 0], commands[:, 1], commands[:, 2]
+        forward[:] = cosine * velocity[:, 0] + sine * velocity[:, 1]
+        left[:] = cosine * velocity[:, 1] - sine * velocity[:, 0]
+        turn[:], commands[:, 3] = 0.0, gripper
         if self._scenario.drive == "differential":
             full_turn = self._scenario.max_turn_rate * self._scenario.control_period
-            turn = np.clip(np.arctan2(left, forward) / full_turn, -1.0, 1.0)
-            forward = np.maximum(forward, 0.0)
-            left[:] = 0.0
-        return np.stack([forward, left, turn, gripper], axis=1)
-
-
-def _loneliest(
-    state: WarehouseState, robot: int, candidates: NDArray[np.int64], is_taken: NDArray[np.bool_]
-) -> int:
-    """Return the candidate farthest from all that are taken, less half the robot's way to it."""
-    positions = state.item_position[candidates]
-    distances = np.linalg.norm(positions - state.robot_position[robot], axis=1)
-    if not is_taken.any():
-        return int(candidates[distances.argmin()])
-    gaps = np.linalg.norm(positions[:, None] - state.item_position[is_taken], axis=2).min(axis=1)
-    return int(candidates[(gaps - 0.5 * distances).argmax()])
+            turn[:] = np.clip(np.arctan2(left, forward) / full_turn, -1.0, 1.0)
+            forward[:], left[:] = np.maximum(forward, 0.0), 0.0
+        return commands
 
 
 def _discs(centres: NDArray[np.float64], radius: float, cost: float) -> NDArray[np.float64]:
-    return np.column_stack([centres, np.tile([radius, cost], (len(centres), 1))])
+    discs = np.empty((len(centres), 4))
+    discs[:, :2], discs[:, 2], discs[:, 3] = centres, radius, cost
+    return discs

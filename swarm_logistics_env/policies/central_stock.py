@@ -11,9 +11,12 @@ Only seeds from 400,000 to 400,002 were used.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.policies.central import REPLAN, Central
 from swarm_logistics_env.policies.routes import cost_to_go
 from swarm_logistics_env.scenario import Scenario
@@ -74,42 +77,56 @@ class CentralStock(Central):
         along = self._floor.along(state.item_position)
         is_far = along < self._floor.edge - ROWS[-1] - SLOT_PITCH
         room = int(is_free.sum()) + most_held - n_held
-        for robot in np.flatnonzero(is_idle & (item != NOBODY)).tolist():
-            item_position = state.item_position[item[robot]]
-            has_arrived = np.linalg.norm(item_position - position[robot]) < ARRIVAL_RADIUS
-            if room > 0 and is_far[item[robot]] and has_arrived:
-                gripper[robot] = 1.0
-                room -= 1
+        away = np.linalg.norm(state.item_position[item] - position, axis=1)
+        may_lift = is_idle & (item != NOBODY) & is_far[item] & (away < ARRIVAL_RADIUS)
+        gripper[np.flatnonzero(may_lift)[: max(room, 0)]] = 1.0
 
-        if laden.any() and state.time >= self._home_planned_at + REPLAN - 1e-6:
+        if not laden.any():
+            return
+        if state.time >= self._home_planned_at + REPLAN - 1e-6:
             unladen = state.robot_present & ~laden
             self._home_cost = self._costs_among(state, unladen, carries=True)
             holding = self._ground.holding_cells(HOLDING_DEPTH)
             self._home_cost_to_go = cost_to_go(self._home_cost, holding)
             self._home_planned_at = state.time
-        for robot in np.flatnonzero(laden).tolist():
-            gripper[robot] = 0.0
-            if self._slot[robot] == NOBODY and n_held > most_held and is_free.any():
-                distances = np.linalg.norm(slots - position[robot], axis=1)
-                self._slot[robot] = np.where(is_free, distances, np.inf).argmin()
-                is_free[self._slot[robot]] = False
-                n_held -= 1
-            x, y = position[robot].tolist()
-            goals[robot] = self._ground.point_to_hold(
-                self._home_cost, self._home_cost_to_go, x, y, HOLDING_DEPTH
-            )
-            if self._slot[robot] != NOBODY:
-                slot = slots[self._slot[robot]]
-                distance = np.linalg.norm(slot - position[robot])
-                if distance < SLOT_IN_SIGHT:
-                    goals[robot] = self._ground.point_to(state, robot, slot)
-                if distance < ARRIVAL_RADIUS:
-                    gripper[robot] = -1.0
+        for robot in np.flatnonzero(laden & (self._slot == NOBODY)).tolist():
+            if n_held <= most_held or not is_free.any():
+                break
+            distances = np.linalg.norm(slots - position[robot], axis=1)
+            self._slot[robot] = np.where(is_free, distances, np.inf).argmin()
+            is_free[self._slot[robot]] = False
+            n_held -= 1
+        gripper[laden] = 0.0
+        goals[laden] = self._ground.points_to_hold(
+            self._home_cost, self._home_cost_to_go, position[laden], HOLDING_DEPTH
+        )
+        for robot in np.flatnonzero(laden & (self._slot != NOBODY)).tolist():
+            slot = slots[self._slot[robot]]
+            distance = math.dist(slot, position[robot])
+            if distance < SLOT_IN_SIGHT:
+                goals[robot] = self._ground.point_to(state, robot, slot)
+            if distance < ARRIVAL_RADIUS:
+                gripper[robot] = -1.0
 
     def _are_free(self, state: WarehouseState, slots: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return which slots have no item and no robot on its way with one (S,)."""
-        stored = state.item_position[state.item_status == STORED]
-        distance = np.linalg.norm(slots[:, None] - stored, axis=2)
-        is_free: NDArray[np.bool_] = (distance > SLOT_RADIUS).all(axis=1)
+        is_free = np.ones(len(slots), np.bool_)
+        take_slots(slots, state.item_position, state.item_status == STORED, is_free)
         is_free[self._slot[self._slot != NOBODY]] = False
         return is_free
+
+
+@kernel
+def take_slots(
+    slots: NDArray[np.float64],
+    item_position: NDArray[np.float64],
+    is_stored: NDArray[np.bool_],
+    is_free: NDArray[np.bool_],
+) -> None:
+    """Note of each slot (S,) that it is not free if an item that is stored (M,) lies in it."""
+    for slot in range(len(slots)):
+        for item in range(len(item_position)):
+            x = slots[slot, 0] - item_position[item, 0]
+            y = slots[slot, 1] - item_position[item, 1]
+            if is_stored[item] and math.sqrt(x * x + y * y) <= SLOT_RADIUS:
+                is_free[slot] = False

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.policies.routes import CELL, costmap, lookahead
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
@@ -44,10 +45,10 @@ class Ground(Protocol):
             x, y: where the robot is [m].
         """
 
-    def point_to_hold(
-        self, cost: Numbers, far: Numbers, x: float, y: float, depth: float
-    ) -> tuple[float, float]:
-        """Return the point [m] to head for on the way to where an item is held."""
+    def points_to_hold(
+        self, cost: Numbers, far: Numbers, position: Numbers, depth: float
+    ) -> Numbers:
+        """Return the points (K, 2) [m] to head for from positions (K, 2) to hold items."""
 
     def point_to(self, state: WarehouseState, robot: int, goal: Numbers) -> Numbers:
         """Return the point (2,) [m] to head for to get to a goal (2,), whatever moves around."""
@@ -67,12 +68,35 @@ class Ground(Protocol):
         """
 
 
+@kernel
+def head_inside(
+    cost: Numbers,
+    far: Numbers,
+    position: Numbers,
+    edge: float,
+    depth: float,
+    deepest: float,
+    points: Numbers,
+) -> None:
+    """Fill the points (K, 2) [m] to head for to hold an item `depth` [m] behind the edge."""
+    for robot in range(len(position)):
+        x, y = position[robot]
+        if x >= edge:
+            points[robot, 0], points[robot, 1] = deepest, y
+        else:
+            next_x, next_y = lookahead(cost, far, x, y)
+            points[robot, 0] = next_x + (depth if next_x > edge - CELL else 0.0)
+            points[robot, 1] = next_y
+
+
 class OpenGround:
     """An empty room with a delivery area along one side."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._edge = scenario.storage_width
+        self._dock_cells: Mask = np.zeros_like(self.costs(np.zeros((0, 4))), np.bool_)
+        self._dock_cells[:, int(self._edge / CELL) :] = True
 
     def costs(self, discs: Numbers) -> Numbers:
         """Return the cost of each cell among discs."""
@@ -82,9 +106,7 @@ class OpenGround:
 
     def dock_cells(self, dock: int) -> Mask:
         """Return the cells of the delivery area."""
-        goal: Mask = np.zeros_like(self.costs(np.zeros((0, 4))), np.bool_)
-        goal[:, int(self._edge / CELL) :] = True
-        return goal
+        return self._dock_cells
 
     def holding_cells(self, depth: float) -> Mask:
         """Return the cells of the delivery area: any way into it goes on to any depth."""
@@ -99,14 +121,14 @@ class OpenGround:
         next_x, next_y = lookahead(cost, far, x, y)
         return next_x + (1.0 if next_x >= self._edge - CELL else 0.0), next_y
 
-    def point_to_hold(
-        self, cost: Numbers, far: Numbers, x: float, y: float, depth: float
-    ) -> tuple[float, float]:
-        """Return the point [m] to head for on the way to where an item is held."""
-        if x >= self._edge:
-            return min(self._edge + depth, self._scenario.warehouse_width), y
-        next_x, next_y = lookahead(cost, far, x, y)
-        return next_x + (depth if next_x > self._edge - CELL else 0.0), next_y
+    def points_to_hold(
+        self, cost: Numbers, far: Numbers, position: Numbers, depth: float
+    ) -> Numbers:
+        """Return the points (K, 2) [m] to head for from positions (K, 2) to hold items."""
+        deepest = min(self._edge + depth, self._scenario.warehouse_width)
+        points = np.empty((len(position), 2))
+        head_inside(cost, far, position, self._edge, depth, deepest, points)
+        return points
 
     def point_to(self, state: WarehouseState, robot: int, goal: Numbers) -> Numbers:
         """Return the goal, as nothing is in the way."""

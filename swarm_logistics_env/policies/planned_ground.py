@@ -105,11 +105,15 @@ class PlannedGround:
         stretch = 1.0 + ENTRY / distance if is_last and distance > 0.0 else 1.0
         return x + stretch * (next_x - x), y + stretch * (next_y - y)
 
-    def point_to_hold(
-        self, cost: Numbers, far: Numbers, x: float, y: float, depth: float
-    ) -> tuple[float, float]:
-        """Return the point [m] to head for on the way to where an item is held."""
-        return (x, y) if far[cell_at(far, x, y)] == 0.0 else lookahead(cost, far, x, y)
+    def points_to_hold(
+        self, cost: Numbers, far: Numbers, position: Numbers, depth: float
+    ) -> Numbers:
+        """Return the points (K, 2) [m] to head for from positions (K, 2) to hold items."""
+        points = position.copy()
+        for robot, (x, y) in enumerate(position.tolist()):
+            if far[cell_at(far, x, y)] != 0.0:
+                points[robot] = lookahead(cost, far, x, y)
+        return points
 
     def point_to(self, state: WarehouseState, robot: int, goal: Numbers) -> Numbers:
         """Return the point (2,) [m] to head for, around racks and obstacles."""

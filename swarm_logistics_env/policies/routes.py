@@ -55,32 +55,56 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
     # A border that no way leads through spares the sweeps a check of every neighbour.
     far = np.full((rows + 2, columns + 2), np.inf)
     far[1:-1, 1:-1] = np.where(goal, 0.0, np.inf)
-    while True:
-        has_changed = False
+    # Rows that may get cheaper: a visit that changed nothing need not be repeated until a
+    # neighbouring row has changed.
+    may_change = np.zeros(rows + 2, np.bool_)
+    for row in range(rows):
+        if goal[row].any():
+            may_change[row : row + 3] = True
+    through_others = np.empty(columns)
+    while may_change[1:-1].any():
         for order in range(4):
             for i in range(rows):
                 row = i + 1 if order % 2 == 0 else rows - i
-                for j in range(columns):
-                    column = j + 1 if order < 2 else columns - j
-                    straight = min(
-                        far[row - 1, column],
-                        far[row + 1, column],
-                        far[row, column - 1],
-                        far[row, column + 1],
-                    )
-                    aslant = min(
-                        far[row - 1, column - 1],
-                        far[row - 1, column + 1],
-                        far[row + 1, column - 1],
-                        far[row + 1, column + 1],
-                    )
-                    step = cost[row - 1, column - 1]
-                    best = min(straight + step, aslant + 1.4142135623730951 * step)
-                    if best < far[row, column] - 1e-9:
-                        far[row, column] = best
-                        has_changed = True
-        if not has_changed:
-            return far[1:-1, 1:-1].copy()
+                if may_change[row]:
+                    may_change[row] = False
+                    if cheapen_row(far, cost[row - 1], row, order < 2, through_others):
+                        may_change[row - 1 : row + 2] = True
+    return far[1:-1, 1:-1].copy()
+
+
+@kernel
+def cheapen_row(
+    far: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    row: int,
+    is_forwards: bool,
+    through_others: NDArray[np.float64],
+) -> bool:
+    """Make cells of a row as cheap as their neighbours allow; return whether one became cheaper.
+
+    Args:
+        far: the cost from each cell, with a border (rows + 2, columns + 2).
+        steps: the cost of each cell of the row (columns,).
+        through_others: scratch (columns,).
+    """
+    above, here, below = far[row - 1], far[row], far[row + 1]
+    columns = len(steps)
+    for column in range(columns):
+        straight = min(above[column + 1], below[column + 1])
+        aslant_above = min(above[column], above[column + 2])
+        aslant = min(aslant_above, min(below[column], below[column + 2]))
+        step = steps[column]
+        through_others[column] = min(straight + step, aslant + 1.4142135623730951 * step)
+    has_changed = False
+    for j in range(columns):
+        column = j if is_forwards else columns - 1 - j
+        beside = min(here[column], here[column + 2]) + steps[column]
+        best = min(through_others[column], beside)
+        if best < here[column + 1] - 1e-9:
+            here[column + 1] = best
+            has_changed = True
+    return has_changed
 
 
 @kernel

@@ -1,0 +1,139 @@
+"""How a controller that sees everything moves robots which have no request: compiled loops."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.warehouse.state import NOBODY
+
+Numbers = NDArray[np.float64]
+
+PERSONAL_SPACE = 0.6  # [m] between centres, which waiting robots try to keep
+AT_GOAL = 0.1  # [m]
+
+
+@kernel
+def drift(
+    position: Numbers,
+    present: NDArray[np.bool_],
+    goals: Numbers,
+    waits_under: NDArray[np.int64],
+    worker: int,
+    stride: float,
+    velocity: Numbers,
+) -> None:
+    """Fill velocities (N, 2), in top speeds, of robots on their way to where they wait.
+
+    Args:
+        position, goals: (N, 2) [m].
+        present: (N,).
+        waits_under: the item of each robot (N,), or `NOBODY`.
+        worker: to whom all give way; `NOBODY`: to none.
+        stride: how far a robot drives in a control period [m].
+    """
+    n_robots = len(position)
+    for robot in range(n_robots):
+        x, y = position[robot]
+        shove_x, shove_y = 0.0, 0.0
+        for other in range(n_robots):
+            from_x, from_y = x - position[other, 0], y - position[other, 1]
+            distance = math.sqrt(from_x * from_x + from_y * from_y)
+            if other == robot or not present[other] or distance >= PERSONAL_SPACE:
+                continue
+            push = (1.0 - distance / PERSONAL_SPACE) / max(distance, 1e-6)
+            if other == worker:
+                push *= 3.0
+            shove_x += push * from_x
+            shove_y += push * from_y
+        to_x, to_y = goals[robot, 0] - x, goals[robot, 1] - y
+        is_at_goal = math.sqrt(to_x * to_x + to_y * to_y) < AT_GOAL
+        # A robot that waits under an item blocks nobody whom the item does not block as well.
+        if is_at_goal and waits_under[robot] != NOBODY:
+            shove_x, shove_y = 0.0, 0.0
+        way_x, way_y = at_most_1(to_x / stride, to_y / stride)
+        # Pass on the right, so that two who meet get past each other.
+        way_x += shove_x + 0.5 * shove_y
+        way_y += shove_y + 0.5 * -shove_x
+        velocity[robot, 0], velocity[robot, 1] = at_most_1(way_x, way_y)
+
+
+@kernel
+def at_most_1(x: float, y: float) -> tuple[float, float]:
+    """Return a vector, shortened to the length 1 if it is longer."""
+    length = max(math.sqrt(x * x + y * y), 1.0)
+    return x / length, y / length
+
+
+@kernel
+def share_items(
+    position: Numbers,
+    item_position: Numbers,
+    is_free: NDArray[np.bool_],
+    waits: NDArray[np.bool_],
+    waits_under: NDArray[np.int64],
+    goals: Numbers,
+) -> None:
+    """Give every robot that waits an item to wait under, as lonely and as near as there is.
+
+    Who has one keeps it as long as it is free.
+
+    Args:
+        position: of robots (N, 2) [m]; item_position: (M, 2) [m].
+        is_free: whether an item lies there and nobody asks for it (M,).
+        waits: which robots wait (N,).
+        waits_under: the item of each robot so far (N,), or `NOBODY`; changed.
+        goals: (N, 2) [m]; of who has an item, filled with where it lies.
+    """
+    is_taken = np.zeros(len(is_free), np.bool_)
+    for robot in range(len(position)):
+        item = waits_under[robot]
+        if item != NOBODY and not (waits[robot] and is_free[item]):
+            waits_under[robot] = NOBODY
+        elif item != NOBODY:
+            is_taken[item] = True
+    for robot in range(len(position)):
+        item = waits_under[robot]
+        if item == NOBODY and waits[robot]:
+            item = loneliest(position[robot], item_position, is_free, is_taken)
+        if item != NOBODY:
+            waits_under[robot] = item
+            is_taken[item] = True
+            goals[robot] = item_position[item]
+
+
+@kernel
+def loneliest(
+    place: Numbers,
+    item_position: Numbers,
+    is_free: NDArray[np.bool_],
+    is_taken: NDArray[np.bool_],
+) -> int:
+    """Return the free item farthest from all that are taken, less half the way there from a place.
+
+    The nearest one if none is taken; `NOBODY` if none is free.
+    """
+    best, most = NOBODY, -np.inf
+    any_taken = is_taken.any()
+    for item in range(len(is_free)):
+        if not is_free[item] or is_taken[item]:
+            continue
+        x, y = item_position[item]
+        gap = np.inf if any_taken else 0.0
+        for other in range(len(is_taken)):
+            if is_taken[other]:
+                gap = min(gap, _distance(x, y, item_position[other]))
+        way = _distance(x, y, place)
+        worth = gap - 0.5 * way if any_taken else -way
+        if worth > most:
+            best, most = item, worth
+    return best
+
+
+@kernel
+def _distance(x: float, y: float, place: Numbers) -> float:
+    away_x, away_y = x - place[0], y - place[1]
+    return math.sqrt(away_x * away_x + away_y * away_y)
