@@ -88,7 +88,7 @@ QUICK := tests/warehouse/test_kinematics.py tests/questions/test_plan.py tests/v
 
 # What reaches every line of the kernels in seconds, without the compiler.
 KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py sensor_errors.py radio.py kinematics.py layout.py grid.py) \
-	$(addprefix tests/policies/test_,swarm_dt.py routes.py homing.py) tests/motion
+	$(addprefix tests/policies/test_,swarm_dt.py routes.py homing.py crowd.py layers.py learned.py) tests/motion
 
 check: $(DEV)/installed
 	$(DEV)/bin/ruff check .
