@@ -70,7 +70,10 @@ def films() -> None:
     film = Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400)
     write_film(MEDIA / "fm4.gif", film.frames(), 12.5)
     for mode in FAILURE_MODES:
-        take = Take(f"{mode}, 2 of 8", run("homing", TINY, 2, [Fault(mode, 2, onset=3.0)]))
+        # Who is late begins when the fault ends; all others fail for good.
+        onset, duration = (0.0, 12.0) if mode == "late" else (3.0, None)
+        failed = [Fault(mode, 2, onset=onset, duration=duration)]
+        take = Take(f"{mode}, 2 of 8", run("homing", TINY, 2, failed))
         film = Film([take], 30.0, speed=8.0, frame_rate=8.0, size=400)
         write_film(MEDIA / f"mode-{mode}.gif", film.frames(), 8.0)
     for name in ("swarm-dt", "homing", "homing-stock", "central", "ppo-delivery", "ppo-robust"):
