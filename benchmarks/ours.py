@@ -38,8 +38,8 @@ def contestants() -> list[Contestant]:
     one, two = (vec_env(threads) for threads in (1, 2))
     two.base = one.name
     many = [each for n_robots in (1_000, 10_000) for each in many_robots(n_robots)]
-    ways = paths(record(Scenario(restock=True), _STEPS))
-    return [*ways, *deciders(WORLD), one, two, *many]
+    one_world = paths(record(Scenario(restock=True), _STEPS))
+    return [*one_world, *deciders(WORLD), one, two, *many]
 
 
 def paths(recording: Recording) -> Iterator[Contestant]:

@@ -5,6 +5,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from benchmarks.results import Contestant
@@ -23,7 +24,7 @@ def deciders(base: str) -> Iterator[Contestant]:
         yield Contestant(
             f"policy {name}",
             "a decision of all robots",
-            lambda name=name: _seconds_of_decisions(name, scenario),  # type: ignore[misc]
+            partial(_seconds_of_decisions, name, scenario),
             scenario.n_robots * _STEPS,
             _STEPS,
             base,

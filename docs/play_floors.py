@@ -1,4 +1,4 @@
-"""How swarms scale in racks: `python docs/play_floors.py` (an hour of two cores).
+"""How swarms scale in racks: `python docs/play_floors.py` (25 minutes of two busy cores).
 
 Plays scripts and networks with 10 to 150 robots on the open floor and on the shipped plans, writes
 the tables of docs/floors.md and the picture of P over the number of robots. What is played stays

@@ -204,7 +204,7 @@ class Study:
                     self.specification.name,
                     end,
                     has_worked=bool(n_before),
-                    more=next_runs if self.specification.until_clear else tuple,
+                    more=next_runs if self.specification.until_clear else None,
                 )
         failed = [error for error in errors if error is not None]
         is_late = end is not None and time.monotonic() > end

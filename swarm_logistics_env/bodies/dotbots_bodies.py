@@ -117,10 +117,10 @@ class DotbotsBodies:
         guard = self._guard
         ahead = self._period + _FENCE_LAG + guard.age
         direction = np.column_stack([np.cos(guard.heading), np.sin(guard.heading)])
-        way = (ahead * speed)[:, None] * direction
-        end = guard.position + way
-        leaves_low = (end < _FENCE) & (way < 0.0)
-        leaves_high = (end > self._size - _FENCE) & (way > 0.0)
+        displacement = (ahead * speed)[:, None] * direction
+        end = guard.position + displacement
+        leaves_low = (end < _FENCE) & (displacement < 0.0)
+        leaves_high = (end > self._size - _FENCE) & (displacement > 0.0)
         return np.where((leaves_low | leaves_high).any(axis=1), 0.0, speed)
 
     def _send(self, speed: Numbers, turn_rate: Numbers) -> None:

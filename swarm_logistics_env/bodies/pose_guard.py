@@ -95,11 +95,11 @@ class PoseGuard:
         return np.asarray(has_pose & ~self._is_jumping, np.bool_)
 
     def _take(self, is_believed: Flags, position: Numbers, heading: Numbers) -> None:
-        way = (position - self.position)[is_believed]
+        displacement = (position - self.position)[is_believed]
         # A jump is no speed.
-        is_driven_way = np.linalg.norm(way, axis=1) <= SLACK + HASTE * self._max_speed
-        velocity = way / self.age[is_believed, None]
-        self.velocity[is_believed] = velocity * is_driven_way[:, None]
+        is_driven = np.linalg.norm(displacement, axis=1) <= SLACK + HASTE * self._max_speed
+        velocity = displacement / self.age[is_believed, None]
+        self.velocity[is_believed] = velocity * is_driven[:, None]
         self.position[is_believed] = position[is_believed]
         self.heading[is_believed] = heading[is_believed]
         self.age[is_believed] = 0.0
@@ -107,8 +107,8 @@ class PoseGuard:
     def _watch_motion(self, is_driven: Flags) -> None:
         """Count how long each was driven since its pose last changed."""
         turn = np.angle(np.exp(1j * (self.heading - self._moved_heading)))
-        way = np.linalg.norm(self.position - self._moved_position, axis=1)
-        has_moved = (way >= LEAST_WAY) | (np.abs(turn) >= LEAST_TURN)
+        distance = np.linalg.norm(self.position - self._moved_position, axis=1)
+        has_moved = (distance >= LEAST_WAY) | (np.abs(turn) >= LEAST_TURN)
         self._moved_position[has_moved] = self.position[has_moved]
         self._moved_heading[has_moved] = self.heading[has_moved]
         self._standing = np.where(has_moved, 0.0, self._standing + self._period * is_driven)

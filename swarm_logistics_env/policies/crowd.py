@@ -54,11 +54,11 @@ def drift(
         # A robot that waits under an item blocks nobody whom the item does not block as well.
         if is_at_goal and waits_under[robot] != NOBODY:
             shove_x, shove_y = 0.0, 0.0
-        way_x, way_y = at_most_1(to_x / stride, to_y / stride)
+        velocity_x, velocity_y = at_most_1(to_x / stride, to_y / stride)
         # Pass on the right, so that two who meet get past each other.
-        way_x += shove_x + 0.5 * shove_y
-        way_y += shove_y + 0.5 * -shove_x
-        velocity[robot, 0], velocity[robot, 1] = at_most_1(way_x, way_y)
+        velocity_x += shove_x + 0.5 * shove_y
+        velocity_y += shove_y + 0.5 * -shove_x
+        velocity[robot, 0], velocity[robot, 1] = at_most_1(velocity_x, velocity_y)
 
 
 @kernel
@@ -107,12 +107,12 @@ def share_items(
 
 @kernel
 def loneliest(
-    place: Numbers,
+    position: Numbers,
     item_position: Numbers,
     is_free: NDArray[np.bool_],
     is_taken: NDArray[np.bool_],
 ) -> int:
-    """Return the free item farthest from all that are taken, less half the way there from a place.
+    """Return the free item farthest from taken ones, less half its distance from a position.
 
     The nearest one if none is taken; `NOBODY` if none is free.
     """
@@ -126,14 +126,14 @@ def loneliest(
         for other in range(len(is_taken)):
             if is_taken[other]:
                 gap = min(gap, _distance(x, y, item_position[other]))
-        way = _distance(x, y, place)
-        worth = gap - 0.5 * way if any_taken else -way
+        distance = _distance(x, y, position)
+        worth = gap - 0.5 * distance if any_taken else -distance
         if worth > most:
             best, most = item, worth
     return best
 
 
 @kernel
-def _distance(x: float, y: float, place: Numbers) -> float:
-    away_x, away_y = x - place[0], y - place[1]
+def _distance(x: float, y: float, position: Numbers) -> float:
+    away_x, away_y = x - position[0], y - position[1]
     return math.sqrt(away_x * away_x + away_y * away_y)

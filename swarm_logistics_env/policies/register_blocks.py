@@ -79,9 +79,9 @@ def _in_registers(width: int) -> SumBlock:
         weights: Any, first_weight: Any, biases: Any, first_bias: Any, sums: Any, first_sum: Any,
         next_sum: Any,
     ) -> Any:  # fmt: skip
-        whole = types.int64
+        int64 = types.int64
         return types.void(
-            values, whole, whole, whole, weights, whole, biases, whole, sums, whole, whole
+            values, int64, int64, int64, weights, int64, biases, int64, sums, int64, int64
         ), generate
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -97,10 +97,10 @@ def _in_registers(width: int) -> SumBlock:
             return ir.Constant(_COUNT, value)
 
         def vectors_at(pointer: Any, first: Any) -> list[Any]:
-            places = (builder.add(first, number(_LANES * vector)) for vector in range(n_vectors))
+            indices = (builder.add(first, number(_LANES * vector)) for vector in range(n_vectors))
             return [
-                builder.bitcast(builder.gep(pointer, [place]), _VECTOR.as_pointer())
-                for place in places
+                builder.bitcast(builder.gep(pointer, [index]), _VECTOR.as_pointer())
+                for index in indices
             ]
 
         def load(pointer: Any) -> Any:

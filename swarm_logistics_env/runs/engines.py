@@ -109,12 +109,12 @@ def play(
     end: float | None = None,
     *,
     has_worked: bool = True,
-    more: Callable[[], Sequence[Run]] = tuple,
+    more: Callable[[], Sequence[Run]] | None = None,
 ) -> tuple[list[str | None], int]:
     """Play runs and keep each in the store at once; show a progress bar.
 
     Args:
-        more: what is called when all are played, and returns the runs that they make necessary.
+        more: called when all are played; returns the runs that they make necessary. None: none.
         end: when to stop (`time.monotonic`) [s]; None: when all are played.
         has_worked: whether a run of the study has succeeded. While none has, it stops as soon as
             every condition has failed, at more than one seed, in as many runs as a condition has.
@@ -122,26 +122,31 @@ def play(
     Returns:
         What each run raised, as they finished; None: it succeeded. And how many runs are left.
     """
-    queue = RunQueue(runs)
+    queue = RunQueue(runs, may_grow=more is not None)
     errors: list[str | None] = []
     failed: list[Run] = []
-    # Closed at once where this stops early, so that no worker outlives it.
-    with closing(engine(queue)) as finished, ProgressBar(title, len(runs), "runs") as progress:
-        for run, outcome in finished:
-            store.add(run, outcome)
-            errors.append(outcome.error)
-            if outcome.error is None:
-                has_worked = True
-            else:
-                failed.append(run)
-            progress.reach(len(errors), f"{len(failed)} failed")
-            if not has_worked and _is_hopeless(runs, failed):
-                break
-            if end is not None and time.monotonic() > end:
-                break
-            if len(errors) == queue.total:
-                queue.extend(more())
-                progress.extend(queue.total)
+    n_played_at_growth, goes_on = -1, True  # how many were played when others joined the queue
+    with ProgressBar(title, len(runs), "runs") as progress:
+        while goes_on and len(queue):
+            # Closed at once where this stops early, so that no worker outlives it.
+            with closing(engine(queue)) as finished:
+                for run, outcome in finished:
+                    store.add(run, outcome)
+                    errors.append(outcome.error)
+                    if outcome.error is None:
+                        has_worked = True
+                    else:
+                        failed.append(run)
+                    progress.reach(len(errors), f"{len(failed)} failed")
+                    is_late = end is not None and time.monotonic() > end
+                    if is_late or (not has_worked and _is_hopeless(runs, failed)):
+                        return errors, queue.total - len(errors)
+                    if more and len(errors) == queue.total:
+                        n_played_at_growth = len(errors)
+                        queue.extend(more())
+                        progress.extend(queue.total)
+            # An engine that took all runs at once ends when others join them: it is called again.
+            goes_on = len(errors) == n_played_at_growth
     return errors, queue.total - len(errors)
 
 

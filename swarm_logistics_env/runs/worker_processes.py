@@ -39,11 +39,13 @@ class RunQueue:
     far make necessary is played by the same workers.
 
     Attributes:
+        may_grow: whether runs may be added later.
         total: how many runs there were in all.
     """
 
-    def __init__(self, runs: Iterable[Run]) -> None:
+    def __init__(self, runs: Iterable[Run], *, may_grow: bool = False) -> None:
         self._waiting = deque[Run]()
+        self.may_grow = may_grow
         self.total = 0
         self.extend(runs)
 
@@ -124,7 +126,7 @@ def in_processes(count: int, run_limit: float, runs: Iterable[Run]) -> Played:
     with TemporaryDirectory() as reports:
         watch = _Watch(run_limit, Path(reports))
         while waiting:
-            with workers(count if waiting is runs else min(count, len(waiting))) as pool:
+            with workers(count if waiting.may_grow else min(count, len(waiting))) as pool:
                 interrupted = yield from _played(pool, waiting, count, watch)
             for run in interrupted:
                 error, died = watch.error(run), [run]

@@ -24,7 +24,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from more_itertools import map_reduce
-from scipy.stats import norm
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Comparison, Family
@@ -170,7 +169,9 @@ class _Family:
                 break
             self._stop_clear_ones(n_seeds)
             self._playing = [
-                comparison for comparison in self._open if self._may_be_clear(comparison, n_seeds)
+                comparison
+                for comparison in self._playing
+                if comparison in self._open and self._may_be_clear(comparison, n_seeds)
             ]
 
     def _is_undefined(self, comparison: Comparison) -> bool:
@@ -205,8 +206,8 @@ class _Family:
     def _may_be_clear(self, comparison: Comparison, n_seeds: int) -> bool:
         """Return whether the last look may decide a comparison that is open at this one."""
         verdict = self._verdicts[comparison]
-        if comparison not in self._playing or verdict.estimate is None:
-            return comparison in self._playing
+        if verdict.estimate is None:
+            return True
         most = self._looks.seeds[-1]
         p = verdict.estimate.p_value
         # Of both sides, that on which the value lies.
@@ -265,8 +266,10 @@ def predictive_power(p: float, n_seeds: int, most: int, alpha: float) -> float:
         n_seeds, most: seeds now and at the last look.
         alpha: level of the test at the last look, one-sided.
     """
+    from scipy.special import ndtr, ndtri
+
     if n_seeds >= most:
         return 0.0
     growth = most / n_seeds
-    expected, deviation = math.sqrt(growth) * norm.isf(p), math.sqrt(growth - 1.0)
-    return float(norm.sf((norm.isf(alpha) - expected) / deviation))
+    expected, deviation = -math.sqrt(growth) * ndtri(p), math.sqrt(growth - 1.0)
+    return float(ndtr((expected + ndtri(alpha)) / deviation))

@@ -118,9 +118,11 @@ def test_a_request_shows_the_letter_of_its_dock() -> None:
         world.state.requested_docks[:] = dock
         pictures.append(floor_of(world)[CELL * 3 : CELL * 7, CELL * 2 : CELL * 6])
     for dock, picture in enumerate(pictures):
-        own, other = (palette.dock_colours(palette.DOCK_HUES[n])[2] for n in (dock, 1 - dock))
-        assert (picture == own).all(axis=2).sum() > 15
-        assert share(picture, other) == 0.0
+        colour, colour_of_other = (
+            palette.dock_colours(palette.DOCK_HUES[n])[2] for n in (dock, 1 - dock)
+        )
+        assert (picture == colour).all(axis=2).sum() > 15
+        assert share(picture, colour_of_other) == 0.0
     any_dock = floor_of(world_of())[CELL * 3 : CELL * 7, CELL * 2 : CELL * 6]
     assert not any(share(any_dock, palette.dock_colours(hue)[2]) for hue in palette.DOCK_HUES)
 

@@ -108,6 +108,18 @@ def test_p_stands_before_the_rest_of_the_first_look_and_the_same_engine_plays_al
     assert printed.splitlines()[-1] == "After T s, 30 seeds: 1 of 3 questions are clear."
 
 
+def test_an_engine_that_takes_all_runs_at_once_is_called_again_for_the_next_look(
+    whole: tuple[Study, Engine],
+) -> None:
+    def eager(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        yield from Engine()(list(runs))
+
+    study = until_clear(60)
+    tally = study.run(eager)
+    assert (tally.played, tally.left) == (len(whole[1].played), 0)
+    assert told(study) == told(whole[0])
+
+
 def verdicts_of(study: Study) -> dict[str, Verdict]:
     return {test.after.name: test for test in study.findings().verdicts}
 
