@@ -63,7 +63,7 @@ def plus(commands: NDArray[np.float64], x: float, y: float) -> NDArray[np.float6
 @pytest.mark.compiled
 @pytest.mark.parametrize("period", [0.02, 0.2])
 def test_the_heading_diffuses_at_its_rate_whatever_the_period(period: float) -> None:
-    policy, rows = swarm(4000, period), sensing(n_robots=4000)
+    policy, rows = swarm(4000, period, diffusion=DIFFUSION), sensing(n_robots=4000)
     first = policy.act(rows)
     np.testing.assert_allclose(np.hypot(first[:, 0], first[:, 1]), 1.0)
     assert (first[:, 2:] == [0.0, 1.0]).all()
@@ -75,7 +75,7 @@ def test_the_heading_diffuses_at_its_rate_whatever_the_period(period: float) -> 
         (first[:, :2] * last[:, :2]).sum(axis=1),
     )
     # Unwrapped it has variance D t = 0.556, so the mean cosine is exp(-D t / 2).
-    assert np.cos(turned).mean() == pytest.approx(math.exp(-1.39 * 0.4 / 2), abs=0.02)
+    assert np.cos(turned).mean() == pytest.approx(math.exp(-DIFFUSION * 0.4 / 2), abs=0.02)
     assert abs(turned.mean()) < 0.06
 
 
