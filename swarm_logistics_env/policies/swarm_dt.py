@@ -62,7 +62,7 @@ class SwarmDTParameters(Record):
         0.7823, description="of an item that is not requested [1/s]; fitted"
     )
     heading_follows: bool = Field(
-        False, description="whether avoidance and taxis turn the stored heading; fitted by hand"
+        False, description="whether avoidance and taxis turn the stored heading; fitted"
     )
     full_speed: bool = Field(
         True,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Scenario
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies import SwarmDT, SwarmDTParameters, load
+from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026
 from swarm_logistics_env.scenario import SOURCES
 
 
@@ -38,13 +39,13 @@ def neighbour(x: float, y: float) -> tuple[int, list[float]]:
 
 def straight(**parameters: Any) -> SwarmDT:
     """Return a policy whose stored heading only turns for what is sensed."""
-    policy = SwarmDT(diffusion=0.0, **parameters)
+    policy = SwarmDT(**{**CONSTANTS_2026, "diffusion": 0.0, **parameters})
     policy.reset(1, 0)
     return policy
 
 
 def swarm(n_robots: int, period: float) -> SwarmDT:
-    policy = SwarmDT()
+    policy = SwarmDT(**CONSTANTS_2026)
     policy.configure(Scenario(control_period=period))
     policy.reset(n_robots, 0)
     return policy
@@ -63,7 +64,7 @@ def plus(commands: NDArray[np.float64], x: float, y: float) -> NDArray[np.float6
 @pytest.mark.compiled
 @pytest.mark.parametrize("period", [0.02, 0.2])
 def test_the_heading_diffuses_at_its_rate_whatever_the_period(period: float) -> None:
-    policy, rows = swarm(4000, period, diffusion=DIFFUSION), sensing(n_robots=4000)
+    policy, rows = swarm(4000, period), sensing(n_robots=4000)
     first = policy.act(rows)
     np.testing.assert_allclose(np.hypot(first[:, 0], first[:, 1]), 1.0)
     assert (first[:, 2:] == [0.0, 1.0]).all()
@@ -75,7 +76,7 @@ def test_the_heading_diffuses_at_its_rate_whatever_the_period(period: float) -> 
         (first[:, :2] * last[:, :2]).sum(axis=1),
     )
     # Unwrapped it has variance D t = 0.556, so the mean cosine is exp(-D t / 2).
-    assert np.cos(turned).mean() == pytest.approx(math.exp(-DIFFUSION * 0.4 / 2), abs=0.02)
+    assert np.cos(turned).mean() == pytest.approx(math.exp(-1.39 * 0.4 / 2), abs=0.02)
     assert abs(turned.mean()) < 0.06
 
 
