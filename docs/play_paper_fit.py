@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from play_fm4 import fm4_table, read_runs, runs, write_runs
 from tables import ROOT, table, with_blocks
 
-from swarm_logistics_env.policies import SwarmDT
+from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
 from swarm_logistics_env.questions.comparison import NO_FAULT, Question, Setting
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change
@@ -66,7 +66,7 @@ Samples = Mapping[str, NDArray[np.float64]]  # P over seeds
 
 def old_constants() -> dict[str, float]:
     """Return the constants of 2026, which were fitted to all tables by hand."""
-    constants: dict[str, Any] = SwarmDT().parameters.model_dump()
+    constants: dict[str, Any] = SwarmDT(**CONSTANTS_2026).parameters.model_dump()
     constants |= {"radio_range": Scenario().radio_range}
     return {name: float(constants[name]) for name in CONSTANTS}
 

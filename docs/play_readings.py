@@ -17,8 +17,8 @@ import numpy as np
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse
 from swarm_logistics_env import observations as row
+from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.warehouse import FailureMode
 
 FIRST_SEED = 3_300_000  # nothing else uses these
@@ -87,7 +87,8 @@ READINGS = (
 def delivered(number: int, n: int, n_items: int, m: int, seed: int) -> int:
     """Return how many items a swarm delivers of which `m` robots have failed."""
     _, _, mode, change, relay = READINGS[number]
-    world, policy = Warehouse(Scenario(n_robots=n, n_items=n_items, relay=relay)), SwarmDT()
+    world = Warehouse(Scenario(n_robots=n, n_items=n_items, relay=relay))
+    policy = load("swarm-dt-2026")
     rows = world.reset(seed, [Fault(mode, m)] if m else [])
     start(policy, world.scenario, seed)
     while not (world.is_over_time or world.all_delivered):

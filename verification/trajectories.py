@@ -54,7 +54,7 @@ class GoldenTrajectory(NamedTuple):
     scenario: Scenario
     faults: tuple[Fault, ...] = ()
     steps: int = 200
-    policy: str = "swarm-dt"
+    policy: str = "swarm-dt-2026"
     seed: int = 0
     events: Events = MappingProxyType({})
 
@@ -95,6 +95,7 @@ GOLDEN = {
     "long memory": _small(memory_size=5),
     "other periods": _small(control_period=0.2, physics_period=0.01, max_speed=1.0),
     "jam": _small(n_robots=30, n_items=1, steps=100),
+    "swarm-dt": _small(policy="swarm-dt"),
     "swarm-dt-follow": _small(policy="swarm-dt-follow"),
     "random-walk": _small(policy="random-walk"),
     "central": _small(policy="central"),

@@ -37,7 +37,7 @@ from swarm_logistics_env.policies.files import (
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
 from swarm_logistics_env.policies.policy import Policy, check_policy, identity_parts
-from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
 from swarm_logistics_env.records import Record, canonical_json
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
@@ -47,6 +47,7 @@ WEIGHTS = Path(__file__).parent / "weights"
 
 SCRIPTED: dict[str, Callable[..., Policy]] = {
     "swarm-dt": SwarmDT,
+    "swarm-dt-2026": functools.partial(SwarmDT, **CONSTANTS_2026),
     "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
     # This is Swarm D-T without its taxis, for ablations.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),

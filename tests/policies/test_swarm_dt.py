@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Scenario
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies import SwarmDT, SwarmDTParameters, load
+from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026
 from swarm_logistics_env.scenario import SOURCES
 
 
@@ -38,13 +39,13 @@ def neighbour(x: float, y: float) -> tuple[int, list[float]]:
 
 def straight(**parameters: Any) -> SwarmDT:
     """Return a policy whose stored heading only turns for what is sensed."""
-    policy = SwarmDT(diffusion=0.0, **parameters)
+    policy = SwarmDT(**{**CONSTANTS_2026, "diffusion": 0.0, **parameters})
     policy.reset(1, 0)
     return policy
 
 
 def swarm(n_robots: int, period: float) -> SwarmDT:
-    policy = SwarmDT()
+    policy = SwarmDT(**CONSTANTS_2026)
     policy.configure(Scenario(control_period=period))
     policy.reset(n_robots, 0)
     return policy
