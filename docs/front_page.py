@@ -89,8 +89,8 @@ paper's "deadlock" may be read (FM4_jam), it is {jam[swarm-dt].text} of `swarm-d
 * **Of {n_claims} claims of the paper's text** {sets[supported]} hold and {sets[contradicted]} \
 fail under nine in ten of [{n_sets} sets of constants](docs/research/paper_fit.md) that fit its \
 cells without faults; {sets[open]} hang on constants that it does not give. With those of \
-`swarm-dt` alone, partly fitted to all of its tables, {counts[supported]} are supported and \
-{counts[contradicted]} contradicted ({contradicted}); {counts[open]} are open, \
+`swarm-dt` alone, whose controller was fitted to no cell with failed robots, {counts[supported]} \
+are supported and {counts[contradicted]} contradicted ({contradicted}); {counts[open]} are open, \
 {counts[untestable]} are untestable.
 
 95 % intervals: {seeds[policies]} seeds ({seeds[clearing]} for times, {seeds[leans]} for slow \

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 PAGE = ROOT / "docs" / "floors.md"
 PICTURE = ROOT / "docs" / "media" / "floors-scaling.png"
 FLOORS = {"open": None, "aisles": "aisles", "two_docks": "two_docks"}
-POLICIES = ("swarm-dt", "homing", "homing-stock", "ppo-robust@all", "ppo-indicator@all")
+POLICIES = ("swarm-dt-2026", "homing", "homing-stock", "ppo-robust@all", "ppo-indicator@all")
 SIZES = (10, 25, 50, 100, 150)
 COMPARED_AT = (25, 100)
 COLLAPSED_BELOW = 0.5  # of P of the best smaller size: a run below it has collapsed

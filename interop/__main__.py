@@ -27,7 +27,7 @@ from swarm_logistics_env.train.evaluation import performances
 ROOT = RESULTS.parents[1]
 TRAININGS = range(3)
 BEST = 2  # learners that learn in the paper's world too
-REFERENCES = ("swarm-dt", "ppo-delivery")
+REFERENCES = ("swarm-dt-2026", "ppo-delivery")
 Beside = dict[str, dict[str, list[float]]]  # P of policies on the same seeds, by world and name
 
 
@@ -125,7 +125,7 @@ def table(beside: Beside) -> str:
                 name, world, f"{kept[0]['agent_steps']:,}",
                 f"{np.mean([row['cpu_minutes'] for row in kept]):.1f}",
                 bracketed(spi.mean_interval(p), 1), each_training(found),
-                f"{sum(is_clear(each, beside[world]['swarm-dt']) for each in p)} of {len(p)}",
+                f"{sum(is_clear(each, beside[world][REFERENCES[0]]) for each in p)} of {len(p)}",
                 *(robustness(p, [row["P_F"][mode] for row in kept], world) for mode in MODES),
             ))  # fmt: skip
     for world, name in product(WORLDS, REFERENCES):
