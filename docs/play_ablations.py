@@ -113,7 +113,7 @@ def train_variant(seed: int, name: str) -> None:
 def study(ablation: str) -> Study:
     """Return the study of an ablation's variants: every training over the same seeds."""
     trained = [f"{OUT / name}@all.safetensors" for name in ABLATIONS[ablation]]
-    shipped = ["ppo-robust@all", "ppo-indicator@all"] if ablation == "half-reward" else []
+    shipped = ["ppo-indicator@all"] if ablation == "half-reward" else []
     return Study(
         name=ablation,
         policies=[*shipped, *trained],
