@@ -52,6 +52,7 @@ def _cells_of(text: str, cell_size: float, robot_diameter: float) -> Floor:
         n_rows=is_solid.shape[0],
         is_solid=np.ascontiguousarray(is_solid),
         gap=np.minimum(gap, _FARTHEST).astype(np.int8),
+        solids_below=np.pad(is_solid.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0))),
         dock=np.ascontiguousarray(plan.dock),
         storage=_columns_and_rows((plan.kind == STORAGE) & plan.reachable),
         start=_columns_and_rows(plan.start_cells),
@@ -70,6 +71,7 @@ _EMPTY_ROOM = Floor(
     n_rows=0,
     is_solid=np.zeros((0, 0), np.bool_),
     gap=np.zeros((0, 0), np.int8),
+    solids_below=np.zeros((1, 1), np.int64),
     dock=np.zeros((0, 0), np.int8),
     storage=np.zeros((0, 2), np.int64),
     start=np.zeros((0, 2), np.int64),
@@ -152,15 +154,29 @@ def is_all_free(floor: Floor, x: float, y: float, reach: float) -> bool:
     return bool((floor.gap[row, column] - 1) * floor.cell >= reach)
 
 
+@inlined_kernel
+def is_free_between(floor: Floor, x: float, y: float, other_x: float, other_y: float) -> bool:
+    """Return whether no cell is solid of the rectangle of cells that two points [m] span."""
+    left = index_along(min(x, other_x), floor.cell, floor.n_columns)
+    right = index_along(max(x, other_x), floor.cell, floor.n_columns) + 1
+    bottom = index_along(min(y, other_y), floor.cell, floor.n_rows)
+    top = index_along(max(y, other_y), floor.cell, floor.n_rows) + 1
+    below = floor.solids_below
+    within = below[top, right] - below[top, left] - below[bottom, right] + below[bottom, left]
+    return bool(within == 0)
+
+
 @kernel
 def is_in_sight(world: World, x: float, y: float, other_x: float, other_y: float) -> bool:
     """Return whether no wall and no rack of the plan stands between two points [m]."""
     floor = world.floor
     if floor.n_columns == 0:
         return True
+    if is_free_between(floor, x, y, other_x, other_y):
+        return True
     to_x, to_y = other_x - x, other_y - y
     distance = math.sqrt(to_x * to_x + to_y * to_y)
-    if distance == 0.0 or is_all_free(floor, x, y, distance):
+    if distance == 0.0:
         return True
     return free_way(floor, x, y, to_x / distance, to_y / distance, distance) >= distance
 

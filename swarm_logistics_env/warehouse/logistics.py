@@ -254,14 +254,14 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
         item, square = grid.members[nearby.slot[index]], nearby.square[index]
         if world.items.status[item] != STORED or is_being_lifted(world, item):
             continue
-        position = world.items.position[item]
-        if not is_in_sight(world, x, y, position[0], position[1]):
-            continue
         is_asked_for = is_known_request(world, robot, item)
         is_first = is_asked_for and not is_best_requested
         if not is_first and (square >= best_square or is_asked_for != is_best_requested):
             continue
-        if is_asked_for or not is_remembered(robots.memory, robot, item):
+        if not is_asked_for and is_remembered(robots.memory, robot, item):
+            continue
+        position = world.items.position[item]
+        if is_in_sight(world, x, y, position[0], position[1]):
             best, best_square, is_best_requested = item, square, is_asked_for
     return best, best_square
 

@@ -173,6 +173,7 @@ class Floor(NamedTuple):
     n_rows: int  # cells along y
     is_solid: Annotated[Flags, "rows", "columns"]  # walls and racks
     gap: Annotated[Bytes, "rows", "columns"]  # cells to the nearest solid one, askew counts as 1
+    solids_below: Annotated[Integers, "rows + 1", "columns + 1"]  # solid cells of smaller numbers
     dock: Annotated[Bytes, "rows", "columns"]  # number of the dock, or NOBODY
     storage: Annotated[Integers, "cells", 2]  # column and row of each cell where items lie
     start: Annotated[Integers, "cells", 2]  # of each cell where robots start
