@@ -32,7 +32,7 @@ class SwarmDTParameters(Record):
     Where a description ends with "fitted", the default is of the fit `shipped` of
     docs/research/paper_fit.md, to the paper's cells without a failed robot. "simulator" is that of
     the paper's author, which draws the noise of the heading and the drop both once a step.
-    `CONSTANTS_2026` are the defaults before, which were fitted by hand to all of the paper's tables.
+    `CONSTANTS_2026` are those before, which were fitted by hand to all of the paper's tables.
     """
 
     error_type = PolicyError
