@@ -150,7 +150,7 @@ def test_scenario_faults_studies_policies_and_trainings_are_listed(command: Comm
 
 def test_run_prints_what_the_episode_gave(command: Command) -> None:
     told = [command(f"run --seed 1 {SMALL} --fault FM1:2@5") for _ in range(2)]
-    for words in ("P = ", " items delivered of 4 in 20 s", "seed 1", "failed robots ", "real time"):
+    for words in ("P = ", " items delivered of 4 in ", "seed 1", "failed robots ", "real time"):
         assert words in told[0]
     assert told[1].splitlines()[:-1] == told[0].splitlines()[:-1]
     # Items that come back have no number.
