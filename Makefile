@@ -32,7 +32,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help paper paper-fit tables test quick check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots docs docs-check dist absolute-links format clean
+.PHONY: help paper paper-fit tables test quick check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -52,6 +52,7 @@ help:
 	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make dotbots         bodies in the DotBots' simulator: the tests, and 20 DotBots for 20 s (half a minute, once pydotbot is installed)"
+	@echo "make bodies          how far results carry to MuJoCo and to the DotBots' simulator: the tables of docs/bodies.md (an hour of two cores)"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make docs-check      every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
@@ -141,6 +142,11 @@ interop-calls: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed $(RL
 
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py
+
+bodies: $(DEV)/installed $(DOTBOTS)/installed
+	$(DOTBOTS)/bin/python docs/play_bodies.py play
+	$(DEV)/bin/python docs/play_bodies.py play
+	$(DEV)/bin/python docs/play_bodies.py tables
 
 dotbots: $(DOTBOTS)/installed
 	$(DOTBOTS)/bin/python -m pytest tests/bodies/test_pose_guard.py tests/bodies/test_dotbots_bodies.py
