@@ -1,0 +1,179 @@
+"""How far results carry from one engine to another: `make bodies` (an hour of two cores).
+
+Plays three policies in the package's own engine, on MuJoCo's robots and in the DotBots' simulator,
+on the same seeds, and writes the tables of docs/bodies.md. `python docs/play_bodies.py play` plays
+what the packages installed beside it can, `tables` writes. What is played stays in results/bodies.
+
+Declared before the first run: an order of two policies turns if the 95 % intervals of their
+difference over seeds lie on different sides of 0.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import typer
+from tables import ROOT, rewrite, table
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.questions.comparison import NO_FAULT
+from swarm_logistics_env.report import section
+from swarm_logistics_env.scenario import CHIPMUNK, Scenario
+from swarm_logistics_env.spi.summaries import t_interval
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict
+
+PAGE = ROOT / "docs" / "bodies.md"
+POLICIES = ("swarm-dt", "homing", "ppo-robust")
+FAULTS = ({"modes": ["FM1", "FM4_jam"], "robots": [2]},)
+
+
+class World(NamedTuple):
+    """A world that two engines move: the package's own and another."""
+
+    name: str
+    scenario: Scenario
+    engine: str
+    n_seeds: int
+    faults: Sequence[Mapping[str, object]] = FAULTS
+
+    def study(self, bodies: str) -> Study:
+        """Return the study of one of the two engines."""
+        return Study(
+            name=section.slug(self.name, bodies),
+            policies=list(POLICIES),
+            seeds=self.n_seeds,
+            first_seed=560_000,
+            scenario=self.scenario.replace(bodies=bodies),
+            indicators=["R", "change"],
+            faults=list(self.faults),
+            ablations=[] if self.faults else [{"title": "policies", "policy": POLICIES[0]}],
+            out=ROOT / "results" / "bodies" / section.slug(self.name, bodies),
+        )
+
+
+_WORLD = Scenario(restock=True, duration=200.0)
+WORLDS = (
+    World("wheels", _WORLD.replace(drive="differential"), "mujoco", 10),
+    World("pushed disc", _WORLD, "mujoco", 10, faults=()),
+    World("dotbots", Scenario.preset("dotbots"), "dotbots", 5),
+)
+PACKAGES = {CHIPMUNK: "pymunk", "mujoco": "mujoco", "dotbots": "dotbot"}
+
+
+def play() -> None:
+    """Play what is missing of each engine whose package is installed."""
+    for world in WORLDS:
+        for bodies in (CHIPMUNK, world.engine):
+            if importlib.util.find_spec(PACKAGES[bodies]):
+                world.study(bodies).run(processes=len(os.sched_getaffinity(0)))
+
+
+class Results(NamedTuple):
+    """What both engines of a world say."""
+
+    world: World
+    own: StudyResults
+    other: StudyResults
+
+
+def p_rows(results: Results) -> Iterator[tuple[str, ...]]:
+    """Yield P of each policy and condition in both engines, and its change."""
+    own, other = (cells_of(study) for study in (results.own, results.other))
+    for policy, setting in own:
+        cells = own[policy, setting], other[policy, setting]
+        p = map(section.mean_p, cells)
+        yield results.world.name, f"`{policy}`", setting, *p, change_of_p(*cells)
+
+
+def change_of_p(own: Cell, other: Cell) -> str:
+    """Return by how much P changes from one engine to the other, e.g. "-20 % [-31, -8]"."""
+    try:
+        change = spi.relative_change(own.by_seed, other.by_seed)
+    except spi.IndicatorError:
+        return section.NOTHING  # nothing was delivered in the package's own engine
+    value, low, high = (100 * (number or 0.0) for number in (change.value, change.low, change.high))
+    return f"{value:+.0f} % [{low:.0f}, {high:.0f}]"
+
+
+def cells_of(results: StudyResults) -> dict[tuple[str, str], Cell]:
+    """Return the cells by policy and condition; of policies compared with the first, each once."""
+    cells = {}
+    for cell in results.cells:
+        setting = cell.arm.setting
+        is_policy = setting.kind == "policy"
+        key = (setting.name, str(NO_FAULT)) if is_policy else (cell.policy, str(setting))
+        cells[key] = cell
+    return {key: cells[key] for key in sorted(cells, key=lambda key: POLICIES.index(key[0]))}
+
+
+def r_rows(results: Results) -> Iterator[tuple[str, ...]]:
+    """Yield R of each policy and failure mode in both engines."""
+    own, other = (verdicts_of(study) for study in (results.own, results.other))
+    for policy, label in own:
+        ratios = (section.ratio(verdicts[policy, label]) for verdicts in (own, other))
+        yield results.world.name, f"`{policy}`", label, *ratios
+
+
+def verdicts_of(results: StudyResults) -> dict[tuple[str, str], Verdict]:
+    """Return the verdicts on R by policy and failure mode."""
+    return {
+        (verdict.compared.policy, verdict.compared.label): verdict
+        for verdict in results.verdicts
+        if verdict.compared.indicator == "R"
+    }
+
+
+def order_rows(results: Results) -> Iterator[tuple[str, ...]]:
+    """Yield the difference of each two policies' P without a fault in both engines."""
+    own, other = (cells_of(study) for study in (results.own, results.other))
+    for first, second in combinations(POLICIES, 2):
+        texts, sides = [], []
+        for cells in (own, other):
+            p, of_second = (cells[policy, str(NO_FAULT)].by_seed for policy in (first, second))
+            interval = t_interval(p - of_second)
+            assert interval.low is not None
+            assert interval.high is not None
+            texts.append(section.bracketed(interval, 0))
+            sides.append(int(interval.low > 0.0) - int(interval.high < 0.0))
+        words = {1: "holds", -1: "turns", 0: "open"}
+        yield results.world.name, f"`{first}` less `{second}`", *texts, words[sides[0] * sides[1]]
+
+
+def write_tables() -> None:
+    """Write the tables of docs/bodies.md from what is stored."""
+    results = [
+        Results(world, world.study(CHIPMUNK).findings(), world.study(world.engine).findings())
+        for world in WORLDS
+    ]
+    seeds = "; ".join(f"{world.name}: {world.n_seeds}" for world in WORLDS)
+    line = f"Seeds from 560,000 on, the same for both engines ({seeds}); intervals of 95 %."
+    engines = "`chipmunk`", "the other engine"
+    blocks = {
+        "bodies p": (
+            ("world", "policy", "condition", *engines, "change of P"),
+            p_rows,
+        ),
+        "bodies order": (("world", "P of", *engines, "order"), order_rows),
+        "bodies r": (("world", "policy", "R", *engines), r_rows),
+    }
+    rewrite(
+        PAGE,
+        {
+            name: table(head, [row for result in results for row in rows(result)], line)
+            for name, (head, rows) in blocks.items()
+        },
+    )
+
+
+if __name__ == "__main__":
+    app = typer.Typer()
+    app.command("play")(play)
+    app.command("tables")(write_tables)
+    app()
