@@ -39,6 +39,12 @@ def test_a_way_goes_around_a_rack() -> None:
     assert around == pytest.approx(2 * 0.5 + 2 * 0.5 + 0.25, rel=0.1)
 
 
+def test_a_way_beside_a_rack_is_that_of_its_cell() -> None:
+    floor = world_of(floor=":=A\n:=A\n:::").floor
+    middle, at_the_rack = floor.along([[0.25, 0.75], [0.45, 0.75]])
+    assert at_the_rack == middle
+
+
 def test_the_way_grows_by_what_a_robot_drives_and_so_does_the_depth() -> None:
     floor = world_of(floor="::::AAAA\n::::AAAA\n::::AAAA").floor
     x = np.linspace(0.3, 3.4, 40)

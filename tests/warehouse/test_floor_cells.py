@@ -58,6 +58,12 @@ def test_beams_stop_at_a_rack_and_hide_what_is_behind() -> None:
     assert world.observe()[0][row.RANGE_ROBOTS] == pytest.approx(1.35 - 0.125, abs=1e-3)
 
 
+def test_beams_see_a_rack_that_their_reach_just_meets() -> None:
+    world = world_of(WALLED, ranger_range=1.0, heading_drift=0.0)
+    put(world, [[0.45, 1.25]], [[0.75, 1.75]])
+    assert world.observe()[0][row.RANGE_WALLS] == pytest.approx(0.55, abs=1e-3)
+
+
 def test_cameras_and_grippers_do_not_reach_through_a_rack_but_the_radio_does() -> None:
     fields: dict[str, Any] = {"view_range": 2.0, "pickup_range": 1.0, "heading_drift": 0.0}
     world = world_of(WALLED, n_robots=2, **fields)
@@ -83,18 +89,27 @@ def test_a_robot_delivers_in_any_dock() -> None:
 def test_items_robots_and_obstacles_start_in_their_cells_and_leave_ways() -> None:
     rows = ["A" * 4 + "." * 4 + ":" * 8] * 8 + ["A" * 4 + "." * 12] * 4 + ["+" * 16] * 4
     scenario = Scenario(
-        floor="\n".join(rows), n_robots=10, n_items=20, n_obstacles=3, obstacle_radius=0.3
+        floor="\n".join(rows), n_robots=10, n_items=20, n_obstacles=4, obstacle_radius=0.3
     )
     world = Warehouse(scenario)
-    for seed in range(5):
+    for seed in range(20):
         world.reset(seed)
         state = world.state
         assert (state.robot_position[:, 1] < 2.0).all()
         assert (state.item_position[:, 0] > 4.0).all()
         assert (state.item_position[:, 1] > 4.0).all()
         centres = state.obstacle_position
-        apart = np.linalg.norm(centres[:, None] - centres, axis=2)[np.triu_indices(3, 1)]
+        apart = np.linalg.norm(centres[:, None] - centres, axis=2)[np.triu_indices(4, 1)]
         assert (apart > 2 * 0.3 + 2 * scenario.robot_radius).all()
+
+
+def test_a_robot_finds_room_above_a_small_item_beside_a_rack() -> None:
+    scenario = Scenario(floor="aisles", n_items=60, item_radius=0.05)
+    world, cells = Warehouse(scenario), floor_of(scenario)
+    for seed in range(5):
+        world.reset(seed)
+        for x, y in world.state.item_position.tolist():
+            assert not is_near_solid(cells, x, y, scenario.robot_radius - 1e-9)
 
 
 def test_what_comes_back_lies_in_storage_again() -> None:
@@ -186,6 +201,8 @@ def test_a_request_that_names_a_dock_is_delivered_in_that_dock_alone() -> None:
             for _ in range(2):
                 world.step(np.array([[0.0, 0.0, 0.0, 1.0]]))
             assert world.state.delivered - delivered == int(number == dock)
+            if number != dock:  # it carries the item, but this is no delivery area to it
+                assert not world.state.robot_in_delivery[0]
     assert set(named) == {0, 1}
 
 
