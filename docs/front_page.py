@@ -86,13 +86,13 @@ paper's "deadlock" may be read (FM4_jam), it is {jam[swarm-dt].text} of `swarm-d
 {jam[ppo-robust].text} of `ppo-robust`.
 * **Four times the robots do not deliver four times as much**: from 25 to 100 S of \
 `swarm-dt-follow` is {s[swarm-dt-follow].text}, of `homing` {s[homing].text}, of `ppo-robust` \
-{s[ppo-robust].text}; of `ppo-delivery` it is open.
+{s[ppo-robust].text}, of `ppo-delivery`, where it is open, {s[ppo-delivery].text}.
 * **Of {n_claims} claims of the paper's text** {sets[supported]} hold ({counts[untestable]} of \
 them cannot fail) and {sets[contradicted]} fail under nine in ten of [{n_sets} sets of \
-constants](docs/research/paper_fit.md) that fit its cells without faults; for {sets[open]} \
-constants or the luck of single runs decide. With those of `swarm-dt` alone {counts[supported]} \
-are supported and {counts[contradicted]} contradicted ({contradicted}); {counts[open]} are open, \
-{counts[untestable]} are untestable.
+constants](docs/research/paper_fit.md) that fit its cells without faults; {sets[open]} are \
+open: constants or the luck of single runs decide them. With those of `swarm-dt` alone \
+{counts[supported]} are supported and {counts[contradicted]} contradicted ({contradicted}); \
+{counts[open]} are open, {counts[untestable]} are untestable.
 
 95 % intervals: {seeds[policies]} seeds ({seeds[clearing]} for times, {seeds[leans]} for \
 deliveries), of networks over trainings too."""

@@ -80,7 +80,7 @@ class Results(NamedTuple):
     """What both engines of a world say."""
 
     world: World
-    own: StudyResults
+    chipmunk: StudyResults
     other: StudyResults
 
 
@@ -97,17 +97,17 @@ def results_of(world: World) -> Results:
 
 def p_rows(results: Results) -> Iterator[tuple[str, ...]]:
     """Yield P of each policy and condition in both engines, and its change."""
-    own, other = (cells_of(study) for study in (results.own, results.other))
-    for policy, setting in own:
-        cells = own[policy, setting], other[policy, setting]
+    in_chipmunk, in_other = (cells_of(study) for study in (results.chipmunk, results.other))
+    for policy, setting in in_chipmunk:
+        cells = in_chipmunk[policy, setting], in_other[policy, setting]
         p, contacts = map(section.mean_p, cells), map(contacts_text, cells)
         yield results.world.name, f"`{policy}`", setting, *p, change_of_p(*cells), *contacts
 
 
-def change_of_p(own: Cell, other: Cell) -> str:
+def change_of_p(in_chipmunk: Cell, in_other: Cell) -> str:
     """Return by how much P changes from one engine to the other, e.g. "-20 % [-31, -8]"."""
     try:
-        change = spi.relative_change(own.by_seed, other.by_seed)
+        change = spi.relative_change(in_chipmunk.by_seed, in_other.by_seed)
     except spi.IndicatorError:
         return section.NOTHING  # nothing was delivered in the package's own engine
     value, low, high = (100 * (number or 0.0) for number in (change.value, change.low, change.high))
@@ -127,9 +127,9 @@ def cells_of(results: StudyResults) -> dict[tuple[str, str], Cell]:
 
 def r_rows(results: Results) -> Iterator[tuple[str, ...]]:
     """Yield R of each policy and failure mode in both engines."""
-    own, other = (verdicts_of(study) for study in (results.own, results.other))
-    for policy, label in own:
-        ratios = (section.ratio(verdicts[policy, label]) for verdicts in (own, other))
+    in_chipmunk, in_other = (verdicts_of(study) for study in (results.chipmunk, results.other))
+    for policy, label in in_chipmunk:
+        ratios = (section.ratio(verdicts[policy, label]) for verdicts in (in_chipmunk, in_other))
         yield results.world.name, f"`{policy}`", label, *ratios
 
 
@@ -144,10 +144,10 @@ def verdicts_of(results: StudyResults) -> dict[tuple[str, str], Verdict]:
 
 def order_rows(results: Results) -> Iterator[tuple[str, ...]]:
     """Yield the difference of each two policies' P without a fault in both engines."""
-    own, other = (cells_of(study) for study in (results.own, results.other))
+    in_chipmunk, in_other = (cells_of(study) for study in (results.chipmunk, results.other))
     for first, second in combinations(POLICIES, 2):
         texts, sides = [], []
-        for cells in (own, other):
+        for cells in (in_chipmunk, in_other):
             p, of_second = (cells[policy, str(NO_FAULT)].by_seed for policy in (first, second))
             interval = t_interval(p - of_second)
             assert interval.low is not None
@@ -161,7 +161,7 @@ def order_rows(results: Results) -> Iterator[tuple[str, ...]]:
 def write_tables() -> None:
     """Write the tables of docs/bodies.md, of those worlds that are played."""
     results = [results_of(world) for world in WORLDS if is_played(world)]
-    seeds = "; ".join(f"{each.world.name}: {each.world.n_seeds}" for each in results)
+    seeds = "; ".join(f"{result.world.name}: {result.world.n_seeds}" for result in results)
     line = f"Seeds from 560,000 on, the same for both engines ({seeds}); intervals of 95 %."
     engines = "P, `chipmunk`", "P, the other engine"
     contacts = "contacts a robot-minute, `chipmunk`", "the other engine"

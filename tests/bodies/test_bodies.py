@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import math
+import random
 import sys
 from pathlib import Path
 from typing import Any
@@ -35,6 +37,27 @@ class Exact:
         self.position = self.position + self.period * velocity
         self.heading = self.heading + self.period * turn_rate
         return Poses(self.position, self.heading, velocity, np.zeros(len(forward), np.bool_))
+
+
+class Watched(Exact):
+    """Robots that do what they want, and now and then lose one; keeps what it was told."""
+
+    def place(self, placement: Placement) -> None:
+        """Begin at rest, with a stream of its own."""
+        super().place(placement)
+        self.rng = random.Random(placement.seed)
+        self.orders: list[Orders] = []
+
+    def move(self, orders: Orders) -> Poses:
+        """Move as wanted, but for robots that are lost from now on."""
+        self.orders.append(orders)
+        poses = self.poses = super().move(orders)
+        if self.rng.random() < 0.05:
+            robot = self.rng.randrange(len(orders.laden))
+            poses.lost[robot] = True
+            poses.position[robot] = math.nan
+            self.position[robot] = 0.0
+        return poses
 
 
 class LosesTheFirst(Exact):

@@ -16,12 +16,11 @@ from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.bodies import Poses
 from swarm_logistics_env.warehouse.commands import IDLE
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
-from tests.bodies.watched import Watched
+from tests.bodies.test_bodies import Watched
 from tests.verification.test_combined_faults import commands_of, planned_faults
 from verification.reference import Able, Faults, Planned
 
 STEPS = 30
-HANDLING_STEPS = 3
 Motion = list[float]  # forward and left [m/s], turn rate [rad/s]
 Pose = tuple[float, float, float]  # x, y [m], heading [rad]
 
@@ -55,10 +54,11 @@ def where_it_is(scenario: Scenario, start: list[float], heading: float, motion: 
 def worlds(draw: st.DrawFn) -> tuple[Scenario, tuple[Planned, ...], int]:
     n_robots = draw(st.integers(2, 5))
     scenario = Scenario(
-        bodies="tests.bodies.watched:Watched", n_robots=n_robots, n_items=draw(st.integers(1, 4)),
+        bodies="tests.bodies.test_bodies:Watched", n_robots=n_robots,
+        n_items=draw(st.integers(1, 4)),
         warehouse_width=2.5, warehouse_height=1.6, delivery_width=0.8, duration=STEPS * 0.1,
         restock=True, pickup_range=0.6, heading_drift=0.5, message_size=1,
-        handling_time=draw(st.sampled_from([0.0, HANDLING_STEPS * 0.1])),
+        handling_time=draw(st.sampled_from([0.0, 0.3])),
         speed_mix=draw(st.sampled_from([(1.0,), (1.0, 0.5)])),
         drive=draw(st.sampled_from(["holonomic", "differential"])),
     )  # fmt: skip
