@@ -1,9 +1,8 @@
-"""How far results carry from one engine to another: `make bodies` (half a core-hour).
+"""How far results carry from one engine to another: `make bodies` (a core-hour).
 
-Plays three policies in the package's own engine, on MuJoCo's holonomic robots and in the DotBots'
-simulator, on the same seeds, and writes the tables of docs/bodies.md. `python docs/play_bodies.py
-play` plays what the packages installed beside it can, `tables` writes. What is played stays in
-results/bodies.
+Plays three policies in the package's own engine, on MuJoCo's robots and in the DotBots' simulator,
+on the same seeds, and writes the tables of docs/bodies.md. `python docs/play_bodies.py play` plays
+what the packages installed beside it can, `tables` writes. What is played stays in results/bodies.
 
 Declared before the first run: an order of two policies turns if the 95 % intervals of their
 difference over seeds lie on different sides of 0.
@@ -61,7 +60,12 @@ class World(NamedTuple):
 
 
 _WORLD = Scenario(restock=True, duration=200.0)
+# MuJoCo's motors give 5 m/s2 at most, so the package's own engine gets no more either.
+_WHEELS = _WORLD.replace(drive="differential", max_acceleration=5.0)
+_SLOW = _WORLD.replace(drive="differential", max_speed=1.0, max_acceleration=2.0)
 WORLDS = (
+    World("wheels", _WHEELS, "mujoco", 10),
+    World("slow wheels", _SLOW, "mujoco", 10, faults=()),
     World("pushed disc", _WORLD, "mujoco", 10, faults=()),
     World("dotbots", Scenario.preset("dotbots"), "dotbots", 5),
 )

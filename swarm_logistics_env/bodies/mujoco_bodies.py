@@ -1,9 +1,10 @@
 """Robots on wheels, or on a driven planar joint, in MuJoCo.
 
 A differential robot is a chassis with two driven wheels and two casters that slide: it slips where
-friction gives way. A holonomic one slides on a plane, pushed and turned by forces, as no wheels of
-that kind are modelled. All outlines are spheres at one height, which meet as discs do. Items are no
-bodies here: one that is carried adds its mass to its robot, and robots drive through free ones.
+friction gives way. Its motors turn it first, and drive it by the torque that is left. A holonomic
+one slides on a plane, pushed and turned by forces, as no wheels of that kind are modelled. All
+outlines are spheres at one height, which meet as discs do. Items are no bodies here: one that is
+carried adds its mass to its robot, and robots drive through free ones.
 """
 
 from __future__ import annotations
@@ -24,9 +25,11 @@ _TIMESTEP = 0.005  # [s] at most
 _ITEM_MASS = 0.3  # of a robot's mass, that a carried item adds
 _WHEEL_MASS = 0.1  # of a robot's mass, in each wheel
 _WHEEL_FRICTION = 0.9  # rubber on a floor
+# [m/s2] that motors give at most, less than rubber holds, as wheels that spin do not steer.
+_STRONGEST = 5.0
 _OUTLINE_FRICTION = 0.2  # robots on each other and on walls
 # Inertia that a motor adds to its wheel, of a ring of the robot's mass; without, it is unstable.
-_ARMATURE = 0.5
+_ARMATURE = 0.1
 _ANSWER = 0.05  # [s] in which a wheel comes near its wanted speed
 _WALL = 0.05  # [m] half the thickness of a wall
 # Categories of geoms: outlines meet each other, wheels and casters the floor alone.
@@ -59,6 +62,8 @@ class MujocoBodies:
         joints = self._model.body_jntadr[self._chassis]
         self._positions = self._model.jnt_qposadr[joints]  # the first of each robot's in qpos
         self._velocities = self._model.jnt_dofadr[joints]  # and in qvel
+        wheels = self._model.actuator_trnid[:, 0].reshape(-1, 2)
+        self._wheels = self._model.jnt_dofadr[wheels]  # left and right, in qvel; none if holonomic
         self._masses = self._model.body_mass[self._chassis].copy()
         self._is_present = np.ones(scenario.n_robots, np.bool_)
         self._put(placement)
@@ -74,17 +79,10 @@ class MujocoBodies:
             self._take_out(robot)
         self._is_present = orders.present
         self._model.body_mass[self._chassis] = self._masses * (1.0 + _ITEM_MASS * orders.laden)
-        if self._scenario.is_holonomic:
-            for _ in range(self._n_substeps):
-                self._push(orders)
-                mujoco.mj_step(self._model, self._data)
-        else:
-            speed, turn_rate = orders.motion[:, 0], orders.motion[:, 2]
-            turning = 0.5 * _track(self._scenario) * turn_rate
-            wheels = self._data.ctrl.reshape(-1, 2)  # left and right [rad/s]
-            wheels[:, 0] = (speed - turning) / _wheel_radius(self._scenario)
-            wheels[:, 1] = (speed + turning) / _wheel_radius(self._scenario)
-            mujoco.mj_step(self._model, self._data, nstep=self._n_substeps)
+        drive = self._push if self._scenario.is_holonomic else self._turn_wheels
+        for _ in range(self._n_substeps):
+            drive(orders)
+            mujoco.mj_step(self._model, self._data)
         if any(warning.number for warning in self._data.warning):
             raise BodiesError(
                 f"MuJoCo became unstable after {self._data.time:.1f} s: should have a smaller "
@@ -125,6 +123,24 @@ class MujocoBodies:
         data.qfrc_applied[self._velocities + 1] = mass * acceleration[:, 1]
         data.qfrc_applied[self._velocities + 2] = inertia * turn
 
+    def _turn_wheels(self, orders: Orders) -> None:
+        """Give the motors speeds within their torque: for turning first, for driving what is left.
+
+        With both wheels at their limit, a robot that presses on a wall could not turn.
+        """
+        scenario = self._scenario
+        radius = _wheel_radius(scenario)
+        wheels = self._data.qvel[self._wheels]  # left and right [rad/s]
+        left, right = wheels.T
+        forward = orders.motion[:, 0] / radius - (right + left) / 2.0
+        turning = 0.5 * _track(scenario) * orders.motion[:, 2] / radius - (right - left) / 2.0
+        limit = _ANSWER * _greatest_acceleration(scenario) / radius  # what takes all the torque
+        turning = np.clip(turning, -limit, limit)
+        left_over = limit - np.abs(turning)
+        forward = np.clip(forward, -left_over, left_over)
+        change = np.column_stack([forward - turning, forward + turning])
+        self._data.ctrl[:] = (wheels + change).ravel()
+
     def _poses(self) -> Poses:
         data = self._data
         position = data.qpos[self._positions[:, None] + np.arange(2)]
@@ -151,6 +167,11 @@ def _wheel_radius(scenario: Scenario) -> float:
 def _track(scenario: Scenario) -> float:
     """Return how far apart the wheels are [m]."""
     return 1.4 * scenario.robot_radius
+
+
+def _greatest_acceleration(scenario: Scenario) -> float:
+    """Return what both wheels together give a robot [m/s2]."""
+    return min(scenario.max_acceleration, _STRONGEST)
 
 
 def _model(placement: Placement, timestep: float) -> Xml.Element:
@@ -211,10 +232,13 @@ def _add_wheeled(body: Xml.Element, actuators: Xml.Element, scenario: Scenario, 
     _add_geom(body, "sphere", _OUTLINE, centre, (radius,), _OUTLINE_FRICTION, chassis_mass)
     for ahead in (-0.7 * radius, 0.7 * radius):
         size = (0.9 * wheel_radius,)
-        _add_geom(body, "sphere", _FLOOR, (ahead, 0.0, -0.1 * wheel_radius), size, 0.0, 1e-3 * mass)
+        _add_geom(
+            body, "sphere", _FLOOR, (ahead, 0.0, -0.08 * wheel_radius), size, 0.0, 1e-3 * mass
+        )
     # Both wheels together give the robot its greatest acceleration, as long as they do not slip.
-    torque = 0.5 * mass * scenario.max_acceleration * wheel_radius
-    gain = 0.5 * mass * wheel_radius**2 / _ANSWER
+    inertia = (0.5 + _ARMATURE) * mass * wheel_radius**2  # that each motor moves
+    torque = inertia * _greatest_acceleration(scenario) / wheel_radius
+    gain = inertia / _ANSWER
     for side, left in (("left", 1.0), ("right", -1.0)):
         wheel = Xml.SubElement(body, "body", pos=f"0 {left * _track(scenario) / 2.0} 0")
         joint = f"robot {robot} {side}"

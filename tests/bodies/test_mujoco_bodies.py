@@ -37,7 +37,7 @@ def orders(*motions: tuple[float, float, float], laden: bool = False) -> Orders:
 
 @pytest.mark.parametrize("drive", DRIVES)
 def test_a_single_robot_goes_as_far_as_in_the_packages_own_engine(drive: str) -> None:
-    ways = {}
+    ways, starts = {}, {}
     for bodies in ("chipmunk", "mujoco"):
         scenario = Scenario.preset("dots").replace(
             drive=drive, bodies=bodies, n_robots=1, n_items=1, warehouse_width=30.0,
@@ -46,11 +46,14 @@ def test_a_single_robot_goes_as_far_as_in_the_packages_own_engine(drive: str) ->
         world = Warehouse(scenario)
         world.reset(seed=1)
         start = world.state.robot_position[0].copy()
-        for forward in [1.0] * 30 + [0.0] * 15:
+        for step, forward in enumerate([1.0] * 30 + [0.0] * 15):
             world.step([[forward, 0.0, 0.0, 0.0]])
+            if step == 3:
+                starts[bodies] = np.linalg.norm(world.state.robot_velocity[0])
         ways[bodies] = np.linalg.norm(world.state.robot_position[0] - start)
         assert np.linalg.norm(world.state.robot_velocity[0]) < 0.05
     assert ways["mujoco"] == pytest.approx(ways["chipmunk"], rel=0.05)
+    assert starts["mujoco"] == pytest.approx(starts["chipmunk"], rel=0.15)
 
 
 @pytest.mark.parametrize("drive", DRIVES)
@@ -89,15 +92,31 @@ def test_a_load_makes_a_wheeled_robot_slower_to_start() -> None:
     assert 0.6 * ways[0] < ways[1] < 0.9 * ways[0]
 
 
-def test_rubber_that_slips_bounds_the_acceleration() -> None:
+def fast_robot(x: float, heading: float) -> Any:
+    """Return the bodies of a robot with wheels of which 20 m/s2 are wanted."""
     from swarm_logistics_env.bodies.mujoco_bodies import MujocoBodies
 
-    scenario = Scenario(bodies="mujoco", drive="differential", n_robots=1)  # 20 m/s2 are wanted
-    fast = MujocoBodies()
-    start = np.array([[2.0, 5.0]])
-    fast.place(Placement(scenario, 0, start, np.zeros(1), np.zeros((0, 2)), np.zeros((0, 4))))
-    speed = float(fast.move(orders((2.0, 0.0, 0.0))).velocity[0, 0])
-    assert 0.0 < speed < 0.1 * 9.81 * 0.9 + 0.05
+    scenario = Scenario(bodies="mujoco", drive="differential", n_robots=1)
+    bodies = MujocoBodies()
+    start = np.array([[x, 5.0]]), np.array([heading])
+    bodies.place(Placement(scenario, 0, *start, np.zeros((0, 2)), np.zeros((0, 4))))
+    return bodies
+
+
+def test_no_motor_is_stronger_than_what_rubber_holds() -> None:
+    speed = float(fast_robot(2.0, 0.0).move(orders((2.0, 0.0, 0.0))).velocity[0, 0])
+    assert 0.3 < speed <= 0.1 * 5.0
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.6])
+def test_a_robot_that_presses_on_a_wall_still_turns(heading: float) -> None:
+    bodies = fast_robot(10.0 - Scenario().robot_radius, heading)
+    for _ in range(10):
+        pressing = float(bodies.move(orders((2.0, 0.0, 0.0))).heading[0])
+    assert abs(pressing - heading) < 0.1
+    for _ in range(15):
+        poses = bodies.move(orders((2.0, 0.0, 2.0)))
+    assert float(poses.heading[0]) - heading > 1.0
 
 
 def test_an_episode_is_the_same_twice_and_no_item_vanishes() -> None:
