@@ -108,6 +108,7 @@ class Watch:
         here = state.item_position[status == STORED]
         self._demand((here > 0.0) & (here < self._far), "an item lies outside")
         self._demand(self.world.floor.is_free(here), "an item lies inside a rack")
+        self._demand(np.isfinite(self.world.floor.along(here)), "no way leads to an item")
 
     def _deliveries(self) -> None:
         state, before = self.world.state, self._before

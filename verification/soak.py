@@ -2,11 +2,13 @@
 
     python -m verification.soak --minutes 10
     python -m verification.soak --first 4711 --worlds 1    # that world again
+    python -m verification.soak --plans --worlds 5000 --steps 60    # each with a floor plan
 
 Ends with 1 at the first broken promise, naming the world that shows it.
 """
 
 import contextlib
+import pickle
 import random
 import sys
 import time
@@ -30,6 +32,9 @@ from verification.invariants import BrokenPromiseError, Watch
 Steer = Callable[[Warehouse, NDArray[np.float32]], NDArray[np.float64]]
 
 POLICIES = ("swarm-dt", "swarm-dt-follow", "random-walk", "central", "anything", "crowd")
+
+
+N_COPIED = 10  # steps for which a pickled copy of a world is played beside it
 
 
 @dataclass
@@ -164,9 +169,9 @@ def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> l
     return faults
 
 
-def play(source: random.Random, steps: int, tally: Tally) -> None:
-    """Play one random world and look at it after every step."""
-    draw = some_planned_scenario if source.random() < 0.4 else some_scenario
+def play(source: random.Random, steps: int, tally: Tally, plans: bool = False) -> None:
+    """Play one random world and look at it after every step; `plans`: one with a floor plan."""
+    draw = some_planned_scenario if source.random() < 0.4 or plans else some_scenario
     scenario = draw(source)
     seconds, seed = steps * scenario.control_period, source.randrange(2**32)
     world = Warehouse(scenario)
@@ -179,13 +184,22 @@ def play(source: random.Random, steps: int, tally: Tally) -> None:
     watch = Watch(world)
     watch.look()
     steer = _steered(source.choice(POLICIES), scenario, seed)
+    copied_at, copy = source.randrange(steps), None
     try:
-        for _ in range(steps):
+        for step in range(steps):
             if source.random() < 3.0 / steps:
                 _disturb(source, world, seconds)
                 watch.faults_changed()
-            observations = world.step(steer(world, observations))
+                copy = None
+            if step == copied_at:
+                copy = pickle.loads(pickle.dumps(world))
+            elif step == copied_at + N_COPIED:
+                copy = None
+            commands = steer(world, observations)
+            observations = world.step(commands)
             watch.look()
+            if copy is not None and copy.step(commands).tobytes() != observations.tobytes():
+                raise BrokenPromiseError(f"a copy senses otherwise than its world at step {step}")
             tally.steps += 1
             if world.all_delivered:
                 break
@@ -233,15 +247,20 @@ def towards(world: Warehouse, target: NDArray[np.float64], width: int) -> NDArra
 
 
 def main(
-    minutes: float = 10.0, first: int = 0, worlds: int = sys.maxsize, steps: int = 400
+    minutes: float = 10.0,
+    first: int = 0,
+    worlds: int = sys.maxsize,
+    steps: int = 400,
+    plans: bool = False,
 ) -> None:
     """Play at most so many random worlds of so many steps until the time is over."""
     tally, until = Tally(), time.monotonic() + 60.0 * minutes
     for number in range(first, first + worlds):
         try:
-            play(random.Random(number), steps, tally)
+            play(random.Random(number), steps, tally, plans)
         except BrokenPromiseError as error:
-            again = f"python -m verification.soak --first {number} --worlds 1"
+            again = f"python -m verification.soak --first {number} --worlds 1 --steps {steps}"
+            again += " --plans" * plans
             print(f"world {number}: {error} ({again})")
             raise SystemExit(1) from None
         if time.monotonic() > until:
