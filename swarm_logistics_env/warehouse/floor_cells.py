@@ -15,16 +15,18 @@ from swarm_logistics_env.floor.floor_plan import RACK, STORAGE, merged_boxes
 from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
 from swarm_logistics_env.scenario import Scenario
 
-from .structs import NOBODY, Flags, Floor, Integers, World
+from .structs import NOBODY, Flags, Floor, Integers, Numbers, World
 
 _FARTHEST = 127  # of `Floor.gap`
+_BLOCK = 0.5  # of the beams' reach: small blocks have few boxes near, large ones need less memory
 
 
 def floor_of(scenario: Scenario) -> Floor:
     """Return the cells of a scenario's floor; worlds of the same plan share them."""
     if scenario.floor is None:
         return _EMPTY_ROOM
-    return _cells_of(scenario.floor, scenario.cell_size, 2.0 * scenario.robot_radius)
+    reach = scenario.ranger_range * max(scenario.sensing_mix)
+    return _cells_of(scenario.floor, scenario.cell_size, 2.0 * scenario.robot_radius, reach)
 
 
 def floor_map(scenario: Scenario) -> FloorMap:
@@ -36,7 +38,7 @@ def floor_map(scenario: Scenario) -> FloorMap:
 
 
 @functools.lru_cache(maxsize=64)
-def _cells_of(text: str, cell_size: float, robot_diameter: float) -> Floor:
+def _cells_of(text: str, cell_size: float, robot_diameter: float, reach: float) -> Floor:
     from scipy import ndimage  # late: an empty room needs none of scipy
 
     plan = floor_plan(text, cell_size, robot_diameter)
@@ -44,8 +46,12 @@ def _cells_of(text: str, cell_size: float, robot_diameter: float) -> Floor:
     gap = np.full(is_solid.shape, _FARTHEST)
     if is_solid.any():
         gap = np.asarray(ndimage.distance_transform_cdt(~is_solid, metric="chessboard"))
-    boxes = merged_boxes(is_solid) * cell_size
+    boxes = merged_boxes(is_solid).astype(np.float64) * cell_size
     corners = boxes[:, [0, 1, 2, 1, 2, 3, 0, 3]].reshape(-1, 2)
+    block = max(_BLOCK * reach, cell_size)
+    n_block_rows, n_block_columns = (math.ceil(n * cell_size / block) for n in is_solid.shape)
+    n_blocks = n_block_columns, n_block_rows
+    first_near, near = _boxes_near_blocks(boxes, block, n_blocks, reach)
     return Floor(
         cell=cell_size,
         n_columns=is_solid.shape[1],
@@ -58,7 +64,39 @@ def _cells_of(text: str, cell_size: float, robot_diameter: float) -> Floor:
         start=_columns_and_rows(plan.start_cells),
         n_docks=len(plan.dock_names),
         corners=np.ascontiguousarray(corners),
+        block=block,
+        n_block_columns=n_block_columns,
+        n_block_rows=n_block_rows,
+        first_near=first_near,
+        near=near,
     )
+
+
+def _boxes_near_blocks(
+    boxes: Numbers, block: float, shape: tuple[int, int], reach: float
+) -> tuple[Integers, Integers]:
+    """Return which boxes lie within `reach` [m] along x and y of each square block of the floor.
+
+    Args:
+        boxes: (n, 4) lowest x and y and highest x and y [m].
+        shape: numbers of blocks along x and y.
+
+    Returns:
+        Where the boxes of each block, row after row, begin in the second array, and the boxes.
+    """
+    n_columns, n_rows = shape
+    limits = np.array(shape) - 1
+    first = np.clip(np.floor((boxes[:, :2] - reach) / block).astype(np.int64), 0, limits)
+    last = np.clip(np.floor((boxes[:, 2:] + reach) / block).astype(np.int64), 0, limits)
+    n_wide, n_high = (last - first + 1).T
+    n_blocks = n_wide * n_high  # that each box is near to
+    box = np.repeat(np.arange(len(boxes)), n_blocks)
+    rank = np.arange(n_blocks.sum()) - np.repeat(n_blocks.cumsum() - n_blocks, n_blocks)
+    columns = first[box, 0] + rank % n_wide[box]
+    blocks = (first[box, 1] + rank // n_wide[box]) * n_columns + columns
+    order = np.argsort(blocks, kind="stable")
+    starts = np.searchsorted(blocks[order], np.arange(n_columns * n_rows + 1))
+    return starts.astype(np.int64), np.ascontiguousarray(box[order])
 
 
 def _columns_and_rows(mask: Flags) -> Integers:
@@ -77,12 +115,17 @@ _EMPTY_ROOM = Floor(
     start=np.zeros((0, 2), np.int64),
     n_docks=1,
     corners=np.zeros((0, 2)),
+    block=1.0,
+    n_block_columns=0,
+    n_block_rows=0,
+    first_near=np.zeros(1, np.int64),
+    near=np.zeros(0, np.int64),
 )
 
 
 @inlined_kernel
 def index_along(coordinate: float, cell: float, n_cells: int) -> int:
-    """Return the column of x, or the row of y; outside counts as the edge."""
+    """Return the column of x, or the row of y, of cells or blocks; outside counts as the edge."""
     return min(max(int(coordinate / cell), 0), n_cells - 1)
 
 

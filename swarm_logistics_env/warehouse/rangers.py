@@ -9,9 +9,9 @@ import numpy as np
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel, kernel
 
-from .floor_cells import free_way, is_all_free
+from .floor_cells import index_along, is_all_free
 from .pose import Pose, in_frame
-from .structs import Floor, Grid, Nearby, Sensed, World
+from .structs import Grid, Nearby, Sensed, World
 
 N_RANGES = row.RANGE_ITEMS + row.N_BEAMS  # of all scans, which come first in a row
 _N_BEAMS = row.N_BEAMS
@@ -19,6 +19,7 @@ _BEAM_X = np.cos(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
 _BEAM_Y = np.sin(2.0 * np.pi * np.arange(_N_BEAMS) / _N_BEAMS)
 # Tangents of the angles half-way between the beams of the first quarter.
 _BORDERS = tuple(math.tan((beam + 0.5) * 2.0 * math.pi / _N_BEAMS) for beam in range(_N_BEAMS // 4))
+_TINY = 1e-300
 # Beyond so many squares of its radius a disc meets only the beam nearest to its centre: it looks
 # less wide than the beams stand apart. A little more, so that rounding decides nothing.
 _ONE_BEAM = 1.001 / math.sin(math.pi / _N_BEAMS) ** 2
@@ -37,7 +38,7 @@ def scan_solids(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
     parameters, obstacles = world.parameters, world.obstacles
     scan_walls(pose, parameters.warehouse_width, parameters.warehouse_height, scan)
     if world.floor.n_columns > 0:
-        scan_cells(pose, reach, world.floor, scan)
+        scan_boxes(pose, reach, world, scan)
     radius = parameters.obstacle_radius
     for obstacle in range(len(obstacles)):
         forward, left = in_frame(pose, obstacles[obstacle, 0], obstacles[obstacle, 1])
@@ -67,24 +68,51 @@ def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
 
 
 @kernel
-def scan_cells(pose: Pose, reach: float, floor: Floor, scan: Sensed) -> None:
-    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall or a rack of the plan."""
+def scan_boxes(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
+    """Shorten the beams of `scan` (N_BEAMS,) [m] that meet a wall or a rack of the plan.
+
+    Without branches in the loops over beams (Kay and Kajiya 1986): several are one instruction.
+    """
+    floor = world.floor
     if is_all_free(floor, pose.x, pose.y, reach):
         return
+    per_x, per_y, free = world.nearby.per_x, world.nearby.per_y, world.nearby.free
     for beam in range(_N_BEAMS):
         step_x = _BEAM_X[beam] * pose.cosine - _BEAM_Y[beam] * pose.sine
         step_y = _BEAM_X[beam] * pose.sine + _BEAM_Y[beam] * pose.cosine
-        scan[beam] = free_way(floor, pose.x, pose.y, step_x, step_y, scan[beam])
+        # Along an axis it never gets farther along the other, but 0 times infinity is nothing.
+        per_x[beam] = 1.0 / (step_x if step_x != 0.0 else _TINY)
+        per_y[beam] = 1.0 / (step_y if step_y != 0.0 else _TINY)
+        free[beam] = math.inf
+    block = floor.n_block_columns * index_along(pose.y, floor.block, floor.n_block_rows)
+    block += index_along(pose.x, floor.block, floor.n_block_columns)
+    for index in range(floor.first_near[block], floor.first_near[block + 1]):
+        low = 4 * floor.near[index]
+        left, bottom = floor.corners[low, 0] - pose.x, floor.corners[low, 1] - pose.y
+        right, top = floor.corners[low + 2, 0] - pose.x, floor.corners[low + 2, 1] - pose.y
+        away_x, away_y = max(left, -right, 0.0), max(bottom, -top, 0.0)
+        if away_x * away_x + away_y * away_y > reach * reach:
+            continue
+        for beam in range(_N_BEAMS):
+            to_left, to_right = left * per_x[beam], right * per_x[beam]
+            to_bottom, to_top = bottom * per_y[beam], top * per_y[beam]
+            enters = max(min(to_left, to_right), min(to_bottom, to_top), 0.0)
+            leaves = min(max(to_left, to_right), max(to_bottom, to_top))
+            distance = enters if enters <= leaves else math.inf
+            free[beam] = min(free[beam], distance)
+    for beam in range(_N_BEAMS):
+        distance = np.float32(free[beam])
+        scan[beam] = distance if distance < scan[beam] else scan[beam]
 
 
 @inlined_kernel
 def hide_behind_solids(scans: Sensed, full: float) -> None:
     """Lengthen to `full` [m] those beams to robots and items that something solid stops before."""
-    for beam in range(_N_BEAMS):
-        wall = scans[row.RANGE_WALLS + beam]
-        for first in (row.RANGE_ROBOTS, row.RANGE_ITEMS):
-            if scans[first + beam] > wall:
-                scans[first + beam] = full
+    hidden = np.float32(full)
+    for first in (row.RANGE_ROBOTS, row.RANGE_ITEMS):
+        for beam in range(_N_BEAMS):
+            distance = scans[first + beam]
+            scans[first + beam] = hidden if distance > scans[row.RANGE_WALLS + beam] else distance
 
 
 @kernel

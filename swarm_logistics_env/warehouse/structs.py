@@ -179,6 +179,11 @@ class Floor(NamedTuple):
     start: Annotated[Integers, "cells", 2]  # of each cell where robots start
     n_docks: int
     corners: Annotated[Numbers, "4 boxes", 2]  # [m] of rectangles of solid cells, anticlockwise
+    block: float  # side of a block of floor [m]
+    n_block_columns: int  # blocks along x
+    n_block_rows: int  # blocks along y
+    first_near: Annotated[Integers, "blocks + 1"]  # where each block's boxes begin in `near`
+    near: Annotated[Integers, "boxes near blocks"]  # boxes that beams from a block may meet
 
 
 class Nearby(NamedTuple):
@@ -198,6 +203,9 @@ class Nearby(NamedTuple):
     scanned_square: Annotated[Numbers, "nearby"]  # [m^2]
     beam: Annotated[Integers, "nearby"]  # that looks nearest to its centre
     distance: Annotated[Numbers, "nearby"]  # [m] where that beam meets it, infinite if it does not
+    per_x: Annotated[Numbers, "beams"]  # how far a beam goes until it is 1 m farther along x
+    per_y: Annotated[Numbers, "beams"]  # and along y
+    free: Annotated[Numbers, "beams"]  # [m] of the beams until they meet a box
 
 
 class Claims(NamedTuple):

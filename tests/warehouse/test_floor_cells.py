@@ -18,6 +18,8 @@ from swarm_logistics_env.warehouse.floor_cells import (
     is_in_sight,
     is_near_solid,
 )
+from swarm_logistics_env.warehouse.pose import Pose
+from swarm_logistics_env.warehouse.rangers import scan_boxes
 from swarm_logistics_env.warehouse.state import NOBODY
 
 
@@ -157,6 +159,28 @@ def test_a_ray_goes_as_far_as_fine_steps_find_floor(
     end = points[min(np.searchsorted(along, distance + 2e-3), len(along) - 1)]
     if distance < reach - 1e-2 and distance < first - 1e-3:
         assert is_near_solid(cells, float(end[0]), float(end[1]), 5e-3)
+
+
+@pytest.mark.parametrize("floor", ["aisles", "two_docks", "bottleneck", "large", "noise"])
+@pytest.mark.parametrize("reach", [0.4, 3.0])
+def test_beams_meet_what_rays_meet_cell_after_cell(floor: str, reach: float) -> None:
+    rng = np.random.default_rng(5)
+    if floor == "noise":
+        signs = np.where(rng.random((30, 40)) < 0.05, "=", ":")
+        signs[:, :4] = "A"
+        floor = "\n".join("".join(line) for line in signs.tolist())
+    world = world_of(floor, ranger_range=reach)
+    sides = world.scenario.warehouse_width, world.scenario.warehouse_height
+    points = rng.uniform((0.0, 0.0), sides, (400, 2))
+    beams = 2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS
+    for x, y in points[world.floor.is_free(points)].tolist():
+        heading = rng.uniform(-np.pi, np.pi)
+        pose = Pose(x, y, np.cos(heading), np.sin(heading))
+        scan = np.full(row.N_BEAMS, reach, np.float32)
+        scan_boxes(pose, reach, world._world, scan)
+        steps = np.column_stack([np.cos(beams + heading), np.sin(beams + heading)])
+        rays = [free_way(world._world.floor, x, y, dx, dy, reach) for dx, dy in steps.tolist()]
+        assert scan == pytest.approx(rays, abs=1e-6)
 
 
 def test_sight_is_the_same_from_both_ends() -> None:
