@@ -1,8 +1,9 @@
-"""How swarms scale in racks: `python docs/play_floors.py` (25 minutes of two busy cores).
+"""How swarms scale in racks, and how they bear narrower aisles: `python docs/play_floors.py`.
 
-Plays scripts and networks with 10 to 150 robots on the open floor and on the shipped plans, writes
-the tables of docs/floors.md and the picture of P over the number of robots. What is played stays
-in results/floors, and the same command goes on after an interruption.
+Plays scripts and networks with 10 to 150 robots on the open floor and on the shipped plans, and
+with 10 and 25 in halls that differ in the width of their aisles; writes the tables of
+docs/floors.md and the picture of P over the number of robots. What is played stays in
+results/floors, and the same command goes on after an interruption.
 
 Declared before the first run: a run collapses if it delivers less than half of what the same policy
 delivers on the same floor at the best of the smaller sizes, on average. Of two policies the order
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest, ttest_ind
 from tables import ROOT, rewrite, seeds_from, table
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
@@ -34,25 +36,44 @@ if TYPE_CHECKING:
 PAGE = ROOT / "docs" / "floors.md"
 PICTURE = ROOT / "docs" / "media" / "floors-scaling.png"
 FLOORS = {"open": None, "aisles": "aisles", "two_docks": "two_docks"}
-POLICIES = ("swarm-dt-2026", "homing", "homing-stock", "ppo-robust@all", "ppo-indicator@all")
+POLICIES = ("swarm-dt", "homing", "homing-stock", "ppo-robust@all", "ppo-indicator@all")
 SIZES = (10, 25, 50, 100, 150)
 COMPARED_AT = (25, 100)
+# Aisles between racks of 0.5 m in a hall of 10 m x 10 m; the shipped plan has 1 m.
+WIDTHS = (1.0, 0.75, 1.5, 2.0)  # [m], the reference first
+SIZES_IN_WIDTHS = (10, 25)
 COLLAPSED_BELOW = 0.5  # of P of the best smaller size: a run below it has collapsed
 Results = Mapping[str, StudyResults]  # by floor
 Numbers = NDArray[np.float64]
 
 
-def study(floor: str) -> Study:
+def study(name: str, scenario: Scenario, sizes: Sequence[int] = SIZES) -> Study:
     """Return the study of one floor."""
     return Study(
-        name=floor,
+        name=name,
         policies=list(POLICIES),
         seeds=6,
         first_seed=540_000,
-        scenario=Scenario(floor=FLOORS[floor], restock=True, duration=200.0),
-        sizes=[{"values": SIZES}],
-        out=ROOT / "results" / "floors" / floor,
+        scenario=scenario,
+        sizes=[{"values": sizes}],
+        out=ROOT / "results" / "floors" / name,
     )
+
+
+def scenario_on(floor: str | None, cell_size: float = 0.5) -> Scenario:
+    """Return the world of a floor with cells of that side [m]."""
+    return Scenario(floor=floor, cell_size=cell_size, restock=True, duration=200.0)
+
+
+def hall(width: float) -> Scenario:
+    """Return the world of the plan `aisles` with other aisles: as many racks as its storage has."""
+    cell = 0.25  # [m]
+    aisle, rack, free, dock = ":" * round(width / cell), "=" * 2, "." * 8, "A" * 8
+    racks = (aisle + rack) * 24
+    between = ":" * 24 + free + dock
+    through = racks[: 24 // len(aisle + rack) * len(aisle + rack)].ljust(24, ":") + free + dock
+    rows = [between] * 4 + [through] * 14 + [between] * 4 + [through] * 14 + [between] * 4
+    return scenario_on("\n".join(rows), cell_size=cell)
 
 
 def cells_of(results: StudyResults) -> dict[tuple[str, int], Cell]:
@@ -145,6 +166,26 @@ def turns_block(results: Results) -> str:
     return table(("P of", "N", *FLOORS), rows, line)
 
 
+def adaptability_block(results: Mapping[float, StudyResults]) -> str:
+    """Return P in aisles of each width and A from the first width to each other."""
+    cells = {width: cells_of(of_width) for width, of_width in results.items()}
+    reference, *others = WIDTHS
+    rows: list[tuple[str, ...]] = []
+    for n, policy in product(SIZES_IN_WIDTHS, results[reference].policies):
+        p_o, p_new = cells[reference][policy, n], {x: cells[x][policy, n] for x in others}
+        a = (
+            spi.adaptability(p_o.by_seed, p_new[x].by_seed, x_o=reference, x_new=x) for x in others
+        )
+        means = (section.mean_p(cell) for cell in (p_o, *p_new.values()))
+        rows.append((str(n), f"`{policy}`", *means, *(section.bracketed(each, 2) for each in a)))
+    return table(
+        ("N", "policy", *(f"P, {x:g} m" for x in WIDTHS), *(f"A, {x:g} m" for x in others)),
+        rows,
+        f"Mean P in 200 s, and A from aisles of {reference:g} m to others, with 95 % intervals; "
+        f"{seeds_from(results[reference])}, of each training; restock.",
+    )
+
+
 def side(interval: tuple[float, float]) -> int:
     """Return on which side of 0 an interval lies; 0: on both."""
     low, high = interval
@@ -171,21 +212,28 @@ def draw(results: Results) -> None:
     figure.savefig(PICTURE, dpi=130)
 
 
+def played(of_floor: Study) -> StudyResults:
+    """Play what is missing of a study; return what its runs say."""
+    of_floor.run(processes=len(os.sched_getaffinity(0)))
+    return of_floor.findings()
+
+
 def main() -> None:
     """Play what is missing, then write tables and picture."""
-    results: dict[str, StudyResults] = {}
-    for floor in FLOORS:
-        of_floor = study(floor)
-        of_floor.run(processes=len(os.sched_getaffinity(0)))
-        results[floor] = of_floor.findings()
+    results = {name: played(study(name, scenario_on(floor))) for name, floor in FLOORS.items()}
     draw(results)
+    in_widths = {
+        width: played(study(f"aisles-{width:g}-m", hall(width), SIZES_IN_WIDTHS))
+        for width in WIDTHS
+    }
     blocks = {
         "floors p": p_block,
         "floors s": scalability_block,
         "floors collapses": collapses_block,
         "floors turns": turns_block,
     }
-    rewrite(PAGE, {name: block(results) for name, block in blocks.items()})
+    tables = {name: block(results) for name, block in blocks.items()}
+    rewrite(PAGE, {**tables, "floors a": adaptability_block(in_widths)})
 
 
 if __name__ == "__main__":
