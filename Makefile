@@ -190,6 +190,9 @@ clean:
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
 $(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,mujoco,onnx
+# The simulator of DotBots, without what it needs elsewhere: two packages of that install a package `tests`, which hides ours.
+$(DEV)/installed: OTHERS := pyserial structlog toml "wasmtime>=49,<55"
+$(DEV)/installed: BARE := "pydotbot>=0.33,<0.34" pydotbot-utils
 $(STUDY)/installed: EXTRAS := study
 $(NEWER)/installed: EXTRAS := study
 $(NEWER)/installed: OTHERS := hypothesis pytest
@@ -232,4 +235,5 @@ $(CANARY)/installed: OTHERS := hypothesis pytest
 .venvs/%/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venvs/$*
 	.venvs/$*/bin/python -m pip install --constraint constraints.txt --editable ".$(EXTRAS:%=[%])" $(OTHERS)
+	$(if $(BARE),.venvs/$*/bin/python -m pip install --no-deps $(BARE))
 	@touch $@

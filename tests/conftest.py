@@ -39,9 +39,7 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
     """Import all modules before the tests, so that their lines count whichever test comes first."""
     if session.config.getoption("--cov", None):
         for module in pkgutil.walk_packages(swarm_logistics_env.__path__, "swarm_logistics_env."):
-            # pydotbot has an environment of its own, see the Makefile.
-            if module.name != "swarm_logistics_env.bodies.dotbots_bodies":
-                importlib.import_module(module.name)
+            importlib.import_module(module.name)
     with _uncovered():
         return (yield)
 

@@ -1,7 +1,4 @@
-"""DotBots in their simulator: they go where they are sent, and who cannot be followed is stopped.
-
-They need pydotbot, which has an environment of its own: `make dotbots`.
-"""
+"""DotBots in their simulator: they go where they are sent, and who cannot be followed is stopped."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from swarm_logistics_env.bodies import Orders, Placement, Poses, load_bodies
 from swarm_logistics_env.errors import BodiesError
 from swarm_logistics_env.policies import load
 
-pytest.importorskip("dotbot", reason="needs the extra dotbots: make dotbots")
+pytest.importorskip("dotbot", reason="needs the extra dotbots")
 ROOM = Scenario.preset("dotbots").replace(bodies="dotbots", n_robots=2, n_items=2, n_requests=1)
 
 
