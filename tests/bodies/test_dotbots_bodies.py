@@ -1,4 +1,4 @@
-"""DotBots in their simulator: they go where they are sent, and who cannot be followed is stopped."""
+"""DotBots in their simulator: they go where they are sent; who cannot be followed is stopped."""
 
 from __future__ import annotations
 
