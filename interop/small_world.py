@@ -41,7 +41,7 @@ N_WORLDS = {"small": 12, "paper": 5}
 SEEDS = range(700_000, 700_020)  # of the row: no training and no curve has them
 CURVE_SEEDS = range(600_000, 600_004)
 POINTS = 16  # of a curve
-MODES = ("FM1", "FM2", "FM3", "FM4")  # that the recipe `robust` trains with
+MODES = ("FM1", "FM2", "FM3", "FM4", "FM4_jam")  # that the recipe `robust` trains with
 FAULTY = 3  # robots that fail
 
 Tensors = Mapping[str, NDArray[np.float32]]
