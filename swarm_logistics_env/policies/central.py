@@ -15,15 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.policies.crowd import drift, share_items
+from swarm_logistics_env.policies.crowd import at_most_1, commands_of, drift, share_items
 from swarm_logistics_env.policies.planned_ground import ground_of
 from swarm_logistics_env.policies.routes import (
-    BLOCKED,
     CELL,
-    CLEARANCE,
-    CROWDED,
     cell_at,
     cost_to_go,
+    discs_among,
     lookahead,
 )
 from swarm_logistics_env.scenario import Scenario
@@ -227,14 +225,13 @@ class Central:
     ) -> NDArray[np.float64]:
         """Return the cost of each cell among `robots`, for one that carries an item or not."""
         scenario = self._scenario
-        discs = [_discs(state.robot_position[robots], scenario.robot_radius, CROWDED)]
-        discs += [_discs(state.obstacle_position, scenario.obstacle_radius, BLOCKED)]
-        if carries:
-            stored = state.item_position[state.item_status == STORED]
-            discs += [_discs(stored, scenario.item_radius, BLOCKED)]
-        obstacles = np.concatenate(discs)
-        obstacles[:, 2] += scenario.robot_radius + CLEARANCE
-        return self._ground.costs(obstacles)
+        is_stored = state.item_status == STORED
+        discs = discs_among(
+            state.robot_position, robots, scenario.robot_radius,
+            state.obstacle_position, scenario.obstacle_radius,
+            state.item_position, is_stored & carries, scenario.item_radius,
+        )  # fmt: skip
+        return self._ground.costs(discs)
 
     def _step_over(
         self,
@@ -280,9 +277,9 @@ class Central:
         self, position: NDArray[np.float64], goal: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return the velocity, in top speeds, to be at the goal in one control step if it can."""
-        velocity = (goal - position) / (self._scenario.max_speed * self._scenario.control_period)
-        speed = np.linalg.norm(velocity, axis=-1, keepdims=True)
-        return np.asarray(velocity / np.maximum(speed, 1.0))
+        stride = self._scenario.max_speed * self._scenario.control_period
+        x, y = ((goal - position) / stride).tolist()
+        return np.array(at_most_1(x, y))
 
     def _steer(
         self,
@@ -290,20 +287,11 @@ class Central:
         velocity: NDArray[np.float64],
         gripper: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        cosine, sine = np.cos(state.robot_heading), np.sin(state.robot_heading)
-        commands = np.empty((len(velocity), 4))
-        forward, left, turn = commands[:, 0], commands[:, 1], commands[:, 2]
-        forward[:] = cosine * velocity[:, 0] + sine * velocity[:, 1]
-        left[:] = cosine * velocity[:, 1] - sine * velocity[:, 0]
-        turn[:], commands[:, 3] = 0.0, gripper
+        heading = state.robot_heading
+        commands = commands_of(velocity, np.cos(heading), np.sin(heading), gripper)
         if self._scenario.drive == "differential":
+            forward, left, turn = commands[:, 0], commands[:, 1], commands[:, 2]
             full_turn = self._scenario.max_turn_rate * self._scenario.control_period
             turn[:] = np.clip(np.arctan2(left, forward) / full_turn, -1.0, 1.0)
             forward[:], left[:] = np.maximum(forward, 0.0), 0.0
         return commands
-
-
-def _discs(centres: NDArray[np.float64], radius: float, cost: float) -> NDArray[np.float64]:
-    discs = np.empty((len(centres), 4))
-    discs[:, :2], discs[:, 2], discs[:, 3] = centres, radius, cost
-    return discs

@@ -32,6 +32,8 @@ SLOT_IN_SIGHT = 1.0  # from here on a robot drives straight to its slot
 ARRIVAL_RADIUS = 0.1
 HOLDING_DEPTH = 0.4  # of robots that hold items, in the area
 
+Numbers = NDArray[np.float64]
+
 
 class CentralStock(Central):
     """Central control that takes items to the delivery area before anybody asks; needs the state.
@@ -60,8 +62,8 @@ class CentralStock(Central):
         self,
         state: WarehouseState,
         is_idle: NDArray[np.bool_],
-        goals: NDArray[np.float64],
-        gripper: NDArray[np.float64],
+        goals: Numbers,
+        gripper: Numbers,
     ) -> None:
         """Let waiting robots lift items, and laden ones take theirs to a slot or hold it inside."""
         position = state.robot_position
@@ -69,17 +71,16 @@ class CentralStock(Central):
         laden = is_idle & (state.robot_item != NOBODY) & (state.robot_item != state.requested)
         self._slot[~laden] = NOBODY
         slots = self._slots
-        is_free = self._are_free(state, slots)
+        is_free = free_slots(slots, state.item_position, state.item_status == STORED, self._slot)
         most_held = int(HELD_SHARE * state.n_robots)
         n_held = int((laden & (self._slot == NOBODY)).sum())
 
-        item = self._waits_under
         along = self._floor.along(state.item_position)
         is_far = along < self._floor.edge - ROWS[-1] - SLOT_PITCH
         room = int(is_free.sum()) + most_held - n_held
-        away = np.linalg.norm(state.item_position[item] - position, axis=1)
-        may_lift = is_idle & (item != NOBODY) & is_far[item] & (away < ARRIVAL_RADIUS)
-        gripper[np.flatnonzero(may_lift)[: max(room, 0)]] = 1.0
+        lift_far_items(
+            position, state.item_position, is_far, self._waits_under, is_idle, room, gripper
+        )
 
         if not laden.any():
             return
@@ -89,44 +90,102 @@ class CentralStock(Central):
             holding = self._ground.holding_cells(HOLDING_DEPTH)
             self._home_cost_to_go = cost_to_go(self._home_cost, holding)
             self._home_planned_at = state.time
-        for robot in np.flatnonzero(laden & (self._slot == NOBODY)).tolist():
-            if n_held <= most_held or not is_free.any():
-                break
-            distances = np.linalg.norm(slots - position[robot], axis=1)
-            self._slot[robot] = np.where(is_free, distances, np.inf).argmin()
-            is_free[self._slot[robot]] = False
-            n_held -= 1
+        send_to_slots(position, laden, slots, n_held - most_held, is_free, self._slot)
         gripper[laden] = 0.0
         goals[laden] = self._ground.points_to_hold(
             self._home_cost, self._home_cost_to_go, position[laden], HOLDING_DEPTH
         )
-        for robot in np.flatnonzero(laden & (self._slot != NOBODY)).tolist():
-            slot = slots[self._slot[robot]]
-            distance = math.dist(slot, position[robot])
-            if distance < SLOT_IN_SIGHT:
-                goals[robot] = self._ground.point_to(state, robot, slot)
-            if distance < ARRIVAL_RADIUS:
-                gripper[robot] = -1.0
-
-    def _are_free(self, state: WarehouseState, slots: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which slots have no item and no robot on its way with one (S,)."""
-        is_free = np.ones(len(slots), np.bool_)
-        take_slots(slots, state.item_position, state.item_status == STORED, is_free)
-        is_free[self._slot[self._slot != NOBODY]] = False
-        return is_free
+        away = ways_to_slots(position, slots, self._slot)
+        for robot in np.flatnonzero(away < SLOT_IN_SIGHT).tolist():
+            goals[robot] = self._ground.point_to(state, robot, slots[self._slot[robot]])
+        gripper[away < ARRIVAL_RADIUS] = -1.0
 
 
 @kernel
-def take_slots(
-    slots: NDArray[np.float64],
-    item_position: NDArray[np.float64],
-    is_stored: NDArray[np.bool_],
-    is_free: NDArray[np.bool_],
+def lift_far_items(
+    position: Numbers,
+    item_position: Numbers,
+    is_far: NDArray[np.bool_],
+    waits_under: NDArray[np.int64],
+    is_idle: NDArray[np.bool_],
+    most: int,
+    gripper: Numbers,
 ) -> None:
-    """Note of each slot (S,) that it is not free if an item that is stored (M,) lies in it."""
-    for slot in range(len(slots)):
+    """Close the grippers (N,) of at most so many idle robots under items far from a dock."""
+    n_lifting = 0
+    for robot in range(len(position)):
+        item = waits_under[robot]
+        if n_lifting >= most or not is_idle[robot] or item == NOBODY or not is_far[item]:
+            continue
+        x, y = item_position[item] - position[robot]
+        if math.sqrt(x * x + y * y) < ARRIVAL_RADIUS:
+            gripper[robot] = 1.0
+            n_lifting += 1
+
+
+@kernel
+def send_to_slots(
+    position: Numbers,
+    laden: NDArray[np.bool_],
+    slots: Numbers,
+    most: int,
+    is_free: NDArray[np.bool_],
+    slot: NDArray[np.int64],
+) -> None:
+    """Send at most so many laden robots without a slot to the nearest free slots (S, 2) [m].
+
+    Args:
+        is_free: which slots are (S,); changed.
+        slot: of each robot (N,), or `NOBODY`; changed.
+    """
+    n_sent = 0
+    for robot in range(len(position)):
+        if n_sent >= most:
+            return
+        if not laden[robot] or slot[robot] != NOBODY:
+            continue
+        nearest, least = NOBODY, math.inf
+        for number in range(len(slots)):
+            x, y = slots[number] - position[robot]
+            distance = math.sqrt(x * x + y * y)
+            if is_free[number] and distance < least:
+                nearest, least = number, distance
+        if nearest == NOBODY:
+            return
+        slot[robot] = nearest
+        is_free[nearest] = False
+        n_sent += 1
+
+
+@kernel
+def ways_to_slots(position: Numbers, slots: Numbers, slot: NDArray[np.int64]) -> Numbers:
+    """Return how far each robot is from its slot (N,) [m]; infinite if it has none."""
+    away = np.full(len(position), np.inf)
+    for robot in range(len(position)):
+        if slot[robot] != NOBODY:
+            x, y = slots[slot[robot]] - position[robot]
+            away[robot] = math.sqrt(x * x + y * y)
+    return away
+
+
+@kernel
+def free_slots(
+    slots: Numbers, item_position: Numbers, is_stored: NDArray[np.bool_], slot: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Return which slots (S, 2) [m] have no item in them and no robot on its way with one (S,).
+
+    Args:
+        item_position, is_stored: of each item (M, 2) [m], (M,).
+        slot: to which each robot is on its way (N,), or `NOBODY`.
+    """
+    is_free = np.ones(len(slots), np.bool_)
+    for number in range(len(slots)):
         for item in range(len(item_position)):
-            x = slots[slot, 0] - item_position[item, 0]
-            y = slots[slot, 1] - item_position[item, 1]
+            x = slots[number, 0] - item_position[item, 0]
+            y = slots[number, 1] - item_position[item, 1]
             if is_stored[item] and math.sqrt(x * x + y * y) <= SLOT_RADIUS:
-                is_free[slot] = False
+                is_free[number] = False
+    for robot in range(len(slot)):
+        if slot[robot] != NOBODY:
+            is_free[slot[robot]] = False
+    return is_free

@@ -62,6 +62,33 @@ def drift(
 
 
 @kernel
+def distances(position: Numbers, goal: Numbers) -> Numbers:
+    """Return how far each position (N, 2) is from a goal (2,), (N,)."""
+    away = np.empty(len(position))
+    for robot in range(len(position)):
+        away[robot] = _distance(goal[0], goal[1], position[robot])
+    return away
+
+
+@kernel
+def commands_of(velocity: Numbers, cosine: Numbers, sine: Numbers, gripper: Numbers) -> Numbers:
+    """Return the commands (N, 4), without turns, that drive robots so in the arena's frame.
+
+    Args:
+        velocity: (N, 2), in top speeds.
+        cosine, sine: of the robots' headings (N,).
+        gripper: their last column (N,).
+    """
+    commands = np.empty((len(velocity), 4))
+    for robot in range(len(velocity)):
+        x, y = velocity[robot]
+        commands[robot, 0] = cosine[robot] * x + sine[robot] * y
+        commands[robot, 1] = cosine[robot] * y - sine[robot] * x
+        commands[robot, 2], commands[robot, 3] = 0.0, gripper[robot]
+    return commands
+
+
+@kernel
 def at_most_1(x: float, y: float) -> tuple[float, float]:
     """Return a vector, shortened to the length 1 if it is longer."""
     length = max(math.sqrt(x * x + y * y), 1.0)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.policies.crowd import distances
 from swarm_logistics_env.policies.routes import CELL, costmap, lookahead
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
@@ -136,7 +137,7 @@ class OpenGround:
 
     def ways_to(self, state: WarehouseState, goal: Numbers) -> Numbers:
         """Return the straight distance of each robot (N,) [m]."""
-        return np.asarray(np.linalg.norm(state.robot_position - goal, axis=1))
+        return distances(state.robot_position, goal)
 
     def resting_places(self, n_robots: int) -> Numbers:
         """Return positions along the wall opposite the delivery area (N, 2) [m]."""

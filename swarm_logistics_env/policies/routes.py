@@ -17,6 +17,42 @@ CLEARANCE = 0.03  # [m] kept from what a laden robot must not touch
 
 
 @kernel
+def discs_among(
+    robots: NDArray[np.float64],
+    stands: NDArray[np.bool_],
+    robot_radius: float,
+    obstacles: NDArray[np.float64],
+    obstacle_radius: float,
+    items: NDArray[np.float64],
+    lies: NDArray[np.bool_],
+    item_radius: float,
+) -> NDArray[np.float64]:
+    """Return the discs (S, 4), see `costmap`, in which the centre of a robot would touch something.
+
+    Args:
+        robots, obstacles, items: their centres (K, 2) [m].
+        stands, lies: which robots and items count (K,).
+    """
+    discs = np.empty((len(robots) + len(obstacles) + len(items), 4))
+    n_discs, reach = 0, robot_radius + CLEARANCE
+    for robot in range(len(robots)):
+        if stands[robot]:
+            discs[n_discs, :2] = robots[robot]
+            discs[n_discs, 2], discs[n_discs, 3] = robot_radius + reach, CROWDED
+            n_discs += 1
+    for obstacle in range(len(obstacles)):
+        discs[n_discs, :2] = obstacles[obstacle]
+        discs[n_discs, 2], discs[n_discs, 3] = obstacle_radius + reach, BLOCKED
+        n_discs += 1
+    for item in range(len(items)):
+        if lies[item]:
+            discs[n_discs, :2] = items[item]
+            discs[n_discs, 2], discs[n_discs, 3] = item_radius + reach, BLOCKED
+            n_discs += 1
+    return discs[:n_discs]
+
+
+@kernel
 def costmap(
     width: float, height: float, radius: float, discs: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -61,14 +97,14 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
     for row in range(rows):
         if goal[row].any():
             may_change[row : row + 3] = True
-    through_others = np.empty(columns)
+    limits, costs = np.empty(columns), np.empty(columns)
     while may_change[1:-1].any():
         for order in range(4):
             for i in range(rows):
                 row = i + 1 if order % 2 == 0 else rows - i
                 if may_change[row]:
                     may_change[row] = False
-                    if cheapen_row(far, cost[row - 1], row, order < 2, through_others):
+                    if cheapen_row(far, cost[row - 1], row, order < 2, limits, costs):
                         may_change[row - 1 : row + 2] = True
     return far[1:-1, 1:-1].copy()
 
@@ -79,32 +115,45 @@ def cheapen_row(
     steps: NDArray[np.float64],
     row: int,
     is_forwards: bool,
-    through_others: NDArray[np.float64],
+    limits: NDArray[np.float64],
+    costs: NDArray[np.float64],
 ) -> bool:
     """Make cells of a row as cheap as their neighbours allow; return whether one became cheaper.
+
+    The cell visited before a cell is the only neighbour that changes on the way. So all others are
+    looked at first, several cells by one instruction.
 
     Args:
         far: the cost from each cell, with a border (rows + 2, columns + 2).
         steps: the cost of each cell of the row (columns,).
-        through_others: scratch (columns,).
+        limits, costs: scratch (columns,).
     """
     above, here, below = far[row - 1], far[row], far[row + 1]
     columns = len(steps)
+    ahead = 2 if is_forwards else 0  # of a cell's left neighbour, the one not visited yet
+    n_cheaper = 0
     for column in range(columns):
-        straight = min(above[column + 1], below[column + 1])
+        straight = min(min(above[column + 1], below[column + 1]), here[column + ahead])
         aslant_above = min(above[column], above[column + 2])
         aslant = min(aslant_above, min(below[column], below[column + 2]))
-        step = steps[column]
-        through_others[column] = min(straight + step, aslant + 1.4142135623730951 * step)
-    has_changed = False
+        step, before = steps[column], here[column + 1]
+        through_others = min(straight + step, aslant + 1.4142135623730951 * step)
+        is_cheaper = through_others < before - 1e-9
+        n_cheaper += int(is_cheaper)
+        costs[column] = through_others if is_cheaper else before
+        limits[column] = min(through_others, before - 1e-9)
+    cost = math.inf
     for j in range(columns):
         column = j if is_forwards else columns - 1 - j
-        beside = min(here[column], here[column + 2]) + steps[column]
-        best = min(through_others[column], beside)
-        if best < here[column + 1] - 1e-9:
-            here[column + 1] = best
-            has_changed = True
-    return has_changed
+        through_last = cost + steps[column]
+        # A branch that is foreseen costs less than to wait for the cell before.
+        if through_last < limits[column]:
+            cost = through_last
+            n_cheaper += 1
+        else:
+            cost = costs[column]
+        here[column + 1] = cost
+    return n_cheaper > 0
 
 
 @kernel
