@@ -72,12 +72,18 @@ def costmap(
                 dx, dy = (column + 0.5) * CELL - x, (row + 0.5) * CELL - y
                 if dx * dx + dy * dy < reach * reach:
                     cost[row, column] = max(cost[row, column], discs[disc, 3])
+    # Both ends of a row in which no more is blocked, or the whole row.
+    n_left, n_right = 0, 0
+    while n_left < columns and (n_left + 0.5) * CELL < radius:
+        n_left += 1
+    while n_right < columns and (columns - n_right - 0.5) * CELL > width - radius:
+        n_right += 1
     for row in range(rows):
         y = (row + 0.5) * CELL
-        for column in range(columns):
-            x = (column + 0.5) * CELL
-            if x < radius or y < radius or x > width - radius or y > height - radius:
-                cost[row, column] = BLOCKED
+        if y < radius or y > height - radius:
+            cost[row] = BLOCKED
+        cost[row, :n_left] = BLOCKED
+        cost[row, columns - n_right :] = BLOCKED
     return cost
 
 
@@ -90,12 +96,15 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
     rows, columns = cost.shape
     # A border that no way leads through spares the sweeps a check of every neighbour.
     far = np.full((rows + 2, columns + 2), np.inf)
-    far[1:-1, 1:-1] = np.where(goal, 0.0, np.inf)
     # Rows that may get cheaper: a visit that changed nothing need not be repeated until a
     # neighbouring row has changed.
     may_change = np.zeros(rows + 2, np.bool_)
     for row in range(rows):
-        if goal[row].any():
+        n_goals = 0
+        for column in range(columns):
+            n_goals += int(goal[row, column])
+            far[row + 1, column + 1] = 0.0 if goal[row, column] else np.inf
+        if n_goals > 0:
             may_change[row : row + 3] = True
     limits, costs = np.empty(columns), np.empty(columns)
     while may_change[1:-1].any():
