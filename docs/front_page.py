@@ -84,13 +84,16 @@ with two robots that deliver nothing (FM4) R is {fm4[swarm-dt].text} of `swarm-d
 paper's "deadlock" may be read (FM4_jam), it is {jam[swarm-dt].text} of `swarm-dt`, \
 {jam[homing].text} of `homing`, {jam[ppo-indicator].text} of `ppo-indicator`, and \
 {jam[ppo-robust].text} of `ppo-robust`.
-* **Four times the robots do not deliver four times as much**: from 25 to 100 S of \
-`swarm-dt-follow` is {s[swarm-dt-follow].text}, of `homing` {s[homing].text}, of `ppo-robust` \
-{s[ppo-robust].text}, of `ppo-delivery`, where it is open, {s[ppo-delivery].text}.
+* **On the open floor four times the robots do not deliver four times as much with these**: from \
+25 to 100 S of `swarm-dt-follow` is {s[swarm-dt-follow].text}, of `homing` {s[homing].text}, of \
+`ppo-robust` {s[ppo-robust].text}, of `ppo-delivery`, where it is open, {s[ppo-delivery].text}. \
+[Among racks](docs/floors.md#how-swarms-scale-in-racks) `homing-stock` delivers more than four \
+times as much.
 * **Of {n_claims} claims of the paper's text** {sets[supported]} hold ({counts[untestable]} of \
 them cannot fail) and {sets[contradicted]} fail under nine in ten of [{n_sets} sets of \
 constants](docs/research/paper_fit.md) that fit its cells without faults; {sets[open]} are \
-open: constants or the luck of single runs decide them. With those of `swarm-dt` alone \
+open: constants or the luck of single runs decide them, and of those that hold one is at the \
+limit. With those of `swarm-dt` alone \
 {counts[supported]} are supported and {counts[contradicted]} contradicted ({contradicted}); \
 {counts[open]} are open, {counts[untestable]} are untestable.
 
@@ -134,7 +137,7 @@ _POLICIES = {
     "homing": "a script",
     "ppo-delivery": "learned",
     "ppo-robust": "learned among faults",
-    "ppo-indicator": "the same, paid half as long as no robot fails",
+    "ppo-indicator": "the same, its team paid half as long as no robot fails",
 }
 _CONDITIONS = {
     "no fault": "no fault",

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import functools
 import json
 import random
 import sqlite3
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from swarm_logistics_env.runs.recorded import import_results
 from swarm_logistics_env.runs.store import FILE_NAME, Runs, export
 from swarm_logistics_env.spi import IndicatorError, read_trials
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.verdicts.cell import Cell
 from tests.made_up import alter, made_old
 
 STUDY = """\
@@ -170,11 +172,17 @@ def check_spoilt(whole: Path, spoil: Callable[[Path], object]) -> None:
         assert [path.name for path in Path(folder).iterdir()] == ["out"]
 
 
+@functools.cache
+def cells_of(whole: Path) -> Sequence[Cell]:
+    """Return what the runs of a study say that nobody spoilt."""
+    return Study.stored(whole).findings().cells
+
+
 def assert_same_or_missing(whole: Path, out: Path) -> None:
     """P of a damaged store is that of the whole one, seed by seed, or is told to be missing."""
-    found, sound = (Study.stored(one).findings().cells for one in (out, whole))
-    if [cell.words for cell in found] == [cell.words for cell in sound]:  # not another study
-        for here, there in zip(found, sound, strict=True):
+    damaged, sound = Study.stored(out).findings().cells, cells_of(whole)
+    if [cell.words for cell in damaged] == [cell.words for cell in sound]:  # not another study
+        for here, there in zip(damaged, sound, strict=True):
             if here.n_seeds == there.n_seeds:
                 assert list(here.by_seed) == list(there.by_seed)
 
