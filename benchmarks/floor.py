@@ -20,16 +20,16 @@ Numbers = NDArray[np.float64]
 
 
 class Recording(NamedTuple):
-    """Swarm D-T from seed 0: what it commanded and how fast that made the robots want to go."""
+    """A policy from seed 0: what it commanded and how fast that made the robots want to go."""
 
     scenario: Scenario
     commands: Numbers  # (T, N, 4)
     wanted_velocity: Numbers  # (T, N, 2) [m/s], world frame
 
 
-def record(scenario: Scenario, n_steps: int) -> Recording:
-    """Play Swarm D-T for `n_steps` control steps."""
-    world, policy = Warehouse(scenario), policies.load("swarm-dt")
+def record(scenario: Scenario, n_steps: int, name: str = "swarm-dt") -> Recording:
+    """Play the policy of that name for `n_steps` control steps."""
+    world, policy = Warehouse(scenario), policies.load(name)
     observations = world.reset(seed=0)
     start(policy, scenario, seed=0)
     commands = np.zeros((n_steps, scenario.n_robots, 4))

@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ def contestants() -> list[Contestant]:
     two.base = one.name
     many = [each for n_robots in (1_000, 10_000) for each in many_robots(n_robots)]
     one_world = paths(record(Scenario(restock=True), _STEPS))
-    return [*one_world, *deciders(WORLD), one, two, *many]
+    return [*one_world, *on_plans(), *deciders(WORLD), one, two, *many]
 
 
 def paths(recording: Recording) -> Iterator[Contestant]:
@@ -53,11 +54,6 @@ def paths(recording: Recording) -> Iterator[Contestant]:
     def floor() -> float:
         return _timed(ForceFloor(recording).step, range(steps))
 
-    def world() -> float:
-        made = Warehouse(recording.scenario)
-        made.reset(seed=0)
-        return _timed(made.step, recording.commands)
-
     def arrays() -> float:
         env = SwarmLogisticsEnv(recording.scenario)
         env.reset_arrays(seed=0)
@@ -70,11 +66,33 @@ def paths(recording: Recording) -> Iterator[Contestant]:
 
     for name, includes, run, base in (
         (FLOOR, "bodies alone, no sensing", floor, None),
-        (WORLD, SENSES, world, FLOOR),
+        (WORLD, SENSES, partial(_seconds_of_world, recording), FLOOR),
         (ARRAYS, f"{SENSES}, rewards, ends", arrays, FLOOR),
         ("env.step", "the same, as PettingZoo's dicts", dicts, ARRAYS),
     ):
         yield Contestant(name, includes, run, n * steps, steps, base)
+
+
+def on_plans() -> Iterator[Contestant]:
+    """Yield worlds with racks beside the open floor, each on commands that were made for it."""
+    for policy in ("swarm-dt", "homing"):
+        base = f"{WORLD}, {policy}"
+        for floor in (None, "aisles", "two_docks"):
+            recording = record(Scenario(floor=floor, restock=True), _STEPS, policy)
+            yield Contestant(
+                f"{base}, {floor}" if floor else base,
+                "among racks" if floor else "on the open floor",
+                partial(_seconds_of_world, recording),
+                recording.scenario.n_robots * _STEPS,
+                _STEPS,
+                base if floor else FLOOR,
+            )
+
+
+def _seconds_of_world(recording: Recording) -> float:
+    world = Warehouse(recording.scenario)
+    world.reset(seed=0)
+    return _timed(world.step, recording.commands)
 
 
 def many_robots(n_robots: int) -> Iterator[Contestant]:
