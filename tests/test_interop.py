@@ -118,7 +118,7 @@ def test_each_learner_learns_two_updates_and_writes_a_policy(
     assert all((points[0][name] != points[-1][name]).any() for name in points[0])
     policy: Any = policies.load(str(tmp_path / f"{learner}-small@0.safetensors"))
     assert (policy.card.network.hidden, policy.card.agent_steps) == ((128, 64), 30_720)
-    assert (len(row["P"]), list(row["P_F"])) == (1, ["FM1", "FM2", "FM3", "FM4"])
+    assert (len(row["P"]), list(row["P_F"])) == (1, list(shared.MODES))
 
 
 def test_worlds_of_torchrl_end_and_begin_each_for_itself() -> None:
