@@ -142,6 +142,8 @@ def dock_at(world: World, x: float, y: float) -> int:
 @kernel
 def is_near_solid(floor: Floor, x: float, y: float, distance: float) -> bool:
     """Return whether a wall or rack of the plan lies nearer than `distance` [m] to a point."""
+    if is_all_free(floor, x, y, distance):
+        return False
     left = index_along(x - distance, floor.cell, floor.n_columns)
     right = index_along(x + distance, floor.cell, floor.n_columns)
     bottom = index_along(y - distance, floor.cell, floor.n_rows)
@@ -217,11 +219,8 @@ def is_in_sight(world: World, x: float, y: float, other_x: float, other_y: float
         return True
     if is_free_between(floor, x, y, other_x, other_y):
         return True
-    to_x, to_y = other_x - x, other_y - y
-    distance = math.sqrt(to_x * to_x + to_y * to_y)
-    if distance == 0.0:
-        return True
-    return free_way(floor, x, y, to_x / distance, to_y / distance, distance) >= distance
+    # In shares of the way to the other point.
+    return free_way(floor, x, y, other_x - x, other_y - y, 1.0) >= 1.0
 
 
 @inlined_kernel
