@@ -220,13 +220,15 @@ def costs_block(costs: Mapping[str, Any]) -> str:
         )
         for row in costs["contestants"]
     ]
-    machine = costs["machine"]
+    machine, seconds = costs["machine"], costs["seconds"]
     return table(
         ("", "agent-steps per s", "us per step", "cost per agent-step"),
         rows,
-        "Cost: less is better; the median over rounds of the ratio in each.\n"
-        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}.\n"
-        f"A second process takes its first step after {costs['seconds']['first_step']:.1f} s.",
+        "Cost: less is better; the median over rounds of the ratio in each.",
+        f"On {machine['processor']}, {machine['cores']} cores, Python {machine['python']}.",
+        f"A second process takes its first step after {seconds['first_step']:.1f} s.",
+        f"In an empty directory `judge homing` shows P after {seconds['judge homing, P']:.0f} s, "
+        f"and its first look at all questions after {seconds['judge homing, first look']:.0f} s.",
     )
 
 
