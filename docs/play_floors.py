@@ -173,11 +173,11 @@ def adaptability_block(results: Mapping[float, StudyResults]) -> str:
     rows: list[tuple[str, ...]] = []
     for n, policy in product(SIZES_IN_WIDTHS, results[reference].policies):
         p_o, p_new = cells[reference][policy, n], {x: cells[x][policy, n] for x in others}
-        a = (
+        estimates = (
             spi.adaptability(p_o.by_seed, p_new[x].by_seed, x_o=reference, x_new=x) for x in others
         )
         means = (section.mean_p(cell) for cell in (p_o, *p_new.values()))
-        rows.append((str(n), f"`{policy}`", *means, *(section.bracketed(each, 2) for each in a)))
+        rows.append((str(n), f"`{policy}`", *means, *(section.bracketed(a, 2) for a in estimates)))
     return table(
         ("N", "policy", *(f"P, {x:g} m" for x in WIDTHS), *(f"A, {x:g} m" for x in others)),
         rows,
