@@ -143,10 +143,8 @@ interop-calls: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed $(RL
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py
 
-bodies: $(DEV)/installed $(DOTBOTS)/installed
-	$(DOTBOTS)/bin/python docs/play_bodies.py play
-	$(DEV)/bin/python docs/play_bodies.py play
-	$(DEV)/bin/python docs/play_bodies.py tables
+bodies: $(DEV)/installed
+	$(DEV)/bin/python docs/play_bodies.py
 
 dotbots: $(DOTBOTS)/installed
 	$(DOTBOTS)/bin/python -m pytest tests/bodies/test_pose_guard.py tests/bodies/test_dotbots_bodies.py
@@ -190,7 +188,7 @@ clean:
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
 $(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,mujoco,onnx
-# The simulator of DotBots, without what it needs elsewhere: two packages of that install a package `tests`, which hides ours.
+# The simulator of DotBots, without what pydotbot needs for other things: two of its dependencies install a package `tests`, which hides ours.
 $(DEV)/installed: OTHERS := pyserial structlog toml "wasmtime>=49,<55"
 $(DEV)/installed: BARE := "pydotbot>=0.33,<0.34" pydotbot-utils
 $(STUDY)/installed: EXTRAS := study

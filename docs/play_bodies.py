@@ -1,8 +1,8 @@
 """How far results carry from one engine to another: `make bodies` (a core-hour).
 
 Plays three policies in the package's own engine, on MuJoCo's robots and in the DotBots' simulator,
-on the same seeds, and writes the tables of docs/bodies.md. `python docs/play_bodies.py play` plays
-what the packages installed beside it can, `tables` writes. What is played stays in results/bodies.
+on the same seeds, and writes the tables of docs/bodies.md. What is played stays in results/bodies,
+and the same command goes on after an interruption.
 
 Declared before the first run: an order of two policies turns if the 95 % intervals of their
 difference over seeds lie on different sides of 0.
@@ -10,13 +10,11 @@ difference over seeds lie on different sides of 0.
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
-import typer
 from tables import ROOT, rewrite, table
 
 from swarm_logistics_env import spi
@@ -69,15 +67,6 @@ WORLDS = (
     World("pushed disc", _WORLD, "mujoco", 10, faults=()),
     World("dotbots", Scenario.preset("dotbots"), "dotbots", 5),
 )
-PACKAGES = {CHIPMUNK: "pymunk", "mujoco": "mujoco", "dotbots": "dotbot"}
-
-
-def play() -> None:
-    """Play what is missing of each engine whose package is installed."""
-    for world in WORLDS:
-        for bodies in (CHIPMUNK, world.engine):
-            if importlib.util.find_spec(PACKAGES[bodies]):
-                world.study(bodies).run(processes=len(os.sched_getaffinity(0)))
 
 
 class Results(NamedTuple):
@@ -88,15 +77,13 @@ class Results(NamedTuple):
     other: StudyResults
 
 
-def is_played(world: World) -> bool:
-    """Return whether no run is missing in either engine."""
-    counts = (world.study(bodies).finished() for bodies in (CHIPMUNK, world.engine))
-    return all(n_finished == n_runs for n_finished, n_runs in counts)
-
-
-def results_of(world: World) -> Results:
-    """Return what the runs of a world say."""
-    return Results(world, world.study(CHIPMUNK).findings(), world.study(world.engine).findings())
+def played(world: World) -> Results:
+    """Play what is missing of a world; return what its runs say."""
+    studies = [world.study(bodies) for bodies in (CHIPMUNK, world.engine)]
+    for study in studies:
+        study.run(processes=len(os.sched_getaffinity(0)))
+    in_chipmunk, in_other = (study.findings() for study in studies)
+    return Results(world, in_chipmunk, in_other)
 
 
 def p_rows(results: Results) -> Iterator[tuple[str, ...]]:
@@ -162,9 +149,9 @@ def order_rows(results: Results) -> Iterator[tuple[str, ...]]:
         yield results.world.name, f"`{first}` less `{second}`", *texts, words[sides[0] * sides[1]]
 
 
-def write_tables() -> None:
-    """Write the tables of docs/bodies.md, of those worlds that are played."""
-    results = [results_of(world) for world in WORLDS if is_played(world)]
+def main() -> None:
+    """Play what is missing, then write the tables of docs/bodies.md."""
+    results = [played(world) for world in WORLDS]
     seeds = "; ".join(f"{result.world.name}: {result.world.n_seeds}" for result in results)
     line = f"Seeds from 560,000 on, the same for both engines ({seeds}); intervals of 95 %."
     engines = "P, `chipmunk`", "P, the other engine"
@@ -187,7 +174,4 @@ def write_tables() -> None:
 
 
 if __name__ == "__main__":
-    app = typer.Typer()
-    app.command("play")(play)
-    app.command("tables")(write_tables)
-    app()
+    main()

@@ -69,9 +69,9 @@ def hall(width: float) -> Scenario:
     """Return the world of the plan `aisles` with other aisles: as many racks as its storage has."""
     cell = 0.25  # [m]
     aisle, rack, free, dock = ":" * round(width / cell), "=" * 2, "." * 8, "A" * 8
-    racks = (aisle + rack) * 24
+    n_racks = 24 // len(aisle + rack)
     between = ":" * 24 + free + dock
-    through = racks[: 24 // len(aisle + rack) * len(aisle + rack)].ljust(24, ":") + free + dock
+    through = (n_racks * (aisle + rack)).ljust(24, ":") + free + dock
     rows = [between] * 4 + [through] * 14 + [between] * 4 + [through] * 14 + [between] * 4
     return scenario_on("\n".join(rows), cell_size=cell)
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.policies.central import REPLAN, Central
+from swarm_logistics_env.policies.crowd import distance_to
 from swarm_logistics_env.policies.routes import cost_to_go
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.floor_cells import floor_map
@@ -117,8 +118,8 @@ def lift_far_items(
         item = waits_under[robot]
         if n_lifting >= most or not is_idle[robot] or item == NOBODY or not is_far[item]:
             continue
-        x, y = item_position[item] - position[robot]
-        if math.sqrt(x * x + y * y) < ARRIVAL_RADIUS:
+        x, y = item_position[item]
+        if distance_to(x, y, position[robot]) < ARRIVAL_RADIUS:
             gripper[robot] = 1.0
             n_lifting += 1
 
@@ -146,8 +147,7 @@ def send_to_slots(
             continue
         nearest, least = NOBODY, math.inf
         for number in range(len(slots)):
-            x, y = slots[number] - position[robot]
-            distance = math.sqrt(x * x + y * y)
+            distance = distance_to(slots[number, 0], slots[number, 1], position[robot])
             if is_free[number] and distance < least:
                 nearest, least = number, distance
         if nearest == NOBODY:
@@ -163,8 +163,8 @@ def ways_to_slots(position: Numbers, slots: Numbers, slot: NDArray[np.int64]) ->
     away = np.full(len(position), np.inf)
     for robot in range(len(position)):
         if slot[robot] != NOBODY:
-            x, y = slots[slot[robot]] - position[robot]
-            away[robot] = math.sqrt(x * x + y * y)
+            x, y = slots[slot[robot]]
+            away[robot] = distance_to(x, y, position[robot])
     return away
 
 
@@ -181,9 +181,8 @@ def free_slots(
     is_free = np.ones(len(slots), np.bool_)
     for number in range(len(slots)):
         for item in range(len(item_position)):
-            x = slots[number, 0] - item_position[item, 0]
-            y = slots[number, 1] - item_position[item, 1]
-            if is_stored[item] and math.sqrt(x * x + y * y) <= SLOT_RADIUS:
+            away = distance_to(slots[number, 0], slots[number, 1], item_position[item])
+            if is_stored[item] and away <= SLOT_RADIUS:
                 is_free[number] = False
     for robot in range(len(slot)):
         if slot[robot] != NOBODY:

@@ -66,7 +66,7 @@ def distances(position: Numbers, goal: Numbers) -> Numbers:
     """Return how far each position (N, 2) is from a goal (2,), (N,)."""
     away = np.empty(len(position))
     for robot in range(len(position)):
-        away[robot] = _distance(goal[0], goal[1], position[robot])
+        away[robot] = distance_to(goal[0], goal[1], position[robot])
     return away
 
 
@@ -152,8 +152,8 @@ def loneliest(
         gap = np.inf if any_taken else 0.0
         for other in range(len(is_taken)):
             if is_taken[other]:
-                gap = min(gap, _distance(x, y, item_position[other]))
-        distance = _distance(x, y, position)
+                gap = min(gap, distance_to(x, y, item_position[other]))
+        distance = distance_to(x, y, position)
         worth = gap - 0.5 * distance if any_taken else -distance
         if worth > most:
             best, most = item, worth
@@ -161,6 +161,7 @@ def loneliest(
 
 
 @kernel
-def _distance(x: float, y: float, position: Numbers) -> float:
+def distance_to(x: float, y: float, position: Numbers) -> float:
+    """Return how far (x, y) is from a position (2,)."""
     away_x, away_y = x - position[0], y - position[1]
     return math.sqrt(away_x * away_x + away_y * away_y)

@@ -72,7 +72,7 @@ def costmap(
                 dx, dy = (column + 0.5) * CELL - x, (row + 0.5) * CELL - y
                 if dx * dx + dy * dy < reach * reach:
                     cost[row, column] = max(cost[row, column], discs[disc, 3])
-    # Both ends of a row in which no more is blocked, or the whole row.
+    # How many columns lie too near to the left wall, and to the right one.
     n_left, n_right = 0, 0
     while n_left < columns and (n_left + 0.5) * CELL < radius:
         n_left += 1
@@ -135,11 +135,12 @@ def cheapen_row(
     Args:
         far: the cost from each cell, with a border (rows + 2, columns + 2).
         steps: the cost of each cell of the row (columns,).
-        limits, costs: scratch (columns,).
+        limits, costs: scratch (columns,): the cell visited before makes a cell cheaper if the way
+            through it costs less than the limit; otherwise the cell's cost is that in `costs`.
     """
     above, here, below = far[row - 1], far[row], far[row + 1]
     columns = len(steps)
-    ahead = 2 if is_forwards else 0  # of a cell's left neighbour, the one not visited yet
+    ahead = 2 if is_forwards else 0  # columns from the left neighbour to the one visited next
     n_cheaper = 0
     for column in range(columns):
         straight = min(min(above[column + 1], below[column + 1]), here[column + ahead])
@@ -155,7 +156,7 @@ def cheapen_row(
     for j in range(columns):
         column = j if is_forwards else columns - 1 - j
         through_last = cost + steps[column]
-        # A branch that is foreseen costs less than to wait for the cell before.
+        # A branch, as the processor foresees it; a minimum would wait for the cell before.
         if through_last < limits[column]:
             cost = through_last
             n_cheaper += 1

@@ -161,13 +161,13 @@ def is_near_solid(floor: Floor, x: float, y: float, distance: float) -> bool:
 
 @kernel
 def free_way(floor: Floor, x: float, y: float, step_x: float, step_y: float, reach: float) -> float:
-    """Return how far a ray is free of walls and racks, `reach` at most [m].
+    """Return how far a ray is free of walls and racks, `reach` at most, in lengths of its step.
 
     Cell after cell (Amanatides and Woo 1987).
 
     Args:
         x, y: where it begins, inside the plan [m].
-        step_x, step_y: its direction, of length 1.
+        step_x, step_y: its step [m]; of length 1 m, `reach` and the result are in m.
     """
     cell = floor.cell
     column, row = index_along(x, cell, floor.n_columns), index_along(y, cell, floor.n_rows)
@@ -219,7 +219,7 @@ def is_in_sight(world: World, x: float, y: float, other_x: float, other_y: float
         return True
     if is_free_between(floor, x, y, other_x, other_y):
         return True
-    # In shares of the way to the other point.
+    # With the whole way as the step, 1 is the other point.
     return free_way(floor, x, y, other_x - x, other_y - y, 1.0) >= 1.0
 
 

@@ -80,14 +80,14 @@ def scan_boxes(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
     for beam in range(_N_BEAMS):
         step_x = _BEAM_X[beam] * pose.cosine - _BEAM_Y[beam] * pose.sine
         step_y = _BEAM_X[beam] * pose.sine + _BEAM_Y[beam] * pose.cosine
-        # Along an axis it never gets farther along the other, but 0 times infinity is nothing.
+        # Not infinity for a beam along an axis, as 0 times infinity is no number.
         per_x[beam] = 1.0 / (step_x if step_x != 0.0 else _TINY)
         per_y[beam] = 1.0 / (step_y if step_y != 0.0 else _TINY)
         free[beam] = math.inf
     block = floor.n_block_columns * index_along(pose.y, floor.block, floor.n_block_rows)
     block += index_along(pose.x, floor.block, floor.n_block_columns)
     for index in range(floor.first_near[block], floor.first_near[block + 1]):
-        low = 4 * floor.near[index]
+        low = 4 * floor.near[index]  # its lowest corner; the highest one is two farther
         left, bottom = floor.corners[low, 0] - pose.x, floor.corners[low, 1] - pose.y
         right, top = floor.corners[low + 2, 0] - pose.x, floor.corners[low + 2, 1] - pose.y
         away_x, away_y = max(left, -right, 0.0), max(bottom, -top, 0.0)
