@@ -106,7 +106,9 @@ def test_presets_and_that_an_episode_has_enough_steps_for_its_duration() -> None
     assert (paper.n_robots, paper.n_items, paper.duration) == (25, 60, 500.0)
     assert (paper.n_steps, paper.n_substeps) == (5000, 5)
     assert Scenario.preset("paper_scalability") == Scenario(n_items=100)
-    assert Scenario.preset("realistic").handling_steps == 10
+    realistic = Scenario.preset("realistic")
+    assert (realistic.handling_steps, realistic.dock_period) == (10, 1.0)
+    assert (realistic.max_speed, realistic.max_acceleration, realistic.max_turn_rate) == (1, 2, 6)
     for duration, period, steps in ((0.7, 0.1, 7), (0.75, 0.1, 8), (2.0, 0.3, 7)):
         assert Scenario(duration=duration, control_period=period).n_steps == steps
     with pytest.raises(ScenarioError, match="no scenario preset 'papr'; did you mean 'paper'"):
