@@ -274,25 +274,33 @@ def _scope(results: StudyResults) -> str:
 
 
 def _performance(results: StudyResults) -> str:
-    cells = [c for c in results.cells if c.arm.setting.kind != "policy" and c.n_seeds]
-    if not cells:
+    played = [cell for cell in results.cells if cell.n_seeds]
+    if not played:
         return templates.PERFORMANCE["nothing"]
-    # Where the swarm is as it should be, or else in the first condition.
+    cells = [cell for cell in played if cell.arm.setting.kind != "policy"]
+    # Where the swarm is as it should be, or else in the first condition. Where policies alone are
+    # compared, in the first table.
     sound = [c for c in cells if c.arm.setting.kind == "fault" and not c.arm.setting.value]
-    candidates = sound or cells
+    candidates = sound or cells or [cell for cell in played if cell.table == played[0].table]
     setting = candidates[0].arm.setting
     case = candidates[0].arm.case
     # The first cell of each policy, the policy with the last one first.
-    cell_of = {cell.policy: cell for cell in reversed(candidates) if cell.arm.setting == setting}
-    by_policy = list(reversed(cell_of.values()))
+    cell_of = {
+        cell.policy if cells else cell.arm.setting.name: cell
+        for cell in reversed(candidates)
+        if not cells or cell.arm.setting == setting
+    }
+    by_policy = dict(reversed(cell_of.items()))
     condition = f"N = {case.scenario.n_robots}"
-    if setting.kind != "size":
+    if not cells:
+        condition += f", {candidates[0].table}"
+    elif setting.kind != "size":
         condition += f", {setting}"
-    means = [_mean(cell) for cell in by_policy]
-    if len(results.policies) > 1:
-        means = [f"{cell.policy} {mean}" for cell, mean in zip(by_policy, means)]
+    means = [_mean(cell) for cell in by_policy.values()]
+    if len(by_policy) > 1 or len(results.policies) > 1:
+        means = [f"{policy} {mean}" for policy, mean in zip(by_policy, means)]
     template = "items" if case.task.name == DEFAULT else "other_task"
-    if any(cell.mean.low is not None for cell in by_policy):
+    if any(cell.mean.low is not None for cell in by_policy.values()):
         template += "_with_interval"
     return templates.PERFORMANCE[template].format(
         level=section.P_LEVEL,

@@ -11,6 +11,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.report.answer import MOST_LINES, answer
 from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.section import limits
+from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.results import StudyResults
 from tests.made_up import decided, paper
 
@@ -95,3 +96,16 @@ def test_policies_stand_one_below_the_other_each_with_its_p(compared: StudyResul
     text = digest(answer(compared), 80)
     assert re.search(r"at N = 25, no fault: swarm-dt 39\.\d \[[\d., ]+\],\s+swarm-dt-follow", text)
     assert re.search(r"swarm-dt-follow\s+20\.\d \[[\d., ]+\]\.", text)
+
+
+def test_a_study_that_compares_policies_alone_says_p_of_each_in_its_first_table() -> None:
+    small = {"warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.0}
+    study = Study(
+        policies=["swarm-dt", "homing"],
+        seeds=2,
+        scenario={**small, "n_robots": 4, "n_items": 6, "duration": 20.0, "restock": True},
+        ablations=[{"title": title, "policy": "homing"} for title in ("as it is", "again")],
+    )
+    study.run()
+    text = digest(answer(study.findings()), 80)
+    assert re.search(r"at N = 4, as it is: swarm-dt [\d.]+ \[.*\], homing\s+[\d.]+ \[", text)
