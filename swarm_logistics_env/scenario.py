@@ -300,17 +300,17 @@ SCENARIO_PRESETS: dict[str, Scenario] = {
     # Table I delivers 74 of its items, so it cannot have held 60.
     "paper_scalability": Scenario(n_items=100),
     "dots": Scenario(max_speed=1.0, max_acceleration=2.0),
-    # Frozen before anything was tuned or trained on it. Radius, mass, turn rate and ranges are the
-    # defaults; whatever else differs from a kind world stands here with its source.
+    # Frozen, so that what is tuned or trained on it can be compared. Each number has its source;
+    # radius, mass, turn rate and ranges are the defaults.
     "realistic": Scenario(
-        drive="differential",  # chosen: DOTS drive in every direction, most warehouse robots do not
-        max_speed=1.0,  # DOTS: what its developers drive
-        max_acceleration=2.0,  # DOTS: the header of the simulator
-        ranger_noise=0.03,  # chosen: data sheets of such rangers print 20 to 30 mm
-        position_noise=0.05,  # chosen: a fifth of a robot
+        drive="differential",  # chosen: harder than DOTS, which drive in every direction
+        max_speed=1.0,  # DOTS: the developers' documents
+        max_acceleration=2.0,  # simulator: its header
+        ranger_noise=0.03,  # chosen: a fourth of a robot's radius
+        position_noise=0.05,  # chosen: a fifth of a robot's diameter
         sensor_dropout=0.02,  # chosen: one reading of 50
         radio_loss=0.1,  # chosen: one message of ten
-        heading_drift=0.05,  # chosen: 3 degrees/s, a MEMS gyro that nobody calibrated
+        heading_drift=0.05,  # chosen: 3 degrees/s, a gyro that nobody calibrated
         handling_time=1.0,  # chosen: to lift, to put down, to deliver
         dock_capacity=1.0,  # chosen: whoever takes deliveries needs 1 s for each
     ),

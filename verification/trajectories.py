@@ -77,16 +77,8 @@ GOLDEN = {
     "preset paper_scalability": _preset("paper_scalability", 50),
     "preset dots": _preset("dots", 100),
     "preset realistic": _preset("realistic", 100),
-    "noisy differential drive": GoldenTrajectory(
-        Scenario(
-            drive="differential",
-            max_acceleration=2.0,
-            ranger_noise=0.03,
-            position_noise=0.05,
-            radio_loss=0.1,
-            heading_drift=0.05,
-        ),
-        steps=100,
+    "preset realistic, as kind as in 0.3": _preset(
+        "realistic", 100, max_speed=2.0, sensor_dropout=0.0, handling_time=0.0, dock_capacity=None
     ),
     "seed 1": _small(seed=1),
     "long, past the rebuilding of bodies": _small(restock=True, steps=650),

@@ -278,24 +278,20 @@ def _performance(results: StudyResults) -> str:
     if not played:
         return templates.PERFORMANCE["nothing"]
     cells = [cell for cell in played if cell.arm.setting.kind != "policy"]
-    # Where the swarm is as it should be, or else in the first condition. Where policies alone are
-    # compared, in the first table.
-    sound = [c for c in cells if c.arm.setting.kind == "fault" and not c.arm.setting.value]
-    candidates = sound or cells or [cell for cell in played if cell.table == played[0].table]
-    setting = candidates[0].arm.setting
-    case = candidates[0].arm.case
+    if cells:
+        # Where the swarm is as it should be, or else in the first condition.
+        sound = [c for c in cells if c.arm.setting.kind == "fault" and not c.arm.setting.value]
+        candidates = sound or cells
+        setting = candidates[0].arm.setting
+        chosen = [(cell.policy, cell) for cell in candidates if cell.arm.setting == setting]
+        where = "" if setting.kind == "size" else f", {setting}"
+    else:  # policies alone are compared: in the first table
+        table = played[0].table
+        chosen = [(cell.arm.setting.name, cell) for cell in played if cell.table == table]
+        where = f", {table}"
     # The first cell of each policy, the policy with the last one first.
-    cell_of = {
-        cell.policy if cells else cell.arm.setting.name: cell
-        for cell in reversed(candidates)
-        if not cells or cell.arm.setting == setting
-    }
-    by_policy = dict(reversed(cell_of.items()))
-    condition = f"N = {case.scenario.n_robots}"
-    if not cells:
-        condition += f", {candidates[0].table}"
-    elif setting.kind != "size":
-        condition += f", {setting}"
+    by_policy = dict(reversed(dict(reversed(chosen)).items()))
+    case = next(iter(by_policy.values())).arm.case
     means = [_mean(cell) for cell in by_policy.values()]
     if len(by_policy) > 1 or len(results.policies) > 1:
         means = [f"{policy} {mean}" for policy, mean in zip(by_policy, means)]
@@ -305,7 +301,7 @@ def _performance(results: StudyResults) -> str:
     return templates.PERFORMANCE[template].format(
         level=section.P_LEVEL,
         duration=case.scenario.duration,
-        condition=condition,
+        condition=f"N = {case.scenario.n_robots}{where}",
         means=", ".join(means),
     )
 
