@@ -8,8 +8,9 @@ all looks together it holds the true value with 95 %, whatever made the comparis
 
 A comparison is also played no further once its verdict can hardly change any more: the predictive
 power, the chance that the last look decides it given the runs so far, is below 5 % (Spiegelhalter,
-Freedman and Blackburn 1986, Controlled Clinical Trials 7). It stays open, and in its family, so
-this costs no error.
+Freedman and Blackburn 1986, Controlled Clinical Trials 7). Nor is one played further whose change
+is shown to be within the margin: which sign so small a change has is not worth the runs. Both stay
+open, and in their family, so this costs no error.
 
 Everything follows from the outcomes, so a study that was killed goes on as if it had not been.
 """
@@ -208,6 +209,8 @@ class _Family:
         verdict = self._verdicts[comparison]
         if verdict.estimate is None:
             return True
+        if self._is_equivalent(verdict, n_seeds):
+            return False
         most = self._looks.seeds[-1]
         p = verdict.estimate.p_value
         # Of both sides, that on which the value lies.
@@ -218,6 +221,14 @@ class _Family:
             p is None or predictive_power(p, n_seeds, most, error / len(self._open)) >= HARDLY
             for p, error in tests  # None: one seed tells nothing yet
         )
+
+    def _is_equivalent(self, verdict: Verdict, n_seeds: int) -> bool:
+        """Return whether a look shows equivalence at the level that holds for a whole family."""
+        test = verdict.equivalence
+        if test is None or test.identical or test.p_value is None:
+            return False
+        level = self._looks.alpha(n_seeds, 2 * ALPHA / len(self._verdicts)) / 2
+        return test.verdict == "equivalent" and test.p_value < level
 
     def _stop(self, comparison: Comparison, n_seeds: int) -> None:
         self._open.remove(comparison)

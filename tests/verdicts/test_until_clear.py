@@ -175,6 +175,21 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
         assert estimate.p_value == alone.p_value
 
 
+def test_a_change_within_the_margin_is_played_no_further() -> None:
+    def hardly_changed(run: Run, _: Outcome) -> Outcome:
+        rng = np.random.default_rng([run.seed, *map(ord, mode_of(run))])
+        return delivered(rng.poisson(148 if run.case.faults else 150))
+
+    study = until_clear(200)
+    study.run(Engine(hardly_changed))
+    for verdict in verdicts_of(study).values():
+        assert verdict.estimate is not None
+        assert verdict.on_equivalence is not None
+        assert (verdict.stopped_at, verdict.on_threshold.adjusted) == (None, "open")
+        assert verdict.on_equivalence.adjusted == "equivalent"
+        assert verdict.estimate.n_seeds <= 100  # for the sign it would go on to 200
+
+
 def test_stopped_before_the_first_look_it_has_a_value_of_every_question_and_no_verdict() -> None:
     study = until_clear(60)
     study.run(Engine(most=35))
