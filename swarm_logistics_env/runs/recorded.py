@@ -219,9 +219,25 @@ def _refuse_unused(origin: Origin, plan: Plan) -> None:
     used = {case.key for case in plan.cases}
     for row in origin.trials:
         if _case(origin, row).key not in used:
+            if name := _confounded(origin.trials):
+                raise StudyError(
+                    f"line {row.line}: the number of robots and {name!r} change together, so what "
+                    "comes of either cannot be told: should have trials in which one of them alone "
+                    "differs"
+                )
             varied = ", ".join(repr(name) for name, _ in row.parameters)
             hint = f"; columns taken for parameters: {varied}" if varied else ""
             raise StudyError(
                 f"line {row.line}: stands alone: should differ from some other row in the fault, "
                 f"the number of robots or one parameter alone{hint}"
             )
+
+
+def _confounded(trials: Sequence[Trial]) -> str | None:
+    """Return a parameter that every size has a value of its own of; None: there is none."""
+    for name, _ in trials[0].parameters:
+        pairs = {(row.n_robots, dict(row.parameters)[name]) for row in trials}
+        n_sizes, n_values = (len(set(values)) for values in zip(*pairs))
+        if n_sizes == n_values == len(pairs) > 1:
+            return name
+    return None

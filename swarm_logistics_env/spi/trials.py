@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,10 +14,11 @@ from .trials_table import Row, read_rows
 
 NO_FAULT_WORD = "none"
 REMOVED_WORD = "removed"
+FEWEST_OF_COVARIATE = 6  # rows that all differ in a column are no conditions of a trial each
 REPEATED = "other behaviour"  # no fault, a second time: what chance alone makes of a pair
+_NO_FAULT_WORDS = ("", NO_FAULT_WORD, "no fault", "no_fault", "baseline", "healthy", "0", "-", "na")
 _FAULT_NAMES = {
-    "": NO_FAULT_WORD,
-    NO_FAULT_WORD: NO_FAULT_WORD,
+    **dict.fromkeys(_NO_FAULT_WORDS, NO_FAULT_WORD),
     REMOVED_WORD: REMOVED_WORD,
     REPEATED: REPEATED,
     "none again": REPEATED,
@@ -37,7 +38,8 @@ class Trial:
         faulty: m, 0 without a fault.
         onset: when they fail [s].
         parameters: name and value of everything else that varies in the file.
-        seed: shared by the trials that belong together; None: the file pairs none.
+        seed: shared by the trials that belong together; a number for each block where the file
+            names blocks by a text, as a map; None: the file pairs none.
         performance: P, 0 or more; of an event log the number of deliveries.
         times: of the deliveries [s], ascending; None: not recorded.
         duration: of the trial [s]; None: not given.
@@ -144,13 +146,21 @@ def read_trials(
     """
     path = Path(path)
     rows, parameters, digest = read_rows(path, columns or {}, ignore, decimal)
-    varying = [name for name in parameters if len({row.cells[name] for row in rows}) > 1]
+    is_log = "time" in rows[0].names
+    varying, covariates = list[str](), list[str]()
+    for name in parameters:
+        values = {row.cells[name] for row in rows}
+        if len(values) > 1:
+            # In an event log a row is a delivery.
+            is_covariate = len(values) == len(rows) >= FEWEST_OF_COVARIATE and not is_log
+            (covariates if is_covariate else varying).append(name)
     faults = dict.fromkeys(row.text("fault") for row in rows)
     _check_columns(path, rows[0], faults)
     # Each fault in small letters to how its first row has it.
     spelled = {name.casefold(): name for name in reversed(faults)}
-    trials = [(_trial(row, spelled, varying, duration), row) for row in rows]
-    complete = _events(trials) if "time" in rows[0].names else _runs(trials)
+    blocks = _blocks(rows)
+    trials = [(_trial(row, spelled, varying, duration, blocks), row) for row in rows]
+    complete = _events(trials) if is_log else _runs(trials)
     _check_pairing(path, complete)
     _check_durations(path, complete)
     notes = [
@@ -158,6 +168,10 @@ def read_trials(
         for name in faults
         if name not in spelled.values()
     ]
+    notes += [
+        f"{name!r} differs in every trial: it tells no conditions apart." for name in covariates
+    ]
+    notes += _notes_on_pairs(complete, rows[0].names.get("seed", "seed"))
     counts = Counter(trial.condition for trial in complete)
     if varying and min(counts.values()) == 1 < max(counts.values()):
         notes.append(
@@ -186,8 +200,20 @@ def _check_columns(path: Path, row: Row, faults: Iterable[str]) -> None:
         )
 
 
+def _blocks(rows: Sequence[Row]) -> dict[str, int]:
+    """Return a number for each block, in the file's order; none where seeds are numbers."""
+    if all(row.is_number("seed") for row in rows):
+        return {}
+    names = dict.fromkeys(row.text("seed") for row in rows if row.text("seed"))
+    return {name: number for number, name in enumerate(names)}
+
+
 def _trial(
-    row: Row, spelled: Mapping[str, str], varying: Sequence[str], duration: float | None
+    row: Row,
+    spelled: Mapping[str, str],
+    varying: Sequence[str],
+    duration: float | None,
+    blocks: Mapping[str, int],
 ) -> Trial:
     """Return the trial of a row, without performance and times."""
     n_robots = row.whole_or_none("n_robots", 1)
@@ -217,7 +243,7 @@ def _trial(
         # Without a fault nothing fails at any time, whatever the column says.
         onset if is_fault else 0.0,
         tuple((name, row.number(name)) for name in varying),
-        row.whole_or_none("seed", 0),
+        blocks.get(row.text("seed")) if blocks else row.whole_or_none("seed", 0),
         0.0,
         duration=duration,
         contacts=row.number_or_none("contacts"),
@@ -258,9 +284,8 @@ def _events(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
 
 
 def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
-    """Refuse seeds that do not pair the runs of all conditions one to one."""
-    seeds = {row.seed for row in rows if row.seed is not None}
-    if not seeds:
+    """Refuse runs without a seed beside others, and two of one seed in a condition."""
+    if all(row.seed is None for row in rows):
         return
     conditions: dict[object, dict[int | None, Trial]] = {}
     for row in rows:
@@ -275,12 +300,29 @@ def _check_pairing(path: Path, rows: Sequence[Trial]) -> None:
                 f"{path}, line {row.line}: has seed {row.seed} like line {first.line}, "
                 "two rows of one seed in one condition: should be one, or leave the column out"
             )
-    for of_seed in conditions.values():
-        if lacking := seeds.difference(of_seed):
-            raise IndicatorError(
-                f"{path}, line {min(row.line for row in of_seed.values())}: its condition has no "
-                f"run of seed {min(lacking)}: give every condition the same seeds, or leave the "
-                "column out"
+
+
+def _notes_on_pairs(trials: Sequence[Trial], block: str) -> Iterator[str]:
+    """Yield which policies have less than all blocks, and how many runs have no partner.
+
+    Args:
+        block: what the file calls a seed.
+    """
+    every = {trial.seed for trial in trials} - {None}
+    by_table: dict[tuple[str, str], dict[object, set[int | None]]] = {}
+    for trial in trials:
+        conditions = by_table.setdefault((trial.policy, trial.table), {})
+        conditions.setdefault(trial.condition, set()).add(trial.seed)
+    for (policy, table), conditions in by_table.items():
+        title = f"{policy}, {table}" if table else policy
+        in_any, in_all = set.union(*conditions.values()), set.intersection(*conditions.values())
+        if len(in_any) < len(every):
+            yield f"{title} has runs of {len(in_any)} of {len(every)} ({block})."
+        alone = sum(len(seeds - in_all) for seeds in conditions.values())
+        if alone:
+            yield (
+                f"{title}: {alone} runs lack a partner of the same {block} in some condition: they "
+                "count for P, and are left out where such a condition is compared."
             )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import difflib
 import hashlib
 import math
@@ -21,7 +22,7 @@ COLUMN_NAMES: dict[str, tuple[str, ...]] = {
     "faulty": ("m", "failed"),
     "onset": ("fault_time",),
     "policy": ("controller",),
-    "seed": ("pair", "block"),
+    "seed": ("pair", "block", "map", "layout", "instance"),
     "trial": ("run", "id"),
     "time": (),
     "duration": ("length",),
@@ -30,8 +31,10 @@ COLUMN_NAMES: dict[str, tuple[str, ...]] = {
 }
 _MEANING = {word: column for column, words in COLUMN_NAMES.items() for word in (column, *words)}
 _TEXTS = ("fault", "policy", "trial", "table")  # columns that hold no numbers
+BLOCK_SIGN = " and "  # between the names of the columns that make a block together
 _ROBOT = re.compile(r"(robot|agent|drone|bot)(_?(id|no|nr|num|number|name|index|label))?|id_robot")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_LIKE_A_NUMBER = re.compile(r"[+-]?[\d.,'’\s]*([eE][+-]?\d+)?")  # however it is written
 # With signs between thousands: "1,204", "1.204.000,5" or "1 204".
 _GROUPED = re.compile(r"[+-]?\d{1,3}(([.,'’\s])\d{3})(\2\d{3})*([.,]\d+)?")
 _LARGEST_EXACT = 2**53  # from here on programs that hold numbers as floats round whole ones
@@ -110,6 +113,11 @@ class Row(NamedTuple):
             )
         return int(value)
 
+    def is_number(self, column: str) -> bool:
+        """Return whether a cell of one column is meant as a number, or empty."""
+        is_joined = BLOCK_SIGN in (self._name(column) or "")
+        return not is_joined and _LIKE_A_NUMBER.fullmatch(self.text(column)) is not None
+
     def error(self, column: str, should: str) -> IndicatorError:
         """Return the error that a cell cannot be."""
         name, cell = self._name(column), self.text(column)
@@ -143,11 +151,12 @@ def read_rows(
         raise IndicatorError(f"--decimal {decimal}: should be . or ,")
     text, digest = _text(path)
     header, cells = _cells(path, text)
-    names, parameters = _columns(path, header, columns, ignore)
+    names, parameters = _columns(path, _with_content(header, cells, columns), columns, ignore)
     if not cells:
         raise IndicatorError(f"{path} holds no trial: should have a row for each below the names")
     rows = [
-        Row(f"{path}, line {line}", line, row, names, decimal or ".") for line, row in cells.items()
+        Row(f"{path}, line {line}", line, _with_block(row, names), names, decimal or ".")
+        for line, row in cells.items()
     ]
     _refuse_rows_of_robots(rows, [name for name in header if name in ignore], parameters)
     if decimal is None:
@@ -156,11 +165,34 @@ def read_rows(
     return rows, parameters, digest
 
 
+def _with_content(
+    header: Sequence[str], cells: Mapping[int, Mapping[str, str]], columns: Mapping[str, str]
+) -> list[str]:
+    """Return the columns without those that would be a seed and are empty in every row."""
+    return [
+        name
+        for name in header
+        if _MEANING.get(_word(name)) != "seed"
+        or name in columns.values()
+        or not cells
+        or any(row[name] for row in cells.values())
+    ]
+
+
+def _with_block(row: dict[str, str], names: Mapping[str, str]) -> dict[str, str]:
+    """Return a row with a cell for its block where several columns make it, as map and seed."""
+    block = names.get("seed", "")
+    if block in row or not block:
+        return row
+    return {**row, block: ", ".join(row[name] for name in block.split(BLOCK_SIGN))}
+
+
 def _text(path: Path) -> tuple[str, str]:
     """Return the text of a file and the digest of its content."""
     try:
         content = path.read_bytes()
-        text = content.decode("utf-8-sig")
+        is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        text = content.decode("utf-16" if is_utf_16 else "utf-8-sig")
     except OSError as error:
         raise IndicatorError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError:
@@ -333,6 +365,8 @@ def _columns(
                     f"leave it out by --ignore {name!r}"
                 )
             parameters.append(name)
+        elif meaning == "seed" and meaning in names:
+            names[meaning] += f"{BLOCK_SIGN}{name}"
         elif meaning in names:
             raise IndicatorError(
                 f"{path} has columns {names[meaning]!r} and {name!r}, both {meaning}: say "

@@ -138,20 +138,24 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         look = latest_look(plan, outcomes)
         plan = replace(plan, specification=specification.replace(seeds=look.shared_seeds))
         verdicts = look.verdicts
+    # Recorded conditions need not have the same seeds.
+    is_even = plan.paired and plan.origin is None
     cells: dict[CellKey, Cell] = {}
     for policy, table, arm in plan.cells:
         runs = [
             outcomes.get((case.key, seed)) for case in arm.case.trainings for seed in plan.seeds
         ]
         cells[policy, table, arm] = Cell.of(
-            policy, table, arm, runs, paired=plan.paired, reference=reference
+            policy, table, arm, runs, paired=is_even, reference=reference
         )
     if not specification.until_clear:
         verdicts = adjust_families(
             [
                 judge_comparison(
                     comparison,
-                    {
+                    _shared_cells(plan, outcomes, comparison)
+                    if plan.origin and plan.paired
+                    else {
                         arm: cells[comparison.policy, comparison.table, arm]
                         for arm in comparison.arms
                     },
@@ -171,6 +175,21 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
         declared.looks,
         late_margin=declared.margin != specification.margin,
     )
+
+
+def _shared_cells(plan: Plan, outcomes: Outcomes, comparison: Comparison) -> dict[Arm, Cell]:
+    """Return the cells of a comparison over the seeds that all its arms have."""
+    keys = [arm.case.key for arm in comparison.arms]
+    shared = [seed for seed in plan.seeds if all((key, seed) in outcomes for key in keys)]
+    return {
+        arm: Cell.of(
+            comparison.policy,
+            comparison.table,
+            arm,
+            [outcomes.get((arm.case.key, seed)) for seed in shared or plan.seeds],
+        )
+        for arm in comparison.arms
+    }
 
 
 def _with_claim(verdict: Verdict, reference: Reference | None) -> Verdict:

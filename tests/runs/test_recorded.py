@@ -110,6 +110,28 @@ def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
     assert not results.exploratory
 
 
+def test_conditions_are_paired_over_the_blocks_that_they_share(tmp_path: Path) -> None:
+    blocks = {
+        5: {"hall": 10, "yard": 20, "roof": 12},
+        10: {"roof": 30, "hall": 21},
+        20: {"yard": 9},
+    }
+    rows = [f"{n},{name},{p}" for n, of_size in blocks.items() for name, p in of_size.items()]
+    study = imported(tmp_path, "\n".join(["robots,map,delivered", *rows]))
+    results = study.findings()
+    doubled, apart = results.verdicts
+    assert doubled.estimate is not None
+    alone = spi.scalability([10, 12], [21, 30], n=5, m=5)
+    assert (doubled.estimate.n_seeds, doubled.estimate.paired) == (2, True)
+    assert (doubled.interval, doubled.estimate.p_value) == (
+        (alone.value, alone.low, alone.high),
+        alone.p_value,
+    )
+    assert apart.problem == "N = 10: 1 of 3 runs missing; N = 20: 2 of 3 runs missing"
+    # P is of all runs of a condition.
+    assert [cell.by_seed.tolist() for cell in results.cells] == [[10, 20, 12], [21, 30], [9]]
+
+
 HEAD = "robots,fault,faulty,width,delivered\n"
 
 
@@ -119,6 +141,10 @@ HEAD = "robots,fault,faulty,width,delivered\n"
         (HEAD + "5,,,,9\n", "line 2: stands alone"),
         (HEAD + "25,none,0,,9\n20,FM1,1,,9\n", "line 3: has the fault 'FM1', but no row"),
         (HEAD + "5,,,0,9\n5,,,2,9\n", "line 2: width = 0 is x_o"),
+        (
+            "robots,tags,delivered\n4,8,9\n4,8,8\n8,16,20\n",
+            "line 2: the number of robots and 'tags' change together",
+        ),
         ("robots,weight,slope,delivered\n4,1,0,9\n4,2,3,9\n", "parameters: 'weight', 'slope'"),
     ],
 )
