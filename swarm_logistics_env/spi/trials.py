@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from .trials_table import Row, read_rows
 NO_FAULT_WORD = "none"
 REMOVED_WORD = "removed"
 FEWEST_OF_COVARIATE = 6  # rows that all differ in a column are no conditions of a trial each
+_IS_A_TIME = re.compile(r"(?i)\b(times?|duration|makespan|latency)\b|\[(s|sec|min|steps?)\]")
 REPEATED = "other behaviour"  # no fault, a second time: what chance alone makes of a pair
 _NO_FAULT_WORDS = ("", NO_FAULT_WORD, "no fault", "no_fault", "baseline", "healthy", "0", "-", "na")
 _FAULT_NAMES = {
@@ -162,12 +164,17 @@ def read_trials(
     trials = [(_trial(row, spelled, varying, duration, blocks), row) for row in rows]
     complete = _events(trials) if is_log else _runs(trials)
     _check_pairing(path, complete)
-    _check_durations(path, complete)
+    takes_times = "time_to_finish" in rows[0].names
+    if not takes_times:  # a rate compares trials of any length
+        _check_durations(path, complete)
     notes = [
         f"The faults {spelled[name.casefold()]} and {name} are taken for one."
         for name in faults
         if name not in spelled.values()
     ]
+    if takes_times:
+        work = rows[0].names.get("work", "1")
+        notes.append(f"P is {work} divided by {rows[0].names['time_to_finish']}: more is better.")
     notes += [
         f"{name!r} differs in every trial: it tells no conditions apart." for name in covariates
     ]
@@ -185,8 +192,14 @@ def read_trials(
 def _check_columns(path: Path, row: Row, faults: Iterable[str]) -> None:
     """Refuse a file without the columns that no other can stand for, all of them at once."""
     lacking = {}
-    if not {"performance", "time"} & row.names.keys():
+    if not {"performance", "time", "time_to_finish"} & row.names.keys():
         lacking["performance"] = "column 'performance', or time, for one delivery a row"
+    name = row.names.get("performance", "")
+    if "time_to_finish" not in row.names and _IS_A_TIME.search(name) and "per" not in name.split():
+        raise IndicatorError(
+            f"{path}: {name!r} is a time by its name, of which less is better: say --column "
+            f"time_to_finish={name!r}, and --column work=NAME if what was done in it varies"
+        )
     fails = any(
         _FAULT_NAMES.get(fault.lower()) not in (NO_FAULT_WORD, REPEATED) for fault in faults
     )
@@ -256,7 +269,27 @@ def _runs(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
         label = row.text("trial")
         if label and (line := labels.setdefault((trial.condition, label), row.line)) != row.line:
             raise row.error("trial", f"is in line {line} too: should name one run a row")
-    return [replace(trial, performance=row.number("performance", 0.0)) for trial, row in rows]
+    rate = _rate if "time_to_finish" in rows[0][1].names else None
+    return [
+        replace(trial, performance=rate(row) if rate else row.number("performance", 0.0))
+        for trial, row in rows
+    ]
+
+
+def _rate(row: Row) -> float:
+    """Return what was done in a trial by the time that it took."""
+    if row.text("time_to_finish"):
+        time = row.number("time_to_finish", 0.0)
+        if not time:
+            raise row.error("time_to_finish", "should be more than 0")
+        return (row.number("work", 0.0) if row.text("work") else 1.0) / time
+    if not (row.text("performance") and row.text("duration")):
+        raise row.error(
+            "time_to_finish",
+            "of a trial that did not finish, columns should say how long it lasted (duration) and "
+            "what was done by then (performance)",
+        )
+    return row.number("performance", 0.0) / row.number("duration", 0.0)
 
 
 def _events(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
@@ -327,6 +360,7 @@ def _notes_on_pairs(trials: Sequence[Trial], block: str) -> Iterator[str]:
 
 
 def _check_durations(path: Path, rows: Sequence[Trial]) -> None:
+    """Refuse trials of which some lasted longer than others."""
     for row in rows:
         if row.duration != rows[0].duration:
             raise IndicatorError(

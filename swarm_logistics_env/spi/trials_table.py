@@ -25,6 +25,8 @@ COLUMN_NAMES: dict[str, tuple[str, ...]] = {
     "seed": ("pair", "block", "map", "layout", "instance"),
     "trial": ("run", "id"),
     "time": (),
+    "time_to_finish": ("finish_time", "completion_time", "makespan"),
+    "work": (),
     "duration": ("length",),
     "table": (),
     "contacts": ("contacts_per_robot_minute",),

@@ -360,3 +360,22 @@ def test_a_file_in_utf_16_is_read(tmp_path: Path) -> None:
     path = tmp_path / "trials.csv"
     path.write_text("robots\tfault\tfaulty\tp\n8\tnone\t0\t9\n8\tRäder\t1\t7\n", encoding="utf-16")
     assert [row.fault for row in spi.read_trials(path).rows] == ["none", "Räder"]
+
+
+def test_a_time_to_finish_gives_a_rate(tmp_path: Path) -> None:
+    text = "robots,boxes,time to finish [s],done,lasted\n5,20,925,,\n10,30,510,,\n20,30,,9,300\n"
+    columns = {"work": "boxes", "performance": "done", "duration": "lasted"}
+    trials = read(tmp_path, text, columns=columns)
+    assert [row.performance for row in trials.rows] == [20 / 925, 30 / 510, 9 / 300]
+    assert trials.notes == ("P is boxes divided by time to finish [s]: more is better.",)
+    alone = read(tmp_path, "robots,makespan\n5,925\n10,510\n")
+    assert [row.performance for row in alone.rows] == [1 / 925, 1 / 510]
+    with pytest.raises(spi.IndicatorError, match="of a trial that did not finish, columns should"):
+        read(tmp_path, "robots,makespan\n5,925\n10,\n")
+
+
+@pytest.mark.parametrize("name", ["Time", "total time", "result [s]", "steps [steps]"])
+def test_a_time_is_no_performance(tmp_path: Path, name: str) -> None:
+    with pytest.raises(spi.IndicatorError, match="is a time by its name") as caught:
+        read(tmp_path, f"robots,{name}\n5,925\n10,510\n", columns={"performance": name})
+    assert f"--column time_to_finish={name!r}" in str(caught.value)
