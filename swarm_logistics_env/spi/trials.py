@@ -354,8 +354,8 @@ def _notes_on_pairs(trials: Sequence[Trial], block: str) -> Iterator[str]:
         alone = sum(len(seeds - in_all) for seeds in conditions.values())
         if alone:
             yield (
-                f"{title}: {alone} runs lack a partner of the same {block} in some condition: they "
-                "count for P, and are left out where such a condition is compared."
+                f"{title}: no partner of the same {block} in some condition for {alone} of its "
+                "runs: they count for P, and are left out where such a condition is compared."
             )
 
 

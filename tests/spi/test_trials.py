@@ -328,8 +328,8 @@ def test_any_text_is_a_block_and_an_empty_column_is_none(tmp_path: Path) -> None
         "A has runs of 2 of 3 (map).",
         "B has runs of 2 of 3 (map).",
         (
-            "B: 1 runs lack a partner of the same map in some condition: they count for P, and "
-            "are left out where such a condition is compared."
+            "B: no partner of the same map in some condition for 1 of its runs: they count for P, "
+            "and are left out where such a condition is compared."
         ),
     )
 
