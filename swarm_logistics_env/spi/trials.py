@@ -282,7 +282,7 @@ def _rate(row: Row) -> float:
         time = row.number("time_to_finish", 0.0)
         if not time:
             raise row.error("time_to_finish", "should be more than 0")
-        return (row.number("work", 0.0) if row.text("work") else 1.0) / time
+        return (row.number("work", 0.0) if "work" in row.names else 1.0) / time
     if not (row.text("performance") and row.text("duration")):
         raise row.error(
             "time_to_finish",

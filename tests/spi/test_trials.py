@@ -372,6 +372,8 @@ def test_a_time_to_finish_gives_a_rate(tmp_path: Path) -> None:
     assert [row.performance for row in alone.rows] == [1 / 925, 1 / 510]
     with pytest.raises(spi.IndicatorError, match="of a trial that did not finish, columns should"):
         read(tmp_path, "robots,makespan\n5,925\n10,\n")
+    with pytest.raises(spi.IndicatorError, match="column 'work': nothing: should be a number"):
+        read(tmp_path, "robots,work,makespan\n5,20,925\n10,,510\n")
 
 
 @pytest.mark.parametrize("name", ["Time", "total time", "result [s]", "steps [steps]"])
