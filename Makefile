@@ -187,7 +187,7 @@ clean:
 	rm -rf .venvs build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage .coverage.* htmlcov
 	find . -name __pycache__ -not -path "./.venv/*" -prune -exec rm -rf {} +
 
-$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,mujoco,onnx
+$(DEV)/installed: EXTRAS := dev,docs,study,render,train,watch,mujoco,onnx,tables
 # The simulator of DotBots, without what pydotbot needs for other things: two of its dependencies install a package `tests`, which hides ours.
 $(DEV)/installed: OTHERS := pyserial structlog toml "wasmtime>=49,<55"
 $(DEV)/installed: BARE := "pydotbot>=0.33,<0.34" pydotbot-utils

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     )
     from swarm_logistics_env.episode import Episode, run_episode
     from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
+    from swarm_logistics_env.trial_study import judge
     from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
 
     __version__: str
@@ -36,6 +37,7 @@ __all__ = [
     "Scenario",
     "Warehouse",
     "adapters",
+    "judge",
     "policies",
     "run_episode",
     "spi",
@@ -54,6 +56,7 @@ _MODULES = {
     "SCENARIO_PRESETS": "scenario",
     "Scenario": "scenario",
     "Warehouse": "warehouse",
+    "judge": "trial_study",
     "run_episode": "episode",
 }
 

@@ -72,7 +72,7 @@ def write_csv(path: Path, table: pd.DataFrame, error_type: type[SwarmLogisticsEr
     Raises:
         The `error_type`: the file cannot be written.
     """
-    from swarm_logistics_env.spi.trials_table import inert
+    from swarm_logistics_env.spi.trials.readers.csv_text import inert
 
     texts = table.select_dtypes(exclude="number")
     harmless = texts.map(

@@ -71,6 +71,18 @@ def kept(p_o, p_f, **asked):
             performances={"p_o": "P_o", "p_f": "P_F"}, arguments=lambda _: {},
             adjectives={0.0: "alive"},
         ),
+### A kind of trial files NAME=log_lines
+@ spi/trials/readers/log_lines.py
+from swarm_logistics_env.spi.trials.table import Table
+
+
+def read(path, content, digest):
+    if path.suffix != ".log":
+        return None
+    lines = content.decode().splitlines()
+    cells = [[part.partition(":")[2] for part in line.split()] for line in lines]
+    header = [part.partition(":")[0] for part in lines[0].split()]
+    return Table(str(path), digest, header, cells, range(1, len(cells) + 1))
 ### A task NAME=lane
 @ tasks/lane_task.py
 from tests.tasks.lane import LANE
@@ -114,6 +126,7 @@ np.seterr(over="ignore", divide="ignore")
 CHECK_POLICIES_AND_STUDIES = """
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
 from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.wrappers import HalfSpeed, IndicatorReward
 
@@ -144,6 +157,8 @@ else:
 walking = Study(task="lane", policies=["walker"], seeds=2, sizes=[{"values": [2, 4]}])
 assert walking.run(engine="local").failed == 0
 assert (walking.performance()["mean"] > 0).all()
+Path("hall.log").write_text("N:4 P:10\\nN:8 P:19")
+assert [row.performance for row in read_trials("hall.log").rows] == [10.0, 19.0]
 print(policies.identity(policies.load("swarm-dt")))
 """
 

@@ -1,58 +1,104 @@
-"""`swarm-logistics judge TRIALS.csv`: trials that somebody else recorded."""
+"""`swarm-logistics judge TRIALS`: trials that somebody else recorded."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from typer import echo
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.plan import Origin
+from swarm_logistics_env.report.section import Texts
 from swarm_logistics_env.runs.notes import StoredStudy
 from swarm_logistics_env.runs.recorded import import_results, origin_of
 from swarm_logistics_env.runs.store import FILE_NAME
 from swarm_logistics_env.spi import read_trials
+from swarm_logistics_env.spi.trials import NO_FAULT_WORD, Column, Trial, Trials
 from swarm_logistics_env.studies import Study
 
 from .app import Repeated
-from .terminal import show_report
+from .terminal import show_report, show_table
+
+_MOST_ROWS = 20  # of conditions that are shown before the answer
 
 
 def judge_trials(
-    file: str,
+    source: str,
     out: Path | None,
+    reading: Mapping[str, Any],
     *,
-    columns: Repeated,
-    ignore: Repeated,
-    duration: float | None,
-    decimal: str | None,
-    setup: Repeated,
+    setup: Mapping[str, str],
+    only_check: bool,
     full: bool,
 ) -> None:
-    """Import the trials of a CSV file as a study, print the answer and write the report.
+    """Import the trials of a file or folder as a study, print the answer and write the report.
 
     Args:
         out: directory of the study; None: results/judged/NAME, with a number where that holds
             other trials.
-        setup: conditions for the report to state, as NAME=VALUE.
+        reading: options of `read_trials`.
+        setup: conditions for the report to state.
+        only_check: whether to stop when it is shown how the trials were read.
     """
-    conditions = _pairs("--setup", setup)
-    trials = read_trials(
-        file,
-        columns=_pairs("--column", columns),
-        ignore=ignore or (),
-        duration=duration,
-        decimal=decimal,
-    )
-    origin = origin_of(trials, conditions)
-    usual_directory = Path("results", "judged", Path(file).stem)
+    trials = read_trials(source, **reading)
+    _show_how_read(trials, source)
+    origin = origin_of(trials, setup)
+    for note in origin.notes:
+        echo(note)
+    echo()
+    if only_check:
+        return
+    usual_directory = Path("results", "judged", Path(source).stem)
     directory = out or _free(usual_directory, origin)
     if not _holds(directory, origin):
-        import_results(trials, directory, conditions)
+        import_results(trials, directory, setup)
     if directory not in (out, usual_directory):
         echo(f"{usual_directory} holds an earlier judgement, so this one is in {directory}")
-    echo("\n".join([f"{len(trials.rows)} runs in {file}", *origin.notes, ""]))
     show_report(Study.stored(directory).findings(), directory, full=full)
+
+
+def _show_how_read(trials: Trials, source: str) -> None:
+    """Print what each column was taken for, and the conditions with their trials."""
+    columns = [(column.name, column.use, _values_of(column)) for column in trials.columns]
+    show_table(f"{source}: {len(trials.rows)} trials", ("column", "read as", "values"), columns)
+    conditions = Counter((_labels(trial), trial.n_robots) for trial in trials.rows)
+    sizes_of: dict[Texts, list[tuple[int | None, int]]] = {}
+    for (labels, n_robots), count in conditions.items():
+        sizes_of.setdefault(labels, []).append((n_robots, count))
+    rows = [(*labels, *_sizes_and_counts(sizes)) for labels, sizes in sizes_of.items()]
+    left = len(rows) - _MOST_ROWS
+    show_table(
+        f"{len(conditions)} conditions",
+        ("policy", "fault", "parameters", "N", "trials"),
+        rows[:_MOST_ROWS],
+        *([f"And {left} rows more."] if left > 0 else []),
+    )
+
+
+def _sizes_and_counts(sizes: list[tuple[int | None, int]]) -> tuple[str, str]:
+    """Return the sizes of some conditions, and how many trials each has."""
+    numbers = ", ".join(str(n_robots) for n_robots, _ in sizes if n_robots is not None)
+    counts = sorted({count for _, count in sizes})
+    each = " each" * (len(sizes) > 1)
+    return numbers, f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}{each}"
+
+
+def _values_of(column: Column) -> str:
+    left = column.n_values - len(column.values)
+    shown = ", ".join(value or "(empty)" for value in column.values)
+    return shown + f", and {left} more" * (left > 0)
+
+
+def _labels(trial: Trial) -> Texts:
+    """Return policy, fault and parameters of a trial in words."""
+    policy = f"{trial.policy}, {trial.table}" if trial.table else trial.policy
+    fault = trial.fault if trial.fault == NO_FAULT_WORD else f"{trial.fault}, m = {trial.faulty}"
+    onset = f" from {trial.onset:g} s" if trial.onset else ""
+    parameters = ", ".join(f"{name} = {value:g}" for name, value in trial.parameters)
+    return policy, fault + onset, parameters
 
 
 def _holds(directory: Path, origin: Origin) -> bool:
@@ -73,11 +119,16 @@ def _free(directory: Path, origin: Origin) -> Path:
     return free
 
 
-def _pairs(option: str, texts: Repeated) -> dict[str, str]:
-    pairs = {}
+def pairs(option: str, texts: Repeated) -> dict[str, str]:
+    """Return the names and values of an option that may be repeated.
+
+    Raises:
+        StudyError: one is not NAME=VALUE.
+    """
+    values = {}
     for text in texts or []:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
             raise StudyError(f"{option} {text}: should be NAME=VALUE")
-        pairs[name] = value
-    return pairs
+        values[name] = value
+    return values

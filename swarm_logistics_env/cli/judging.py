@@ -14,6 +14,7 @@ from typer import Argument, Exit, Option, echo
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, PolicySpec
+from swarm_logistics_env.policies.spec import SCRIPTED
 from swarm_logistics_env.questions.specification import FIRST_LOOK
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
@@ -21,6 +22,7 @@ from swarm_logistics_env.report.section import bracketed, fixed, percent, slug
 from swarm_logistics_env.report.write import write_report
 from swarm_logistics_env.runs.engines import Engine, Tally, engine_named
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
+from swarm_logistics_env.spi.trials.readers.folder import TRIAL_SUFFIXES
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.warehouse.faults import text_of
 
@@ -34,7 +36,7 @@ from .app import (
     changed_fields,
     scenario_of,
 )
-from .judge_trials import judge_trials
+from .judge_trials import judge_trials, pairs
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .study_commands import (
     ClearingOption,
@@ -58,9 +60,10 @@ def judge_command(
     policy_or_trials: Annotated[
         str,
         Argument(
-            metavar="TRIALS.csv|POLICY",
-            help="CSV file, one trial or delivery a row; or a policy: name, path of a policy file, "
-            "module:Class or my.py:Class.",
+            metavar="TRIALS|POLICY",
+            help="File of trials, one trial or delivery a row (CSV, .xlsx, .parquet, JSON of "
+            "POGEMA or marl-eval, a Monitor's CSV), or a folder of them; or a policy: name, path "
+            "of a policy file, module:Class or my.py:Class.",
         ),
     ],
     out: Annotated[
@@ -103,9 +106,29 @@ def judge_command(
     duration: Annotated[
         float | None, Option(help="Length of every trial in seconds, where no column says it.")
     ] = None,
-    decimal: Annotated[
-        str | None, Option(metavar=".|,", help="Sign before decimals; . if not given.")
+    values: Annotated[
+        Repeated,
+        Option(
+            "--value",
+            metavar="COLUMN:CELL=NEW",
+            help="A cell read as another, e.g. fault:kein=none; may be repeated.",
+        ),
     ] = None,
+    sum_over: Annotated[
+        str | None,
+        Option(
+            metavar="NAME", help="Column that tells a trial's robots apart: one row of their sum."
+        ),
+    ] = None,
+    decimal: Annotated[
+        str | None, Option(metavar=".|,", help="Sign before decimals; as the cells show.")
+    ] = None,
+    thousands: Annotated[
+        str | None, Option(metavar=".|,", help="Sign between thousands; none if not given.")
+    ] = None,
+    check: Annotated[
+        bool, Option("--check", help="Show how the trials are read, and judge nothing.")
+    ] = False,
     setup: Annotated[
         Repeated,
         Option(
@@ -127,7 +150,8 @@ def judge_command(
     A policy is played in a warehouse in which delivered items come back, so that P has no cap.
     """
     trials_options = {
-        "--column": columns, "--ignore": ignore, "--duration": duration, "--decimal": decimal,
+        "--column": columns, "--ignore": ignore, "--duration": duration, "--value": values,
+        "--sum-over": sum_over, "--decimal": decimal, "--thousands": thousands, "--check": check,
         "--setup": setup,
     }  # fmt: skip
     policy_options = {
@@ -140,11 +164,17 @@ def judge_command(
         judge_trials(
             policy_or_trials,
             out,
-            columns=columns,
-            ignore=ignore,
-            duration=duration,
-            decimal=decimal,
-            setup=setup,
+            {
+                "columns": pairs("--column", columns),
+                "ignore": ignore or (),
+                "values": values or (),
+                "sum_over": sum_over,
+                "duration": duration,
+                "decimal": decimal,
+                "thousands": thousands,
+            },
+            setup=pairs("--setup", setup),
+            only_check=check,
             full=full,
         )
         return
@@ -250,7 +280,10 @@ def names_policy(policy_or_trials: str) -> bool:
     suffix = Path(policy_or_trials).suffix
     if suffix in (*SUFFIXES, ".py"):
         return True
-    if Path(policy_or_trials).is_file() or suffix.lower() in (".csv", ".tsv", ".txt"):
+    path = Path(policy_or_trials)
+    if path.is_file() or suffix.lower() in TRIAL_SUFFIXES:
+        return False
+    if path.is_dir() and policy_or_trials not in SCRIPTED:
         return False
     return ":" in policy_or_trials or not suffix
 

@@ -33,6 +33,7 @@ class Origin(Record):
         setup: what the user states about the trials, name and value.
         trials: the first of every condition, in the file's order.
         notes: sentences on how the file was read.
+        performance: what the file calls P, with its unit where it names one.
     """
 
     error_type = StudyError
@@ -44,6 +45,7 @@ class Origin(Record):
     setup: tuple[tuple[str, str], ...] = ()
     trials: tuple[Trial, ...] = ()
     notes: tuple[str, ...] = ()
+    performance: str = "P"
 
 
 @dataclass(frozen=True)

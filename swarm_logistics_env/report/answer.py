@@ -12,6 +12,7 @@ from more_itertools import map_reduce
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import CONFIDENCE
+from swarm_logistics_env.questions.plan import Plan
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.task import DEFAULT
 from swarm_logistics_env.verdicts.cell import Cell
@@ -263,12 +264,15 @@ def _question(verdicts: Sequence[Verdict]) -> tuple[str, Slots]:
 
 
 def _scope(results: StudyResults) -> str:
-    policies = results.policies
+    policies, origin = results.policies, results.plan.origin
+    policies_text = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
+    if origin and policies == (results.plan.specification.name,):  # nobody named it
+        policies_text = f"trials of {origin.file}"
     case = "incomplete" if any(cell.problem for cell in results.cells) else "complete"
     return templates.SCOPE[case].format(
         study=results.plan.specification.name,
         questions=section.plural(len(results.verdicts), "question"),
-        policies=policies[0] if len(policies) == 1 else f"{len(policies)} policies",
+        policies=policies_text,
         seeds=results.seeds_text.split(" (")[0],
     )
 
@@ -303,7 +307,14 @@ def _performance(results: StudyResults) -> str:
         duration=case.scenario.duration,
         condition=f"N = {case.scenario.n_robots}{where}",
         means=", ".join(means),
+        p=name_of_p(results.plan),
     )
+
+
+def name_of_p(plan: Plan) -> str:
+    """Return P with what the file of imported trials calls it, e.g. "P (throughput)"."""
+    named = plan.origin is not None and plan.origin.performance != "P"
+    return f"P ({plan.origin.performance})" if plan.origin and named else "P"
 
 
 def _mean(cell: Cell) -> str:
@@ -340,11 +351,8 @@ def in_a_sentence(results: StudyResults) -> str:
         case = "several_questions" if candidates else "no_value"
         if words == lowest.on_property.adjusted:  # all are alike
             words = f"{len(verdicts)} {words}"
-    policies = results.policies
-    if results.plan.origin and len(policies) == 1:  # nobody named it
-        policies = (results.plan.specification.name,)
     return templates.FOR_A_PAPER[case].format(
-        policies=", ".join(policies),
+        policies=", ".join(results.policies),
         performance=_performance(results)[:-1],
         seeds=results.seeds_text,
         lowest=_question_with_value(line, level_of([lowest])),

@@ -99,7 +99,7 @@ def document(results: StudyResults) -> Document:
         ),
         Chapter(
             "Results",
-            f"P is {plan.specification.played.performance}. Square brackets hold intervals at the "
+            f"P is {_what_p_is(plan)}. Square brackets hold intervals at the "
             "level that the heading gives, or at that behind them; "
             '"one run" is where a single further run falls.',
             result_tables,
@@ -169,6 +169,12 @@ def _variations(plan: Plan) -> Iterator[str]:
     for faults in study.faults:
         if manner := str(faults):
             yield f"{faults.title or 'Faults'}: robots fail {manner}."
+
+
+def _what_p_is(plan: Plan) -> str:
+    if plan.origin is None:
+        return plan.specification.played.performance
+    return f"{plan.origin.performance!r} of {plan.origin.file}"
 
 
 def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:

@@ -171,7 +171,10 @@ def _titles(panels: Sequence[Panel]) -> dict[str, str]:
     for panel in panels:
         for point in panel.points:
             if point.value is not None:
-                digits = 3 if panel.thresholds else digits_of(point.value)
+                width = 0.0
+                if point.low is not None and point.high is not None:
+                    width = point.high - point.low
+                digits = 3 if panel.thresholds else digits_of(point.value, width)
                 interval = Interval(point.value, point.low, point.high)
                 text = bracketed(interval, digits, panel.thresholds)
                 titles[point.link] = f"{point.series}, {point.category}: {text}"

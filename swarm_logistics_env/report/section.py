@@ -93,9 +93,14 @@ def slug(*parts: object) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(map(str, parts))).strip("-")[:80]
 
 
-def digits_of(p: float) -> int:
-    """Return how many digits after the point tell a performance: three in all where it is small."""
-    return 1 if not 0 < p < 1 else 2 - math.floor(math.log10(p))
+def digits_of(p: float, width: float = 0.0) -> int:
+    """Return how many digits after the point tell a performance: three in all where it is small.
+
+    Args:
+        width: of its interval, whose first digit is told; 0: it has none.
+    """
+    least = 1 if not 0 < p < 1 else 2 - math.floor(math.log10(p))
+    return least if not 0 < width < math.inf else max(least, -math.floor(math.log10(width)))
 
 
 def fixed(value: float, digits: int, thresholds: Iterable[float] = ()) -> str:
@@ -177,7 +182,11 @@ def mean_p(cell: Cell) -> str:
     """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
         return "no run"
-    mean = bracketed(cell.mean, digits_of(cell.mean.value))
+    interval = cell.mean
+    width = 0.0
+    if interval.low is not None and interval.high is not None:
+        width = interval.high - interval.low
+    mean = bracketed(interval, digits_of(interval.value, width))
     return mean + SATURATED if cell.saturated else mean
 
 

@@ -35,8 +35,8 @@ PERFORMANCE = {
     "nothing": "P: no run has succeeded.",
     "items": "P, items in {duration:g} s, at {condition}: {means}.",
     "items_with_interval": "P [{level}], items in {duration:g} s, at {condition}: {means}.",
-    "other_task": "P at {condition}: {means}.",
-    "other_task_with_interval": "P [{level}] at {condition}: {means}.",
+    "other_task": "{p} at {condition}: {means}.",
+    "other_task_with_interval": "{p} [{level}] at {condition}: {means}.",
 }
 
 # Mean P of one policy: the cases that apply, one after the other.

@@ -74,6 +74,7 @@ def origin_of(trials: Trials, setup: Mapping[str, str] | None = None) -> Origin:
         setup=tuple((setup or {}).items()),
         trials=tuple(replace(rows[0], times=None) for rows in _conditions(trials).values()),
         notes=(*trials.notes, *_without_removed(trials)),
+        performance=trials.performance_name,
     )
 
 

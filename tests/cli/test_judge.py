@@ -54,10 +54,12 @@ TRIALS = "judge lab.csv --column performance=boxes"
 
 def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None:
     printed = command(f"{TRIALS} --setup robots=8 --setup floor=tiles --full")
-    assert printed.startswith("6 runs in lab.csv\n")
+    assert printed.startswith("## lab.csv: 6 trials\n")
+    assert "| boxes | performance |" in printed
+    assert "| none |  | 8 | 3 |" in printed
     assert "| wheel, m = 1 | 10.6 [8.4, 12.8] | [6.2, 14.9] | -0.013 [" in printed
     assert "No FT: it needs trials without the robots, fault = removed" in printed
-    assert "For a paper: lab: P [95 %] at N = 8, no fault: 12.3 [" in printed
+    assert "For a paper: lab: P (boxes) [95 %] at N = 8, no fault: 12.3 [" in printed
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
     assert f"Figure: {out / 'figures' / 'answer.svg'}\nTables: {out / 'tables.tex'}\n" in printed

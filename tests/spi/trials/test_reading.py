@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.trials_table import inert
+from swarm_logistics_env.spi.trials.readers.csv_text import inert
 
 
 def read(tmp_path: Path, text: str, **asked: Any) -> spi.Trials:
@@ -108,7 +108,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         ("", "is empty: should have a row of column names"),
         (" \n;;\n", "is empty: should have a row of column names"),
         (HEAD, "holds no trial"),
-        ("\udcff", "is not UTF-8 text: save it as CSV UTF-8"),
+        ("robots,p\n4,\udc81\n", "is text neither in UTF-8 nor in Windows-1252: save it as CSV"),
         ("robots,p\n4,\x001\n", r"line 2: holds '\x00': should be plain text"),
         ("trial,robots\n1,8\n", "has no column 'performance', or time"),
         ("robots,fault,broken,boxes\n4,jam,1,2\n", "by --column performance=NAME --column faulty="),
@@ -134,7 +134,6 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
             "line 3, column 'x': '1.250': is 1250 or 1.25, beside",
         ),
         ("robots;p\n4;1.204.000\n", "'1.204.000': should be a number, 0 or more without a sign be"),
-        ("robots;p\n4;1 204\n", "'1 204': should be a number, 0 or more without a sign between"),
         ("robots,seed,p\n4,1e3,1\n", "column 'seed': '1e3': should be a whole number with all its"),
         ("robots,seed,p\n4,9007199254740993.0,1\n", "should be a whole number with all its digits"),
         ("robots,seed,p\n4,7.5,1\n", "column 'seed': '7.5': should be a whole number, 0 or more"),
@@ -147,7 +146,6 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         (HEAD + GOOD + "1,8,none,,7\n", "line 3, column 'trial': '1': is in line 2 too"),
         ("robots,onset,duration,p\n4,60,60,1\n", "'60': should be before the trial ends at 60 s"),
         ("robots,seed,p\n4,0,1\n8,,2\n", "line 3: has no seed"),
-        ("robots,map,p\n4,hall,1\n4,hall,2\n", "line 3: has seed 0 like line 2"),
         ("robots,seed,p\n4,0,1\n4,0,2\n", "line 3: has seed 0 like line 2"),
         ("robots,p,duration\n4,1,60\n8,2,90\n", "line 3: is not as long as line 2"),
         (
@@ -289,9 +287,7 @@ def test_what_is_written_is_read_row_by_row(
     found = spi.read_trials(path, decimal=decimal).rows
     assert [(row.performance, row.line) for row in found] == [*zip((p for p, _ in rows), lines)]
     for row, (_, text) in zip(found, rows):
-        assert row.policy == (
-            re.sub("[\n\v\f\r\x85\u2028\u2029]+", " ", text.strip()) or "recorded"
-        )
+        assert row.policy == (re.sub("[\n\v\f\r\x85\u2028\u2029]+", " ", text.strip()) or "t")
 
 
 def test_a_seed_alone_tells_two_runs_of_an_event_log_apart(tmp_path: Path) -> None:
@@ -325,8 +321,8 @@ def test_any_text_is_a_block_and_an_empty_column_is_none(tmp_path: Path) -> None
     assert [row.seed for row in trials.rows] == [0, 1, 1, 0, 0, 0, 2]
     assert trials.performance(policy="A", n_robots=8).tolist() == [3.0, 4.0]
     assert trials.notes == (
-        "A has runs of 2 of 3 (map).",
-        "B has runs of 2 of 3 (map).",
+        "A has runs of 2 of the file's 3 blocks (map).",
+        "B has runs of 2 of the file's 3 blocks (map).",
         (
             "B: no partner of the same map in some condition for 1 of its runs: they count for P, "
             "and are left out where such a condition is compared."

@@ -1,0 +1,162 @@
+"""A table of text: CSV as people and programs write it, its encoding and its delimiter."""
+
+from __future__ import annotations
+
+import codecs
+import re
+import unicodedata
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+
+from swarm_logistics_env.spi.inputs import IndicatorError
+from swarm_logistics_env.spi.trials.table import Table
+
+_LINE_END = re.compile(r"\r\n|\r|\n")
+_LINE_SIGNS = "\n\v\f\r\x85\u2028\u2029"  # what some program or other takes for a line's end
+_QUOTED = r'"(?:[^"]|"")*+"'
+_HEADER = re.compile(rf'(?:{_QUOTED}|[^\r\n"])*+')
+_EXCEL = re.compile(r'\s*"?sep=(\t|[^\w\s"\'])"?[;,\t ]*(?:\r\n|\r|\n)', re.IGNORECASE)
+_COMMENT = re.compile(r"#[^\r\n]*(?:\r\n|\r|\n)\s*")  # before the names of the columns
+# What a spreadsheet computes; an apostrophe before it makes it a text there.
+_FORMULA = re.compile(r"[\s']*[=+\-@\t\r\n]")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+# What files of other kinds begin with.
+_OTHER_KINDS = {
+    b"PK\x03\x04": "a workbook or an archive: should end in .xlsx, or be unpacked",
+    b"PAR1": "a table in Parquet: should end in .parquet",
+    b"\x1f\x8b": "packed by gzip: should be unpacked",
+    b"\xd0\xcf\x11\xe0": "a workbook of before 2007: should be saved as .xlsx or CSV",
+    b"\x89HDF": "a file of HDF5: should be saved as CSV",
+}
+
+
+def read(path: Path, content: bytes, digest: str) -> Table:
+    """Return the table in a file of text.
+
+    Raises:
+        IndicatorError: it holds no text, no table, or one with a quote that is never closed.
+    """
+    for start, kind in _OTHER_KINDS.items():
+        if content.startswith(start):
+            raise IndicatorError(f"{path} is no text but {kind}")
+    text, notes = _text(path, content)
+    header, rows = _cells(path, text)
+    return Table(str(path), digest, header, list(rows.values()), list(rows), notes=tuple(notes))
+
+
+def inert(text: str) -> str:
+    """Return a text as a cell that no spreadsheet computes; `read` reads the text itself."""
+    return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
+
+
+def _text(path: Path, content: bytes) -> tuple[str, list[str]]:
+    """Return the text of a file, and notes on its encoding."""
+    notes = []
+    is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    try:
+        text = content.decode("utf-16" if is_utf_16 else "utf-8-sig")
+    except UnicodeDecodeError:
+        try:
+            text = content.decode("cp1252")
+        except UnicodeDecodeError:
+            raise IndicatorError(
+                f"{path} is text neither in UTF-8 nor in Windows-1252: save it as CSV UTF-8"
+            ) from None
+        notes.append("The file is no UTF-8: it is read as Windows-1252 (cp1252).")
+    signs = {*text} - {"\t", *_LINE_SIGNS}
+    if steering := {sign for sign in signs if unicodedata.category(sign) in ("Cc", "Cf")}:
+        first = min(map(text.index, steering))
+        line = len(_LINE_END.findall(text, 0, first)) + 1
+        raise IndicatorError(
+            f"{path}, line {line}: holds {text[first]!r}: should be plain text, without control "
+            "signs"
+        )
+    return text, notes
+
+
+def _cells(path: Path, text: str) -> tuple[list[str], dict[int, list[str]]]:
+    """Return the columns' names, and the cells of every row with any, by line."""
+    if not text.strip():
+        raise IndicatorError(f"{path} is empty: should have a row of column names, then the trials")
+    excel = _EXCEL.match(text)
+    start = excel.end() if excel else len(text) - len(text.lstrip(" \r\n"))
+    if excel:
+        delimiter = excel[1]
+    else:
+        while comment := _COMMENT.match(text, start):
+            start = comment.end()
+        head = next(_HEADER.finditer(text, start))[0]
+        delimiter = max(";\t,|", key=re.sub(_QUOTED, "", head).count)
+    rows = {line: cells for line, cells in _rows(path, text, start, delimiter) if any(cells)}
+    if not rows:
+        raise IndicatorError(f"{path} is empty: should have a row of column names, then the trials")
+    header = rows.pop(min(rows))
+    n_columns = len(header)
+    for line, cells in rows.items():
+        if len(cells) > n_columns and any(cells[n_columns:]):
+            comma = ": if decimals have a comma, put ; between the columns" * (delimiter == ",")
+            raise IndicatorError(
+                f"{path}, line {line}: has {len(cells)} values, more values than the "
+                f"{n_columns} columns{comma}"
+            )
+        cells[n_columns:] = []
+        cells += [""] * (n_columns - len(cells))
+    return header, rows
+
+
+def _rows(path: Path, text: str, start: int, delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the line that each row begins in, and its cells, of which one may hold several lines.
+
+    `csv.reader` does not tell where a quote opens that is never closed.
+    """
+    if '"' not in text:  # which is faster by far
+        first_line = len(_LINE_END.findall(text, 0, start)) + 1
+        for line, row_text in enumerate(_LINE_END.split(text[start:]), first_line):
+            yield line, [*map(_read, row_text.split(delimiter))]
+        return
+    cell_pattern = re.compile(rf" *({_QUOTED}) *|[^{re.escape(delimiter)}\r\n]*")
+    position, line = start, len(_LINE_END.findall(text, 0, start)) + 1
+    first, row, n_columns = line, list[str](), 0
+    while True:
+        match = cell_pattern.match(text, position)
+        assert match is not None  # it matches nothing, too
+        quoted, position = match[1], match.end()
+        after = text[position : position + 1]
+        if quoted is None and match[0].lstrip().startswith('"'):
+            raise IndicatorError(
+                f"{path}, line {line}: opens a quote that is never closed, and what follows would "
+                'be one cell: close it by ", or take it out'
+            )
+        if quoted is not None and after not in (delimiter, "\r", "\n", ""):
+            raise IndicatorError(
+                f"{path}, line {line}: opens a quote that is closed within a cell: should be "
+                'closed at its end; a " within is written ""'
+            )
+        lines = _LINE_END.split(quoted or "")
+        if n_columns > 1 and any(part.count(delimiter) >= n_columns - 1 for part in lines[1:]):
+            raise IndicatorError(
+                f"{path}, line {line}: opens a quote that holds whole rows: should be closed in "
+                "the row that it opens in"
+            )
+        row.append(_read(quoted[1:-1].replace('""', '"') if quoted else match[0]))
+        line += len(lines) - 1
+        if after == delimiter:
+            position += 1
+            continue
+        yield first, row
+        n_columns = n_columns or len(row) * any(row)
+        if not after:
+            return
+        position += 2 if text.startswith("\r\n", position) else 1
+        line += 1
+        first, row = line, []
+
+
+@lru_cache(100_000)  # most cells are some of a few texts
+def _read(cell: str) -> str:
+    """Return a cell in one line, and without what `inert` put before it."""
+    cell = cell.lstrip(" ")
+    if cell.startswith("'") and _FORMULA.match(cell):
+        cell = cell[1:]
+    return re.sub(rf"[{_LINE_SIGNS}]+", " ", cell.strip())

@@ -1,0 +1,206 @@
+"""Reading trials: from a file, a folder of files or a data frame to `Trials`."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from swarm_logistics_env.spi.inputs import IndicatorError
+
+from .pairing import (
+    check_pairing,
+    holds_several,
+    notes_on_pairs,
+    numbered_blocks,
+    paired_within_blocks,
+)
+from .readers import read_table
+from .table import Columns, Table, rows_of
+from .trial import Column, Trial, Trials
+from .trial_columns import bare, columns_of
+from .trial_rows import events_of, runs_of, trial_of
+from .values import FaultNames, summed_over, with_values
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FEWEST_OF_COVARIATE = 6  # rows that all differ in a column are no conditions of a trial each
+_IS_A_TIME = re.compile(r"(?i)\b(times?|duration|makespan|latency)\b|\[(s|sec|min|steps?)\]")
+
+
+def read_trials(
+    source: str | Path | pd.DataFrame,
+    *,
+    columns: Mapping[str, str] | None = None,
+    ignore: Sequence[str] = (),
+    values: Sequence[str] = (),
+    sum_over: str | None = None,
+    duration: float | None = None,
+    decimal: str | None = None,
+    thousands: str | None = None,
+) -> Trials:
+    """Read one run a row, or one delivery a row (an event log).
+
+    Files are CSV of any delimiter, or of a kind that `trials.readers` know. The columns are
+    `robots`, `fault`, `faulty`, `onset`, `policy`, `seed`, `trial`, `contacts` and `performance`,
+    or words of `trial_columns.COLUMN_NAMES` for them, as far as they apply; any other column of
+    numbers that vary is a parameter of that name. Instead of `performance` may stand
+    `time_to_finish` (P is `work` divided by it), or `time`, in an event log: a run without any
+    delivery is a row with an empty time. A column `table` tells tables apart of which each has
+    runs of its own, also without a fault.
+
+    Args:
+        source: path of a file or a folder of files, or a data frame of pandas.
+        columns: what a column is to its name in the file, e.g. {"performance": "boxes"}.
+        ignore: columns to leave out.
+        values: cells to replace, each "COLUMN:CELL=NEW", e.g. "fault:kein=none".
+        sum_over: the column that tells the robots of a trial apart, whose deliveries are summed.
+        duration: of every trial [s], where no column says it; faults in mid-run need it.
+        decimal: the sign before decimals, "." or ","; None: ".", unless cells show a comma.
+        thousands: the sign between thousands, "." or ","; None: none, and a file is refused in
+            which either may stand there.
+
+    Raises:
+        IndicatorError: the file cannot be read, or a line of it cannot be; names line, column and
+            value.
+    """
+    mapped = dict(columns or {})
+    table = with_values(read_table(source), mapped, values)
+    if sum_over is not None:
+        table = summed_over(table, sum_over, mapped)
+    known, guesses = columns_of(table, mapped, ignore, decimal, thousands)
+    if not table.cells:
+        raise IndicatorError(
+            f"{table.source} holds no trial: should have a row for each below the names"
+        )
+    rows = [*rows_of(table, known)]
+    varying, covariates = _parameters(table, known)
+    faults = FaultNames(rows)
+    _check_columns(table, known, faults)
+    blocks = numbered_blocks(rows)
+    unnamed = Path(table.source).stem or table.source
+    pairs = [(trial_of(row, faults, varying, duration, blocks, unnamed), row) for row in rows]
+    trials = events_of(pairs) if "time" in known.names else runs_of(pairs)
+    block = known.names.get("seed", "seed")
+    notes = [*table.notes, *guesses, *faults.notes]
+    if blocks and holds_several(trials) and all(trial.seed is not None for trial in trials):
+        trials = paired_within_blocks(trials)
+        notes.append(
+            f"Some {block} holds several trials of one condition: they are paired in the file's "
+            "order."
+        )
+    check_pairing(table, trials)
+    if "time_to_finish" not in known.names:  # a rate compares trials of any length
+        _check_durations(table, trials)
+    notes += _notes_on_conditions(trials, known, varying, covariates)
+    notes += notes_on_pairs(trials, block)
+    return Trials(
+        Path(table.source).name or table.source,
+        table.digest,
+        tuple(trials),
+        tuple(notes),
+        _uses_of(table, known, varying, covariates),
+        _name_of_performance(known),
+    )
+
+
+def _notes_on_conditions(
+    trials: Sequence[Trial], columns: Columns, varying: Sequence[str], covariates: Sequence[str]
+) -> Iterator[str]:
+    """Yield what P is where it is a rate, and what tells the conditions apart, or does not."""
+    if "time_to_finish" in columns.names:
+        time = columns.names["time_to_finish"]
+        yield f"P is {columns.names.get('work', '1')} divided by {time}: more is better."
+    for name in covariates:
+        yield f"{name!r} differs in every trial: it tells no conditions apart."
+    counts = Counter(trial.condition for trial in trials)
+    if varying and min(counts.values()) == 1 < max(counts.values()):
+        yield (
+            f"{len(trials)} trials in {len(counts)} conditions, told apart by "
+            f"{' and '.join(varying)}, some of a single trial: leave out what was only noted, as "
+            f"by --ignore {varying[0]!r}."
+        )
+
+
+def _parameters(table: Table, columns: Columns) -> tuple[list[str], list[str]]:
+    """Return the parameters that vary, and those that differ in every row."""
+    varying, covariates = list[str](), list[str]()
+    for name in columns.parameters:
+        values = {*table.column(name)}
+        if len(values) > 1:
+            # In an event log a row is a delivery.
+            differs_in_all = len(values) == len(table.cells) >= FEWEST_OF_COVARIATE
+            is_covariate = differs_in_all and "time" not in columns.names
+            (covariates if is_covariate else varying).append(name)
+    return varying, covariates
+
+
+def _uses_of(
+    table: Table, columns: Columns, varying: Sequence[str], covariates: Sequence[str]
+) -> tuple[Column, ...]:
+    """Return what every column of a table was taken for."""
+    meanings = {name: meaning for meaning, name in columns.names.items()}
+    meanings |= dict.fromkeys(columns.blocks, "seed")
+    uses = []
+    for name in table.header:
+        values = (*dict.fromkeys(table.column(name)),)
+        use = meanings.get(name)
+        if use is None and name in varying:
+            use = "parameter"
+        elif use is None and name in covariates:
+            use = "differs in every trial"
+        elif use is None:
+            use = "left out" if name in columns.ignored or len(values) > 1 else "the same in all"
+        use = "robots" if use == "n_robots" else use
+        uses.append(Column(name, use, values[:_FEW_VALUES], len(values)))
+    return tuple(uses)
+
+
+_FEW_VALUES = 6  # that show what a column holds
+
+
+def _name_of_performance(columns: Columns) -> str:
+    """Return what the file calls P."""
+    names = columns.names
+    if "time_to_finish" in names:
+        return f"{names.get('work', '1')} / {names['time_to_finish']}"
+    if "time" in names:
+        return "deliveries"
+    return "P" if bare(names["performance"]) in ("p", "performance") else names["performance"]
+
+
+def _check_columns(table: Table, columns: Columns, faults: FaultNames) -> None:
+    """Refuse a file without the columns that no other can stand for, all of them at once."""
+    names = columns.names
+    lacking = {}
+    if not {"performance", "time", "time_to_finish"} & names.keys():
+        lacking["performance"] = "column 'performance', or time, for one delivery a row"
+    name = names.get("performance", "")
+    if "time_to_finish" not in names and _IS_A_TIME.search(name) and "per" not in name.split():
+        raise IndicatorError(
+            f"{table.source}: {name!r} is a time by its name, of which less is better: say "
+            f"--column time_to_finish={name!r}, and --column work=NAME if what was done in it "
+            "varies"
+        )
+    if faults.any_fails and "faulty" not in names:
+        lacking["faulty"] = "column 'faulty', for how many robots fail"
+    if lacking:
+        options = " ".join(f"--column {name}=NAME" for name in lacking)
+        raise IndicatorError(
+            f"{table.source} has no {' and no '.join(lacking.values())}: it has "
+            f"{', '.join(map(repr, table.header))}; say which it is by {options}, or add it"
+        )
+
+
+def _check_durations(table: Table, trials: Sequence[Trial]) -> None:
+    """Refuse trials of which some lasted longer than others."""
+    for trial in trials:
+        if trial.duration != trials[0].duration:
+            raise IndicatorError(
+                f"{table.source}, {table.line_word} {trial.line}: is not as long as "
+                f"{table.line_word} {trials[0].line}: runs compared should be of one length; else "
+                "let P be a rate, and leave the column out"
+            )

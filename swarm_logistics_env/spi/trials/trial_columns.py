@@ -1,0 +1,216 @@
+"""What each column of a table is, by its name or as somebody says."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+from swarm_logistics_env.spi.inputs import IndicatorError
+
+from .table import BLOCK_SIGN, Columns, Table
+
+# What a column is, and the words that name it in files; small letters, "_" for all that is none.
+COLUMN_NAMES: dict[str, tuple[str, ...]] = {
+    "performance": ("p", "delivered", "items", "score", "throughput", "avg_throughput"),
+    "n_robots": ("robots", "n", "swarm_size", "num_agents", "n_agents", "agents"),
+    "fault": ("failure", "mode", "fault_mode", "failure_mode"),
+    "faulty": ("m", "failed", "n_faulty"),
+    "onset": ("fault_time",),
+    "policy": ("controller", "algorithm", "planner", "method"),
+    "seed": ("pair", "block", "map", "map_name", "layout", "instance", "day", "date", "operator"),
+    "trial": ("run", "id"),
+    "time": (),
+    "time_to_finish": ("finish_time", "completion_time", "makespan"),
+    "finished": (),
+    "work": (),
+    "duration": ("length",),
+    "table": (),
+    "contacts": ("contacts_per_robot_minute",),
+}
+MEANING = {word: column for column, words in COLUMN_NAMES.items() for word in (column, *words)}
+TEXTS = ("fault", "policy", "trial", "table", "finished")  # columns that hold no numbers
+_ROBOT = re.compile(r"(robot|agent|drone|bot)(_?(id|no|nr|num|number|name|index|label))?|id_robot")
+# How a decimal comma looks that can stand between no thousands.
+_DECIMAL_COMMA = re.compile(r"[+-]?(\d+,(\d{1,2}|\d{4,})|0,\d+|\d{4,},\d+)")
+ONE_TRIAL_A_ROW = (
+    "the unit is the trial, never the robot; sum the deliveries of a trial's robots into one row"
+)
+
+
+def columns_of(
+    table: Table,
+    columns: Mapping[str, str],
+    ignore: Sequence[str],
+    decimal: str | None,
+    thousands: str | None,
+) -> tuple[Columns, list[str]]:
+    """Return what the columns of a table are, and notes on what was guessed.
+
+    Args:
+        columns: what a column is (a word of `COLUMN_NAMES`) to its name in the table.
+        ignore: names of columns to leave out.
+        decimal: the sign before decimals, "." or ","; None: ".", unless a column says otherwise.
+        thousands: the sign between thousands; None: none, but where it can be nothing else.
+
+    Raises:
+        IndicatorError: a column is not there, is named twice, or may be a misspelled one; or rows
+            are of robots instead of trials.
+    """
+    for option, sign in (("--decimal", decimal), ("--thousands", thousands)):
+        if sign not in (None, ".", ","):
+            raise IndicatorError(f"{option} {sign}: should be . or ,")
+    if decimal is not None and decimal == thousands:
+        raise IndicatorError(f"--thousands {thousands}: should be another sign than --decimal")
+    names, parameters, blocks = _names(table, columns, ignore)
+    notes = []
+    numbers = [*(name for column, name in names.items() if column not in TEXTS), *parameters]
+    numbers = [name for name in numbers if name in table.index]
+    decimal = decimal or table.decimal or ("," if thousands == "." else None)
+    if decimal is None and (cell := _decimal_comma(table, numbers)):
+        decimal = ","
+        notes.append(f"Decimals are taken to have a comma, as in {cell}.")
+    if decimal is None and thousands is None:
+        for name in numbers:
+            _refuse_thousands(table, name)
+    ignored = [name for name in table.header if name in ignore]
+    found = Columns(names, parameters, ignored, blocks, decimal or ".", thousands)
+    _refuse_rows_of_robots(table, found)
+    return found, notes
+
+
+def _names(
+    table: Table, columns: Mapping[str, str], ignore: Sequence[str]
+) -> tuple[dict[str, str], list[str], list[str]]:
+    """Return the name of each known column, columns left as parameters, and those of the block."""
+    path, header = table.source, _with_content(table, columns)
+    for column in columns:
+        if column not in MEANING:
+            raise IndicatorError(f"--column {column}: {_one_of(column, MEANING)}")
+    for name in (*columns.values(), *ignore):
+        if name not in table.index:
+            raise IndicatorError(f"{path} has no column {name!r}: {_one_of(name, table.header)}")
+    names = {MEANING[column]: name for column, name in columns.items()}
+    for column, name in table.meanings.items():
+        if name not in ignore:
+            names.setdefault(column, name)
+    chosen, parameters, of_robots = {*names}, list[str](), list[str]()
+    blocks = [names["seed"]] if "seed" in names else []
+    for name in header:
+        if not name or name in ignore or name in names.values():
+            continue
+        if name in table.left_out:
+            continue
+        if header.count(name) > 1:
+            raise IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
+        word = bare(name)
+        if is_robot(name):
+            of_robots.append(name)
+            continue
+        meaning = MEANING.get(word)
+        if meaning is None or (meaning in chosen and name not in COLUMN_NAMES):
+            close = difflib.get_close_matches(word, MEANING, n=1, cutoff=0.75)
+            if close and meaning is None and len(word) > 3 and not table.kind:
+                raise IndicatorError(
+                    f"{path} has a column {name!r}; did you mean {close[0]!r}? Else rename it, or "
+                    f"leave it out by --ignore {name!r}"
+                )
+            parameters.append(name)
+        elif meaning == "seed":
+            blocks.append(name)
+            names[meaning] = BLOCK_SIGN.join(blocks)
+        elif meaning in names:
+            raise IndicatorError(
+                f"{path} has columns {names[meaning]!r} and {name!r}, both {meaning}: say "
+                f"which it is by --column {meaning}=NAME, and leave the other out by --ignore NAME"
+            )
+        else:
+            names[meaning] = name
+    if of_robots and "time" not in names:
+        raise IndicatorError(
+            f"{path} has a column {of_robots[0]!r}, so its rows may be robots instead of trials: "
+            f"{ONE_TRIAL_A_ROW} by --sum-over {of_robots[0]!r}, or leave the column out; where it "
+            f"is the swarm's size, say --column robots={of_robots[0]!r}"
+        )
+    return names, parameters, blocks
+
+
+def _with_content(table: Table, columns: Mapping[str, str]) -> list[str]:
+    """Return the columns without those that would be a seed and are empty in every row."""
+    return [
+        name
+        for name in table.header
+        if MEANING.get(bare(name)) != "seed"
+        or name in columns.values()
+        or not table.cells
+        or any(table.column(name))
+    ]
+
+
+def _decimal_comma(table: Table, names: Sequence[str]) -> str | None:
+    """Return a cell whose comma stands before decimals, if no cell has a point; None: none."""
+    cells = {cell for name in names for cell in table.column(name)}
+    if any("." in cell for cell in cells):
+        return None
+    return min((cell for cell in cells if _DECIMAL_COMMA.fullmatch(cell)), default=None)
+
+
+def _refuse_thousands(table: Table, name: str) -> None:
+    """Refuse a column in which "1.200" beside "980" may be 1200 or 1.2."""
+    first = {cell: row for row, cell in reversed([*enumerate(table.column(name))]) if cell}
+    plain_numbers = {cell: row for cell, row in first.items() if cell.isdecimal()}
+    with_points = [cell for cell in first if re.fullmatch(r"[1-9]\d{0,2}\.\d{3}", cell)]
+    if not (plain_numbers and with_points) or len(plain_numbers) + len(with_points) < len(first):
+        return
+    largest, smallest = max(plain_numbers, key=float), min(with_points, key=float)
+    if float(largest) >= 10.0 * float(smallest):
+        raise IndicatorError(
+            f"{table.location(first[smallest])}, column {name!r}: {smallest!r}: is "
+            f"{smallest.replace('.', '')} or {float(smallest):g}, beside {largest} in "
+            f"{table.line_word} {table.lines[plain_numbers[largest]]}: should be without a sign "
+            "between thousands; or say --thousands . where it is one, --decimal . where decimals "
+            "have a point"
+        )
+
+
+def _refuse_rows_of_robots(table: Table, columns: Columns) -> None:
+    """Refuse rows that differ in an ignored column of robots and in what each delivered alone."""
+    of_robots = [name for name in columns.ignored if is_robot(name)]
+    names = columns.names
+    if not of_robots or "time" in names:  # a row of an event log is a delivery, whoever made it
+        return
+    compared = [table.index[name] for name in _all_but_performance(table, columns)]
+    trials: dict[tuple[str, ...], int] = {}
+    for row, cells in enumerate(table.cells):
+        first = trials.setdefault(tuple(cells[column] for column in compared), row)
+        for robot in of_robots:
+            if cells[table.index[robot]] != table.cells[first][table.index[robot]]:
+                hint = ", or name each row's trial in a column 'trial'" * ("trial" not in names)
+                raise IndicatorError(
+                    f"{table.location(row)}: differs from {table.line_word} {table.lines[first]} "
+                    f"in {robot!r} and in what was delivered alone, so these may be robots of one "
+                    f"trial: {ONE_TRIAL_A_ROW}, as by --sum-over {robot!r}{hint}"
+                )
+
+
+def _all_but_performance(table: Table, columns: Columns) -> list[str]:
+    """Return the columns of a table that say which trial a row is of."""
+    known = [name for column, name in columns.names.items() if column != "performance"]
+    return [name for name in (*known, *columns.blocks, *columns.parameters) if name in table.index]
+
+
+def is_robot(name: str) -> bool:
+    """Return whether a column tells robots apart, by its name."""
+    return _ROBOT.fullmatch(bare(name)) is not None
+
+
+def bare(name: str) -> str:
+    """Return a column's name in small letters, without unit: "Time [s]" is "time"."""
+    without_unit = re.sub(r"\s*[\[(].*?[\])]\s*", " ", name)
+    return re.sub(r"\W+", "_", without_unit.strip().lower()).strip("_")
+
+
+def _one_of(name: str, choices: Iterable[str]) -> str:
+    names = [choice for choice in choices if choice]
+    close = difflib.get_close_matches(name, names, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"should be one of {', '.join(names)}"

@@ -1,0 +1,119 @@
+"""Trials made of a table's rows: one run a row, or one delivery a row."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from .table import Row
+from .trial import NO_FAULT_WORD, REPEATED, Trial
+from .values import FaultNames
+
+_NOT_FINISHED = ("no", "n", "false", "f", "0", "0.0")
+
+
+def trial_of(
+    row: Row,
+    faults: FaultNames,
+    varying: Sequence[str],
+    duration: float | None,
+    blocks: Mapping[str, int],
+    unnamed: str,
+) -> Trial:
+    """Return the trial of a row, without performance and times.
+
+    Args:
+        faults: of the file.
+        varying: names of the parameters.
+        duration: of every trial [s], where no column says it.
+        blocks: a number for each block; none where they are numbers.
+        unnamed: what a policy is called that the file does not name.
+    """
+    n_robots = row.whole_or_none("n_robots", 1)
+    fault, faulty = faults[row.text("fault")], row.whole_or_none("faulty", 0) or 0
+    is_fault = fault not in (NO_FAULT_WORD, REPEATED)
+    onset = row.number_or_none("onset") or 0.0
+    if row.text("duration"):
+        duration = row.number("duration", 0.0)
+    if is_fault and not faulty:
+        raise row.error("faulty", f"should be how many robots fail by {fault!r}, 1 or more")
+    if faulty and not is_fault:
+        raise row.error("faulty", "should be 0 without a fault, or the fault be named")
+    if is_fault and n_robots is None:
+        raise row.error("n_robots", "should be the swarm's size, or R is undefined")
+    if n_robots is not None and faulty >= n_robots:
+        raise row.error("faulty", f"should be less than the {n_robots} robots")
+    if duration is not None and onset >= duration:
+        raise row.error("onset", f"should be before the trial ends at {duration:g} s")
+    return Trial(
+        row.line,
+        row.text("policy") or unnamed,
+        row.text("table"),
+        n_robots,
+        fault,
+        faulty,
+        # Without a fault nothing fails at any time, whatever the column says.
+        onset if is_fault else 0.0,
+        tuple((name, row.parameter(name)) for name in varying),
+        blocks.get(row.text("seed")) if blocks else row.whole_or_none("seed", 0),
+        0.0,
+        duration=duration,
+        contacts=row.number_or_none("contacts"),
+    )
+
+
+def runs_of(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
+    """Return the trials of a table with one run a row, with their performance."""
+    labels: dict[object, Row] = {}
+    for trial, row in rows:
+        label = row.text("trial")
+        if label and (first := labels.setdefault((trial.condition, label), row)) is not row:
+            raise row.error("trial", f"is in line {first.line} too: should name one run a row")
+    rate = _rate if "time_to_finish" in rows[0][1].names else None
+    return [
+        replace(trial, performance=rate(row) if rate else row.number("performance", 0.0))
+        for trial, row in rows
+    ]
+
+
+def _rate(row: Row) -> float:
+    """Return what was done in a trial by the time that it took."""
+    has_ended = row.text("finished").casefold() not in _NOT_FINISHED
+    if row.text("time_to_finish") and has_ended:
+        time = row.number("time_to_finish", 0.0)
+        if not time:
+            raise row.error("time_to_finish", "should be more than 0")
+        return (row.number("work", 0.0) if "work" in row.names else 1.0) / time
+    lasted = "duration" if row.text("duration") else "time_to_finish"
+    if not (row.text("performance") and row.text(lasted)):
+        raise row.error(
+            "time_to_finish",
+            "of a trial that did not finish, columns should say how long it lasted (duration) and "
+            "what was done by then (performance)",
+        )
+    return row.number("performance", 0.0) / row.number(lasted, 0.0)
+
+
+def events_of(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
+    """Return the trials of a table with one delivery a row, with their times."""
+    runs: dict[object, tuple[Trial, list[float]]] = {}
+    for trial, row in rows:
+        if row.text("performance"):
+            raise row.error("performance", "should not stand beside times: ignore one of them")
+        if not row.text("trial") and trial.seed is None:
+            raise row.error("trial", "should say which run a delivery belongs to, or a seed do")
+        time = row.number_or_none("time")
+        if time is not None and trial.duration is not None and time > trial.duration:
+            raise row.error("time", f"should not be after its duration {trial.duration:g}")
+        if trial.onset and trial.duration is None:
+            raise row.error(
+                "duration",
+                "should say when a trial ends [s], as a fault begins during it; "
+                "a column of it, or --duration SECONDS",
+            )
+        key = (trial.condition, trial.seed, row.text("trial"))
+        runs.setdefault(key, (trial, []))[1].extend([] if time is None else [time])
+    return [
+        replace(trial, times=tuple(sorted(times)), performance=float(len(times)))
+        for trial, times in runs.values()
+    ]

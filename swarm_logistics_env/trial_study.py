@@ -1,0 +1,53 @@
+"""Judging trials that somebody else recorded, from Python and for the command line."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.spi import read_trials
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.verdicts.results import StudyResults
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def judge(
+    trials: str | Path | pd.DataFrame,
+    *,
+    out: str | Path | None = None,
+    setup: Mapping[str, str] | None = None,
+    **reading: Any,
+) -> StudyResults:
+    """Judge trials: S, R, FT and A of what varies in them.
+
+    Args:
+        trials: path of a file or folder, or a data frame of pandas, with a row for each trial.
+        out: directory of the study, for `swarm-logistics study report`; None: it is not kept.
+        setup: name and value of conditions for the report to state.
+        reading: how the trials are read, see `spi.read_trials`, e.g. `columns={"performance":
+            "boxes"}`.
+
+    Raises:
+        IndicatorError: the trials cannot be read.
+        StudyError: nothing in them can be compared, or `out` holds another study.
+
+    Example:
+        >>> import pandas as pd
+        >>> robots, boxes = [4, 4, 4, 8, 8, 8], [10, 11, 12, 17, 19, 18]
+        >>> results = judge(pd.DataFrame({"robots": robots, "delivered": boxes}))
+        >>> results.verdicts[0].compared.indicator
+        'S'
+    """
+    recorded = read_trials(trials, **reading)
+    if out is not None:
+        import_results(recorded, Path(out), setup)
+        return Study.stored(out).findings()
+    with tempfile.TemporaryDirectory() as folder:
+        directory = Path(folder, "study")
+        import_results(recorded, directory, setup)
+        return Study.stored(directory).findings()
