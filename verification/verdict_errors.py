@@ -5,7 +5,9 @@ they are clear; with runs that stall; and over trainings, of which some collapse
 tables and writes them to `docs/results/verdict_errors.csv`.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +26,7 @@ STUDIES, TRAINED_STUDIES = 4_000, 1_000
 P_O, P_F, LEARNED_P = 39.0, 34.0, 300.0  # true means [items]
 EDGE = 0.1
 REMOVED, ROBOTS = 3, 25
+WORK = 20  # items of a run that ends when they are delivered
 LEFT = 0.02  # of P, by a training that collapsed
 FILE = Path(__file__).parents[1] / "docs" / "results" / "verdict_errors.csv"
 
@@ -79,6 +82,32 @@ def _two_kinds(rng: Rng, shape: Shape, p_f: float) -> Pair:
     return rng.poisson(P_O, shape) * 1.0, rng.poisson(p_f * left / 0.8) * 1.0
 
 
+@cache
+def _rate_of_finishing(rate: float, ends_at: float) -> float:
+    """Return the mean of work / time where items come at a rate and runs end at some time."""
+    return float(_work_by_time(np.random.default_rng(0), (20_000, 1), rate, ends_at).mean())
+
+
+def _work_by_time(rng: Rng, shape: Shape, rate: float, ends_at: float) -> Floats:
+    """Return the work of WORK items by the time that it took, or what was done until the end."""
+    times = rng.exponential(1.0 / rate, (*shape, WORK)).cumsum(axis=-1)
+    done = np.asarray((times <= ends_at).sum(axis=-1))
+    return np.where(done == WORK, WORK / times[..., -1], done / min(ends_at, 1e9))
+
+
+def _timed(ends_at: float) -> Model:
+    """Return work by time, of runs that end unfinished where they take longer than that [s]."""
+
+    def draw(rng: Rng, shape: Shape, p_f: float) -> Pair:
+        rates = P_O, p_f
+        drawn = (_work_by_time(rng, shape, rate, ends_at) for rate in rates)
+        means = (_rate_of_finishing(rate, ends_at) for rate in rates)
+        before, after = (p / mean * rate for p, mean, rate in zip(drawn, means, rates))
+        return before, after
+
+    return Model(draw, P_O, P_F)
+
+
 def _stalling(share: float, p_o: float, deviation: float) -> Model:
     """Return counts of which a share of the runs with faults stalls.
 
@@ -115,6 +144,8 @@ OWN: Mapping[str, Model] = {
     "few items": Model(_few_items, 6.0, 5.0),
     "deadlock": Model(_deadlock, P_O, 15.0),
     "two kinds": Model(_two_kinds, P_O, 30.0),
+    "times to finish": _timed(math.inf),
+    "times, some unfinished": _timed(WORK / P_O * 1.1),
 }
 _ALL = {**MODELS, **STALLS, **OWN}
 

@@ -22,6 +22,7 @@ from swarm_logistics_env.studies import Study
 from .app import Repeated
 from .terminal import show_report, show_table
 
+_LONGEST_VALUE = 12  # characters that show what a column holds
 _MOST_ROWS = 20  # of conditions that are shown before the answer
 
 
@@ -88,7 +89,7 @@ def _sizes_and_counts(sizes: list[tuple[int | None, int]]) -> tuple[str, str]:
 
 def _values_of(column: Column) -> str:
     left = column.n_values - len(column.values)
-    shown = ", ".join(value or "(empty)" for value in column.values)
+    shown = ", ".join(value[:_LONGEST_VALUE] or "(empty)" for value in column.values)
     return shown + f", and {left} more" * (left > 0)
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.verdicts.collapses import collapses
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
 
 from . import section, templates
+from .collapse_tables import collapsed_in_words
 from .templates import Slots, fill
 
 
@@ -44,13 +46,14 @@ def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
         yield "exploratory", {}
     if results.late_margin:
         yield "late_margin", {}
-    collapses = [v.estimate.collapsed for v in verdicts if v.estimate and v.estimate.collapsed]
-    if collapses:
-        yield "collapsed", {"collapsed": max(collapses, key=lambda collapsed: collapsed.number)}
+    trainings = [v.estimate.collapsed for v in verdicts if v.estimate and v.estimate.collapsed]
+    if trainings:
+        yield "collapsed", {"collapsed": max(trainings, key=lambda collapsed: collapsed.number)}
     if any(verdict.saturated for verdict in verdicts):
         yield "capped", {"mark": section.SATURATED}
-    if any(cell.stalled for cell in results.cells):
-        yield "stalled", {}
+    if named := collapses(results.cells):
+        words = collapsed_in_words(named, names_policies=len(results.policies) > 1)
+        yield "collapsed_runs", {"conditions": words}
     open_verdicts = [verdict for verdict in verdicts if verdict.conclusion == "open"]
     if open_verdicts:
         yield "open", {"runs": "seeds" if is_paired else "trials a condition"}

@@ -13,6 +13,7 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.verdicts.agreement import Agreement
 from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.verdicts.collapses import collapses
 from swarm_logistics_env.verdicts.mid_run_faults import (
     RUNS_ARE_MISSING,
     RepairCurve,
@@ -24,6 +25,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict, level_of
 
 from . import section
+from .collapse_tables import collapsed_in_words, edge_sections
 from .figures import rate_figures
 from .section import NOTHING, Section, Sentence, Texts
 
@@ -67,6 +69,7 @@ def tables(results: StudyResults) -> Iterator[Section]:
     yield from map(_agreement, results.agreements)
     yield from _text_sections(results)
     yield from _times_to_clear(results.cells)
+    yield from edge_sections(results.cells)
 
 
 def _layouts(
@@ -251,15 +254,11 @@ def warnings(results: StudyResults) -> Iterator[str]:
             "least one run, and the indicators that rest on it. A verdict that a larger P could "
             "turn is open."
         )
-    stalls = [cell for cell in results.cells if cell.stalled > 0.0]
-    if stalls:
-        shares = [
-            f"{cell.policy}, {cell.arm.setting} ({cell.stalled:.0%} of {cell.n_seeds})"
-            for cell in stalls
-        ]
+    if named := collapses(results.cells):
+        words = collapsed_in_words(named, names_policies=len(results.policies) > 1, most=None)
         yield (
-            "Runs stalled: they have less than a quarter of the median P of their condition: "
-            f"{'; '.join(dict.fromkeys(shares))}."
+            f"Runs are of two phases, a good one and one that has collapsed: {words}. A mean P is "
+            "of both."
         )
     if results.exploratory:
         yield (

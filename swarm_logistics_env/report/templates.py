@@ -85,7 +85,7 @@ NOTES = {
     "late_margin": "equivalence is exploratory: another margin was declared",
     "collapsed": "of the trainings at worst {collapsed}",
     "capped": "{mark} P is capped: --clearing or --restock has no cap",
-    "stalled": "some runs stalled (P below a quarter of the median; --full names them)",
+    "collapsed_runs": "runs collapse {conditions}",
     "open": "so many more {runs} would tell such a value from the threshold in 4 of 5 studies",
     "open_at_an_interval_on_one_side": "open beside an interval on one side of it: {reasons}",
     "claims_of_the_text": "of {claims} in the paper's text {counts}",

@@ -18,6 +18,7 @@ from .multiplicity import (
     holm,
     look_alphas,
 )
+from .phases import Phases, collapsed_runs, critical_size, two_phases
 from .power import (
     lower_decile_of_power,
     minimum_detectable_effect,
@@ -49,6 +50,7 @@ __all__ = [
     "IndicatorError",
     "Interval",
     "Options",
+    "Phases",
     "Spending",
     "SurvivalCurve",
     "Trial",
@@ -56,6 +58,8 @@ __all__ = [
     "adaptability",
     "adjust",
     "adjusted_p_values",
+    "collapsed_runs",
+    "critical_size",
     "equivalence",
     "fault_budget",
     "fault_tolerance",
@@ -82,6 +86,7 @@ __all__ = [
     "seeds_for_power",
     "share_stalled",
     "trainings_against_collapses",
+    "two_phases",
     "worst_decile",
 ]
 

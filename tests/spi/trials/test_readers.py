@@ -203,7 +203,7 @@ def test_a_folder_of_unlike_files_is_refused(tmp_path: Path) -> None:
         spi.read_trials(tmp_path)
     for name, header in (("a.csv", "robots,P"), ("b.csv", "robots,boxes")):
         (tmp_path / name).write_text(f"{header}\n4,1\n8,2\n")
-    with pytest.raises(spi.IndicatorError, match=r"has other columns than .*a\.csv: P, boxes"):
+    with pytest.raises(spi.IndicatorError, match=r"a\.csv has no column 'boxes', as others in"):
         spi.read_trials(tmp_path)
     (tmp_path / "b.csv").write_text("P,robots\n3,4\n4,8\n")
     trials = spi.read_trials(tmp_path)

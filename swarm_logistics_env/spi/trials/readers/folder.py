@@ -34,13 +34,14 @@ def read(folder: Path, read_file: Callable[[Path], Table]) -> Table:
         )
     tables = [read_file(path) for path in paths]
     first = tables[0]
-    header = [*first.header]
-    for table in tables[1:]:
-        if {*table.header} != {*header}:
-            more = sorted({*table.header} ^ {*header})
+    # What is left out anyhow, some files need not have.
+    left_out = frozenset().union(*(table.left_out for table in tables))
+    header = [*dict.fromkeys(name for table in tables for name in table.header)]
+    for table in tables:
+        if lacking := sorted({*header} - {*table.header} - left_out):
             raise IndicatorError(
-                f"{table.source} has other columns than {first.source}: {', '.join(more)}; should "
-                "be the same, or files of one kind in a folder of their own"
+                f"{table.source} has no column {', '.join(map(repr, lacking))}, as others in the "
+                "folder: should have the same columns, or stand in a folder of its kind"
             )
     named = [_from_names(path.relative_to(folder)) for path in paths]
     labels = [*named[0]]
@@ -56,9 +57,10 @@ def read(folder: Path, read_file: Callable[[Path], Table]) -> Table:
     labels = [label for label in labels if label not in header]
     cells, lines = [], []
     for table, values in zip(tables, named):
-        order = [table.index[name] for name in header]
+        order = [table.index.get(name) for name in header]
         for row in table.cells:
-            cells.append([*(row[number] for number in order), *(values[name] for name in labels)])
+            cells_of_file = ["" if number is None else row[number] for number in order]
+            cells.append([*cells_of_file, *(values[name] for name in labels)])
             lines.append(len(cells))
     digest = hashlib.sha256("".join(table.digest for table in tables).encode()).hexdigest()[:16]
     counts = f"{len(paths)} file{'s' * (len(paths) > 1)}: {len(cells)} rows."
@@ -74,7 +76,7 @@ def read(folder: Path, read_file: Callable[[Path], Table]) -> Table:
         "row",
         first.kind and f"a folder of {first.kind}",
         first.meanings,
-        first.left_out,
+        left_out,
         first.decimal,
         tuple(notes),
     )

@@ -115,7 +115,7 @@ def _table(
     cells = [[_text(record.get(name)) for name in header] for record in records]
     others = [name for name in metrics if name != performance]
     note = f"These are {kind}: P is {performance}"
-    note += f"; --column performance=NAME takes {' or '.join(others)}." if others else "."
+    note += "; --column performance=NAME takes another metric." if others else "."
     return Table(
         str(path), digest, header, cells, range(1, len(cells) + 1), "record", kind,
         {"performance": performance}, frozenset(others), ".", (note,),
