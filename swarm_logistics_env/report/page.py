@@ -24,7 +24,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from . import drawing
-from .answer import Answer
+from .answer import Answer, name_of_p
 from .document import Document
 from .drawing import Panel, Point
 from .figures import X_LABELS
@@ -37,6 +37,7 @@ Runs: TypeAlias = Mapping[str, Sequence[float | None]]
 # Name, drawing, what it shows, and what its marks mean.
 Chart: TypeAlias = tuple[str, str, Sequence[Panel], tuple[str, ...]]
 _HEIGHT = 2.9  # inch, of a drawing of P
+_MOST_DOTS = 20_000  # runs that a page draws, the first of each condition
 _MOST_TIMES = 150_000  # deliveries in the curves of a page: about 400 kB
 # Of decisions, on light and on dark paper, after Okabe and Ito.
 _COLOURS = {
@@ -122,7 +123,9 @@ def _views(
 
 def _performance_charts(results: StudyResults, runs: Runs) -> Iterator[Chart]:
     repeat = "seed" if results.plan.paired else "trial"
-    legend = (f"bar: {P_LEVEL} interval", f"dot: one {repeat}, click it")
+    n_drawn = max(map(len, runs.values()))
+    only = f" of the first {n_drawn:,}" * (n_drawn < len(results.plan.seeds))
+    legend = (f"bar: {P_LEVEL} interval", f"dot: one {repeat}{only}, click it")
     for table, panel in _performance_panels(results, runs):
         svg = drawing.svg_image(partial(drawing.intervals, panels=[panel]), _HEIGHT)
         yield f"P: {table}", svg, [panel], legend
@@ -155,7 +158,7 @@ def _performance_panels(results: StudyResults, runs: Runs) -> Iterator[tuple[str
         setting = cells[0].arm.setting
         x_label = X_LABELS.get(setting.kind, setting.name)
         if points:
-            yield table, Panel("", "performance P", points, (), x_label)
+            yield table, Panel("", f"performance {name_of_p(results.plan)}", points, (), x_label)
 
 
 def _indicator_charts(figures: Iterable[Figure], drawings: Mapping[str, str]) -> Iterator[Chart]:
@@ -219,13 +222,15 @@ def _page_data(results: StudyResults, runs: Runs, sentences: Sequence[Sentence])
 
 
 def _p_by_seed(results: StudyResults) -> Runs:
-    """Return mean P over the trainings, seed by seed, of every condition, each once."""
+    """Return mean P over the trainings of every condition, each once, at the seeds drawn."""
+    arms = _arms(results)
+    seeds = results.plan.seeds[: max(1, _MOST_DOTS // len(arms))]
     return {
         key: [
             _mean_p([results.succeeded.get((case.key, seed)) for case in arm.case.trainings])
-            for seed in results.plan.seeds
+            for seed in seeds
         ]
-        for key, arm in _arms(results).items()
+        for key, arm in arms.items()
     }
 
 

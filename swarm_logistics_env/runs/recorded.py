@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,6 +12,7 @@ from more_itertools import map_reduce
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies.spec import PolicySpec
+from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.questions.comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
 from swarm_logistics_env.questions.declaration import Declaration
 from swarm_logistics_env.questions.plan import Origin, Plan
@@ -55,13 +56,27 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
     except StudyError as error:
         raise StudyError(f"{trials.file}, {error}") from None
     with Runs.new(out, "import") as runs:
-        for rows in conditions.values():
-            case = _case(origin, rows[0])
-            for number, row in enumerate(rows):
-                run = Run(case, plan.code, number if row.seed is None else row.seed)
-                runs.add(run, _outcome(row))
+        runs.add_all(_runs(conditions.values(), origin, plan.code))
         note(runs, plan, Declaration.model_validate(specification))
     return len(trials.rows)
+
+
+def _runs(
+    conditions: Collection[Sequence[Trial]], origin: Origin, code: str
+) -> Iterator[tuple[Run, Outcome]]:
+    """Yield the run and the outcome of each trial, and show how many are imported."""
+    n_done, total = 0, sum(map(len, conditions))
+    with ProgressBar("import", total, "trials") as progress:
+        for trials in conditions:
+            case = _case(origin, trials[0])
+            for number, trial in enumerate(trials):
+                yield Run(case, code, number if trial.seed is None else trial.seed), _outcome(trial)
+                n_done += 1
+                if n_done % _PROGRESS_EVERY == 0:
+                    progress.reach(n_done)
+
+
+_PROGRESS_EVERY = 10_000  # trials
 
 
 def origin_of(trials: Trials, setup: Mapping[str, str] | None = None) -> Origin:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 FILE_NAME = "study.sqlite"
 SCHEMA_VERSION = 5
 _WITHOUT_DIGESTS = 4  # as version 0.3.0 wrote it; read, and given digests where runs are added
+_CACHE_KIB = 128 * 1024  # of a store that many runs are added to at once
 TIMEOUT = 60.0  # s, for other processes that write
 APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
 
@@ -69,6 +70,7 @@ class Runs:
 
     def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
         self.path = path
+        self._damaged: list[str] | None = None  # keys of damaged rows; None: not looked for
         database = str(path or ":memory:")
         if path is not None and read_only:
             # SQLite makes two files beside a database in WAL mode, even to read it, but for this.
@@ -145,6 +147,16 @@ class Runs:
         with self._transaction():
             self._execute(_ADD, (*content, outcome.wall_seconds, row_digest(*content)))
 
+    def add_all(self, runs: Iterable[tuple[Run, Outcome]]) -> None:
+        """Keep runs as `add` does, all or none of them."""
+        # Keys come in no order, so that the whole index is written to all the time.
+        self._execute(f"PRAGMA cache_size = -{_CACHE_KIB}")
+        with self._transaction():
+            for run, outcome in runs:
+                content = content_of(run, outcome)
+                row = (*content, outcome.wall_seconds, row_digest(*content))
+                self._connection.execute(_ADD, row)
+
     def absorb(self, other: Runs) -> None:
         """Add the runs of another store, to which `add`'s rule applies; not those damaged there.
 
@@ -167,7 +179,9 @@ class Runs:
 
     def damage(self) -> str | None:
         """Return which rows are damaged, in a sentence, as a terminal may show it; None: none."""
-        keys = sorted(plain(str(row.key))[:12] for row in self._rows(sound=False))
+        if self._damaged is None:
+            self._damaged = [str(row.key) for row in self._rows(sound=False)]
+        keys = sorted(plain(key)[:12] for key in self._damaged)
         if not keys:
             return None
         runs = "1 run of {} is" if len(keys) == 1 else f"{len(keys)} runs of {{}} are"
@@ -182,6 +196,7 @@ class Runs:
             with self._transaction():
                 for row in list(self._rows(sound=False)):
                     self._execute("DELETE FROM runs WHERE rowid = ?", (row.rowid,))
+            self._damaged = None
         return damage
 
     def succeeded(self) -> set[str]:
@@ -191,7 +206,14 @@ class Runs:
     def outcomes(self, runs: Iterable[Run]) -> dict[tuple[str, int], Outcome]:
         """Return the outcomes of those of `runs` that finished, by the case's key and the seed."""
         wanted = {run.key: (run.case.key, run.seed) for run in runs}
-        return {wanted[row.key]: outcome_of(row.outcome) for row in self._rows(wanted)}
+        outcomes, damaged = {}, list[str]()
+        for row in self._all_rows():
+            if not row.is_sound:
+                damaged.append(str(row.key))
+            elif row.key in wanted:
+                outcomes[wanted[row.key]] = outcome_of(row.outcome)
+        self._damaged = damaged
+        return outcomes
 
     def frame(self, keys: Iterable[str] | None = None) -> pd.DataFrame:
         """Return one row a run, sorted by key, without wall times.
@@ -249,15 +271,18 @@ class Runs:
         Args:
             keys: of the rows wanted; None: all.
         """
+        for row in self._all_rows():
+            if (keys is None or row.key in keys) and row.is_sound == sound:
+                yield row
+
+    def _all_rows(self) -> Iterator[StoredRow]:
         # Without the index, which may be damaged by itself.
         statement = (
             "SELECT rowid, key, run, failed, outcome, wall_seconds, "
             f"{self._digest_column} FROM runs NOT INDEXED"
         )
         with self._explained():
-            for row in map(StoredRow._make, self._connection.execute(statement)):
-                if (keys is None or row.key in keys) and row.is_sound == sound:
-                    yield row
+            yield from map(StoredRow._make, self._connection.execute(statement))
 
     def _execute(self, statement: str, values: tuple[object, ...] = ()) -> list[tuple[Any, ...]]:
         with self._explained():

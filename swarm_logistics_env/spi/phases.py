@@ -22,6 +22,7 @@ LEVEL = 0.05  # chance that two phases are named in a set of runs that has one
 _LEAST_SHARE = 0.2  # of the runs in the smaller of two groups that are told apart by their variance
 _TAIL_WIDTHS = 4.5  # below the median, in distances from the lower quartile: 3 standard deviations
 _TAIL_SHARE = 0.03  # of the runs of one phase at most lie there
+_MOST_DRAWN = 300  # runs of a uniform sample
 _N_DRAWS = 2_000  # of uniform samples, which give the level of the first test
 
 
@@ -59,7 +60,8 @@ def two_phases(p: ArrayLike, level: float = LEVEL) -> Phases:
     if len(below_cap) < FEWEST_RUNS:
         return Phases(1.0, None)
     split, share = _best_split(below_cap)
-    draws = _shares_of_uniform_draws(len(below_cap))
+    # The share falls with the number of runs: of fewer it is on the safe side.
+    draws = _shares_of_uniform_draws(min(len(below_cap), _MOST_DRAWN))
     p_of_groups = (1.0 + np.count_nonzero(draws >= share)) / (1.0 + len(draws))
     edge = _lower_edge(below_cap)
     n_below = int((below_cap < edge).sum()) if edge < np.median(below_cap) else 0

@@ -30,7 +30,7 @@ Fields: TypeAlias = Mapping[str, object]  # of a record, by name
 
 
 def _check_ascending(times: Seconds) -> Seconds:
-    if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
+    if times.size and not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) >= 0.0).all()):
         raise ValueError("should ascend")
     return times
 
@@ -249,6 +249,11 @@ class Case:
         return digest_of(*self.content)
 
     @cached_property
+    def content_text(self) -> str:
+        """The content as it stands in the JSON that a run's key is the digest of."""
+        return canonical_json(self.content)[1:-1]
+
+    @cached_property
     def trainings(self) -> tuple[Case, ...]:
         """The case of each training of its policy; this one alone if that is one policy."""
         if not self.policy.trainings:
@@ -271,7 +276,9 @@ class Run:
     @cached_property
     def key(self) -> str:
         """Digest of everything that decides its outcome, 64 hexadecimal digits."""
-        return digest_of(*self.case.content, self.code, str(self.seed))
+        # As `digest_of` of the content, the code and the seed; a study may have a million of them.
+        own = canonical_json([self.code, str(self.seed)])[1:]
+        return hashlib.sha256(f"[{self.case.content_text},{own}".encode()).hexdigest()
 
     @property
     def policy_seed(self) -> int:

@@ -21,13 +21,16 @@ from .readers import read_table
 from .table import Columns, Table, rows_of
 from .trial import Column, Trial, Trials
 from .trial_columns import bare, columns_of
-from .trial_rows import events_of, runs_of, trial_of
+from .trial_rows import check_labels, events_of, performance_of, trial_of
 from .values import FaultNames, summed_over, with_values
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FEWEST_OF_COVARIATE = 6  # rows that all differ in a column are no conditions of a trial each
+# A column is a covariate, no parameter, that has so many values at least, and more values than half
+# of the trials or than any plan has levels.
+FEWEST_OF_COVARIATE = 6
+MOST_LEVELS = 50
 _IS_A_TIME = re.compile(r"(?i)\b(times?|duration|makespan|latency)\b|\[(s|sec|min|steps?)\]")
 
 
@@ -82,8 +85,15 @@ def read_trials(
     _check_columns(table, known, faults)
     blocks = numbered_blocks(rows)
     unnamed = Path(table.source).stem or table.source
-    pairs = [(trial_of(row, faults, varying, duration, blocks, unnamed), row) for row in rows]
-    trials = events_of(pairs) if "time" in known.names else runs_of(pairs)
+    is_log = "time" in known.names
+    pairs = []
+    for row in rows:
+        p = 0.0 if is_log else performance_of(row)
+        trial = trial_of(row, faults, varying, duration, blocks, unnamed, performance=p)
+        pairs.append((trial, row))
+    if not is_log and "trial" in known.names:
+        check_labels(pairs)
+    trials = events_of(pairs) if is_log else [trial for trial, _ in pairs]
     block = known.names.get("seed", "seed")
     notes = [*table.notes, *guesses, *faults.notes]
     if blocks and holds_several(trials) and all(trial.seed is not None for trial in trials):
@@ -115,7 +125,7 @@ def _notes_on_conditions(
         time = columns.names["time_to_finish"]
         yield f"P is {columns.names.get('work', '1')} divided by {time}: more is better."
     for name in covariates:
-        yield f"{name!r} differs in every trial: it tells no conditions apart."
+        yield f"{name!r} differs from trial to trial: it tells no conditions apart."
     counts = Counter(trial.condition for trial in trials)
     if varying and min(counts.values()) == 1 < max(counts.values()):
         yield (
@@ -126,15 +136,15 @@ def _notes_on_conditions(
 
 
 def _parameters(table: Table, columns: Columns) -> tuple[list[str], list[str]]:
-    """Return the parameters that vary, and those that differ in every row."""
+    """Return the parameters that vary, and the covariates among them."""
     varying, covariates = list[str](), list[str]()
     for name in columns.parameters:
         values = {*table.column(name)}
         if len(values) > 1:
+            is_wide = len(values) > min(MOST_LEVELS, len(table.cells) / 2)
             # In an event log a row is a delivery.
-            differs_in_all = len(values) == len(table.cells) >= FEWEST_OF_COVARIATE
-            is_covariate = differs_in_all and "time" not in columns.names
-            (covariates if is_covariate else varying).append(name)
+            is_covariate = len(values) >= FEWEST_OF_COVARIATE and "time" not in columns.names
+            (covariates if is_wide and is_covariate else varying).append(name)
     return varying, covariates
 
 
@@ -151,7 +161,7 @@ def _uses_of(
         if use is None and name in varying:
             use = "parameter"
         elif use is None and name in covariates:
-            use = "differs in every trial"
+            use = "covariate"
         elif use is None:
             use = "left out" if name in columns.ignored or len(values) > 1 else "the same in all"
         use = "robots" if use == "n_robots" else use

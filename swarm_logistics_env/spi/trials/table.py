@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 from swarm_logistics_env.spi.inputs import IndicatorError
@@ -90,12 +90,16 @@ class Columns(NamedTuple):
 class Row:
     """A row of a table, read by what its columns are."""
 
-    __slots__ = ("_columns", "_number", "_table")
+    __slots__ = ("_cells", "_columns", "_number", "_positions", "_table")
 
-    def __init__(self, table: Table, number: int, columns: Columns) -> None:
+    def __init__(
+        self, table: Table, number: int, columns: Columns, positions: Mapping[str, int]
+    ) -> None:
         self._table = table
         self._number = number
         self._columns = columns
+        self._positions = positions  # of what a column is, in the row
+        self._cells = table.cells[number]
 
     @property
     def location(self) -> str:
@@ -114,14 +118,14 @@ class Row:
 
     def cell(self, name: str) -> str:
         """Return a cell by the column's name in the file."""
-        return self._table.cells[self._number][self._table.index[name]]
+        return self._cells[self._table.index[name]]
 
     def text(self, column: str) -> str:
         """Return a cell by what its column is; empty where there is none."""
         if column == "seed" and len(self._columns.blocks) > 1:
             return ", ".join(map(self.cell, self._columns.blocks))
-        name = self._columns.names.get(column)
-        return "" if name is None else self.cell(name)
+        position = self._positions.get(column)
+        return "" if position is None else self._cells[position]
 
     def number(
         self, column: str, least: float = -math.inf, *, must_be_whole: bool = False
@@ -136,23 +140,13 @@ class Row:
     def _number_in(
         self, cell: str, column: str, least: float, must_be_whole: bool, *, is_parameter: bool
     ) -> float:
-        plain = self._plain(cell)
-        value = float(plain) if _NUMBER.fullmatch(plain) else math.inf
+        value = _value_of(cell, self._columns.decimal, self._columns.thousands)
         if math.isfinite(value) and value >= least and (not must_be_whole or value.is_integer()):
             return value
         should = f"should be a {'whole ' * must_be_whole}number"
         should += f", {least:g} or more" if math.isfinite(least) else ""
         should += self._hint(cell, column, is_parameter)
         raise self._error(cell, column if is_parameter else self.names.get(column), column, should)
-
-    def _plain(self, cell: str) -> str:
-        """Return a cell as Python writes numbers: a point, nothing between thousands."""
-        decimal, thousands = self._columns.decimal, self._columns.thousands
-        if thousands and _GROUPED.fullmatch(cell) and thousands in cell:
-            cell = cell.replace(thousands, "")
-        elif _SURELY_GROUPED.fullmatch(cell):
-            cell = re.sub(r"['’\s]", "", cell)
-        return cell if decimal == "." else cell.replace(".", " ").replace(decimal, ".")
 
     def _hint(self, cell: str, column: str, is_parameter: bool) -> str:
         """Return what would make a cell a number."""
@@ -215,4 +209,18 @@ class Row:
 
 def rows_of(table: Table, columns: Columns) -> Iterator[Row]:
     """Yield the rows of a table."""
-    return (Row(table, number, columns) for number in range(len(table.cells)))
+    known = columns.names.items()
+    positions = {column: table.index[name] for column, name in known if name in table.index}
+    return (Row(table, number, columns, positions) for number in range(len(table.cells)))
+
+
+@lru_cache(100_000)  # most cells are some of a few numbers
+def _value_of(cell: str, decimal: str, thousands: str | None) -> float:
+    """Return a cell's number, or infinity where it is none."""
+    if thousands and _GROUPED.fullmatch(cell) and thousands in cell:
+        cell = cell.replace(thousands, "")
+    elif _SURELY_GROUPED.fullmatch(cell):
+        cell = re.sub(r"['’\s]", "", cell)
+    # As Python writes numbers: a point, and nothing between thousands.
+    plain = cell if decimal == "." else cell.replace(".", " ").replace(decimal, ".")
+    return float(plain) if _NUMBER.fullmatch(plain) else math.inf

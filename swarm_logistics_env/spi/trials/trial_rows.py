@@ -19,8 +19,10 @@ def trial_of(
     duration: float | None,
     blocks: Mapping[str, int],
     unnamed: str,
+    *,
+    performance: float = 0.0,
 ) -> Trial:
-    """Return the trial of a row, without performance and times.
+    """Return the trial of a row, without the times of an event log.
 
     Args:
         faults: of the file.
@@ -28,6 +30,7 @@ def trial_of(
         duration: of every trial [s], where no column says it.
         blocks: a number for each block; none where they are numbers.
         unnamed: what a policy is called that the file does not name.
+        performance: P of it.
     """
     n_robots = row.whole_or_none("n_robots", 1)
     fault, faulty = faults[row.text("fault")], row.whole_or_none("faulty", 0) or 0
@@ -56,24 +59,30 @@ def trial_of(
         onset if is_fault else 0.0,
         tuple((name, row.parameter(name)) for name in varying),
         blocks.get(row.text("seed")) if blocks else row.whole_or_none("seed", 0),
-        0.0,
+        performance,
         duration=duration,
         contacts=row.number_or_none("contacts"),
     )
 
 
-def runs_of(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
-    """Return the trials of a table with one run a row, with their performance."""
+def check_labels(rows: Sequence[tuple[Trial, Row]]) -> None:
+    """Refuse runs of one condition that have one label.
+
+    Raises:
+        IndicatorError: there are some.
+    """
     labels: dict[object, Row] = {}
     for trial, row in rows:
         label = row.text("trial")
         if label and (first := labels.setdefault((trial.condition, label), row)) is not row:
             raise row.error("trial", f"is in line {first.line} too: should name one run a row")
-    rate = _rate if "time_to_finish" in rows[0][1].names else None
-    return [
-        replace(trial, performance=rate(row) if rate else row.number("performance", 0.0))
-        for trial, row in rows
-    ]
+
+
+def performance_of(row: Row) -> float:
+    """Return P of a row that is a run: what the column says, or work by time."""
+    if "time_to_finish" in row.names:
+        return _rate(row)
+    return row.number("performance", 0.0)
 
 
 def _rate(row: Row) -> float:

@@ -100,7 +100,9 @@ def summed_over(table: Table, robots: str, columns: Mapping[str, str]) -> Table:
                 f"{table.lines[first]} too: name each row's trial in a column 'trial'"
             )
         first_rows.setdefault(trial, number)
-        delivered = Row(table, number, view).number("performance", 0.0)
+        delivered = Row(table, number, view, {"performance": performance}).number(
+            "performance", 0.0
+        )
         totals[trial] = totals.get(trial, 0.0) + delivered
     header = [name for name in table.header if name != robots]
     summed = []

@@ -341,7 +341,9 @@ def test_what_differs_in_every_row_tells_no_conditions_apart(tmp_path: Path) -> 
     rows = [f"{n},{temperature},9" for temperature, n in enumerate([4, 4, 4, 8, 8, 8])]
     trials = read(tmp_path, "\n".join(["robots,temperature,p", *rows]))
     assert {row.parameters for row in trials.rows} == {()}
-    assert trials.notes == ("'temperature' differs in every trial: it tells no conditions apart.",)
+    assert trials.notes == (
+        "'temperature' differs from trial to trial: it tells no conditions apart.",
+    )
     few = read(tmp_path, "\n".join(["robots,temperature,p", *rows[:3]]))
     assert len({row.parameters for row in few.rows}) == 3
 
