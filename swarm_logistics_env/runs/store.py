@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FILE_NAME = "study.sqlite"
 SCHEMA_VERSION = 5
 _WITHOUT_DIGESTS = 4  # as version 0.3.0 wrote it; read, and given digests where runs are added
-_CACHE_KIB = 128 * 1024  # of a store that many runs are added to at once
+_CACHE_KIB = 128 * 1024
 TIMEOUT = 60.0  # s, for other processes that write
 APPLICATION_ID = 0x53574C47  # "SWLG": marks the file as ours
 
@@ -143,19 +143,13 @@ class Runs:
 
     def add(self, run: Run, outcome: Outcome) -> None:
         """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
-        content = content_of(run, outcome)
-        with self._transaction():
-            self._execute(_ADD, (*content, outcome.wall_seconds, row_digest(*content)))
+        self.add_all([(run, outcome)])
 
     def add_all(self, runs: Iterable[tuple[Run, Outcome]]) -> None:
         """Keep runs as `add` does, all or none of them."""
-        # Keys come in no order, so that the whole index is written to all the time.
-        self._execute(f"PRAGMA cache_size = -{_CACHE_KIB}")
         with self._transaction():
-            for run, outcome in runs:
-                content = content_of(run, outcome)
-                row = (*content, outcome.wall_seconds, row_digest(*content))
-                self._connection.execute(_ADD, row)
+            for content, seconds in ((content_of(*run), run[1].wall_seconds) for run in runs):
+                self._connection.execute(_ADD, (*content, seconds, row_digest(*content)))
 
     def absorb(self, other: Runs) -> None:
         """Add the runs of another store, to which `add`'s rule applies; not those damaged there.
@@ -321,6 +315,8 @@ class Runs:
         # A process that is killed loses nothing; a power cut at most the latest runs.
         self._change_to_wal()
         self._execute("PRAGMA synchronous = NORMAL")
+        # Keys come in no order: the whole index of a million runs is written to all the time.
+        self._execute(f"PRAGMA cache_size = -{_CACHE_KIB}")
         if is_ours and (read_only or version == SCHEMA_VERSION):
             return
         with self._transaction():

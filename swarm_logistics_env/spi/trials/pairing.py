@@ -38,7 +38,9 @@ def paired_within_blocks(trials: Sequence[Trial]) -> list[Trial]:
 
 
 def holds_several(trials: Sequence[Trial]) -> bool:
-    """Return whether some block holds several trials of a condition."""
+    """Return whether some block holds several trials of a condition, and each is in a block."""
+    if any(trial.seed is None for trial in trials):
+        return False
     keys = [(trial.condition, trial.seed) for trial in trials]
     return len({*keys}) < len(keys)
 

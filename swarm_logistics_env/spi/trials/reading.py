@@ -86,22 +86,19 @@ def read_trials(
     blocks = numbered_blocks(rows)
     unnamed = Path(table.source).stem or table.source
     is_log = "time" in known.names
-    pairs = []
-    for row in rows:
-        p = 0.0 if is_log else performance_of(row)
-        trial = trial_of(row, faults, varying, duration, blocks, unnamed, performance=p)
-        pairs.append((trial, row))
-    if not is_log and "trial" in known.names:
+    performances = ((0.0 if is_log else performance_of(row)) for row in rows)
+    pairs = [
+        (trial_of(row, faults, varying, duration, blocks, unnamed, performance=p), row)
+        for row, p in zip(rows, performances)
+    ]
+    if "trial" in known.names and not is_log:
         check_labels(pairs)
     trials = events_of(pairs) if is_log else [trial for trial, _ in pairs]
     block = known.names.get("seed", "seed")
     notes = [*table.notes, *guesses, *faults.notes]
-    if blocks and holds_several(trials) and all(trial.seed is not None for trial in trials):
+    if blocks and holds_several(trials):
         trials = paired_within_blocks(trials)
-        notes.append(
-            f"Some {block} holds several trials of one condition: they are paired in the file's "
-            "order."
-        )
+        notes.append(f"Several trials of one {block} and condition are paired in the file's order.")
     check_pairing(table, trials)
     if "time_to_finish" not in known.names:  # a rate compares trials of any length
         _check_durations(table, trials)

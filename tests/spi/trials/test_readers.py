@@ -261,4 +261,5 @@ def test_several_trials_of_a_day_are_paired_in_their_order(tmp_path: Path) -> No
     path.write_text("\n".join(["robots,day,P", *rows]))
     trials = spi.read_trials(path)
     assert [row.seed for row in trials.rows] == [0, 1, 2, 0, 1, 2]
-    assert "Some day holds several trials of one condition: they are paired in" in trials.notes[0]
+    note = "Several trials of one day and condition are paired in the file's order."
+    assert trials.notes == (note,)
