@@ -38,6 +38,7 @@ class Table:
         left_out: columns that are read only where somebody says what they are.
         decimal: the sign before decimals; None: not known.
         notes: sentences on how the file was read.
+        origins: of each row, where it stands in which file; empty: in this one.
     """
 
     source: str
@@ -51,6 +52,7 @@ class Table:
     left_out: frozenset[str] = frozenset()
     decimal: str | None = None
     notes: tuple[str, ...] = ()
+    origins: Sequence[str] = ()
 
     @cached_property
     def index(self) -> dict[str, int]:
@@ -64,6 +66,8 @@ class Table:
 
     def location(self, row: int) -> str:
         """Return file and line of a row."""
+        if self.origins:
+            return self.origins[row]
         return f"{self.source}, {self.line_word} {self.lines[row]}"
 
 

@@ -111,11 +111,21 @@ def summed_over(table: Table, robots: str, columns: Mapping[str, str]) -> Table:
         row[performance] = f"{totals[trial]:.15g}"
         del row[robot]
         summed.append(row)
-    sizes = {len(table.cells) / len(summed)}
-    note = f"{len(table.cells)} rows of robots are summed into {len(summed)} trials"
-    note += f", {min(sizes):g} robots each on average." if len(summed) < len(table.cells) else "."
+    n_robots = len(table.cells) / max(1, len(summed))
+    note = (
+        f"{len(table.cells)} rows of robots are summed into {len(summed)} trials, {n_robots:g} "
+        "robots each on average."
+    )
     lines = [table.lines[number] for number in first_rows.values()]
-    return replace(table, header=header, cells=summed, lines=lines, notes=(*table.notes, note))
+    origins = [table.location(number) for number in first_rows.values()] if table.origins else ()
+    return replace(
+        table,
+        header=header,
+        cells=summed,
+        lines=lines,
+        notes=(*table.notes, note),
+        origins=origins,
+    )
 
 
 class FaultNames:

@@ -205,6 +205,9 @@ def test_a_folder_of_unlike_files_is_refused(tmp_path: Path) -> None:
         (tmp_path / name).write_text(f"{header}\n4,1\n8,2\n")
     with pytest.raises(spi.IndicatorError, match=r"a\.csv has no column 'boxes', as others in"):
         spi.read_trials(tmp_path)
+    (tmp_path / "b.csv").write_text("P,robots\n3,4\nfour,8\n")
+    with pytest.raises(spi.IndicatorError, match=r"b\.csv, line 3, column 'P': 'four': should"):
+        spi.read_trials(tmp_path)
     (tmp_path / "b.csv").write_text("P,robots\n3,4\n4,8\n")
     trials = spi.read_trials(tmp_path)
     assert [(row.policy, row.n_robots, row.performance) for row in trials.rows] == [

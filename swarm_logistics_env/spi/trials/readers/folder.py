@@ -55,13 +55,13 @@ def read(folder: Path, read_file: Callable[[Path], Table]) -> Table:
         labels.append("policy")
         named = [{**values, "policy": policy} for values, policy in zip(named, policies)]
     labels = [label for label in labels if label not in header]
-    cells, lines = [], []
+    cells, origins = [], []
     for table, values in zip(tables, named):
         order = [table.index.get(name) for name in header]
-        for row in table.cells:
+        for number_of_row, row in enumerate(table.cells):
             cells_of_file = ["" if number is None else row[number] for number in order]
             cells.append([*cells_of_file, *(values[name] for name in labels)])
-            lines.append(len(cells))
+            origins.append(table.location(number_of_row))
     digest = hashlib.sha256("".join(table.digest for table in tables).encode()).hexdigest()[:16]
     counts = f"{len(paths)} file{'s' * (len(paths) > 1)}: {len(cells)} rows."
     notes = dict.fromkeys(
@@ -72,13 +72,14 @@ def read(folder: Path, read_file: Callable[[Path], Table]) -> Table:
         digest,
         [*header, *labels],
         cells,
-        lines,
+        range(1, len(cells) + 1),
         "row",
         first.kind and f"a folder of {first.kind}",
         first.meanings,
         left_out,
         first.decimal,
         tuple(notes),
+        origins,
     )
 
 
