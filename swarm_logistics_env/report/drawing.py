@@ -226,8 +226,7 @@ def _mark(axes: Axes, at: float, point: Point, *, level: bool = False, n_beside:
     value, low, high = point.value, point.low, point.high
     if value is None:
         return
-    style = point.style % len(COLOURS)
-    colour = COLOURS[style]
+    colour = COLOURS[point.style % len(COLOURS)]
     error = None
     if low is not None and high is not None:
         # An infinite end is drawn far outside.
@@ -238,7 +237,7 @@ def _mark(axes: Axes, at: float, point: Point, *, level: bool = False, n_beside:
         at if level else value,
         xerr=error if level else None,
         yerr=None if level else error,
-        fmt="o" if level else MARKERS[style],
+        fmt="o" if level else marker_of(point.style),
         color=colour,
         markerfacecolor=colour if point.decided else PAPER,
         markersize=5.0 * shrink,
@@ -327,7 +326,7 @@ def rates(
                 LINES[index % len(LINES)],
                 color=colour,
                 label=curve.runs,
-                marker=MARKERS[index % len(MARKERS)],
+                marker=marker_of(index),
                 markevery=(index * 4, 12),
             )
         axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
@@ -343,3 +342,8 @@ def _legend(canvas: Canvas, axes: Axes) -> None:
     handles, labels = axes.get_legend_handles_labels()
     series = dict(zip(labels, handles))
     canvas.legend(series.values(), series, loc="outside upper left", ncols=min(len(series), 3))
+
+
+def marker_of(index: int) -> str:
+    """Return the marker of a series; from the seventh on, colours return with other markers."""
+    return MARKERS[(index + index // len(COLOURS)) % len(MARKERS)]

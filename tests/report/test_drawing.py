@@ -33,3 +33,10 @@ def test_figures_are_drawn_whatever_backend_is_set(backend: str, left: str | Non
     named, used = done.stdout.split()
     assert named == backend
     assert left is None or used.lower() == left
+
+
+def test_thirty_six_series_have_marks_of_their_own() -> None:
+    from swarm_logistics_env.report.drawing import COLOURS, marker_of
+
+    marks = {(COLOURS[index % len(COLOURS)], marker_of(index)) for index in range(36)}
+    assert len(marks) == 36
