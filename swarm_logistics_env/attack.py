@@ -298,7 +298,7 @@ def _outcomes(
     finished = store.succeeded()
     missing = {run.key: run for run in runs if run.key not in finished}
     for run, outcome in engine(missing.values()):
-        store.add(run, outcome)
+        store.add([(run, outcome)])
         if outcome.error is not None:
             raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
     outcomes = store.outcomes(runs)

@@ -131,7 +131,7 @@ def play(
             # Closed at once where this stops early, so that no worker outlives it.
             with closing(engine(queue)) as finished:
                 for run, outcome in finished:
-                    store.add(run, outcome)
+                    store.add([(run, outcome)])
                     errors.append(outcome.error)
                     if outcome.error is None:
                         has_worked = True

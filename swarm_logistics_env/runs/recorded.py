@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +56,7 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
     except StudyError as error:
         raise StudyError(f"{trials.file}, {error}") from None
     with Runs.new(out, "import") as runs:
-        runs.add_all(_runs(conditions.values(), origin, plan.code))
+        runs.add(_runs(conditions.values(), origin, plan.code))
         note(runs, plan, Declaration.model_validate(specification))
     return len(trials.rows)
 
@@ -145,9 +145,14 @@ def _case(origin: Origin, row: Trial) -> Case:
     return Case(policy, identity, scenario, faults, behaviour, task=RECORDED)
 
 
+@lru_cache(10_000)  # many trials have the same P
+def _untimed(performance: float, contacts: float | None) -> Outcome:
+    return Outcome(untimed=performance, contacts_per_robot_minute=contacts)
+
+
 def _outcome(row: Trial) -> Outcome:
     if row.times is None:
-        return Outcome(untimed=row.performance, contacts_per_robot_minute=row.contacts)
+        return _untimed(row.performance, row.contacts)
     return Outcome(
         delivery_times=np.array(row.times),
         ended_at=row.duration or 0.0,

@@ -88,6 +88,7 @@ def _described(case: Case, code: str) -> tuple[str, str]:
     return before + seed[:-1], after
 
 
+@lru_cache(256)  # trials that others recorded often have one of a few numbers
 def outcome_of(text: str) -> Outcome:
     """Return the outcome that was stored.
 

@@ -141,12 +141,11 @@ class Runs:
         ((count,),) = self._execute("SELECT count(*) FROM runs NOT INDEXED")
         return int(count)
 
-    def add(self, run: Run, outcome: Outcome) -> None:
-        """Keep a finished run; one that failed before is replaced, one that succeeded stays."""
-        self.add_all([(run, outcome)])
+    def add(self, runs: Iterable[tuple[Run, Outcome]]) -> None:
+        """Keep finished runs, all or none of them.
 
-    def add_all(self, runs: Iterable[tuple[Run, Outcome]]) -> None:
-        """Keep runs as `add` does, all or none of them."""
+        One that failed before is replaced, one that succeeded stays.
+        """
         with self._transaction():
             for content, seconds in ((content_of(*run), run[1].wall_seconds) for run in runs):
                 self._connection.execute(_ADD, (*content, seconds, row_digest(*content)))

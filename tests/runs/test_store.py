@@ -45,12 +45,12 @@ def outcome(*times: float) -> Outcome:
 
 def test_failure_is_kept_until_the_run_succeeds_and_success_for_good() -> None:
     with Runs(None) as runs:
-        runs.add(run(0), Outcome(error="Traceback: first"))
+        runs.add([(run(0), Outcome(error="Traceback: first"))])
         assert runs.succeeded() == set()
         (row,) = runs.frame().to_dict("records")
         assert (row["error"], row["delivered"]) == ("Traceback: first", None)
         for late in (outcome(1.0), Outcome(error="Traceback: late"), outcome(1.0, 2.0)):
-            runs.add(run(0), late)
+            runs.add([(run(0), late)])
             assert runs.succeeded() == {run(0).key}
         (row,) = runs.frame().to_dict("records")
         assert (row["delivered"], row["error"]) == (1, None)
@@ -103,7 +103,7 @@ def test_no_text_in_a_csv_is_a_formula_and_each_is_read_again(text: str) -> None
 def test_labels_and_errors_are_exported_without_formulas(tmp_path: Path) -> None:
     evil = Case(PolicySpec(name="swarm-dt", label="=1+1"), "id", Scenario(), task=WAREHOUSE)
     with Runs(None) as runs:
-        runs.add(Run(evil, "code", 0), Outcome(error="@SUM(1)\r=2"))
+        runs.add([(Run(evil, "code", 0), Outcome(error="@SUM(1)\r=2"))])
         export(runs, tmp_path / "rows.csv")
     with (tmp_path / "rows.csv").open(newline="") as file:
         (row,) = csv.DictReader(file)
@@ -125,7 +125,7 @@ def test_what_is_no_store_is_refused_with_the_reason(
     path = tmp_path / FILE_NAME
     with Runs(path) as runs:
         for seed in range(50):
-            runs.add(run(seed), outcome(*[1.0] * 50))
+            runs.add([(run(seed), outcome(*[1.0] * 50))])
         runs._connection.execute(spoil)
     before = path.read_bytes()[: None if spoil else 5000]
     path.write_bytes(before)
@@ -140,7 +140,7 @@ def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: P
     directory.mkdir()
     path = directory / FILE_NAME
     with Runs(path) as runs:
-        runs.add(run(0), outcome(*times))
+        runs.add([(run(0), outcome(*times))])
         # A log holds the latest runs until the last writer closes.
         with Runs.existing(directory) as reader:
             assert reader.succeeded() == {run(0).key}
@@ -148,7 +148,7 @@ def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: P
     with Runs.existing(directory) as runs:
         ((place, kept),) = runs.outcomes([run(0), run(1)]).items()
         with pytest.raises(StudyError, match="readonly database"):
-            runs.add(run(1), outcome(1.0))
+            runs.add([(run(1), outcome(1.0))])
         assert list(directory.iterdir()) == [path]
     assert path.read_bytes() == before
     assert (place, kept.delivery_times.tolist()) == ((CASE.key, 0), times)
@@ -158,8 +158,8 @@ def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: P
 def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) -> None:
     counted = replace(outcome(1.0), contacts_per_robot_minute=0.0, overlap_share=0.25)
     with Runs(tmp_path / FILE_NAME) as runs, Runs(None) as other:
-        runs.add(run(0), outcome(1.0))  # as an older version, which knew none of the fields
-        runs.add(run(1), counted)
+        runs.add([(run(0), outcome(1.0))])  # as an older version, which knew none of the fields
+        runs.add([(run(1), counted)])
         written = [row.outcome for row in sorted(runs._rows(), key=lambda row: row.rowid)]
         assert not any(name in written[0] for name in ContactMeasures._fields)
         older, newer = (runs.outcomes([run(seed)])[CASE.key, seed] for seed in range(2))
