@@ -176,8 +176,8 @@ def test_a_node_that_is_lost_costs_no_run(undisturbed: str, tmp_path: Path) -> N
     added = [cluster.add_node(num_cpus=1)]
     add = Runs.add
 
-    def add_and_lose(store: Runs, run: Any, outcome: Any) -> None:
-        add(store, run, outcome)
+    def add_and_lose(store: Runs, runs: Any) -> None:
+        add(store, runs)
         if added and len(store) == 3:
             cluster.remove_node(added.pop(), allow_graceful=False)
 
