@@ -71,7 +71,8 @@ def _uncovered() -> Iterator[None]:
 
 def mirrors(test: Path) -> bool:
     """Return whether a file of tests is of one module or folder of the package."""
-    name = test.stem.removeprefix("test_") if test.parent == ROOT / "tests" else test.parent.name
+    folder = test.parent.relative_to(ROOT / "tests")
+    name = folder if folder.name else test.stem.removeprefix("test_")
     return any((PACKAGE / f"{name}{suffix}").exists() for suffix in ("", ".py"))
 
 
