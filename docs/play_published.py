@@ -114,22 +114,21 @@ def main() -> None:
     for name, _, path in (argument.partition("=") for argument in sys.argv[1:]):
         rows[name] = judged(name, path)
     ROWS.write_text(json.dumps(rows, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    known = {name: rows[name] for name in SETS if name in rows}
+    rows_of_sets = {name: rows[name] for name in SETS if name in rows}
     sources = [
         [name, SETS[name].source, SETS[name].licence, f"`{SETS[name].command}`", _outcome(of_set)]
-        for name, of_set in known.items()
+        for name, of_set in rows_of_sets.items()
     ]
     columns = ["set", "policy", "N", "S from each to the next", "S > 0", "runs that collapse"]
-    scaling = [
-        [name, *row] for name, of_set in known.items() for row in of_set.get("scalability", [])
-    ]
-    others = [[name, *row] for name, of_set in known.items() for row in of_set.get("others", [])]
+    sets = rows_of_sets.items()
+    scaling = [[name, *row] for name, of_set in sets for row in of_set.get("scalability", [])]
+    other_questions = [[name, *row] for name, of_set in sets for row in of_set.get("others", [])]
     heads = ["set", "source", "licence", "command", "read"]
     questions = ["set", "policy", "question", "value", "> 0"]
     blocks = {
         "published sources": table(heads, sources),
         "published s": table(columns, scaling),
-        "published others": table(questions, others),
+        "published others": table(questions, other_questions),
     }
     rewrite(PAGE, blocks)
 

@@ -56,7 +56,7 @@ def study(rng: np.random.Generator, centre: float, slope: float, n: int) -> dict
 def coverage(n: int, slope: float, studies: int = STUDIES) -> tuple[float, float]:
     """Return the share of studies that give a critical size, and of these that cover it."""
     rng = np.random.default_rng(n)
-    n_covered, n_given = 0, 0
+    n_covered, n_with_size = 0, 0
     for _ in range(studies):
         centre = float(np.exp(rng.uniform(math.log(25.0), math.log(80.0))))
         counts = spi.collapsed_runs(study(rng, centre, slope, n))
@@ -64,9 +64,9 @@ def coverage(n: int, slope: float, studies: int = STUDIES) -> tuple[float, float
             size = spi.critical_size(SIZES, [*counts.values()], [n] * len(SIZES))
             assert size.low is not None
             assert size.high is not None
-            n_given += 1
+            n_with_size += 1
             n_covered += size.low <= centre <= size.high
-    return n_given / studies, n_covered / max(n_given, 1)
+    return n_with_size / studies, n_covered / max(n_with_size, 1)
 
 
 def main() -> None:
@@ -79,10 +79,9 @@ def main() -> None:
     print(pd.DataFrame(named).pivot_table(index="runs", columns="n", values="named").to_string())
     planted = []
     for n, slope in ((30, 8.0), (60, 8.0), (128, 20.0)):
-        given, covered = coverage(n, slope)
-        planted.append(
-            {"table": "critical size", "n": n, "slope": slope, "named": given, "covered": covered}
-        )
+        named_share, covered = coverage(n, slope)
+        row = {"table": "critical size", "n": n, "slope": slope}
+        planted.append({**row, "named": named_share, "covered": covered})
     print(pd.DataFrame(planted).to_string(index=False))
     pd.DataFrame([*named, *planted]).to_csv(FILE, index=False, float_format="%.4g")
 

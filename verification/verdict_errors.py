@@ -1,8 +1,7 @@
 """How often verdicts are wrong, and how often they tell: `python -m verification.verdict_errors`.
 
-It simulates studies in worlds whose truth is known: of so many seeds, paired and not, and until
-they are clear; with runs that stall; and over trainings, of which some collapse. It prints the
-tables and writes them to `docs/results/verdict_errors.csv`.
+It simulates studies in worlds whose truth is known: paired and not, until they are clear, with runs
+that stall, and over trainings. It prints tables and writes `docs/results/verdict_errors.csv`.
 """
 
 import math
@@ -91,19 +90,19 @@ def _rate_of_finishing(rate: float, ends_at: float) -> float:
 def _work_by_time(rng: Rng, shape: Shape, rate: float, ends_at: float) -> Floats:
     """Return the work of WORK items by the time that it took, or what was done until the end."""
     times = rng.exponential(1.0 / rate, (*shape, WORK)).cumsum(axis=-1)
-    done = np.asarray((times <= ends_at).sum(axis=-1))
-    return np.where(done == WORK, WORK / times[..., -1], done / min(ends_at, 1e9))
+    done = (times <= ends_at).sum(axis=-1)
+    return np.where(done == WORK, WORK / times[..., -1], done / ends_at)
 
 
 def _timed(ends_at: float) -> Model:
     """Return work by time, of runs that end unfinished where they take longer than that [s]."""
 
     def draw(rng: Rng, shape: Shape, p_f: float) -> Pair:
-        rates = P_O, p_f
-        drawn = (_work_by_time(rng, shape, rate, ends_at) for rate in rates)
-        means = (_rate_of_finishing(rate, ends_at) for rate in rates)
-        before, after = (p / mean * rate for p, mean, rate in zip(drawn, means, rates))
-        return before, after
+        p_o, p_new = (
+            _work_by_time(rng, shape, rate, ends_at) * rate / _rate_of_finishing(rate, ends_at)
+            for rate in (P_O, p_f)
+        )
+        return p_o, p_new
 
     return Model(draw, P_O, P_F)
 

@@ -29,7 +29,7 @@ from .document import Document
 from .drawing import Panel, Point
 from .figures import X_LABELS
 from .inline_svg import forest_rows, inline
-from .section import P_LEVEL, Figure, Sentence, bracketed, digits_of, percent
+from .section import P_LEVEL, Figure, Sentence, bracketed, digits_of, percent, width_of
 
 Json: TypeAlias = dict[str, JsonValue]
 # P seed by seed of every condition, by the key of its case; None: a run failed, or is missing.
@@ -174,11 +174,8 @@ def _titles(panels: Sequence[Panel]) -> dict[str, str]:
     for panel in panels:
         for point in panel.points:
             if point.value is not None:
-                width = 0.0
-                if point.low is not None and point.high is not None:
-                    width = point.high - point.low
-                digits = 3 if panel.thresholds else digits_of(point.value, width)
                 interval = Interval(point.value, point.low, point.high)
+                digits = 3 if panel.thresholds else digits_of(point.value, width_of(interval))
                 text = bracketed(interval, digits, panel.thresholds)
                 titles[point.link] = f"{point.series}, {point.category}: {text}"
             if point.published is not None:

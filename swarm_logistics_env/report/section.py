@@ -103,6 +103,13 @@ def digits_of(p: float, width: float = 0.0) -> int:
     return least if not 0 < width < math.inf else max(least, -math.floor(math.log10(width)))
 
 
+def width_of(interval: spi.Interval) -> float:
+    """Return the width of an interval; 0: it has none."""
+    if interval.low is None or interval.high is None:
+        return 0.0
+    return interval.high - interval.low
+
+
 def fixed(value: float, digits: int, thresholds: Iterable[float] = ()) -> str:
     """Return a number to so many digits; infinity as its sign.
 
@@ -183,10 +190,7 @@ def mean_p(cell: Cell) -> str:
     if not cell.n_seeds:
         return "no run"
     interval = cell.mean
-    width = 0.0
-    if interval.low is not None and interval.high is not None:
-        width = interval.high - interval.low
-    mean = bracketed(interval, digits_of(interval.value, width))
+    mean = bracketed(interval, digits_of(interval.value, width_of(interval)))
     return mean + SATURATED if cell.saturated else mean
 
 

@@ -40,8 +40,8 @@ def test_what_cannot_show_two_phases_shows_one(runs: list[float]) -> None:
 
 def test_the_planted_critical_size_is_covered() -> None:
     # 1,000 studies there.
-    given, covered = coverage(60, 8.0, studies=100)
-    assert given > 0.85
+    named_share, covered = coverage(60, 8.0, studies=100)
+    assert named_share > 0.85
     assert covered >= 0.86  # .95 are expected; less than .86 by chance in .1 % of tests
 
 

@@ -74,43 +74,43 @@ def read_trials(
     table = with_values(read_table(source), mapped, values)
     if sum_over is not None:
         table = summed_over(table, sum_over, mapped)
-    known, guesses = columns_of(table, mapped, ignore, decimal, thousands)
+    table_columns, guesses = columns_of(table, mapped, ignore, decimal, thousands)
     if not table.cells:
         raise IndicatorError(
             f"{table.source} holds no trial: should have a row for each below the names"
         )
-    rows = [*rows_of(table, known)]
-    varying, covariates = _parameters(table, known)
+    rows = [*rows_of(table, table_columns)]
+    varying, covariates = _parameters(table, table_columns)
     faults = FaultNames(rows)
-    _check_columns(table, known, faults)
+    _check_columns(table, table_columns, faults)
     blocks = numbered_blocks(rows)
     unnamed = Path(table.source).stem or table.source
-    is_log = "time" in known.names
+    is_log = "time" in table_columns.names
     performances = ((0.0 if is_log else performance_of(row)) for row in rows)
     pairs = [
         (trial_of(row, faults, varying, duration, blocks, unnamed, performance=p), row)
         for row, p in zip(rows, performances)
     ]
-    if "trial" in known.names and not is_log:
+    if "trial" in table_columns.names and not is_log:
         check_labels(pairs)
     trials = events_of(pairs) if is_log else [trial for trial, _ in pairs]
-    block = known.names.get("seed", "seed")
+    block = table_columns.names.get("seed", "seed")
     notes = [*table.notes, *guesses, *faults.notes]
     if blocks and holds_several(trials):
         trials = paired_within_blocks(trials)
         notes.append(f"Several trials of one {block} and condition are paired in the file's order.")
     check_pairing(table, trials)
-    if "time_to_finish" not in known.names:  # a rate compares trials of any length
+    if "time_to_finish" not in table_columns.names:  # a rate compares trials of any length
         _check_durations(table, trials)
-    notes += _notes_on_conditions(trials, known, varying, covariates)
+    notes += _notes_on_conditions(trials, table_columns, varying, covariates)
     notes += notes_on_pairs(trials, block)
     return Trials(
         Path(table.source).name or table.source,
         table.digest,
         tuple(trials),
         tuple(notes),
-        _uses_of(table, known, varying, covariates),
-        _name_of_performance(known),
+        _uses_of(table, table_columns, varying, covariates),
+        _name_of_performance(table_columns),
     )
 
 

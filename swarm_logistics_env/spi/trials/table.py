@@ -213,8 +213,8 @@ class Row:
 
 def rows_of(table: Table, columns: Columns) -> Iterator[Row]:
     """Yield the rows of a table."""
-    known = columns.names.items()
-    positions = {column: table.index[name] for column, name in known if name in table.index}
+    names = columns.names.items()
+    positions = {column: table.index[name] for column, name in names if name in table.index}
     return (Row(table, number, columns, positions) for number in range(len(table.cells)))
 
 

@@ -74,9 +74,9 @@ def columns_of(
         for name in numbers:
             _refuse_thousands(table, name)
     ignored = [name for name in table.header if name in ignore]
-    found = Columns(names, parameters, ignored, blocks, decimal or ".", thousands)
-    _refuse_rows_of_robots(table, found)
-    return found, notes
+    table_columns = Columns(names, parameters, ignored, blocks, decimal or ".", thousands)
+    _refuse_rows_of_robots(table, table_columns)
+    return table_columns, notes
 
 
 def _names(
@@ -195,8 +195,12 @@ def _refuse_rows_of_robots(table: Table, columns: Columns) -> None:
 
 def _all_but_performance(table: Table, columns: Columns) -> list[str]:
     """Return the columns of a table that say which trial a row is of."""
-    known = [name for column, name in columns.names.items() if column != "performance"]
-    return [name for name in (*known, *columns.blocks, *columns.parameters) if name in table.index]
+    named_columns = [name for column, name in columns.names.items() if column != "performance"]
+    return [
+        name
+        for name in (*named_columns, *columns.blocks, *columns.parameters)
+        if name in table.index
+    ]
 
 
 def is_robot(name: str) -> bool:

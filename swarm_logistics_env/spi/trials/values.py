@@ -40,7 +40,7 @@ def with_values(table: Table, columns: Mapping[str, str], values: Sequence[str])
         if parts is None:
             raise IndicatorError(f"--value {value}: should be COLUMN:CELL=NEW, as fault:kein=none")
         column, old, new = (part.strip() for part in parts.groups())
-        number = _column_number(table, columns, column)
+        number = _column_number(table, columns, column, "--value")
         rows = [row for row in cells if row[number] == old]
         if not rows:
             raise IndicatorError(
@@ -53,13 +53,13 @@ def with_values(table: Table, columns: Mapping[str, str], values: Sequence[str])
     return replace(table, cells=cells)
 
 
-def _column_number(table: Table, columns: Mapping[str, str], column: str) -> int:
+def _column_number(table: Table, columns: Mapping[str, str], column: str, option: str) -> int:
     meanings = {MEANING[bare(name)]: name for name in table.header if bare(name) in MEANING}
     by_meaning = {**meanings, **table.meanings, **columns}
     name = column if column in table.index else by_meaning.get(MEANING.get(column, column))
     if name not in table.index:
         raise IndicatorError(
-            f"--value {column}: {table.source} has no such column, but "
+            f"{option} {column}: {table.source} has no such column, but "
             f"{', '.join(map(repr, table.header))}"
         )
     return table.index[name]
@@ -84,15 +84,17 @@ def summed_over(table: Table, robots: str, columns: Mapping[str, str]) -> Table:
             f"--sum-over {robots}: {table.source} has no such column, but "
             f"{', '.join(map(repr, table.header))}"
         )
-    performance = _column_number(table, columns, "performance")
+    performance = _column_number(table, columns, "performance", "--sum-over needs the column")
     robot = table.index[robots]
-    others = [number for number in range(len(table.header)) if number not in (performance, robot)]
+    other_columns = [
+        number for number in range(len(table.header)) if number not in (performance, robot)
+    ]
     view = Columns({"performance": table.header[performance]}, (), (), (), ".", None)
     totals: dict[tuple[str, ...], float] = {}
     first_rows: dict[tuple[str, ...], int] = {}
     rows_of_robots: dict[tuple[tuple[str, ...], str], int] = {}
     for number, cells in enumerate(table.cells):
-        trial = tuple(cells[other] for other in others)
+        trial = tuple(cells[column] for column in other_columns)
         first = rows_of_robots.setdefault((trial, cells[robot]), number)
         if first != number:
             raise IndicatorError(

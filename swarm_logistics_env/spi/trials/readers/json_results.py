@@ -113,12 +113,12 @@ def _table(
     header = [*dict.fromkeys(name for record in records for name in record)]
     performance = next((name for name in preferred if name in metrics), metrics[0])
     cells = [[_text(record.get(name)) for name in header] for record in records]
-    others = [name for name in metrics if name != performance]
+    other_metrics = [name for name in metrics if name != performance]
     note = f"These are {kind}: P is {performance}"
-    note += "; --column performance=NAME takes another metric." if others else "."
+    note += "; --column performance=NAME takes another metric." if other_metrics else "."
     return Table(
         str(path), digest, header, cells, range(1, len(cells) + 1), "record", kind,
-        {"performance": performance}, frozenset(others), ".", (note,),
+        {"performance": performance}, frozenset(other_metrics), ".", (note,),
     )  # fmt: skip
 
 
