@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.verdicts.cell import Cell
@@ -27,11 +29,20 @@ def collapsed_in_words(
     ordered = sorted(named, key=lambda collapse: collapse.share.value, reverse=True)
     words = [
         f"{f'of {collapse.cell.policy} ' * names_policies}at {collapse.cell.words} in "
-        f"{share_in_words(collapse.share)}"
+        f"{share_in_words(collapse.share)}{_breaks_in_words(collapse)}"
         for collapse in ordered[:most]
     ]
     left = len(ordered) - len(words)
     return ", ".join(words) + f" and {left} conditions more (--full)" * (left > 0)
+
+
+def _breaks_in_words(collapse: Collapse) -> str:
+    """Return how many of the runs collapsed in mid-run, and when; empty where none is known to."""
+    breaks = collapse.breaks
+    if not len(breaks):
+        return ""
+    when = f"after {np.median(breaks):.0f} s (median)"
+    return f" (of these {len(breaks)} of {collapse.n_collapsed} in mid-run, {when})"
 
 
 def share_in_words(share: spi.Interval) -> str:

@@ -44,8 +44,8 @@ class StoredRow(NamedTuple):
     @property
     def is_sound(self) -> bool:
         """Whether it is as it was written; if it has no digest (None), whether it reads."""
-        texts = (self.key, self.run, self.outcome)
-        if not all(isinstance(text, str) for text in texts) or self.failed not in (0, 1):
+        types = type(self.key), type(self.run), type(self.outcome)
+        if types != (str, str, str) or self.failed not in (0, 1):
             return False
         if self.digest is not None:
             return bool(self.digest == row_digest(*self.content))
@@ -58,8 +58,8 @@ class StoredRow(NamedTuple):
 
 def row_digest(*values: object) -> str:
     """Return the digest of a row's values, 64 hexadecimal digits."""
-    texts = [str(value) for value in values]
-    lengths = " ".join(str(len(text)) for text in texts)
+    texts = list(map(str, values))
+    lengths = " ".join(map(str, map(len, texts)))
     return hashlib.sha256(f"{lengths}\n{''.join(texts)}".encode()).hexdigest()
 
 

@@ -32,10 +32,11 @@ def performance(name: str, values: ArrayLike, *, or_trainings: bool = False) -> 
         )
     if array.size == 0:
         raise IndicatorError(f"{name} is empty: should hold one number per seed (or size)")
-    for index, value in np.ndenumerate(array):
-        if not 0.0 <= value < math.inf:
-            where = ", ".join(map(str, index))
-            raise IndicatorError(f"{name}[{where}] = {value:g}: should be finite, not negative")
+    unusable = np.argwhere(~((array >= 0.0) & (array < math.inf)))
+    if len(unusable):
+        index = tuple(unusable[0].tolist())
+        where = ", ".join(map(str, index))
+        raise IndicatorError(f"{name}[{where}] = {array[index]:g}: should be finite, not negative")
     most = float(array.max())
     if most > LARGEST or 0.0 < most < SMALLEST:
         raise IndicatorError(

@@ -10,7 +10,7 @@ import time
 import traceback
 from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Protocol, TypeAlias, runtime_checkable
 
@@ -265,6 +265,9 @@ class Case:
         )
 
 
+_as_json = lru_cache(100)(canonical_json)  # of the versions of code that runs are of
+
+
 @dataclass(frozen=True)
 class Run:
     """One episode to play: a case at a seed, by one version of the code."""
@@ -277,8 +280,8 @@ class Run:
     def key(self) -> str:
         """Digest of everything that decides its outcome, 64 hexadecimal digits."""
         # As `digest_of` of the content, the code and the seed; a study may have a million of them.
-        own = canonical_json([self.code, str(self.seed)])[1:]
-        return hashlib.sha256(f"[{self.case.content_text},{own}".encode()).hexdigest()
+        text = f'[{self.case.content_text},{_as_json(self.code)},"{self.seed}"]'
+        return hashlib.sha256(text.encode()).hexdigest()
 
     @property
     def policy_seed(self) -> int:

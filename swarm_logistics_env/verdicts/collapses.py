@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from more_itertools import map_reduce
+from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.spi.phases import LEVEL, collapsed_runs, critical_size, two_phases
+from swarm_logistics_env.tasks.task import Outcome
 
 from .cell import Cell
+
+# Of log-likelihood by a change of rate: one steady run in two hundred gains more.
+_LEAST_GAIN = 7.0
 
 
 @dataclass(frozen=True)
@@ -23,10 +29,15 @@ class Collapse:
     Attributes:
         cell: of the condition.
         share: of its runs that collapsed, in [0, 1], with its exact interval.
+        n_collapsed: the number of its runs that collapsed.
+        breaks: when those of them that had delivered like the others before did so no more,
+            ascending [s], shape (k,); none where the times of deliveries are not known.
     """
 
     cell: Cell
     share: spi.Interval
+    n_collapsed: int
+    breaks: Numbers
 
 
 @dataclass(frozen=True)
@@ -56,9 +67,52 @@ def collapses(cells: Sequence[Cell]) -> list[Collapse]:
         for rank, (phases, cell) in enumerate(tests):
             if phases.boundary is None or phases.p_value > LEVEL / (len(tests) - rank):
                 break
-            runs = cell.by_seed.ravel()
-            named.append(Collapse(cell, _share(int((runs < phases.boundary).sum()), len(runs))))
+            has_collapsed = cell.by_seed.ravel() < phases.boundary
+            n_collapsed = int(has_collapsed.sum())
+            share = _share(n_collapsed, len(has_collapsed))
+            named.append(Collapse(cell, share, n_collapsed, _breaks(cell.outcomes, has_collapsed)))
     return named
+
+
+def _breaks(outcomes: Sequence[Outcome], has_collapsed: NDArray[np.bool_]) -> Numbers:
+    """Return when runs broke off that had delivered at half of the others' rate or more [s]."""
+    # A run without deliveries never began; where P is no number of times, none is known.
+    is_timed = np.array([len(outcome.delivery_times) > 0 for outcome in outcomes])
+    others = [outcomes[i] for i in np.flatnonzero(is_timed & ~has_collapsed).tolist()]
+    if not others:
+        return np.empty(0)
+    usual = float(np.median([len(run.delivery_times) / run.ended_at for run in others]))
+    breaks = []
+    for i in np.flatnonzero(is_timed & has_collapsed).tolist():
+        change = _change_of_rate(outcomes[i].delivery_times, outcomes[i].ended_at)
+        if change is not None and change.after < 0.5 * usual <= change.before:
+            breaks.append(change.time)
+    return np.sort(breaks)
+
+
+class _Change(NamedTuple):
+    """When the rate of a run's deliveries changed [s], and the rates around it [1/s]."""
+
+    time: float
+    before: float
+    after: float
+
+
+def _change_of_rate(times: Numbers, end: float) -> _Change | None:
+    """Return the most likely change of a Poisson rate; None: a steady one will do."""
+    inside = times[(times > 0.0) & (times < end)]
+    if not len(inside):
+        return None
+    n_before = np.arange(1, len(inside) + 1)
+    n_after = len(inside) - n_before
+    before, after = n_before / inside, n_after / (end - inside)
+    # n ln(rate) is 0 where nothing is delivered.
+    likelihood = n_before * np.log(before) + n_after * np.log(np.where(n_after, after, 1.0))
+    best = int(np.argmax(likelihood))
+    gain = likelihood[best] - len(inside) * np.log(len(inside) / end)
+    if gain < _LEAST_GAIN:
+        return None
+    return _Change(float(inside[best]), float(before[best]), float(after[best]))
 
 
 def edges(cells: Sequence[Cell]) -> Iterator[Edge]:

@@ -185,6 +185,8 @@ class Row:
         cell = self.text(column)
         if not cell:
             return None
+        if cell.isascii() and cell.isdigit() and int(cell) >= least:
+            return int(cell)
         value = self.number(column, least, must_be_whole=True)
         if re.fullmatch(r"\+?\d+", cell):
             return int(cell)

@@ -1,0 +1,38 @@
+"""Conditions of two phases: which share of their runs collapsed, and when."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from swarm_logistics_env import judge
+from swarm_logistics_env.report.collapse_tables import collapsed_in_words
+from swarm_logistics_env.verdicts.collapses import collapses
+
+
+def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
+    """20 runs of 500 s with a delivery in 5 s; three more stop at 100 s, and two are slow."""
+    rng = np.random.default_rng(0)
+    rows = []
+    for run, (rate, end) in enumerate(
+        [(0.2, 500.0)] * 20 + [(0.2, 100.0)] * 3 + [(0.04, 500.0)] * 2
+    ):
+        for robots in (4, 8):
+            times = np.sort(rng.uniform(0.0, end, rng.poisson(rate * end)))
+            rows += [(robots, run, time, 500.0) for time in times]
+    frame = pd.DataFrame(rows, columns=["robots", "run", "time", "duration"])
+    named = collapses(judge(frame).cells)
+    assert [collapse.cell.words for collapse in named] == ["N = 4", "N = 8"]
+    for collapse in named:
+        assert collapse.n_collapsed == 5
+        np.testing.assert_allclose(collapse.breaks, 100.0, atol=20.0)
+    words = collapsed_in_words(named, names_policies=False)
+    assert "20 % [7, 41] (of these 3 of 5 in mid-run, after 9" in words
+
+
+def test_without_times_nothing_is_said_of_mid_run() -> None:
+    p = np.repeat([*range(90, 110), 3, 4, 5, 6, 7], 2)
+    frame = pd.DataFrame({"robots": [4, 8] * 25, "delivered": p})
+    collapse, _ = collapses(judge(frame).cells)
+    assert len(collapse.breaks) == 0
+    assert "mid-run" not in collapsed_in_words([collapse], names_policies=False)
