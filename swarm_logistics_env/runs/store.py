@@ -125,8 +125,7 @@ class Runs:
             raise StudyError(f"{out} holds a study already: {verb} into a new directory")
         _make_folder(out)
         with atomic_write(path, StudyError) as part, cls(part) as runs:
-            # Nobody else reads it yet: no log, in which all would be written a second time.
-            runs._execute("PRAGMA journal_mode = DELETE")
+            runs._execute("PRAGMA journal_mode = DELETE")  # with a log all would be written twice
             yield runs
 
     def __enter__(self) -> Self:

@@ -77,7 +77,7 @@ def collapses(cells: Sequence[Cell]) -> list[Collapse]:
 def _breaks(outcomes: Sequence[Outcome], has_collapsed: NDArray[np.bool_]) -> Numbers:
     """Return when runs broke off that had delivered at half of the others' rate or more [s]."""
     # A run without deliveries never began; where P is no number of times, none is known.
-    is_timed = np.array([len(outcome.delivery_times) > 0 for outcome in outcomes])
+    is_timed = np.array([len(run.delivery_times) > 0 and run.ended_at > 0.0 for run in outcomes])
     others = [outcomes[i] for i in np.flatnonzero(is_timed & ~has_collapsed).tolist()]
     if not others:
         return np.empty(0)
