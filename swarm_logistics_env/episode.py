@@ -88,14 +88,17 @@ class Play:
         Raises:
             PolicyError: the policy returned commands of the wrong shape, or not finite.
         """
-        if self.is_over:
-            return
-        commands = decide(self._policy, self.world.observe(), self.world.state)
+        if not self.is_over:
+            self._advance()
+
+    def _advance(self) -> None:
+        world = self.world
+        commands = decide(self._policy, world.observe(), world.state)
         try:
-            self.world.step(commands)
+            world.step(commands)
         except CommandError as error:
             raise PolicyError(
-                f"{type(self._policy).__name__} at {self.world.state.time:g} s: {error}"
+                f"{type(self._policy).__name__} at {world.state.time:g} s: {error}"
             ) from error
 
 
@@ -129,9 +132,11 @@ def run_episode(
     with one_thread():  # once for all steps, as each change takes a while
         play = Play(scenario, policy, seed, faults, policy_seed)
         world = play.world
-        while not play.is_over:
-            play.step()
-            digest.update(world.state.robot_position.tobytes())
+        is_over = play.is_over
+        while not is_over:
+            play._advance()
+            digest.update(world.state.robot_position.data)
+            is_over = world.is_eventful and play.is_over  # no end without an event
     state = world.state
     delivery_times = np.array(state.delivery_times, dtype=np.float64)
     digest.update(delivery_times.tobytes())

@@ -60,11 +60,11 @@ def one_thread() -> Iterator[None]:
     Its sums are other bits with another number of threads, so that a run would depend on who plays
     it; and networks as small as those of robots are slower on several.
     """
-    torch: Any = sys.modules.get("torch")
-    n_threads = 1 if torch is None else torch.get_num_threads()
-    if n_threads == 1:
+    if _has_one_thread():
         yield
         return
+    torch: Any = sys.modules["torch"]
+    n_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
         yield
@@ -94,11 +94,25 @@ def decide(
     A policy that needs the state is a central controller: its commands reach robots that hear.
     They are checked where they are used, by `Warehouse.step`.
     """
+    if _has_one_thread():  # nearly always, and decisions are many
+        return _commands(policy, observations, state)
     with one_thread():
-        if getattr(policy, "needs_state", False):
-            # The protocol knows the one argument that all policies take.
-            return mask_unreachable_commands(policy.act(observations, state), state)  # type: ignore[call-arg]
-        return policy.act(observations)
+        return _commands(policy, observations, state)
+
+
+def _commands(
+    policy: Policy, observations: NDArray[np.float32], state: WarehouseState
+) -> NDArray[np.float64]:
+    if getattr(policy, "needs_state", False):
+        # The protocol knows the one argument that all policies take.
+        return mask_unreachable_commands(policy.act(observations, state), state)  # type: ignore[call-arg]
+    return policy.act(observations)
+
+
+def _has_one_thread() -> bool:
+    """Return whether torch, if it is loaded, works in one thread."""
+    torch: Any = sys.modules.get("torch")
+    return torch is None or torch.get_num_threads() == 1
 
 
 def mask_unreachable_commands(commands: NDArray[Any], state: WarehouseState) -> NDArray[Any]:

@@ -23,8 +23,13 @@ def in_one_thread(method: M) -> M:
 
     @functools.wraps(method)
     def refusing(self: Any, *arguments: Any, **keywords: Any) -> Any:
-        with holding([self.lock]):
+        lock: Lock = self.lock
+        if not lock.acquire(blocking=False):  # as `holding`, in a tenth of the time
+            raise used_elsewhere()
+        try:
             return method(self, *arguments, **keywords)
+        finally:
+            lock.release()
 
     return cast("M", refusing)
 
