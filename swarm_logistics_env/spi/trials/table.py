@@ -185,7 +185,8 @@ class Row:
         cell = self.text(column)
         if not cell:
             return None
-        if cell.isascii() and cell.isdigit() and int(cell) >= least:
+        is_short = len(cell) < 16  # Python refuses to read thousands of digits
+        if is_short and cell.isascii() and cell.isdigit() and int(cell) >= least:
             return int(cell)
         value = self.number(column, least, must_be_whole=True)
         if re.fullmatch(r"\+?\d+", cell):

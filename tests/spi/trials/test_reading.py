@@ -136,6 +136,7 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         ("robots;p\n4;1.204.000\n", "'1.204.000': should be a number, 0 or more without a sign be"),
         ("robots,seed,p\n4,1e3,1\n", "column 'seed': '1e3': should be a whole number with all its"),
         ("robots,seed,p\n4,9007199254740993.0,1\n", "should be a whole number with all its digits"),
+        (f"robots,p\n{'9' * 5000},1\n", "should be a whole number, 1 or more"),
         ("robots,seed,p\n4,7.5,1\n", "column 'seed': '7.5': should be a whole number, 0 or more"),
         ('robots,p\n4,"1,204"\n8,998\n', "line 2, column 'p': '1,204': should be a number, 0 or"),
         ("robots,p,note\n4,1,a\n8,2,b\n", "line 2, column 'note': 'a': should be a number, as"),
