@@ -117,13 +117,11 @@ class MotionView:
     def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
 
-        A robot that is caged by items clears its way instead, and one that handles an item stands.
+        A robot that is caged by items clears its way instead.
         A differential robot turns its body to where it wants to drive.
         """
         commands = np.zeros((len(outputs), 4))
-        command_rows(
-            outputs.astype(np.float64), self.turned, self.rows, self._period, self.memory, commands
-        )
+        command_rows(outputs.astype(np.float64), self.turned, self.rows, self.memory, commands)
         return commands
 
     def command_directions(self, wanted: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -133,9 +131,7 @@ class MotionView:
             wanted: commands (N, 4); their turns are left out.
         """
         commands = np.zeros((len(wanted), 4))
-        command_own_frames(
-            wanted, _COSINES, _SINES, self.turned, self.rows, self._period, self.memory, commands
-        )
+        command_own_frames(wanted, _COSINES, _SINES, self.turned, self.rows, self.memory, commands)
         return commands
 
 
@@ -148,7 +144,6 @@ def command_rows(
     outputs: NDArray[np.float64],
     turned: NDArray[np.float64],
     rows: NDArray[np.float32],
-    period: float,
     memories: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
@@ -156,7 +151,7 @@ def command_rows(
     for robot in range(outputs.shape[0]):
         along, aside, gripper = outputs[robot]
         turn_outputs(along, aside, gripper, turned[robot], commands[robot])
-        finish_command(rows[robot], period, memories[robot], commands[robot])
+        finish_command(rows[robot], memories[robot], commands[robot])
 
 
 @kernel
@@ -166,7 +161,6 @@ def command_own_frames(
     sines: NDArray[np.float64],
     turned: NDArray[np.float64],
     rows: NDArray[np.float32],
-    period: float,
     memories: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
@@ -181,19 +175,17 @@ def command_own_frames(
         # There and back: outputs are clipped in the frame of motion.
         along, aside = to_frame((cosines[beams], sines[beams]), x, y)
         turn_outputs(along, aside, gripper, turned[robot], commands[robot])
-        finish_command(rows[robot], period, memories[robot], commands[robot])
+        finish_command(rows[robot], memories[robot], commands[robot])
 
 
 @inlined_kernel
 def finish_command(
     sensed: NDArray[np.float32],
-    period: float,
     memory: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> None:
-    """Change a command (4,) where the robot is caged or handles an item, and take note of it."""
+    """Change a command (4,) where the robot is caged, and take note of it."""
     column.clear_the_way(sensed, memory, command)
-    column.stand_to_handle(sensed, period, memory, command)
     column.note_command(sensed, command, memory)
     column.steer(memory, command)
 
