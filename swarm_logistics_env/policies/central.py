@@ -29,7 +29,7 @@ from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 REPLAN = 0.3  # [s]
 NEAR = 0.3  # [m] from here on the worker drives straight to its item
-PATIENCE = 2.0  # [s] without getting nearer, until another robot is sent
+PATIENCE = 2.0  # [s] without getting nearer, beside its handling time, until another one is sent
 STUCK = 0.6  # [s] without getting nearer, until a laden worker steps over an item
 STEP = 0.2  # [s] without its item
 DISTRUST = 30.0  # [s]
@@ -175,7 +175,7 @@ class Central:
         if distance < self._least_distance - 0.05:
             self._least_distance = distance
             self._least_distance_at = state.time
-        elif state.time > self._least_distance_at + PATIENCE:
+        elif state.time > self._least_distance_at + PATIENCE + self._scenario.handling_time:
             self._trusted_from[self._worker] = state.time + DISTRUST
 
     def _distance_to_goal(self, state: WarehouseState) -> float:

@@ -222,8 +222,6 @@ class Homing:
         (3, 4)
     """
 
-    _decide = staticmethod(decide_homing)
-
     def __init__(self) -> None:
         self.configure(Scenario())
         self.reset(0, 0)
@@ -246,5 +244,10 @@ class Homing:
         frame = self._frame
         frame.remember(observations)
         wanted = np.zeros((len(observations), 4))
-        self._decide(observations, frame.memory, frame.keys, frame.counts, self._period, wanted)
+        self._fill(observations, wanted)
         return frame.command_directions(wanted)
+
+    def _fill(self, observations: NDArray[np.float32], commands: NDArray[np.float64]) -> None:
+        """Fill the commands (N, 4) in the robots' own frames."""
+        frame = self._frame
+        decide_homing(observations, frame.memory, frame.keys, frame.counts, self._period, commands)
