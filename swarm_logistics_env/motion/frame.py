@@ -88,6 +88,18 @@ class MotionView:
         self.counts += 1
         self.rows = observations
 
+    def hold(self, observations: NDArray[np.float32]) -> None:
+        """Let memories and time go on between two decisions; outputs keep their direction.
+
+        Raises:
+            PolicyError: there are more or fewer rows than keys at `begin`.
+        """
+        self._check(observations)
+        column.remember_observation(observations, self._period, self.memory)
+        self.turned -= self._period * observations[:, row.TURN_RATE]
+        self.counts += 1
+        self.rows = observations
+
     def _check(self, observations: NDArray[np.float32]) -> None:
         if len(observations) != len(self.keys):
             raise PolicyError(

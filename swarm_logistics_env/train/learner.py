@@ -124,6 +124,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         self._privileged = np.zeros((worlds.num_envs, len(PRIVILEGED)), np.float32)
         self._n_episodes = 0
         self._seed = 0
+        self._n_held = training.network.decides_every - 1
         super().__init__(
             worlds,
             Box(-np.inf, np.inf, (len(INPUTS) + len(PRIVILEGED),), np.float32),
@@ -155,11 +156,17 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
+        self._outputs = actions
         self.venv.step_async(self.frame.command(actions))
 
     def step_wait(self) -> Any:
-        """Step every world."""
+        """Step every world until the next decision."""
         observations, rewards, dones, infos = self.venv.step_wait()
+        for _ in range(self._n_held):
+            self.frame.hold(observations)
+            self.venv.step_async(self.frame.command(self._outputs))
+            observations, more, dones, infos = self.venv.step_wait()
+            rewards = rewards + more
         ended = np.flatnonzero(dones)
         if ended.size:
             last = np.stack([infos[row]["terminal_observation"] for row in ended.tolist()])

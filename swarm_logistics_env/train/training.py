@@ -90,6 +90,7 @@ class Training(Part):
     def _check_consistency(self) -> Self:
         if any(scenario.message_size for _, scenario in self.each_world):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
+        self._check_decisions()
         sizes = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
         for size in sorted(sizes):
             self.scenario.replace(n_robots=size)
@@ -108,6 +109,20 @@ class Training(Part):
                 f"{self.rows} robots x {self.ppo.n_steps} steps"
             )
         return self
+
+    def _check_decisions(self) -> None:
+        """Raise a ValueError if an episode could end between two decisions."""
+        every = self.network.decides_every
+        mixed = [*self.conditions, *(kind for world in self.worlds for kind in world.conditions)]
+        changed = {name for kind in mixed for name in kind.scenario}
+        ends_between = changed & {"duration", "control_period", "restock"} or any(
+            scenario.n_steps % every or not scenario.restock for _, scenario in self.each_world
+        )
+        if every > 1 and ends_between:
+            raise ValueError(
+                f"network.decides_every = {every}: should divide the control steps of each episode,"
+                " and delivered items should come back, or episodes end between two decisions"
+            )
 
     @property
     def each_world(self) -> tuple[tuple[WorldKind, Scenario], ...]:

@@ -193,3 +193,17 @@ def test_of_several_requests_the_nearest_is_read_and_who_carries_sees_obstacles(
     assert told(read, "items_in_view") == 3 / 8
     assert [told(read, f"obstacle_{n}_present") for n in range(4)] == [1.0, 1.0, 1.0, 0.0]
     assert not told(frame_of().read(amid(*items)), "obstacle_0_present")
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.35, -2.0])
+def test_between_decisions_outputs_keep_their_direction_in_the_room(turn: float) -> None:
+    frame = frame_of()
+    rows = np.zeros((1, row.N_COLUMNS), np.float32)
+    frame.read(rows)
+    outputs = np.array([[0.6, 0.3, 0.0]])
+    decided = complex(*frame.command(outputs)[0, :2])
+    rows[0, row.TURN_RATE] = 10.0 * turn  # its body turned in this step
+    frame.hold(rows)
+    held = complex(*frame.command(outputs)[0, :2])
+    assert held == pytest.approx(decided * np.exp(-1j * turn))
+    assert frame.counts.tolist() == [2]
