@@ -163,6 +163,11 @@ def contact(world: Warehouse, before: Before) -> Earned:
     return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
 
 
+def collision(world: Warehouse, before: Before) -> Earned:
+    """Speed [m/s] at which the robot ran into others in this step, summed; weigh it negatively."""
+    return world.state.contacts.closing
+
+
 def blocked_request(world: Warehouse, before: Before) -> Earned:
     """Seconds that a robot that cannot deliver held a requested item; weigh it negatively.
 
@@ -191,6 +196,7 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "approach": approach,
     "stocking": stocking,
     "contact": contact,
+    "collision": collision,
     "blocked_request": blocked_request,
 }
 _AT_DELIVERIES = {"delivery", "own_delivery"}

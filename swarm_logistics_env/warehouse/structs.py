@@ -148,6 +148,7 @@ class ContactCounts(NamedTuple):
 
     position_before: Annotated[Numbers, "N", 2]  # [m] of the robots
     velocity_before: Annotated[Numbers, "N", 2]  # [m/s]
+    closing: Annotated[Numbers, "N"]  # [m/s] of its contacts that began in this step, summed
     n_contacts: Annotated[Integers, 1]  # pairs that began to overlap
     n_fast: Annotated[Integers, 1]  # those of them that closed fast
     is_deep: Annotated[Flags, 1]  # a pair overlaps deeply in this step
