@@ -141,7 +141,8 @@ def stocking(world: Warehouse, before: Before) -> Earned:
     """Metres that the item a robot carries, requested or not, came nearer to the delivery area.
 
     The way counts from where the item lay, so no circle earns: carrying it back costs as much.
-    What lies nearer is delivered sooner once it is requested. Privileged: as `approach`.
+    What lies nearer is delivered sooner once it is requested; nearer than `STOCK_DISTANCE` it
+    would be in the way. Privileged: as `approach`.
     """
     state, floor = world.state, world.floor
     # The step in which a robot lets go still moves the item; one that was delivered lies elsewhere.
@@ -151,8 +152,9 @@ def stocking(world: Warehouse, before: Before) -> Earned:
     if not items.size:
         return None
     docks = state.item_docks[items]
-    metres = np.minimum(floor.along(state.item_position[items], docks), floor.edge)
-    metres -= np.minimum(floor.along(before.item_position[items], docks), floor.edge)
+    nearest = floor.edge - STOCK_DISTANCE
+    metres = np.minimum(floor.along(state.item_position[items], docks), nearest)
+    metres -= np.minimum(floor.along(before.item_position[items], docks), nearest)
     reward = np.zeros(state.n_robots)
     np.add.at(reward, carriers[items], metres)  # who lets go of one may lift another at once
     return reward
@@ -188,6 +190,7 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
 
 
 SECONDS_A_METRE = 2.0
+STOCK_DISTANCE = 1.5  # [m] from the delivery area
 
 REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
     "delivery": delivery,

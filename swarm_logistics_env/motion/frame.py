@@ -45,7 +45,7 @@ class MotionView:
         """Begin an episode of as many rows as there are keys, which are those of their streams.
 
         Args:
-            bodies: (N, 3) of robots that are not all as the scenario has them (`memory.body_of`).
+            bodies: (N, 4) of robots that are not all as the scenario has them (`memory.body_of`).
         """
         n = len(keys)
         self.keys, self.counts = np.empty(n, np.uint64), np.empty(n, np.int64)

@@ -73,9 +73,9 @@ def wall_angle(sensed: NDArray[np.float32]) -> float:
     IN_VAIN,  # [s] that it held on to items in vain; fades in FADING_TIME, a lift clears it
     DELIVERING,  # [s] that it held the requested item inside the area; fades as IN_VAIN
     # What its maker knows of its body, see `body_of`; they stay for the whole episode.
-    TOP_SPEED, HANDLING_TIME, WIDEST_TURN,
+    TOP_SPEED, HANDLING_TIME, WIDEST_TURN, ACCELERATION,
     N_COLUMNS,
-) = range(26)  # fmt: skip
+) = range(27)  # fmt: skip
 BODY = slice(TOP_SPEED, N_COLUMNS)
 
 FAILURE_TIME = 60.0  # [s]
@@ -93,13 +93,16 @@ MOVES = 0.1  # [m/s] and more: its velocity has a direction
 
 
 def body_of(scenario: Scenario) -> NDArray[np.float64]:
-    """Return a robot's top speed [m/s], handling time [s] and widest turn in a period [rad], (3,).
+    """Return what its maker knows of a robot (4,).
 
-    The widest turn is 0 of a robot that drives in every direction and never has to turn.
+    Top speed [m/s], handling time [s], widest turn in a period [rad], and acceleration [m/s2]. The
+    widest turn is 0 of a robot that drives in every direction and never has to turn.
     """
     turns = scenario.drive == "differential"
     widest = scenario.max_turn_rate * scenario.control_period if turns else 0.0
-    return np.array([scenario.max_speed, scenario.handling_time, widest])
+    return np.array(
+        [scenario.max_speed, scenario.handling_time, widest, scenario.max_acceleration]
+    )
 
 
 @kernel

@@ -179,7 +179,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def _bodies(self) -> NDArray[np.float64]:
         # Every episode may have robots of another kind.
-        bodies = np.empty((self.num_envs, 3))
+        bodies = np.empty((self.num_envs, 4))
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
             bodies[rows] = body_of(world.warehouse.scenario)
         return bodies

@@ -80,7 +80,8 @@ class WorldKind(Part):
     Args:
         count: how many.
         n_robots: the swarm size.
-        scenario: fields in which they differ from the training's scenario.
+        scenario: fields in which they differ from the training's scenario; with "preset", from
+            that preset.
         conditions: kinds of episodes that are mixed in these worlds; none: the training's.
     """
 

@@ -17,6 +17,7 @@ from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.records import FileName, each_of, one_of, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
@@ -38,13 +39,18 @@ PRESETS_FOLDER = Path(__file__).parent / "presets"
 Seed = Annotated[int, Field(ge=0, lt=2**32)]
 
 
+def _scenario_of(fields: object) -> object:
+    return WAREHOUSE.vary(Scenario(), fields) if isinstance(fields, dict) else fields
+
+
 class Training(Part):
     """Everything that decides the result of a training.
 
     Args:
         name: the policy's name.
         about: a sentence about the policy, for its card.
-        scenario: the conditions; a table of fields makes one.
+        scenario: the conditions; a table of fields makes one, in which "preset" names the scenario
+            to start from.
         worlds: kinds of worlds that run side by side. A training begins to learn in easy ones,
             which therefore stand beside the hard ones.
         threads: how many threads step the worlds, and how many processes measure the scores; no
@@ -65,7 +71,7 @@ class Training(Part):
 
     name: FileName = "policy"
     about: str = ""
-    scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
+    scenario: Annotated[Scenario, BeforeValidator(_scenario_of)] = Scenario(restock=True)
     worlds: Annotated[
         tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(each_of(WorldKind))
     ] = (WorldKind(count=6),)
@@ -128,7 +134,7 @@ class Training(Part):
     def each_world(self) -> tuple[tuple[WorldKind, Scenario], ...]:
         """The kind and the scenario of every world."""
         return tuple(
-            (kind, self.scenario.replace(n_robots=kind.n_robots, **kind.scenario))
+            (kind, WAREHOUSE.vary(self.scenario, {"n_robots": kind.n_robots, **kind.scenario}))
             for kind in self.worlds
             for _ in range(kind.count)
         )
