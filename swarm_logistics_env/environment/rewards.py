@@ -37,6 +37,10 @@ class RewardTerms:
             if name not in REWARD_TERMS:
                 raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
             finite_number(f"rewards[{name!r}]", weight)
+        self.reweigh(weights)
+
+    def reweigh(self, weights: Mapping[str, float]) -> None:
+        """Pay by other terms or weights from the next step on."""
         self._terms = [(REWARD_TERMS[name], weight) for name, weight in weights.items()]
         self.pays_steadily = not _AT_DELIVERIES.issuperset(weights)
 

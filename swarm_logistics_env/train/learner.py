@@ -12,6 +12,7 @@ import inspect
 import io
 import math
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -176,6 +177,11 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
                 infos[row]["terminal_observation"] = terminal_inputs
             self.frame.begin_rows(ended, self._keys()[ended], self._bodies()[ended])
         return self._read(observations), rewards, dones, infos
+
+    def change_rewards(self, rewards: Mapping[str, float]) -> None:
+        """Pay by other weights from the next step on, in every world."""
+        for world in self.venv.worlds:
+            world.unwrapped.change_rewards(rewards)
 
     def _bodies(self) -> NDArray[np.float64]:
         # Every episode may have robots of another kind.

@@ -257,7 +257,10 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
     def _on_rollout_start(self) -> None:
         self._log.cpu_seconds += time.process_time() - self._cpu
-        floor = self._training.ppo.floor(self.num_timesteps / self._training.agent_steps)
+        progress = self.num_timesteps / self._training.agent_steps
+        if self._training.final_rewards:
+            self.model.env.change_rewards(self._training.rewards_at(progress))
+        floor = self._training.ppo.floor(progress)
         with torch.no_grad():
             self.model.policy.log_std.clamp_(min=math.log(floor))
         curve = self._log.curve

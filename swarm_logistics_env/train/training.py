@@ -58,6 +58,8 @@ class Training(Part):
         seed: the number that decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`.
+        final_rewards: weights at the end of those terms whose weight changes, linearly over the
+            training. A price that grows is learned better than one that is high from the start.
         indicators: the indicators that are paid beside the task reward; none: the task reward.
         conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
@@ -79,6 +81,7 @@ class Training(Part):
     seed: Seed = 0
     agent_steps: PositiveInt = 2_000_000
     rewards: dict[str, float] = Field(default_factory=lambda: {"delivery": 1.0})
+    final_rewards: dict[str, float] = Field(default_factory=dict)
     indicators: Annotated[Indicators | None, BeforeValidator(one_of(Indicators))] = None
     conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
     network: Annotated[Network, BeforeValidator(one_of(Network))] = Network()
@@ -97,6 +100,10 @@ class Training(Part):
         if any(scenario.message_size for _, scenario in self.each_world):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         self._check_decisions()
+        RewardTerms(self.final_rewards)
+        for term in self.final_rewards:
+            if term not in self.rewards:
+                raise ValueError(f"final_rewards: {term!r} should be among the rewards, too")
         sizes = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
         for size in sorted(sizes):
             self.scenario.replace(n_robots=size)
@@ -129,6 +136,14 @@ class Training(Part):
                 f"network.decides_every = {every}: should divide the control steps of each episode,"
                 " and delivered items should come back, or episodes end between two decisions"
             )
+
+    def rewards_at(self, progress: float) -> dict[str, float]:
+        """Return the weights of the reward's terms at a time of the training, from 0 to 1."""
+        ends = {**self.rewards, **self.final_rewards}
+        return {
+            term: weight + min(progress, 1.0) * (ends[term] - weight)
+            for term, weight in self.rewards.items()
+        }
 
     @property
     def each_world(self) -> tuple[tuple[WorldKind, Scenario], ...]:
