@@ -100,9 +100,7 @@ def body_of(scenario: Scenario) -> NDArray[np.float64]:
     """
     turns = scenario.drive == "differential"
     widest = scenario.max_turn_rate * scenario.control_period if turns else 0.0
-    return np.array(
-        [scenario.max_speed, scenario.handling_time, widest, scenario.max_acceleration]
-    )
+    return np.array([scenario.max_speed, scenario.handling_time, widest, scenario.max_acceleration])
 
 
 @kernel

@@ -218,12 +218,10 @@ FIRST_OUTPUTS = (0.8, 0.0, 0.0)
 def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
     """Return PPO as the training asks for it; seeds the worlds and global generators."""
     ppo, network = training.ppo, training.network
-    first, last = ppo.learning_rate, ppo.final_learning_rate
     learner = PPO(
         AsymmetricPolicy,
         view,
-        # The last rollout may pass the end of a training, where the rate would go on to fall.
-        learning_rate=lambda left: max(0.0, last + left * (first - last)),
+        learning_rate=lambda left: ppo.rate(1.0 - left),
         n_steps=ppo.n_steps,
         batch_size=training.rows * ppo.n_steps // ppo.n_minibatches,
         n_epochs=ppo.epochs,

@@ -125,6 +125,8 @@ class PPOSettings(Part):
         epochs: the number of passes over a batch.
         learning_rate: the rate at the start; it falls linearly to `final_learning_rate`.
         final_learning_rate: the rate at the end.
+        restarts: how often, at equal distances, the rate begins anew at `learning_rate`, and with
+            it the averages of Adam (warm restarts, Loshchilov and Hutter 2017).
         gamma: the discount of a control step.
         gae_lambda: lambda of generalised advantage estimation (Schulman et al. 2016).
         clip: the largest distance from 1 at which the ratio of an action's probabilities pays.
@@ -147,6 +149,7 @@ class PPOSettings(Part):
     epochs: PositiveInt = 4
     learning_rate: PositiveFloat = 3e-4
     final_learning_rate: NonNegativeFloat = 0.0
+    restarts: NonNegativeInt = 0
     gamma: Fraction = 0.995
     gae_lambda: Fraction = 0.95
     clip: PositiveFloat = 0.2
@@ -158,6 +161,17 @@ class PPOSettings(Part):
     least_deviation: tuple[PositiveFloat, PositiveFloat] = (0.001, 0.001)
     least_until: Fraction = 1.0
     value_hidden: tuple[PositiveInt, ...] = (128, 128)
+
+    def rate(self, done: float) -> float:
+        """Return the learning rate once a share `done` of the training is over."""
+        first, last = self.learning_rate, self.final_learning_rate
+        # The last rollout may pass the end of a training, where the rate would begin anew.
+        cycles = min(done, 1.0) * (self.restarts + 1)
+        return last + (self.cycle(done) + 1 - cycles) * (first - last)
+
+    def cycle(self, done: float) -> int:
+        """Return how often the rate began anew before a share `done` of the training was over."""
+        return min(int(done * (self.restarts + 1)), self.restarts)
 
     def floor(self, done: float) -> float:
         """Return the least deviation once a share `done` of the training is over."""

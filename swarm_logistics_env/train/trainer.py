@@ -273,6 +273,13 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
             self._save()
         self._cpu = time.process_time()
 
+    def _on_rollout_end(self) -> None:
+        training, done = self._training, self.num_timesteps
+        before = done - training.rows * training.ppo.n_steps
+        cycles = [training.ppo.cycle(steps / training.agent_steps) for steps in (before, done)]
+        if cycles[0] != cycles[1]:
+            self.model.policy.optimizer.state.clear()
+
     def _on_training_end(self) -> None:
         self._log.cpu_seconds += time.process_time() - self._cpu
         if self._log.curve[-1]["agent_steps"] < self.num_timesteps:
