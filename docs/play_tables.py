@@ -8,19 +8,19 @@ is written from what `make benchmark` left, if it did.
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import front_page
 import numpy as np
 from more_itertools import map_reduce
+from play_benchmark import benchmark_blocks, benchmark_studies
 from play_paper import claim_rows, draw_figures, paper_block, paper_studies, sentences_block
 from tables import ROOT, answer, by_policy, example, rewrite, seeds_from, table, write_rows
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.cli.judging import ENTRIES
-from swarm_logistics_env.report import benchmark, drawing, section
+from swarm_logistics_env.report import drawing, section
 from swarm_logistics_env.report.tables import contacts_text
 from swarm_logistics_env.runs.engines import usable_cores
 from swarm_logistics_env.spi.summaries import Interval, t_interval
@@ -232,47 +232,6 @@ def costs_block(costs: Mapping[str, Any]) -> str:
     )
 
 
-# Other people's learners, where `make interop` has trained them; each in its largest world.
-LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "benchmarl-mappo-small")
-
-
-def benchmark_studies(out: Path) -> tuple[Study, ...]:
-    """Return the benchmark's study of each policy that clears and of the learners, in folders."""
-    folder = ROOT / "results" / "interop"
-    trained = [name for name in LEARNERS if (folder / f"{name}@0.safetensors").exists()]
-    names = [policy.name for policy in example(out, "clearing").specification.policies]
-    names += [f"{folder / name}@all.safetensors" for name in trained]
-    return tuple(
-        Study.preset(
-            benchmark.STUDY,
-            out=out / "benchmark" / section.slug(Path(name).stem),
-            policies=[name],
-        )
-        for name in names
-    )
-
-
-def benchmark_block(studies: Sequence[StudyResults]) -> str:
-    """Return the leaderboard and every entrant's worst cell; note the scores for `judge`."""
-    scores = {results.policies[0]: benchmark.score(results) for results in studies}
-    entries = {name: score.tolist() for name, score in scores.items()}
-    ENTRIES.write_text(json.dumps(entries) + "\n")
-    board = benchmark.leaderboard(scores)
-    worst_cells, contacts = {}, {}
-    for results in studies:
-        test, share = benchmark.worst(results)
-        worst_cells[results.policies[0]] = f"{test.compared.table}, {test.after}: {share:.0%}"
-        contacts[results.policies[0]] = benchmark.contacts(results)
-    return table(
-        (*board.columns, "contacts a robot-minute", "worst cell, share of P without it"),
-        [
-            (f"`{name}`", *columns, contacts[name], worst_cells[name])
-            for name, *columns in board.rows
-        ],
-        f"{seeds_from(studies[0])}, of each training. {' '.join(board.lines)}",
-    )
-
-
 def estimate_rows(
     policies: StudyResults, clearing: StudyResults, leans: StudyResults, broken: StudyResults
 ) -> Iterator[tuple[object, ...]]:
@@ -341,7 +300,7 @@ def main() -> None:
         "leans": leans_block(leans),
         "policies": policies_block(policies),
         "robust": robust_block(robust),
-        "benchmark": benchmark_block(play(benchmark_studies(OUT))),
+        **benchmark_blocks(play(benchmark_studies(OUT))),
     }
     estimates = estimate_rows(policies, clearing, leans, broken)
     write_rows(RESULTS / "estimates.csv", ESTIMATES, estimates)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.report import section
+from swarm_logistics_env.report import benchmark, section
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
@@ -55,7 +55,9 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             {**paper, "faults": [{"modes": ["FM3_send"]}]},
             without_faults,
         ],
-        "benchmark": [{"policies": ["homing"], "parameters": [widths]}],
+        "benchmark": [
+            {"policies": [policy], "parameters": [widths]} for policy in ("homing", "swarm-dt")
+        ],
     }
     examples = {
         "clearing": {"task": "clearing", "policies": policies[1:], "scenario": few, **sizes},
@@ -77,8 +79,9 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in studies_fields:
         monkeypatch.setattr(tables, f"{name}_studies", lambda out, *_, n=name: studies(n, out))
     monkeypatch.setattr(tables, "example", lambda out, name: study(out / name, examples[name]))
-    for name in ("OUT", "BENCHMARK", "ENTRIES"):
+    for name in ("OUT", "BENCHMARK"):
         monkeypatch.setattr(tables, name, tmp_path / name)
+    monkeypatch.setattr(benchmark, "ENTRIES", tmp_path / "entries")
     for name, value in {
         "PAGE": page,
         "RESULTS": tmp_path / "csv",
@@ -119,7 +122,7 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     monkeypatch.setattr(Study, "run", counting_run)
     tables.main()
     assert page.read_text() == first
-    assert played == [0] * 12
+    assert played == [0] * 13
     # Nor does what is played anew change a digit.
     monkeypatch.setattr(tables, "OUT", tmp_path / "anew")
     tables.main()

@@ -8,7 +8,6 @@ from pathlib import Path
 from shlex import join
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 from typer import Argument, Exit, Option, echo
 
@@ -288,16 +287,12 @@ def names_policy(policy_or_trials: str) -> bool:
     return ":" in policy_or_trials or not suffix
 
 
-# Scores of the shipped policies in the benchmark; `docs/play_tables.py` writes it.
-ENTRIES = Path(__file__).parents[1] / "report" / "benchmark_entries.json"
-
-
 def _show_benchmark(results: StudyResults, out: Path) -> None:
     """Print the table of a policy in the benchmark and its place, and write the report."""
-    show(benchmark.table(results))
-    entries = {name: np.array(scores) for name, scores in json.loads(ENTRIES.read_text()).items()}
-    entries[results.policies[0]] = benchmark.score(results)
-    show(benchmark.leaderboard(entries))
+    entries = benchmark.Entries.read()
+    show(benchmark.table(results, entries.references))
+    score = benchmark.score(results, entries.references)
+    show(benchmark.leaderboard({**entries.scores, results.policies[0]: score}))
     echo(f"Report: {write_report(results, out, document(results))[0]}")
 
 

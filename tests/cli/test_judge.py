@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from swarm_logistics_env.cli import judge_trials
 from swarm_logistics_env.questions.presets import PRESETS
+from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.studies import Study
 from tests.cli.conftest import Command
 
@@ -33,7 +35,9 @@ class Short(Mine):
 
 
 @pytest.fixture(autouse=True)
-def material(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def material(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     """Trials and a policy in the current folder; a policy is judged in a small warehouse."""
     Path("lab.csv").write_text(LAB)
     Path("judged_policy.py").write_text(OWN)
@@ -47,6 +51,8 @@ def material(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     held_out = {"title": "Held out: x", "modes": ["FM1+FM4"], "robots": [1]}
     monkeypatch.setitem(PRESETS, "scorecard", small)
     monkeypatch.setitem(PRESETS, "benchmark", small.replace(seeds=3, faults=[held_out], sizes=[]))
+    monkeypatch.setattr(benchmark, "ENTRIES", tmp_path_factory.mktemp("entries") / "entries")
+    benchmark.Entries({"Held out: x, no fault": 2.0}, {"swarm-dt": np.full(3, 0.5)}).write()
 
 
 TRIALS = "judge lab.csv --column performance=boxes"
