@@ -274,10 +274,10 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         self._cpu = time.process_time()
 
     def _on_rollout_end(self) -> None:
-        training, done = self._training, self.num_timesteps
-        before = done - training.rows * training.ppo.n_steps
-        cycles = [training.ppo.cycle(steps / training.agent_steps) for steps in (before, done)]
-        if cycles[0] != cycles[1]:
+        training, ppo = self._training, self._training.ppo
+        done = self.num_timesteps / training.agent_steps
+        before = done - training.rows * ppo.n_steps / training.agent_steps
+        if ppo.restarts_before(before) < ppo.restarts_before(done):
             self.model.policy.optimizer.state.clear()
 
     def _on_training_end(self) -> None:

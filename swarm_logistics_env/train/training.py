@@ -21,6 +21,7 @@ from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
+    Fraction,
     Indicators,
     Part,
     PPOSettings,
@@ -58,8 +59,9 @@ class Training(Part):
         seed: the number that decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`.
-        final_rewards: weights at the end of those terms whose weight changes, linearly over the
-            training. A price that grows is learned better than one that is high from the start.
+        final_rewards: later weights of those terms whose weight changes, linearly until
+            `final_rewards_from`.
+        final_rewards_from: the share of the training after which weights change no more.
         indicators: the indicators that are paid beside the task reward; none: the task reward.
         conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
@@ -82,6 +84,7 @@ class Training(Part):
     agent_steps: PositiveInt = 2_000_000
     rewards: dict[str, float] = Field(default_factory=lambda: {"delivery": 1.0})
     final_rewards: dict[str, float] = Field(default_factory=dict)
+    final_rewards_from: Fraction = 1.0
     indicators: Annotated[Indicators | None, BeforeValidator(one_of(Indicators))] = None
     conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
     network: Annotated[Network, BeforeValidator(one_of(Network))] = Network()
@@ -140,9 +143,9 @@ class Training(Part):
     def rewards_at(self, progress: float) -> dict[str, float]:
         """Return the weights of the reward's terms at a time of the training, from 0 to 1."""
         ends = {**self.rewards, **self.final_rewards}
+        change = min(progress / self.final_rewards_from, 1.0)
         return {
-            term: weight + min(progress, 1.0) * (ends[term] - weight)
-            for term, weight in self.rewards.items()
+            term: weight + change * (ends[term] - weight) for term, weight in self.rewards.items()
         }
 
     @property
