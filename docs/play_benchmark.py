@@ -36,7 +36,8 @@ def benchmark_studies(out: Path) -> tuple[Study, ...]:
         if (folder / f"{name}@0.safetensors").exists()
     ]
     studies = []
-    for policy in (*LOCAL, *OTHERS, *learners):
+    policies: list[str | PolicySpec] = [*LOCAL, *OTHERS, *learners]
+    for policy in policies:
         title = policy.title if isinstance(policy, PolicySpec) else policy
         directory = out / "benchmark" / section.slug(Path(title).stem)
         studies.append(Study.preset(benchmark.STUDY, out=directory, policies=[policy]))

@@ -231,8 +231,8 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
         rows,
         (
             (
-                "Score: the mean over the held-out cells of P as a share of the best local script's "
-                "in the same world without a fault."
+                "Score: P as a share of the best local script's in the same world without a fault, "
+                "the mean of the held-out cells."
             ),
             f"Limits of a rank, and how often it is the same: of {RESAMPLES} resamples of both.",
             f"Open: of fewer than {LEAST_TRAININGS} trainings, too few for a rank.",

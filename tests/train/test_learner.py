@@ -86,7 +86,9 @@ def test_between_decisions_worlds_go_on_and_their_rewards_are_summed(small: Any)
         NetworkView(small(rewards=rewards)),
         NetworkView(small(rewards=rewards, network=network)),
     )
-    outputs = np.tile(np.float32([1.0, 0.0, 1.0]), (8, 1))  # ahead, until they run into something
+    outputs = np.tile(
+        np.array([1.0, 0.0, 1.0], np.float32), (8, 1)
+    )  # ahead, until they run into something
     for view in (often, seldom):
         view.seed(0)
         view.reset()
