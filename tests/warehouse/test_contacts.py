@@ -111,5 +111,7 @@ def test_a_copy_and_a_world_that_begins_again_count_the_same() -> None:
 
 def test_homing_meets_as_often_as_was_measured_apart_from_this_code() -> None:
     # Another program counted .5 contacts a robot-minute on other seeds.
-    counted = run_episode(Scenario(n_robots=25, duration=100.0), policies.load("homing"), 0).contacts
+    counted = run_episode(
+        Scenario(n_robots=25, duration=100.0), policies.load("homing"), 0
+    ).contacts
     assert counted.contacts_per_robot_minute == pytest.approx(0.5, abs=0.4)
