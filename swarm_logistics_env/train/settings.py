@@ -127,7 +127,7 @@ class PPOSettings(Part):
         learning_rate: the rate at the start; it falls linearly to `final_learning_rate`.
         final_learning_rate: the rate at the end, and before it begins anew.
         restarts: pairs (share of the training, rate) at which the rate begins anew, and with it
-            Adam's averages (warm restarts, Loshchilov and Hutter 2017).
+            Adam's averages (warm restarts, Loshchilov and Hutter 2017) and the episodes.
         gamma: the discount of a control step.
         gae_lambda: lambda of generalised advantage estimation (Schulman et al. 2016).
         clip: the largest distance from 1 at which the ratio of an action's probabilities pays.

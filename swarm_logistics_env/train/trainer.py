@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
@@ -278,7 +279,10 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         done = self.num_timesteps / training.agent_steps
         before = done - training.rows * ppo.n_steps / training.agent_steps
         if ppo.restarts_before(before) < ppo.restarts_before(done):
+            # From here on it is as a training that begins with these weights.
             self.model.policy.optimizer.state.clear()
+            self.model._last_obs = self.model.env.reset()
+            self.model._last_episode_starts = np.ones(training.rows, np.bool_)
 
     def _on_training_end(self) -> None:
         self._log.cpu_seconds += time.process_time() - self._cpu

@@ -182,7 +182,9 @@ def test_a_robot_knows_its_own_body_whatever_its_neighbours_have() -> None:
     frame, rows = MotionView(Scenario()), np.tile(amid(), (2, 1))
     bodies = np.stack([column.body_of(Scenario()), column.body_of(scenario)])
     frame.begin(row_keys(0, "test", 2), bodies)
-    assert frame.read(rows)[:, -3:].tolist() == [[1.0, 0.0, 0.0], [0.5, 0.25, 1.0]]
+    # Its top speed, handling time, whether it turns to drive, and the time to its top speed.
+    body_inputs = frame.read(rows)[:, -4:]
+    np.testing.assert_allclose(body_inputs, [[1.0, 0.0, 0.0, 0.1], [0.5, 0.25, 1.0, 0.05]])
     commands = frame.command(np.array([[0.3, 0.9, 0.0]] * 2))
     assert commands[0, 2] == commands[1, 1] == 0.0
     assert commands[0, 1] != 0.0 != commands[1, 2], "one drives aside, the other one turns"
