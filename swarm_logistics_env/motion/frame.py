@@ -14,7 +14,7 @@ from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.memory import length_of, to_frame
 from swarm_logistics_env.scenario import Scenario
 
-from .network_inputs import INPUTS, read_observations, turn_frames
+from .network_inputs import INPUTS, read_observations
 
 OUTPUTS = ("along", "aside", "gripper")
 
@@ -71,24 +71,14 @@ class MotionView:
         Raises:
             PolicyError: there are more or fewer rows than keys at `begin`.
         """
-        self._check(observations)
+        self.check(observations)
         inputs = self._inputs(observations, self.memory, self.keys, self.counts, self.turned)
         self.counts += 1
         self.rows = observations
         return inputs
 
-    def remember(self, observations: NDArray[np.float32]) -> None:
-        """Let memories and time go on as `read` does, for who needs no inputs.
-
-        Raises:
-            PolicyError: there are more or fewer rows than keys at `begin`.
-        """
-        self._check(observations)
-        turn_frames(observations, self._period, self.memory, self.turned)
-        self.counts += 1
-        self.rows = observations
-
-    def _check(self, observations: NDArray[np.float32]) -> None:
+    def check(self, observations: NDArray[np.float32]) -> None:
+        """Raise PolicyError if there are more or fewer rows than keys at `begin`."""
         if len(observations) != len(self.keys):
             raise PolicyError(
                 f"observations of {len(observations)} robots: reset was told {len(self.keys)}"
@@ -126,18 +116,6 @@ class MotionView:
         )
         return commands
 
-    def command_directions(self, wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the commands (N, 4) as `command` does, of velocities in the robots' own frames.
-
-        Args:
-            wanted: commands (N, 4); their turns are left out.
-        """
-        commands = np.zeros((len(wanted), 4))
-        command_own_frames(
-            wanted, _COSINES, _SINES, self.turned, self.rows, self._period, self.memory, commands
-        )
-        return commands
-
 
 _TURNS = 2.0 * math.pi * np.arange(row.N_BEAMS) / row.N_BEAMS  # of frames, by whole beams [rad]
 _COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
@@ -161,25 +139,18 @@ def command_rows(
 
 @kernel
 def command_own_frames(
-    wanted: NDArray[np.float64],
-    cosines: NDArray[np.float64],
-    sines: NDArray[np.float64],
+    commands: NDArray[np.float64],
     turned: NDArray[np.float64],
     rows: NDArray[np.float32],
     period: float,
     memories: NDArray[np.float64],
-    commands: NDArray[np.float64],
 ) -> None:
-    """Do as `command_rows` of commands (N, 4) in the robots' own frames.
-
-    Args:
-        cosines, sines: of a turn by each number of beams.
-    """
-    for robot in range(wanted.shape[0]):
+    """Do as `command_rows` with commands (N, 4) in the robots' own frames; turns are left out."""
+    for robot in range(commands.shape[0]):
         beams = round(turned[robot] / (2.0 * math.pi / row.N_BEAMS))
-        x, y, gripper = wanted[robot, 0], wanted[robot, 1], wanted[robot, 3]
+        x, y, gripper = commands[robot, 0], commands[robot, 1], commands[robot, 3]
         # There and back: outputs are clipped in the frame of motion.
-        along, aside = to_frame((cosines[beams], sines[beams]), x, y)
+        along, aside = to_frame((_COSINES[beams], _SINES[beams]), x, y)
         turn_outputs(along, aside, gripper, turned[robot], commands[robot])
         finish_command(rows[robot], period, memories[robot], commands[robot])
 

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
 from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.frame import MotionView
+from swarm_logistics_env.motion.frame import MotionView, command_own_frames
 from swarm_logistics_env.motion.memory import length_of, set_velocity
-from swarm_logistics_env.motion.network_inputs import random_heading
+from swarm_logistics_env.motion.network_inputs import random_heading, turn_frames
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -38,6 +38,26 @@ SURE = 3.0  # after this many entries, a robot no longer listens to timers
 CLEARANCE, OBSTACLE_RANGE = 0.28, 0.5
 N_DIRECTIONS = 32
 LIFT, HOLD, LET_GO = 1.0, 0.0, -1.0  # commands of the gripper
+
+
+@kernel
+def act_homing(
+    rows: NDArray[np.float32],
+    memories: NDArray[np.float64],
+    keys: NDArray[np.uint64],
+    counts: NDArray[np.int64],
+    turned: NDArray[np.float64],
+    period: float,
+    commands: NDArray[np.float64],
+) -> None:
+    """Fill the commands (N, 4) of a step of `Homing`; memories and counts go on.
+
+    One kernel a step: each call of one costs some microseconds.
+    """
+    turn_frames(rows, period, memories, turned)
+    counts += 1
+    decide_homing(rows, memories, keys, counts, period, commands)
+    command_own_frames(commands, turned, rows, period, memories)
 
 
 @kernel
@@ -222,8 +242,6 @@ class Homing:
         (3, 4)
     """
 
-    _decide = staticmethod(decide_homing)
-
     def __init__(self) -> None:
         self.configure(Scenario())
         self.reset(0, 0)
@@ -243,8 +261,13 @@ class Homing:
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
+        self._frame.check(observations)
+        commands = np.empty((len(observations), 4))
+        self._fill(observations, commands)
+        return commands
+
+    def _fill(self, observations: NDArray[np.float32], commands: NDArray[np.float64]) -> None:
+        """Fill the commands (N, 4) of the robots' next step."""
         frame = self._frame
-        frame.remember(observations)
-        wanted = np.zeros((len(observations), 4))
-        self._decide(observations, frame.memory, frame.keys, frame.counts, self._period, wanted)
-        return frame.command_directions(wanted)
+        memory, keys, counts, turned = frame.memory, frame.keys, frame.counts, frame.turned
+        act_homing(observations, memory, keys, counts, turned, self._period, commands)

@@ -27,11 +27,13 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
 from swarm_logistics_env.motion import memory as column
+from swarm_logistics_env.motion.frame import command_own_frames
 from swarm_logistics_env.motion.memory import length_of, set_velocity
 from swarm_logistics_env.motion.network_inputs import (
     RANDOM_HEADING_TIME,
     random_heading,
     random_heading_number,
+    turn_frames,
 )
 from swarm_logistics_env.policies.homing import (
     AVOID_GAIN,
@@ -65,6 +67,23 @@ PULL = 0.4  # home, beside a random direction of length 1
 Home: TypeAlias = tuple[float, float, float]  # the direction, and how often it was taken lately
 Push: TypeAlias = tuple[float, float]  # away from near neighbours
 Motion: TypeAlias = tuple[float, float, float, float]  # direction (x, y), speed, gripper
+
+
+@kernel
+def act_homing_stock(
+    rows: NDArray[np.float32],
+    memories: NDArray[np.float64],
+    keys: NDArray[np.uint64],
+    counts: NDArray[np.int64],
+    turned: NDArray[np.float64],
+    period: float,
+    commands: NDArray[np.float64],
+) -> None:
+    """Fill the commands (N, 4) of a step of `HomingStock`, see `act_homing`."""
+    turn_frames(rows, period, memories, turned)
+    counts += 1
+    decide_homing_stock(rows, memories, keys, counts, period, commands)
+    command_own_frames(commands, turned, rows, period, memories)
 
 
 @kernel
@@ -283,4 +302,7 @@ class HomingStock(Homing):
         (3, 4)
     """
 
-    _decide = staticmethod(decide_homing_stock)
+    def _fill(self, observations: NDArray[np.float32], commands: NDArray[np.float64]) -> None:
+        frame = self._frame
+        memory, keys, counts, turned = frame.memory, frame.keys, frame.counts, frame.turned
+        act_homing_stock(observations, memory, keys, counts, turned, self._period, commands)
