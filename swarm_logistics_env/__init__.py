@@ -62,6 +62,9 @@ _MODULES = {
 
 # Modules are imported when an environment is made.
 gymnasium.register("SwarmLogistics-v0", f"{__name__}.adapters.central_env:CentralEnv")
+gymnasium.register(
+    "SwarmLogisticsRows-v0", vector_entry_point=f"{__name__}.adapters.vector_env:SwarmRows"
+)
 if hasattr(pettingzoo, "register"):  # since 1.27
     _house = f"{__name__}.swarm_logistics_v0"
     pettingzoo.register("aec", "swarm_logistics_v0", entry_point=f"{_house}:env")

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .central_env import CentralEnv
+from .vector_env import SwarmRows
 
 if TYPE_CHECKING:
     from .sb3 import LogDeliveries, SwarmVecEnv, SwarmVecNormalize
 
-__all__ = ["CentralEnv", "LogDeliveries", "SwarmVecEnv", "SwarmVecNormalize"]
+__all__ = ["CentralEnv", "LogDeliveries", "SwarmRows", "SwarmVecEnv", "SwarmVecNormalize"]
 
 
 def __getattr__(name: str) -> Any:
@@ -19,3 +20,7 @@ def __getattr__(name: str) -> Any:
     from . import sb3
 
     return getattr(sb3, name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -6,6 +6,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
@@ -14,6 +15,8 @@ from swarm_logistics_env.environment.requests import checked_count, numbers_of
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies.policy import mask_unreachable_commands
 from swarm_logistics_env.wrappers import FixedAgents, Wrapper
+
+from .worlds import with_episode_limit
 
 
 class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -82,6 +85,17 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         times = n_rows if flat else (n_rows, 1)
         self.observation_space = Box(np.tile(row.low, times), np.tile(row.high, times))
         self.action_space = Box(np.tile(command.low, times), np.tile(command.high, times))
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How Gymnasium made it, with the steps of the longest episode as `max_episode_steps`."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = with_episode_limit(spec, [self.env])
+
+    _spec: EnvSpec | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

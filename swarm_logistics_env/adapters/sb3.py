@@ -104,13 +104,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     ) -> None:
         n_worlds = checked_count("n_worlds", n_worlds)
         threads = checked_count("threads", threads)
-        if make_env is None:
-            make_env = maker(scenario, n_worlds, n_robots, fields)
-        elif scenario is not None or n_robots is not None or fields:
-            raise SetupError(
-                "make_env and conditions: should be one or the other; make_env decides what its "
-                "environments are like"
-            )
+        make_env = maker(make_env, scenario, n_worlds, n_robots, fields)
         self._worlds = Worlds(make_env, n_worlds, threads)
         self.worlds = self._worlds.envs
         # What the next infos are copies of, unless a world has something to tell.

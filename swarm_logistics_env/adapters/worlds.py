@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
@@ -127,16 +130,17 @@ class Worlds:
             row = np.argwhere(~np.isfinite(self._commands))[0, 0]
             raise CommandError(f"actions[{row}] = {numbers[row]}: should be finite")
 
-    def step(self) -> RowsStep:
-        """Take one control period in every world, with the commands that were given."""
+    def step(self, waiting: frozenset[int] = frozenset()) -> RowsStep:
+        """Take one control period in every world but those `waiting`, with the commands given."""
         # New arrays, because the caller may still hold those of the step before.
         terminated, truncated = np.zeros((2, self.n_rows), np.bool_)
         rewards = np.zeros(self.n_rows, np.float32)
         outcome = RowsStep(self.blank(), rewards, terminated, truncated)
         self.reported = []
-        if self._shared_out:
+        if self._shared_out and not waiting:
             outcome = self._step_together(outcome)
-        for world in self._alone:
+        alone = [w for w in range(len(self.envs)) if w not in waiting] if waiting else self._alone
+        for world in alone:
             robots = self._robots(world)
             step = self.envs[world].step_arrays(self._commands[robots].copy())
             outcome.observations[robots] = step[0]
@@ -225,16 +229,24 @@ def _spaces(worlds: Sequence[TrainingWorld]) -> tuple[Box, Box]:
 
 
 def maker(
+    make_env: Callable[[int], TrainingWorld] | None,
     scenario: Scenario | None,
     n_worlds: int,
     n_robots: int | Sequence[int] | None,
     fields: Mapping[str, Any],
 ) -> Callable[[int], TrainingWorld]:
-    """Return a function that makes plain environments, of one size or of several in turn.
+    """Return what makes the environments: `make_env`, or plain ones of the sizes in turn.
 
     Raises:
-        SetupError: there are no sizes, or more than worlds.
+        SetupError: there are no sizes, or more than worlds; or there is both.
     """
+    if make_env is not None:
+        if scenario is not None or n_robots is not None or fields:
+            raise SetupError(
+                "make_env and conditions: should be one or the other; make_env decides what its "
+                "environments are like"
+            )
+        return make_env
     sizes = [None] if n_robots is None else np.atleast_1d(n_robots).tolist()
     if not 1 <= len(sizes) <= n_worlds:
         raise SetupError(
@@ -242,9 +254,26 @@ def maker(
             "worlds to have them"
         )
 
-    def make_env(world: int) -> TrainingWorld:
+    def make_plain_env(world: int) -> TrainingWorld:
         size = sizes[world % len(sizes)]
         size_field = {} if size is None else {"n_robots": size}
         return SwarmLogisticsEnv(scenario, **size_field, **fields)
 
-    return make_env
+    return make_plain_env
+
+
+def with_episode_limit(spec: EnvSpec | None, envs: Iterable[TrainingWorld]) -> EnvSpec | None:
+    """Return Gymnasium's description of environments, with the most steps that episodes take.
+
+    Learners read it. The environments count time themselves, so that no wrapper has to.
+    """
+    if spec is None:
+        return None
+    most = max(steps_of(env, scenario) for env in envs for scenario in env.scenarios)
+    return replace(spec, max_episode_steps=most)
+
+
+def steps_of(env: TrainingWorld, scenario: Scenario) -> int:
+    """Return the number of steps after which an episode in `scenario` is truncated."""
+    steps = math.ceil(scenario.duration / scenario.control_period - 1e-9)
+    return steps if env.max_cycles is None else min(steps, env.max_cycles)
