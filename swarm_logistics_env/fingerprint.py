@@ -18,11 +18,13 @@ from typing import Any
 
 from swarm_logistics_env.code_files import PACKAGE, is_users_own, names_in, source_files
 
-# What decides an episode. The other files hold messages, validation, statistics and pictures.
+# What decides an episode. The other files hold messages, validation, statistics and pictures, and
+# "!" excludes those that name and read policies: a policy's identity tells what was read.
 EPISODE_CODE = (
     "episode.py", "fast_kernels.py", "kernels.py", "numba_fence.py", "observations.py",
     "scenario.py", "scenario_checks.py", "streams.py", "bodies/*.py",
-    "floor/*.py", "floor/plans/*.txt", "motion/*.py", "policies/*.py", "warehouse/*.py",
+    "floor/*.py", "floor/plans/*.txt", "motion/*.py", "policies/*.py", "!policies/__init__.py",
+    "!policies/spec.py", "!policies/files.py", "!policies/models.py", "warehouse/*.py",
 )  # fmt: skip
 UNSTABLE = "unstable "  # begins the fingerprint of a value that is another one each time
 
@@ -32,11 +34,18 @@ def package_code(*patterns: str) -> str:
     """Return 16 hexadecimal digits that change with files of this package.
 
     Args:
-        patterns: of paths in the package, as "warehouse/*.py".
+        patterns: of paths in the package, as "warehouse/*.py"; one that begins with "!" excludes.
     """
-    paths = sorted({path for pattern in patterns for path in PACKAGE.glob(pattern)})
+    paths = sorted(
+        _matching(p for p in patterns if p[0] != "!")
+        - _matching(p[1:] for p in patterns if p[0] == "!")
+    )
     texts = {path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8") for path in paths}
     return _hash(*chain.from_iterable(texts.items()))
+
+
+def _matching(patterns: Iterable[str]) -> set[Path]:
+    return {path for pattern in patterns for path in PACKAGE.glob(pattern)}
 
 
 def fingerprint(value: object, files: Iterable[Path] = ()) -> dict[str, Any]:

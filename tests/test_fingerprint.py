@@ -223,6 +223,7 @@ def test_changes_are_told_by_the_file() -> None:
     [
         ("errors.py", "class ", "MORE = 1\n\n\nclass ", False),
         ("report/answer.py", "import ", "import os\nimport ", False),
+        ("policies/spec.py", "import ", "import os\nimport ", False),
         ("policies/swarm_dt.py", "2.0 * uniform", "1.9 * uniform", True),
         ("motion/memory.py", "STANDS = 0.2", "STANDS = 0.3", True),
         ("kernels.py", "2.0 * math.pi", "6.28", True),
