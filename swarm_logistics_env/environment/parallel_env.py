@@ -249,6 +249,11 @@ class SwarmLogisticsEnv(DictView):
         """
         return {"delivered": self.warehouse.state.delivered}
 
+    @property
+    def declared_scenarios(self) -> frozenset[Scenario]:
+        """The scenarios that spaces hold: its own, and those given to `declare_spaces`."""
+        return frozenset(self._spaces.declared)
+
     def declare_spaces(self, scenario: Scenario) -> None:
         """Widen the observation space so that episodes may also be played in `scenario`.
 

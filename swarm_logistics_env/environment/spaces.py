@@ -78,6 +78,7 @@ class Spaces:
     Attributes:
         observation: the space of an observation row (D,).
         action: the space of a command (4 + message_size,).
+        declared: the scenarios that episodes may be played in.
         most: the largest value in a declared scenario of each field that bounds the state.
     """
 
@@ -86,7 +87,7 @@ class Spaces:
         self.observation = Box(low, high, dtype=np.float32)
         self.action = Box(-1.0, 1.0, (4 + scenario.message_size,), dtype=np.float32)
         self._own = scenario
-        self._declared = {scenario}
+        self.declared = {scenario}
         self.most = {name: getattr(scenario, name) for name in _BOUND_THE_STATE}
 
     def widen(self, scenario: Scenario) -> None:
@@ -106,7 +107,7 @@ class Spaces:
         self.observation = Box(low, high, dtype=np.float32)
         for name, most in self.most.items():
             self.most[name] = max(most, getattr(scenario, name))
-        self._declared.add(scenario)
+        self.declared.add(scenario)
 
     def state(self, n_robots: int) -> Box:
         """Return the space of the state with rows for `n_robots` and the most items."""
@@ -134,7 +135,7 @@ class Spaces:
                 f"possible_agents never change; make the environment with "
                 f"max_robots={scenario.n_robots} or wrap it in SwarmSize"
             )
-        if scenario in self._declared:
+        if scenario in self.declared:
             return
         is_seen_within = all(map(self.observation.contains, bounds(scenario)))
         is_state_within = all(getattr(scenario, name) <= most for name, most in self.most.items())
@@ -152,7 +153,7 @@ class Spaces:
 
 
 Observations = dict[str, NDArray[np.float32]]
-InfosByRobot = dict[str, dict[str, float]]
+InfosByRobot = dict[str, dict[str, Any]]
 ArrayStep = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]
 
 
@@ -182,6 +183,11 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         raise NotImplementedError
 
     @property
+    def robot_info(self) -> Mapping[str, NDArray[Any]]:
+        """The entries of agents' infos that differ by robot: name -> (N, ...), a row for each."""
+        return {}
+
+    @property
     def n_rows(self) -> int:
         """The number of rows of the arrays in this episode: its robots, also absent ones."""
         return self.warehouse.state.n_robots
@@ -203,7 +209,8 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
 
         Each agent has a dict of infos of its own. It contains numbers, with the same keys at
         every step: "failed" is 1 while any failure mode holds for the robot, else 0; "delivered"
-        is the number of items that the whole swarm has delivered; wrappers add `episode_info`.
+        is the number of items that the whole swarm has delivered; wrappers add `episode_info`, and
+        arrays of `robot_info`.
         """
         observations = self.reset_arrays(seed, options)
         agents = self.agents
@@ -261,6 +268,9 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         for agent in agent_names(np.flatnonzero(self.warehouse.state.failed).tolist()):
             if agent in infos:
                 infos[agent]["failed"] = 1
+        for name, rows in self.robot_info.items():
+            for agent in agents:
+                infos[agent][name] = rows[_row(agent)]
         return infos
 
 

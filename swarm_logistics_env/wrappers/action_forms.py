@@ -1,9 +1,10 @@
-"""Commands in other forms: in the frame of each robot's motion, and by number."""
+"""Observations and commands in the frame of each robot's motion, and commands by number."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import motion
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import numbers_of
+from swarm_logistics_env.environment.requests import checked_options, numbers_of
 from swarm_logistics_env.environment.spaces import ArrayStep
 from swarm_logistics_env.errors import CommandError, SetupError
 from swarm_logistics_env.motion.frame import OUTPUTS
-from swarm_logistics_env.motion.network_inputs import INPUTS
+from swarm_logistics_env.motion.network_inputs import INPUT, INPUTS, N_OBSTACLES
+from swarm_logistics_env.observations import N_BEAMS
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
 from .wrapper import Wrapper
@@ -25,37 +28,50 @@ from .wrapper import Wrapper
 class MotionFrame(Wrapper):
     """Gives each robot a memory of its own, and turns what it reads and commands into its motion.
 
-    Observations become rows of `motion.INPUTS` (94 numbers, most within -1 and 1): walls,
+    Observations become rows of `motion.INPUTS` (95 numbers, most within -1 and 1): walls,
     neighbours, items and the lowest timer, relative to the direction in which the robot drives,
     and what it remembers, such as the way to the delivery area. Actions become rows of
     `motion.OUTPUTS`: along and aside, fractions of the top speed, and the gripper, all within -1
     and 1. A robot of the differential drive turns to where it wants to go. It is what
     `swarm-logistics train` learns on; rows of absent robots are zeros.
 
+    It goes around whatever changes rows of the warehouse, and inside of `DiscreteActions`.
+
     Args:
         env: the environment, or a wrapper of one.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
 
     Raises:
-        SetupError: it is something else.
+        SetupError: it is something else, or its rows or commands are not the warehouse's.
 
     Example:
         >>> from swarm_logistics_env import swarm_logistics_v0
         >>> env = MotionFrame(swarm_logistics_v0.parallel_env(n_robots=3))
         >>> observations, infos = env.reset(seed=0)
         >>> observations["robot_0"].shape, env.action_space("robot_0").shape
-        ((94,), (3,))
+        ((95,), (3,))
     """
 
     def __init__(self, env: SwarmLogisticsEnv | Wrapper, listens: bool = True) -> None:
         super().__init__(env)
+        rows, commands = env.observation_space("robot_0"), env.action_space("robot_0")
+        own = self.unwrapped
+        if commands != own.action_space("robot_0") or rows.shape != own.observation_space("").shape:
+            raise SetupError(
+                f"MotionFrame around {type(env).__name__}, whose rows are {rows.shape} and whose "
+                f"commands are {commands}: should be around the warehouse's rows and commands, "
+                f"as {type(env).__name__}(MotionFrame(env))"
+            )
         self._listens = listens
-        self._read_space = Box(-np.inf, np.inf, (len(INPUTS),), np.float32)
         self._output_space = Box(-1.0, 1.0, (len(OUTPUTS),), np.float32)
+        self._spaces_of: dict[frozenset[Scenario], Box] = {}
 
     def observation_space(self, agent: str) -> Box:
-        """Return the space of a row of inputs (94,), the same for every agent."""
-        return self._read_space
+        """Return the space of a row of inputs (95,), the same for every agent."""
+        scenarios = self.unwrapped.declared_scenarios
+        if scenarios not in self._spaces_of:
+            self._spaces_of[scenarios] = _input_space(scenarios)
+        return self._spaces_of[scenarios]
 
     def action_space(self, agent: str) -> Box:
         """Return the space of along, aside and gripper (3,), the same for every agent."""
@@ -64,9 +80,22 @@ class MotionFrame(Wrapper):
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
-        """Begin an episode and return the first inputs (N, 94)."""
-        observations = super().reset_arrays(seed, options)
-        return self._read(observations)
+        """Begin an episode and return the first inputs (N, 95).
+
+        Raises:
+            SetupError: as `SwarmLogisticsEnv.reset_arrays`, or the robots are slower to lift or to
+                gather speed than the space holds.
+        """
+        seed = self.env.next_seed if seed is None else seed
+        scenario = self.scenario_of(seed, checked_options(options))
+        most = self.observation_space("robot_0").high[_OF_BODIES]
+        if (_input_space([scenario]).high[_OF_BODIES] > most).any():
+            raise SetupError(
+                f"handling_time = {scenario.handling_time}, max_speed = {scenario.max_speed}, "
+                f"max_acceleration = {scenario.max_acceleration}: inputs could leave their space; "
+                "should be declared by env.declare_spaces(scenario)"
+            )
+        return self._read(super().reset_arrays(seed, options))
 
     def begun(self, seed: int) -> None:
         """Begin an episode of empty memories and random headings."""
@@ -91,8 +120,48 @@ class MotionFrame(Wrapper):
         return inputs
 
 
-_HALF = math.sqrt(0.5)
+_OF_BODIES = [INPUT.top_speed, INPUT.handling_time, INPUT.time_to_top_speed]
+_NEVER_NEGATIVE = [
+    *(f"wall_{beam}" for beam in range(N_BEAMS)),
+    "requested_present", "requested_distance", "requested_nearness", "requested_recently_held",
+    "lead_present", "lead_distance", "lead_timer",
+    "carrying", "carrying_requested", "in_delivery_area", "timer_runs", "timer", "contact",
+    "home_certainty", "failed", "stuck", "cannot_deliver", "cannot_lift", "delivering_in_vain",
+    "items_in_view", "top_speed", "handling_time", "turns_to_drive", "time_to_top_speed",
+]  # fmt: skip
 
+
+def _input_space(scenarios: Iterable[Scenario]) -> Box:
+    """Return the space of a row of inputs in all these scenarios; see `network_inputs`."""
+    high = np.ones(len(INPUTS))
+    for scenario in scenarios:
+        # A vector whose parts are within a limit is longer by the root of 2.
+        view = math.sqrt(2.0) * scenario.view_range
+        far = math.sqrt(2.0) * max(scenario.view_range, scenario.radio_range)
+        speed = math.sqrt(2.0) * scenario.max_speed
+        most = {
+            "requested_distance": view,
+            "lead_distance": far / 4.0,
+            "lead_timer": scenario.timer_limit / 10.0,
+            "timer": scenario.timer_limit / 10.0,
+            "velocity_along": speed / 2.0,
+            "velocity_aside": speed / 2.0,
+            "top_speed": scenario.max_speed / 2.0,
+            "handling_time": scenario.handling_time / 2.0,
+            "time_to_top_speed": scenario.max_speed / scenario.max_acceleration,
+        }
+        for obstacle, part in product(range(N_OBSTACLES), ("along", "aside")):
+            most[f"obstacle_{obstacle}_{part}"] = view
+        for name, value in most.items():
+            column = getattr(INPUT, name)
+            high[column] = max(high[column], value)
+    high *= 1.0 + 1e-5  # sines and cosines of single precision may pass 1
+    low = -high
+    low[[getattr(INPUT, name) for name in _NEVER_NEGATIVE]] = 0.0
+    return Box(low.astype(np.float32), high.astype(np.float32))
+
+
+_HALF = math.sqrt(0.5)
 # Forward, left, turn, gripper of each action; one that drives or turns leaves the gripper as it is.
 ACTIONS: Mapping[str, tuple[float, float, float, float]] = {
     "stay": (0.0, 0.0, 0.0, 0.0),
@@ -111,16 +180,29 @@ ACTIONS: Mapping[str, tuple[float, float, float, float]] = {
 }
 
 
-class DiscreteActions(Wrapper):
-    """Commands robots by the numbers of `ACTIONS`: stay, eight directions, two turns, hold, open.
+STAY, ACTION_MASK = 0, "action_mask"
+_DIRECTIONS = {name: row for name, row in ACTIONS.items() if row[2] == 0.0}  # without turns
 
-    For learners with discrete actions (DQN, QMIX, VDN). A robot drives and turns at full speed; a
-    gripper stays as it is until the next "hold" or "open", and so lifts and carries while its robot
-    drives. Nothing is broadcast but the timers (`message_size` numbers are zeros). Arrays of
-    commands are (N,); stay is 0. It goes inside of `FixedAgents`.
+
+class DiscreteActions(Wrapper):
+    """Commands robots by numbers: stay, eight directions, two turns, hold, open (`ACTIONS`).
+
+    For learners with discrete actions (DQN, QMIX, MaskablePPO). A robot drives and turns at full
+    speed; a gripper stays as it is until the next "hold" or "open", and so lifts and carries while
+    its robot drives. Nothing is broadcast but the timers (`message_size` numbers are zeros). Arrays
+    of commands are (N,); stay is 0. It goes inside of `FixedAgents`. Around a `MotionFrame` the
+    directions are in the frame of motion, and there are no turns.
+
+    An action is legal if it changes what a robot does: not "hold" of a gripper that holds already
+    (nor "open" likewise), and not a direction in which a differential robot cannot drive; one that
+    is absent may only stay. `action_masks` tells, and each agent's infos as "action_mask". Illegal
+    ones are taken, too: they do nothing but what is legal.
 
     Args:
         env: the environment, or a wrapper of one.
+
+    Attributes:
+        actions: the names of the numbers.
 
     Raises:
         SetupError: it is something else, or its commands are numbers already.
@@ -132,34 +214,70 @@ class DiscreteActions(Wrapper):
         Discrete(13)
         >>> observations, infos = env.reset(seed=0)
         >>> observations, rewards, *_ = env.step({"robot_0": 1, "robot_1": 11})
+        >>> env.actions[11], env.action_masks()[:, 11].tolist()
+        ('hold', [True, False])
     """
 
     def __init__(self, env: SwarmLogisticsEnv | Wrapper) -> None:
         super().__init__(env)
         space = env.action_space("robot_0")
         if not isinstance(space, Box):
-            raise SetupError(f"env = {env}: its commands are {space}, should be a Box")
-        self._space = Discrete(len(ACTIONS))
-        self._commands = np.zeros((len(ACTIONS), *space.shape))
-        self._commands[:, :4] = list(ACTIONS.values())
+            raise SetupError(
+                f"DiscreteActions around {type(env).__name__}, whose commands are {space}: should "
+                "be around vectors"
+            )
+        self._is_of_motion = space.shape == (len(OUTPUTS),)
+        rows = _DIRECTIONS if self._is_of_motion else ACTIONS
+        self.actions = tuple(rows)
+        self._space = Discrete(len(rows))
+        self._commands = np.zeros((len(rows), *space.shape))
+        if self._is_of_motion:
+            self._commands[:] = np.delete(list(rows.values()), 2, axis=1)
+        else:
+            self._commands[:, :4] = list(rows.values())
+        self._grippers = np.array([row[3] for row in rows.values()])
+        self._goes_aside = np.array([row[1] != 0.0 for row in rows.values()])
 
     def action_space(self, agent: str) -> Discrete:
-        """Return the numbers of `ACTIONS`; the same space for all."""
+        """Return the numbers of `actions`; the same space for all."""
         return self._space
+
+    def begun(self, seed: int) -> None:
+        """Begin an episode with grippers that were never commanded."""
+        self._gripper = np.zeros(self.warehouse.state.n_robots)
 
     def step_arrays(self, commands: ArrayLike) -> ArrayStep:
         """Take one control period with the numbers of actions (N,).
 
         Raises:
-            CommandError: no whole numbers from 0 to 12, one for each robot.
+            CommandError: no whole numbers of `actions`, one for each robot.
             SetupError: there was no reset.
         """
         numbers = numbers_of(commands, "actions", (self.n_rows,))
-        is_action = np.isin(numbers, np.arange(len(ACTIONS)))
+        is_action = np.isin(numbers, np.arange(len(self.actions)))
         if not is_action.all():
             robot = int(np.argmin(is_action))
             raise CommandError(
                 f"action of robot_{robot} = {numbers[robot]}: should be a whole number from 0 to "
-                f"{len(ACTIONS) - 1}"
+                f"{len(self.actions) - 1}"
             )
-        return super().step_arrays(self._commands[numbers.astype(np.intp)])
+        chosen = numbers.astype(np.intp)
+        outcome = super().step_arrays(self._commands[chosen])
+        grippers = self._grippers[chosen]
+        self._gripper = np.where(grippers == 0.0, self._gripper, grippers)
+        return outcome
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Return which actions are legal (N, actions); "stay" always is."""
+        world = self.warehouse
+        repeats = (self._grippers != 0.0) & (self._grippers == self._gripper[:, None])
+        legal: NDArray[np.bool_] = ~repeats
+        if world.scenario.drive == "differential" and not self._is_of_motion:
+            legal &= ~self._goes_aside
+        legal[~world.state.robot_present, 1:] = False
+        return legal
+
+    @property
+    def robot_info(self) -> dict[str, NDArray[Any]]:
+        """It adds "action_mask", 1 for each legal action, else 0."""
+        return {**self.env.robot_info, ACTION_MASK: self.action_masks().astype(np.int8)}

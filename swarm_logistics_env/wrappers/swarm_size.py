@@ -23,6 +23,7 @@ from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse import Fault
 from swarm_logistics_env.warehouse.faults import failed_robots
 
+from .action_forms import ACTION_MASK, STAY
 from .wrapper import Wrapper, as_choices, draw
 
 
@@ -94,6 +95,14 @@ class FixedAgents(Wrapper):
             np.full(self.n_rows, is_over and not is_cut),
             np.full(self.n_rows, is_cut),
         )
+
+    @property
+    def robot_info(self) -> dict[str, NDArray[Any]]:
+        """Its entries have P rows; who is not there may only stay."""
+        padded = {name: self._pad(rows) for name, rows in self.env.robot_info.items()}
+        if ACTION_MASK in padded:
+            padded[ACTION_MASK][self.warehouse.state.n_robots :, STAY] = 1
+        return padded
 
     def _pad(self, rows: NDArray[Any]) -> NDArray[Any]:
         padded = np.zeros((self.n_rows, *rows.shape[1:]), rows.dtype)

@@ -202,6 +202,14 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
         return self.env.episode_info
 
     @property
+    def robot_info(self) -> Mapping[str, NDArray[Any]]:
+        """The entries of agents' infos that differ by robot: name -> (N, ...), a row for each.
+
+        A subclass adds entries by returning `{**self.env.robot_info, "key": rows}`.
+        """
+        return self.env.robot_info
+
+    @property
     def max_cycles(self) -> int | None:
         """The number of steps after which an episode is truncated, or None."""
         return self.env.max_cycles

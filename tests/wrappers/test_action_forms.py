@@ -11,6 +11,7 @@ import pytest
 from swarm_logistics_env import Fault, Scenario, motion
 from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, ParameterChange, SwarmSize
 from swarm_logistics_env.wrappers.action_forms import ACTIONS
@@ -68,10 +69,55 @@ def test_what_is_no_action_is_refused_before_anything_moves(
     assert env.warehouse.state.step == 0
 
 
-@pytest.mark.parametrize("form", [DiscreteActions, CentralEnv])
-def test_numbers_of_numbers_and_central_control_by_numbers_are_refused(form: Any) -> None:
-    with pytest.raises(SetupError, match=r"commands are Discrete\(13\), should be a Box"):
+@pytest.mark.parametrize(
+    ("form", "message"),
+    [
+        (DiscreteActions, r"whose commands are Discrete\(13\): should be around vectors"),
+        (MotionFrame, r"should be around .*, as DiscreteActions\(MotionFrame\(env\)\)"),
+        (CentralEnv, r"commands are Discrete\(13\), should be a Box"),
+    ],
+)
+def test_what_numbers_cannot_be_wrapped_in_is_refused(form: Any, message: str) -> None:
+    with pytest.raises(SetupError, match=message):
         form(DiscreteActions(small()))
+
+
+def test_numbers_around_the_frame_of_motion_are_directions_in_it() -> None:
+    numbers, outputs = DiscreteActions(MotionFrame(small())), MotionFrame(small())
+    assert numbers.actions == tuple(name for name in ACTIONS if not name.startswith("turn"))
+    np.testing.assert_array_equal(numbers.reset_arrays(0), outputs.reset_arrays(0))
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        drawn = rng.integers(11, size=6)
+        rows = [ACTIONS[numbers.actions[number]] for number in drawn]
+        wanted = [(along, aside, gripper) for along, aside, _, gripper in rows]
+        np.testing.assert_equal(numbers.step_arrays(drawn), outputs.step_arrays(wanted))
+
+
+def test_masks_name_the_actions_that_change_something() -> None:
+    faults = [Fault("removed", (2,), onset=0.25)]
+    env = DiscreteActions(small(n_robots=3, drive="differential", faults=faults))
+    _, infos = env.reset(seed=0)
+    aside = [name for name, command in ACTIONS.items() if command[1]]
+    assert not env.action_masks()[:, [NUMBERS[name] for name in aside]].any()
+    assert env.action_masks().sum() == 3 * (len(ACTIONS) - len(aside))
+    env.step(dict(zip(env.agents, [NUMBERS["hold"], NUMBERS["open"], NUMBERS["stay"]])))
+    _, _, _, _, infos = env.step(dict.fromkeys(env.agents, NUMBERS["forward"]))
+    legal = env.action_masks()[:, [NUMBERS["hold"], NUMBERS["open"]]]
+    assert legal.tolist() == [[False, True], [True, False], [True, True]]
+    np.testing.assert_array_equal(infos["robot_0"]["action_mask"], env.action_masks()[0])
+    env.step(dict.fromkeys(env.agents, NUMBERS["forward"]))
+    present = env.warehouse.state.robot_present
+    assert env.action_masks()[~present].sum() == env.action_masks()[~present, 0].sum() == 1
+
+
+def test_inputs_stay_within_bounds_that_are_finite_in_every_declared_world() -> None:
+    env = ParameterChange(MotionFrame(small()), "handling_time", [0.0, 4.0])
+    space = env.observation_space("robot_0")
+    assert np.isfinite([space.low, space.high]).all()
+    assert space.high[INPUTS.index("handling_time")] == pytest.approx(2.0, rel=1e-4)
+    with pytest.raises(SetupError, match=r"handling_time = 5.0, .* declared by env"):
+        MotionFrame(small()).reset(options={"scenario": {"handling_time": 5.0}})
 
 
 def test_it_reads_and_commands_as_the_frame_of_the_shipped_networks_does() -> None:

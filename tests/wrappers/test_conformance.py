@@ -42,13 +42,14 @@ def in_all(env: Any) -> Any:
     return FaultInjection(FaultInjection(env, "FM3", onset=onsets), "motor_slow", onset=[0.0, 1.0])
 
 
-# The arrays of all but the last two have a row for each robot of the warehouse.
+# The arrays of the first three have a row for each robot of the warehouse.
 STACKS: dict[str, Callable[[Any], Any]] = {
     "plain": lambda env: env,
     "indicators": lambda env: IndicatorReward(in_all(env), "R", references=RunningMeans()),
     "motion": lambda env: MotionFrame(in_all(env)),
     "fixed": lambda env: FixedAgents(in_all(env)),
     "numbers": lambda env: DiscreteActions(in_all(env)),
+    "numbers of motion": lambda env: FixedAgents(DiscreteActions(MotionFrame(in_all(env)))),
 }
 each_stack = pytest.mark.parametrize("stack", STACKS)
 
@@ -67,8 +68,7 @@ def conformance(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
         warnings.filterwarnings("ignore", "reset option 'options' is ignored")
         # In a swarm smaller than the largest, not all possible agents end.
         warnings.filterwarnings("ignore", "No agents present but not all possible_agents")
-        # Inputs of the frame of motion have no bounds; a robot that left observes zeros.
-        warnings.filterwarnings("ignore", "Agent's m.* observation space value is")
+        # A robot that left observes zeros.
         warnings.filterwarnings("ignore", "Observation numpy array is all zeros")
         yield importlib.import_module("pettingzoo.test")
 
@@ -80,6 +80,32 @@ def test_pettingzoos_own_tests_pass(conformance: ModuleType, stack: str) -> None
     env = stacked(stack, duration=2.0)
     conformance.api_test(parallel_to_aec(env), num_cycles=25)
     conformance.state_test(parallel_to_aec(env), env, num_cycles=20)
+
+
+WRAPPERS: dict[str, Callable[[Any], Any]] = {
+    "faults": lambda env: FaultInjection(env, "FM1", onset=1.0),
+    "change": lambda env: ParameterChange(env, "handling_time", [0.5, 1.0]),
+    "sizes": lambda env: SwarmSize(env, [2, 4], leave=[(1, 1.0)]),
+    "indicator": lambda env: IndicatorReward(env, "R", references=10.0),
+    "fixed": FixedAgents,
+    "motion": MotionFrame,
+    "numbers": DiscreteActions,
+    "own": wrappers.Wrapper,
+}
+REFUSED = {("numbers", "numbers"), ("numbers", "motion"), ("motion", "motion")}
+
+
+@pytest.mark.parametrize("outer", WRAPPERS)
+@pytest.mark.parametrize("inner", WRAPPERS)
+def test_two_wrappers_stack_in_either_order_or_are_refused_when_made(
+    conformance: ModuleType, inner: str, outer: str
+) -> None:
+    env = WRAPPERS[inner](small(n_robots=4, warehouse_width=6.0, n_items=5, duration=2.0))
+    if inner == "fixed" or (inner, outer) in REFUSED:
+        with pytest.raises(SetupError, match=r"around .* should be"):
+            WRAPPERS[outer](env)
+    else:
+        conformance.parallel_api_test(WRAPPERS[outer](env), num_cycles=45)
 
 
 @pytest.mark.parametrize("n_robots", [1, 12])
