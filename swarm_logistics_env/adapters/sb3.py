@@ -1,7 +1,4 @@
-"""Stable-baselines3's VecEnv over the array methods: every robot of every world is a row.
-
-Its VecNormalize as well, with statistics of robots alone.
-"""
+"""Stable-baselines3's VecEnv over the array methods: every robot of every world is a row."""
 
 from __future__ import annotations
 
@@ -15,14 +12,14 @@ from swarm_logistics_env.environment.requests import checked_count, checked_opti
 from swarm_logistics_env.errors import SetupError, how_to_install
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import key
+from swarm_logistics_env.wrappers.action_forms import STAY
 from swarm_logistics_env.wrappers.wrapper import layers_of
 
 from .worlds import RowsStep, TrainingWorld, Worlds, maker
 
 try:
-    from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.running_mean_std import RunningMeanStd
-    from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import VecEnv
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
         f"SwarmVecEnv needs stable-baselines3 ({error}): {how_to_install('train')}"
@@ -54,9 +51,11 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     (the paper's P, so far), and what wrappers add (see `wrappers.IndicatorReward`). A done row's
     has `terminal_observation` besides, as stable-baselines3 expects, and, where it was a robot's,
     `episode`: its return "r", length "l" [steps] and the world's "delivered". So learners log
-    `rollout/ep_rew_mean` and `ep_len_mean` by themselves; the means of a `VecMonitor` count padding
-    as episodes of return 0. `learn(.., callback=LogDeliveries())` logs `rollout/delivered_mean` as
-    well.
+    `rollout/ep_rew_mean` and `ep_len_mean` by themselves, and `evaluate_policy` and `EvalCallback`
+    count robots alone, as by a `Monitor`. They wait for an episode of every row, so evaluate with
+    no more `max_robots` than the largest swarm that is played. The means of a `VecMonitor` count
+    padding as episodes of return 0. `learn(.., callback=LogDeliveries())` logs
+    `rollout/delivered_mean` as well.
 
     Args:
         scenario: the conditions; default: the paper's.
@@ -115,6 +114,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._start_steps = np.zeros(n_rows, np.int64)
         self._n_steps = 0
         super().__init__(n_rows, self._worlds.observation_space, self._worlds.command_space)
+        self.metadata = dict(self.worlds[0].metadata)
         if seed is not None:
             self.seed(seed)
 
@@ -139,13 +139,35 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         self._seeds = [key(seed, "world", world) >> 1 for world in self._worlds.world_of.tolist()]
         return list(self._seeds)
 
-    def set_options(self, options: Mapping[str, Any] | None = None) -> None:
-        """Set the options of the next `reset`, the same for all worlds.
+    def set_options(
+        self, options: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None
+    ) -> None:
+        """Set the options of the next `reset`.
+
+        Args:
+            options: the same for all worlds, or a list: one for each world, or for each row.
 
         Raises:
-            SetupError: they are no dict, or one is nearly called as one that there is.
+            SetupError: they are no dicts, one is nearly called as one that there is, the list has
+                another length, or rows of one world differ.
         """
-        self._options = [checked_options(options)] * self.num_envs
+        if options is None or isinstance(options, Mapping):
+            self._options = [checked_options(options)] * self.num_envs
+            return
+        by_row = list(options)
+        if len(by_row) == len(self.worlds):
+            by_row = [by_row[world] for world in self._worlds.world_of.tolist()]
+        if len(by_row) != self.num_envs:
+            raise SetupError(
+                f"options for {len(by_row)}: should be for all, for each of {len(self.worlds)} "
+                f"worlds or for each of {self.num_envs} rows"
+            )
+        for world, rows in enumerate(self._worlds.rows):
+            if any(row != by_row[rows.start] for row in by_row[rows]):
+                raise SetupError(
+                    f"options of the rows of world {world}: should be the same, as they are one"
+                )
+        self._options = list(map(checked_options, by_row))
 
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in every world; returns the observations (num_envs, D).
@@ -221,7 +243,13 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         indices: int | Iterable[int] | None = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """Call a method of the worlds of these rows, once each; returns the answer by row."""
+        """Call a method of the worlds of these rows, once each; returns the answer by row.
+
+        The answer of `action_masks` is that of the row's robot; padding may only stay.
+        """
+        if method_name == "action_masks":
+            masks = self._action_masks()
+            return [masks[row] for row in self._get_indices(indices)]
         return self._of_rows(
             lambda env: getattr(env, method_name)(*method_args, **method_kwargs), indices
         )
@@ -229,7 +257,12 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     def env_is_wrapped(
         self, wrapper_class: type, indices: int | Iterable[int] | None = None
     ) -> list[bool]:
-        """Return by row whether its world has such a wrapper around it."""
+        """Return by row whether its world has such a wrapper around it.
+
+        True of `Monitor`, because infos tell the episodes of robots as one would.
+        """
+        if wrapper_class is Monitor:
+            return [True for _ in self._get_indices(indices)]
         return self._of_rows(
             lambda env: any(isinstance(layer, wrapper_class) for layer in layers_of(env)), indices
         )
@@ -241,6 +274,14 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
     def close(self) -> None:
         """Release threads and what rendering holds; harmless when called twice."""
         self._worlds.close()
+
+    def _action_masks(self) -> NDArray[np.bool_]:
+        masks = np.zeros((self.num_envs, self.action_space.n), np.bool_)
+        masks[:, STAY] = True
+        for env, rows in zip(self.worlds, self._worlds.rows):
+            legal = env.action_masks()
+            masks[rows.start : rows.start + len(legal)] = legal
+        return masks
 
     def _of_rows(
         self, answer: Callable[[TrainingWorld], Any], indices: int | Iterable[int] | None
@@ -290,86 +331,3 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         else:
             self._worlds.note_present(world)
         self._note(world)
-
-
-class LogDeliveries(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check
-    """Logs `rollout/delivered_mean`: the mean P [items] of the episodes that `ep_rew_mean` is of.
-
-    Example:
-        >>> from stable_baselines3 import PPO
-        >>> model = PPO("MlpPolicy", SwarmVecEnv(n_robots=2, duration=2.0), n_steps=32)
-        >>> model.learn(512, callback=LogDeliveries()).num_timesteps
-        512
-    """
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_end(self) -> None:
-        # A VecMonitor around the worlds replaces what they say of an episode.
-        ended = [info for info in self.model.ep_info_buffer or () if "delivered" in info]
-        if ended:
-            delivered = float(np.mean([info["delivered"] for info in ended]))
-            self.logger.record("rollout/delivered_mean", delivered)
-
-
-class SwarmVecNormalize(VecNormalize):  # type: ignore[misc]  # not in the environment of the type check
-    """`VecNormalize` around a `SwarmVecEnv` whose rows are partly padding.
-
-    `VecNormalize` itself counts rows of padding, which are zeros: with sizes drawn from 3 and 25
-    that is 44 % of all rows, so that its means and deviations are not those of what robots sense.
-    Here rows that are no robot's count neither among observations nor among returns, and they stay
-    zeros.
-
-    Args:
-        venv: a `SwarmVecEnv`, or wrappers of stable-baselines3 around one.
-        **arguments: those of `VecNormalize`.
-
-    Raises:
-        SetupError: `venv` is something else.
-
-    Example:
-        >>> env = SwarmVecNormalize(SwarmVecEnv(n_worlds=2, n_robots=3))
-        >>> env.reset().shape
-        (6, 140)
-    """
-
-    returns: NDArray[np.float64]
-
-    def __init__(self, venv: Any, **arguments: Any) -> None:
-        if not isinstance(getattr(venv, "unwrapped", None), SwarmVecEnv):
-            raise SetupError(f"venv = {venv!r}: should be a SwarmVecEnv or wrappers around one")
-        super().__init__(venv, **arguments)
-        if self.norm_obs:
-            self.obs_rms = _OfRobots(shape=self.observation_space.shape)
-
-    def step_async(self, actions: ArrayLike) -> None:
-        """Take the commands of the step that `step_wait` makes."""
-        self._acting = self.venv.present
-        super().step_async(actions)
-
-    def _normalize_obs(
-        self, obs: NDArray[np.float32], obs_rms: RunningMeanStd
-    ) -> NDArray[np.float32]:
-        # Robots always sense something, so zeros are padding; of rows, or of one, as at an end.
-        is_robot = obs.any(axis=-1, keepdims=True)
-        return np.where(is_robot, super()._normalize_obs(obs, obs_rms), 0.0)
-
-    def _unnormalize_obs(
-        self, obs: NDArray[np.float32], obs_rms: RunningMeanStd
-    ) -> NDArray[np.float32]:
-        is_robot = obs.any(axis=-1, keepdims=True)
-        return np.where(is_robot, super()._unnormalize_obs(obs, obs_rms), 0.0)
-
-    def _update_reward(self, reward: NDArray[np.float32]) -> None:
-        self.returns = self.returns * self.gamma + reward
-        if self._acting.any():
-            self.ret_rms.update(self.returns[self._acting])
-
-
-class _OfRobots(RunningMeanStd):  # type: ignore[misc]  # as above
-    def update(self, arr: NDArray[np.float32]) -> None:
-        """Count the rows of robots, who always sense something; padding is zeros."""
-        robots = arr[arr.any(axis=1)]
-        if len(robots):
-            super().update(robots)

@@ -40,7 +40,7 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
       a world that is over. A row of a world that goes on is no reason to begin it anew.
 
     Infos are arrays by row, each with its mask `_name`: `delivered` (the paper's P, so far),
-    `failed`, `padding`, `world`, `n_robots`, and what wrappers add.
+    `failed`, `padding`, `world`, `n_robots`, and what wrappers add, such as `action_mask`.
 
     Args:
         num_envs: how many worlds run side by side.
@@ -170,8 +170,9 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             elif self._worlds.is_over[world]:
                 step.terminated[rows] |= ~step.truncated[rows]  # padding ends with its world
         infos = self._infos()
-        if self._mode is AutoresetMode.SAME_STEP and any(self._worlds.is_over):
-            infos = self._begin_anew(step, infos)
+        ended = step.terminated | step.truncated
+        if self._mode is AutoresetMode.SAME_STEP and ended.any():
+            infos = self._begin_anew(step, ended, infos)
         for world, is_over in enumerate(self._worlds.is_over):
             if not is_over:
                 self._worlds.note_present(world)
@@ -205,9 +206,10 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
                 )
         return [world for world in np.unique(named).tolist() if self._worlds.is_over[world]]
 
-    def _begin_anew(self, step: RowsStep, infos: dict[str, Any]) -> dict[str, Any]:
+    def _begin_anew(
+        self, step: RowsStep, ended: NDArray[np.bool_], infos: dict[str, Any]
+    ) -> dict[str, Any]:
         """Begin the next episode of worlds that are over; return the infos of this step."""
-        ended = step.terminated | step.truncated
         final_observations = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended).tolist():
             final_observations[row] = step.observations[row].copy()
@@ -234,6 +236,9 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             columns["n_robots"][rows] = state.n_robots
             for name, value in env.episode_info.items():
                 columns.setdefault(name, np.full(self.num_envs, np.nan))[rows] = value
+            for name, robots in env.robot_info.items():
+                blank = np.zeros((self.num_envs, *robots.shape[1:]), robots.dtype)
+                columns.setdefault(name, blank)[rows.start : rows.start + len(robots)] = robots
         everybody = np.ones(self.num_envs, np.bool_)
         return columns | {f"_{name}": everybody.copy() for name in columns}
 

@@ -16,14 +16,19 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.logger import configure
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecCheckNan, VecMonitor, VecNormalize
 
 from swarm_logistics_env.adapters import CentralEnv, SwarmVecNormalize, sb3
-from swarm_logistics_env.adapters.sb3 import LogDeliveries, SwarmVecEnv
+from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
+from swarm_logistics_env.adapters.sb3_learning import LogDeliveries
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.wrappers import SwarmSize
 from tests.wrappers.conftest import brief, worlds
+
+# Infos tell episodes as a Monitor would, so stable-baselines3 warns of a VecMonitor around them.
+pytestmark = pytest.mark.filterwarnings("ignore:The environment is already wrapped with a `Mon")
 
 torch.set_num_threads(1)  # as a training does; nets this small are slower on several
 
@@ -89,11 +94,30 @@ def test_robots_ends_are_those_that_a_monitor_finds() -> None:
     assert len(returns) > 1
 
 
+def test_evaluations_count_the_episodes_of_robots_alone() -> None:
+    class Still:
+        def predict(self, rows: Any, **_: object) -> Any:
+            return np.zeros((len(rows), 4)), None
+
+    env, own = in_padding(), in_padding()
+    returns, lengths = evaluate_policy(Still(), env, 48, return_episode_rewards=True)
+    assert env.env_is_wrapped(Monitor) == [True] * 24
+    ended: list[list[Any]] = [[] for _ in range(24)]
+    own.reset()
+    while min(map(len, ended)) < 2:
+        for row, info in enumerate(own.step(np.zeros((24, 4)))[-1]):
+            if "episode" in info:
+                ended[row].append((info["episode"]["r"], info["episode"]["l"]))
+    counted = sorted(pair for row in ended for pair in row[:2])
+    assert sorted(zip(returns, lengths)) == counted
+
+
+@pytest.mark.parametrize("monitor", [lambda env: env, VecMonitor])
 def test_learners_log_returns_lengths_and_deliveries_by_themselves(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, monitor: Any
 ) -> None:
     monkeypatch.setattr(SwarmLogisticsEnv, "episode_info", {"delivered": 7})
-    model = ppo(worlds(2, 4, rewards={"contact": -1.0}), 50, batch_size=50)
+    model = ppo(monitor(worlds(2, 4, rewards={"contact": -1.0})), 50, batch_size=50)
     model.set_logger(configure(str(tmp_path), ["json"]))
     model.learn(400, callback=LogDeliveries())
     model.logger.close()

@@ -14,6 +14,7 @@ from swarm_logistics_env import Fault
 from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.wrappers import (
+    DiscreteActions,
     FaultInjection,
     IndicatorReward,
     ParameterChange,
@@ -144,9 +145,33 @@ def test_options_are_for_the_next_reset_only() -> None:
     for n_faults in (1, 0):
         env.reset()
         assert [len(world.warehouse.faults) for world in env.worlds] == [n_faults] * 2
-    given: Any = [faulty, faulty]
-    with pytest.raises(SetupError, match="should be None or a dict"):
-        env.set_options(given)
+
+
+@pytest.mark.parametrize("per", ["world", "row"])
+def test_options_may_differ_by_world(per: str) -> None:
+    env = worlds(2)
+    faulty: dict[str, Any] = {"faults": [Fault("FM1", (0,))]}
+    env.set_options([faulty, {}] if per == "world" else [faulty] * 3 + [{}] * 3)
+    env.reset()
+    assert [len(world.warehouse.faults) for world in env.worlds] == [1, 0]
+    with pytest.raises(SetupError, match="options of the rows of world 1: should be the same"):
+        env.set_options([{}] * 5 + [faulty])
+    with pytest.raises(SetupError, match=r"options for 3: should be .* 2 worlds or .* 6 rows"):
+        env.set_options([{}] * 3)
+
+
+def test_masks_of_actions_are_those_of_each_row() -> None:
+    def make_env(world: int) -> DiscreteActions:
+        return DiscreteActions(SwarmSize(brief(n_robots=4), 3 + world))
+
+    env = SwarmVecEnv(make_env=make_env, n_worlds=2, seed=0)
+    env.reset()
+    assert env.num_envs == 3 + 4
+    env.step([11] + [0] * 6)  # the first robot holds
+    masks = np.stack(env.env_method("action_masks"))
+    assert masks.shape == (7, 13)
+    assert (~masks).sum() == 1 == (~masks)[0, 11]
+    assert env.metadata["render_fps"] == 10.0
 
 
 def test_a_reset_or_seed_that_is_refused_changes_no_world() -> None:
