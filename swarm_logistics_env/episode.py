@@ -89,13 +89,18 @@ class Play:
             PolicyError: the policy returned commands of the wrong shape, or not finite.
         """
         if not self.is_over:
-            self._advance()
+            self.advance(self.world.observe())
 
-    def _advance(self) -> None:
+    def advance(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Take one control period upon observation rows (N, D); return what is sensed after it.
+
+        Raises:
+            PolicyError: as `step`.
+        """
         world = self.world
-        commands = decide(self._policy, world.observe(), world.state)
+        commands = decide(self._policy, rows, world.state)
         try:
-            world.step(commands)
+            return world.step(commands)
         except CommandError as error:
             raise PolicyError(
                 f"{type(self._policy).__name__} at {world.state.time:g} s: {error}"
@@ -131,15 +136,24 @@ def run_episode(
     digest = hashlib.blake2b(digest_size=16)
     with one_thread():  # once for all steps, as each change takes a while
         play = Play(scenario, policy, seed, faults, policy_seed)
-        world = play.world
+        world, rows = play.world, play.world.observe()
         is_over = play.is_over
         while not is_over:
-            play._advance()
+            rows = play.advance(rows)
             digest.update(world.state.robot_position.data)
             is_over = world.is_eventful and play.is_over  # no end without an event
+    return episode_of(world, seed, digest)
+
+
+def episode_of(world: Warehouse, seed: int, positions: hashlib.blake2b) -> Episode:
+    """Return the results of the episode that a world has ended.
+
+    Args:
+        positions: the hash of all robots' positions so far.
+    """
     state = world.state
     delivery_times = np.array(state.delivery_times, dtype=np.float64)
-    digest.update(delivery_times.tobytes())
+    positions.update(delivery_times.tobytes())
     return Episode(
         seed=seed,
         delivery_times=delivery_times,
@@ -147,6 +161,6 @@ def run_episode(
         all_delivered=world.all_delivered,
         failed_robots=world.struck_robots,
         anchoring_seconds=round(state.anchoring_seconds, 9),
-        digest=digest.hexdigest(),
+        digest=positions.hexdigest(),
         contacts=state.contact_measures,
     )

@@ -38,6 +38,8 @@ R = TypeVar("R")
 _CHECKSUM_SIZE = 16  # bytes
 _SILENCE = 1.0  # [s] of compiling that nobody is told of
 _HERE = Path(__file__).parent
+# Where kernels stand, and what they take from.
+_SOURCES = ("*.py", "floor/*.py", "motion/*.py", "policies/*.py", "train/*.py", "warehouse/*.py")
 _all_kernels: list[Any] = []
 _parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
 _config, _types = cast("tuple[Any, Any]", (config, types))  # without types
@@ -245,7 +247,7 @@ def _checksum(content: bytes) -> bytes:
 def _digest() -> str:
     """Return a digest of the files whose code kernels are made of."""
     digest = hashlib.blake2b(digest_size=8)
-    for pattern in ("*.py", "motion/*.py", "policies/*.py", "train/*.py", "warehouse/*.py"):
+    for pattern in _SOURCES:
         for file in sorted(_HERE.glob(pattern)):
             digest.update(file.read_bytes())
     return digest.hexdigest()

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies.crowd import at_most_1, commands_of, drift, share_items
 from swarm_logistics_env.policies.planned_ground import ground_of
+from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.policies.routes import (
     CELL,
     cell_at,
@@ -35,7 +36,7 @@ STEP = 0.2  # [s] without its item
 DISTRUST = 30.0  # [s]
 
 
-class Central:
+class Central(Described):
     """One controller that sees the whole warehouse, for comparison with swarms; needs the state.
 
     Example:

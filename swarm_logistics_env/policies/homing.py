@@ -25,6 +25,7 @@ from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import MotionView, command_own_frames
 from swarm_logistics_env.motion.memory import length_of, set_velocity
 from swarm_logistics_env.motion.network_inputs import random_heading, turn_frames
+from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -232,7 +233,7 @@ def freest_direction(
     return best_x, best_y
 
 
-class Homing:
+class Homing(Described):
     """Every robot remembers for some ten seconds where it last entered the delivery area.
 
     Example:

@@ -6,6 +6,7 @@ The card says how the policy decides, how it was made, and how good it is.
 from __future__ import annotations
 
 import hashlib
+import html
 import math
 from collections.abc import Mapping
 from itertools import pairwise
@@ -26,6 +27,7 @@ from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import gaussian, kernel, pair_key
 from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.motion.network_inputs import INPUTS
+from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -134,7 +136,7 @@ class PolicyCard(_Part):
 STREAM = "trained policy"
 
 
-class LearnedPolicy:
+class LearnedPolicy(Described):
     """A network that decides for each robot alone, from its own row: for swarms of any size.
 
     Args:
@@ -164,6 +166,13 @@ class LearnedPolicy:
             "weights": digest(tensors),
         }
         self.configure(Scenario())
+
+    def __repr__(self) -> str:
+        steps = f"{self.card.agent_steps:,} agent-steps"
+        return f"LearnedPolicy({self.card.name!r}, seed {self.card.seed}, {steps})"
+
+    def _repr_html_(self) -> str:
+        return f"<b>{html.escape(repr(self))}</b><br>{html.escape(self.card.about)}"
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: its control period and its body."""

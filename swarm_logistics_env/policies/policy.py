@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import html
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -46,11 +47,31 @@ def check_policy(policy: object) -> None:
     Raises:
         PolicyError: it is none.
     """
+    if isinstance(policy, type):
+        raise PolicyError(
+            f"policy = the class {policy.__name__}: should be an object, as {policy.__name__}(), "
+            "which each run copies"
+        )
     if not isinstance(policy, Policy):
         raise PolicyError(
             f"policy = {policy!r}: should have the methods reset and act, as what "
             "policies.load(name) returns has"
         )
+
+
+class Described:
+    """A policy that says in a line what it is: in a session, and with a sentence in a notebook."""
+
+    def __repr__(self) -> str:
+        parameters: Any = getattr(self, "parameters", {})
+        if isinstance(parameters, Record):
+            parameters = parameters.model_dump(exclude_defaults=True)
+        listed = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+        return f"{type(self).__name__}({listed})"
+
+    def _repr_html_(self) -> str:
+        about = (type(self).__doc__ or "").partition("\n\n")[0]
+        return f"<b>{html.escape(repr(self))}</b><br>{html.escape(' '.join(about.split()))}"
 
 
 @contextlib.contextmanager

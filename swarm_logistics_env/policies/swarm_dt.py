@@ -21,6 +21,7 @@ from pydantic import Field, NonNegativeFloat
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -109,7 +110,7 @@ class StepConstants(NamedTuple):
     widest_step: float
 
 
-class SwarmDT:
+class SwarmDT(Described):
     """Swarm Diffusion-Taxis: a robot with the requested item follows the lowest timer it hears.
 
     Its keyword arguments are the fields of `SwarmDTParameters`.
