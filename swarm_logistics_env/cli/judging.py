@@ -37,6 +37,7 @@ from .app import (
     scenario_of,
 )
 from .judge_trials import judge_trials, pairs
+from .policy_choice import FrameOption, NormalizeOption, policies_of
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .study_commands import (
     ClearingOption,
@@ -140,6 +141,8 @@ def judge_command(
     run_limit: LimitOption = None,
     full: FullOption = False,
     trust_code: TrustOption = False,
+    frame: FrameOption = False,
+    normalize: NormalizeOption = None,
 ) -> None:
     """Judge a policy until its verdicts are clear, or recorded trials.
 
@@ -157,7 +160,7 @@ def judge_command(
     policy_options = {
         "--seeds": seeds, "--minutes": minutes, "--clearing": clearing,
         "--set": changes, "--bodies": bodies, "--benchmark": as_benchmark,
-        "--run-limit": run_limit,
+        "--run-limit": run_limit, "--frame": frame, "--normalize": normalize,
     }  # fmt: skip
     if not names_policy(policy_or_trials):
         _refuse(policy_options, policy_or_trials, "a file of trials")
@@ -185,8 +188,9 @@ def judge_command(
     if as_benchmark and (options := [option for option, value in conditions.items() if value]):
         raise StudyError(f"{options[0]}: the benchmark has the same conditions for everybody")
     engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
+    (policy,) = policies_of([policy_or_trials], trust_code, frame, normalize)
     tally = judge_policy(
-        policy_or_trials,
+        policy,
         out,
         most_seeds=seeds or JUDGE_SEEDS,
         until_clear=until_clear,
@@ -196,7 +200,6 @@ def judge_command(
         as_benchmark=as_benchmark,
         engine=engine,
         full=full,
-        trust_code=trust_code,
         command=str(context.obj),
     )
     raise Exit(1 if tally.failed else 0)
@@ -210,7 +213,7 @@ def _refuse(options: Mapping[str, object], policy_or_trials: str, kind: str) -> 
 
 
 def judge_policy(
-    policy_text: str,
+    policy: PolicySpec,
     out: Path | None,
     *,
     most_seeds: int,
@@ -221,28 +224,26 @@ def judge_policy(
     as_benchmark: bool,
     engine: Engine,
     full: bool,
-    trust_code: bool,
     command: str,
 ) -> Tally:
     """Play a study of a policy, print the answer and write the report.
 
     Args:
-        policy_text: the policy as it was typed.
+        policy: as it was typed, and whether its code is trusted.
         fields: of the scenario that are changed in all conditions.
         out: directory of the study; None: results/judged/NAME or results/benchmark/NAME.
         command: the command line, which goes on where it was stopped.
     """
-    policy = PolicySpec.of(policy_text).replace(trusted=trust_code)
     for training in policy.trainings or (policy,):
         training.load()  # what is wrong with it is said before anything is written
     if as_benchmark:
         directory = out or Path("results", "benchmark", slug(policy.title))
-        study = study_of(benchmark.STUDY, directory, None, [policy_text], trust_code)
+        study = study_of(benchmark.STUDY, directory, None, [policy], policy.trusted)
     else:
         parts = [slug(policy.title), *["clearing"] * clearing, *changes_in_words(fields)]
         directory = out or Path("results", "judged", "-".join(parts))
         looks = until_clear and most_seeds > FIRST_LOOK
-        study = study_of(STUDY, directory, most_seeds, [policy_text], trust_code, until_clear=looks)
+        study = study_of(STUDY, directory, most_seeds, [policy], policy.trusted, until_clear=looks)
     if clearing:
         switch_to_clearing(study)
     change_scenario(study, fields)
@@ -260,8 +261,8 @@ def judge_policy(
         reason = f"Stopped after {minutes:g} min, {tally.left} runs are left"
         say(f"{reason}; the same command goes on:", command)
     # Several trainings and untrusted code need options that the suggested command does not have.
-    elif is_open and not (tally.left or as_benchmark or policy.trainings or trust_code):
-        options = [policy_text, *(["--clearing"] if clearing else [])]
+    elif is_open and not (tally.left or as_benchmark or policy.trainings or policy.trusted):
+        options = [policy.name, *(["--clearing"] if clearing else [])]
         for name, value in fields.items():
             options += ["--set", f"{name}={value if isinstance(value, str) else json.dumps(value)}"]
         _suggest_more_seeds(options, directory, max(JUDGE_SEEDS, 2 * most_seeds))

@@ -32,6 +32,7 @@ from .app import (
     faults_of,
     scenario_of,
 )
+from .policy_choice import FrameOption, NormalizeOption, policies_of
 
 FRAME_RATE = 25.0  # frames a second
 
@@ -66,11 +67,13 @@ def run_command(
     ] = None,
     speed: Annotated[float, Option(help="How many times real time the film plays.")] = 4.0,
     trust_code: TrustOption = False,
+    frame: FrameOption = False,
+    normalize: NormalizeOption = None,
 ) -> None:
     """Play one episode and print what it delivered, or write a film."""
     scenario = scenario_of(preset, scenario_file, changes, bodies)
     scheduled = faults_of(faults, scenario)
-    names = policies or ["swarm-dt"]
+    players = policies_of(policies or ["swarm-dt"], trust_code, frame, normalize)
     if film is not None:
         variants = [(faults or [], scheduled)]
         if twin:
@@ -78,26 +81,25 @@ def run_command(
                 raise SetupError("--twin: shows a run without its faults: --fault should be given")
             variants.insert(0, (["no fault"], []))
         runs = []
-        for name in names:
+        for player in players:
             for fault_texts, scheduled_faults in variants:
-                title = ", ".join([display_name(name)[-24:], *fault_texts])
-                player = load(name, trust_code=trust_code)
-                runs.append((title, Play(scenario, player, seed, scheduled_faults)))
+                title = ", ".join([display_name(player.name)[-24:], *fault_texts])
+                runs.append((title, Play(scenario, player.load(), seed, scheduled_faults)))
         _write_film(film, runs, scenario.duration if until is None else until, speed)
         return
-    if twin or until is not None or len(names) > 1:
+    if twin or until is not None or len(players) > 1:
         raise SetupError("--twin, --until, several --policy: are for a film, with --film FILE.mp4")
-    player = load(names[0], trust_code=trust_code)
+    policy = players[0].load()
     # This compiles the kernels, so that the time below is that of the episode alone.
-    run_episode(scenario.replace(duration=scenario.control_period), player, seed)
+    run_episode(scenario.replace(duration=scenario.control_period), policy, seed)
     start = time.perf_counter()
-    episode = run_episode(scenario, player, seed, scheduled)
+    episode = run_episode(scenario, policy, seed, scheduled)
     wall = time.perf_counter() - start
     times = episode.delivery_times
     of_all = "" if scenario.restock else f" of {scenario.n_items}"
     echo(
         f"P = {episode.delivered} items delivered{of_all} in {episode.ended_at:g} s "
-        f"by {scenario.n_robots} robots with {display_name(names[0])}, seed {seed}"
+        f"by {scenario.n_robots} robots with {display_name(players[0].name)}, seed {seed}"
     )
     if len(times):
         wait = np.diff(times, prepend=0.0).max()
@@ -133,6 +135,8 @@ def watch_command(
         float | None, Option(help="With --save: time at which the replay ends [s].")
     ] = None,
     trust_code: TrustOption = False,
+    frame: FrameOption = False,
+    normalize: NormalizeOption = None,
 ) -> None:
     """Watch two runs in the browser; inspect, break and repair robots."""
     import webbrowser
@@ -145,7 +149,8 @@ def watch_command(
     if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
         raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
     scenario = scenario_of(preset, scenario_file, changes, bodies)
-    typed = {display_name(name): name for name in filter(None, (policy, against))}
+    players = policies_of(filter(None, (policy, against)), trust_code, frame, normalize)
+    typed = {display_name(player.name): player for player in players}
     session = Session(
         scenario,
         display_name(policy),
@@ -153,7 +158,7 @@ def watch_command(
         seed,
         faults_of(faults, scenario),
         speed,
-        lambda name: load(typed.get(name, name), trust_code=trust_code),
+        lambda name: typed[name].load() if name in typed else load(name, trust_code=trust_code),
     )
     if save is None:
         from swarm_logistics_env.watch.server import serve  # needs aiohttp

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,10 @@ from swarm_logistics_env.bodies.bodies import load_bodies
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.floor.floor_plan import PLAN_SIZES
 from swarm_logistics_env.policies import PolicySpec
-from swarm_logistics_env.policies.files import SB3_SUFFIX
+from swarm_logistics_env.policies.sb3_files import SB3_SUFFIX
 from swarm_logistics_env.report.section import slug
 from swarm_logistics_env.studies import Study
 
-from .app import Repeated
 from .terminal import say
 
 
@@ -24,27 +23,27 @@ def study_of(
     study_name: str,
     out: Path | None,
     seeds: int | None,
-    policies: Repeated,
+    policies: Sequence[PolicySpec],
     trust_code: bool,
     **fields: object,
 ) -> Study:
     """Return the study of a file or a preset with the options and fields that are given, not None.
 
+    Args:
+        policies: instead of those that it names, if any.
+
     Raises:
         StudyError: there is no such file or preset, or it cannot be.
     """
-    options = {"seeds": seeds, **fields}
+    options = {"seeds": seeds, "policies": tuple(policies) or None, **fields}
     fields = {name: value for name, value in options.items() if value is not None}
-    if policies:
-        policy_specs = [PolicySpec.of(name) for name in policies]
-        fields["policies"] = tuple(policy.replace(trusted=trust_code) for policy in policy_specs)
-        for name in policies:
-            # What is typed names a class on purpose; a file may look like any other.
-            if name.endswith(SB3_SUFFIX) and not trust_code:
-                raise StudyError(
-                    f"--policy {name}: reading a model of stable-baselines3 executes the code in "
-                    "it: should be allowed by --trust-code"
-                )
+    for policy in policies:
+        # What is typed names a class on purpose; a file may look like any other.
+        if policy.name.endswith(SB3_SUFFIX) and not trust_code:
+            raise StudyError(
+                f"--policy {policy.name}: reading a model of stable-baselines3 executes the code "
+                "in it: should be allowed by --trust-code"
+            )
     if study_name.endswith(".toml") or Path(study_name).is_file():
         return Study.from_file(study_name, out=out, trust_code=trust_code, **fields)
     return Study.preset(study_name, out=out, **fields)

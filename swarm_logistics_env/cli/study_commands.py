@@ -23,6 +23,7 @@ from swarm_logistics_env.verdicts.gate import SUBJECTS, Gate, GateAnswer, answer
 from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 
 from .app import BodiesOption, Repeated, SetOption, TrustOption, changed_fields
+from .policy_choice import FrameOption, NormalizeOption, policies_of
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .terminal import (
     AnswerSoFar,
@@ -117,6 +118,8 @@ def run_command(
     run_limit: LimitOption = None,
     full: FullOption = False,
     trust_code: TrustOption = False,
+    frame: FrameOption = False,
+    normalize: NormalizeOption = None,
 ) -> None:
     """Play what is missing, print the answer, write the report."""
     part = Shard.parse(shard) if shard else None
@@ -124,8 +127,9 @@ def run_command(
         seeds = MOST_SEEDS_UNTIL_CLEAR
     looks = until_clear or None
     fields = changed_fields(changes, bodies)
+    policy_specs = policies_of(policies or (), trust_code, frame, normalize)
     study = study_of(
-        study_name, out, seeds, policies, trust_code, first_seed=first_seed, until_clear=looks
+        study_name, out, seeds, policy_specs, trust_code, first_seed=first_seed, until_clear=looks
     )
     if clearing:
         switch_to_clearing(study)
@@ -215,7 +219,8 @@ def plan_command(
         results = Study.stored(study_name, trust_code=trust_code).findings()
         show_power(study_name, results, effect)
         return
-    plan = study_of(study_name, None, seeds, policies, trust_code, first_seed=first_seed).plan()
+    policy_specs = policies_of(policies or (), trust_code)
+    plan = study_of(study_name, None, seeds, policy_specs, trust_code, first_seed=first_seed).plan()
     uses: dict[str, list[str]] = {}
     for _, table, arm in plan.cells:
         uses.setdefault(arm.case.key, []).append(f"{table} ({arm.setting})")

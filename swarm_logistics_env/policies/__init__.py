@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from swarm_logistics_env.policies.files import read_card, write_onnx
     from swarm_logistics_env.policies.learned import PolicyCard
+    from swarm_logistics_env.policies.models import of
     from swarm_logistics_env.policies.policy import Policy, identity
+    from swarm_logistics_env.policies.sb3_files import from_sb3
     from swarm_logistics_env.policies.spec import (
         NAMES,
         SUFFIXES,
@@ -31,9 +33,11 @@ __all__ = [
     "SwarmDT",
     "SwarmDTParameters",
     "display_name",
+    "from_sb3",
     "identity",
     "known_policies",
     "load",
+    "of",
     "read_card",
     "write_onnx",
 ]
@@ -42,7 +46,9 @@ __all__ = [
 _HOMES = {
     "files": {"read_card", "write_onnx"},
     "learned": {"PolicyCard"},
+    "models": {"of"},
     "policy": {"Policy", "identity"},
+    "sb3_files": {"from_sb3"},
     "spec": {"NAMES", "SUFFIXES", "PolicySpec", "display_name", "known_policies", "load"},
     "swarm_dt": {"SwarmDT", "SwarmDTParameters"},
 }
@@ -53,3 +59,7 @@ def __getattr__(name: str) -> Any:
         if name in names:
             return getattr(importlib.import_module(f"{__name__}.{home}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

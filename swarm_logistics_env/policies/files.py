@@ -1,7 +1,7 @@
-"""Files of trained policies, in three formats.
+"""Files of trained policies.
 
 Safetensors with the card as JSON in the header execute nothing. ONNX is for robots and programs
-without Python. Models that stable-baselines3 saved execute the code in them when they are read.
+without Python. Models that stable-baselines3 saved are read by `models`.
 """
 
 from __future__ import annotations
@@ -17,15 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.code_files import allow_all_imports
-from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError, how_to_install
+from swarm_logistics_env.errors import PolicyError, how_to_install
 from swarm_logistics_env.motion.frame import OUTPUTS
 from swarm_logistics_env.motion.network_inputs import LEAD
-from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.policies.sb3_files import SB3_SUFFIX, from_sb3
 from swarm_logistics_env.records import atomic_write, canonical_json
-from swarm_logistics_env.scenario import Scenario
 
 SUFFIX = ".safetensors"
 CARD = "swarm_logistics_policy"  # the header's entry that holds the card
@@ -203,84 +201,11 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
         part.write_bytes(model.SerializeToString())
 
 
-SB3_SUFFIX = ".zip"
-
-
-class StableBaselinesModel:
-    """A PPO model that stable-baselines3 saved; it gives its most likely action each time.
-
-    It decides for one robot at a time, from the robot's observation row.
-
-    Args:
-        path: of the .zip file. Reading it executes the code in it.
-
-    Raises:
-        PolicyError: it cannot be read, or stable-baselines3 is missing.
-    """
-
-    def __init__(self, path: Path) -> None:
-        try:
-            from stable_baselines3 import PPO
-        except ImportError:
-            raise PolicyError(
-                f"{path} needs stable-baselines3: install swarm-logistics-env[train]"
-            ) from None
-        try:
-            self.parameters = {"sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-            with allow_all_imports():
-                self._model: Any = PPO.load(path, device="cpu")
-        except RAISED_BY_OTHERS as error:  # whatever the code in a file that is none raises
-            reason = (str(error) or type(error).__name__).splitlines()[0]
-            raise PolicyError(f"{path} is no PPO model of stable-baselines3: {reason}") from error
-
-    def reset(self, n_robots: int, seed: int) -> None:
-        """Begin an episode; nothing here is random."""
-
-    def act(self, observations: NDArray[np.float32]) -> NDArray[Any]:
-        """Return an action for each row of observations (N, D)."""
-        actions, _ = self._model.predict(observations, deterministic=True)
-        return np.asarray(actions)
-
-
-class StableBaselinesPolicy(StableBaselinesModel):
-    """A model for the warehouse.
-
-    It should have learned from bare observation rows (D,) to give commands (4,), as from
-    `adapters.SwarmVecEnv`; what normalised its observations is not in the file.
-
-    Args:
-        path: the path of the .zip file. Reading it executes the code in it.
-
-    Raises:
-        PolicyError: it cannot be read, has other spaces, or stable-baselines3 is
-            missing.
-    """
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        row_shape, command_shape = (n_columns(Scenario()),), (4,)
-        shapes = self._model.observation_space.shape, self._model.action_space.shape
-        if shapes != (row_shape, command_shape):
-            raise PolicyError(
-                f"{path} maps observations {shapes[0]} to commands {shapes[1]}: should map "
-                f"{row_shape} to {command_shape}"
-            )
-
-
 def maker_of_file(name: str, trust_code: bool) -> Callable[..., Policy] | None:
-    """Return what reads the policy file of that path; None: its name is not one of a policy file.
-
-    Raises:
-        PolicyError: reading it would execute the code in it, and nobody trusts that.
-    """
+    """Return what reads the policy file of that path; None: it is not called as one."""
     path = Path(name)
     if path.suffix == SUFFIX:
         return functools.partial(read_policy, path)
     if path.suffix == SB3_SUFFIX:
-        if not trust_code:
-            raise PolicyError(
-                f"{path} is a file of stable-baselines3: reading it executes the code in it; if "
-                "you trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
-            )
-        return functools.partial(StableBaselinesPolicy, path)
+        return functools.partial(from_sb3, path, trust_code=trust_code)
     return None

@@ -27,9 +27,7 @@ from swarm_logistics_env.fingerprint import UNSTABLE, changed_files, changes
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
 from swarm_logistics_env.policies.files import (
-    SB3_SUFFIX,
     SUFFIX,
-    StableBaselinesModel,
     maker_of_file,
     read_card,
     read_policy,
@@ -37,6 +35,11 @@ from swarm_logistics_env.policies.files import (
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
 from swarm_logistics_env.policies.policy import Policy, check_policy, identity_parts
+from swarm_logistics_env.policies.sb3_files import (
+    SB3_SUFFIX,
+    StableBaselinesModel,
+    refuse_untrusted,
+)
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
 from swarm_logistics_env.records import Record, canonical_json
 
@@ -144,6 +147,10 @@ class PolicySpec(Record):
         if isinstance(value, str):
             card_name = display_name(value)
             return cls(name=value, label="" if card_name == value else card_name)
+        if isinstance(value, type):
+            raise ValueError(
+                f"is the class {value.__name__}: should be an object, as {value.__name__}()"
+            )
         if not hasattr(value, "act"):
             raise ValueError(
                 "should be a policy's name, its path, a table of name and parameters, or an object "
@@ -263,7 +270,7 @@ class PolicySpec(Record):
         if makers and self.name in NAMES:
             raise PolicyError(f"the task has no policy {self.name!r}{suggest(self.name, makers)}")
         if makers and self.name.endswith(SB3_SUFFIX):
-            maker_of_file(self.name, self.trusted)  # refuses what nobody trusts
+            refuse_untrusted(Path(self.name), self.trusted)
             return StableBaselinesModel(Path(self.name))
         return load(self.name, trust_code=self.trusted, **self.parameters)
 

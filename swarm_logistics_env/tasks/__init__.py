@@ -1,6 +1,6 @@
 """Tasks: what a study can play."""
 
-from swarm_logistics_env.policies.files import StableBaselinesModel
+from swarm_logistics_env.policies.sb3_files import StableBaselinesModel
 
 from .parallel_policies import RandomActions, SumOfInfos, SumOfRewards
 from .parallel_task import ParallelTask

@@ -16,6 +16,7 @@ from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import checked_options, numbers_of
 from swarm_logistics_env.environment.spaces import ArrayStep
 from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
 from swarm_logistics_env.motion.frame import OUTPUTS
 from swarm_logistics_env.motion.network_inputs import INPUT, INPUTS, N_OBSTACLES
 from swarm_logistics_env.observations import N_BEAMS
@@ -161,27 +162,7 @@ def _input_space(scenarios: Iterable[Scenario]) -> Box:
     return Box(low.astype(np.float32), high.astype(np.float32))
 
 
-_HALF = math.sqrt(0.5)
-# Forward, left, turn, gripper of each action; one that drives or turns leaves the gripper as it is.
-ACTIONS: Mapping[str, tuple[float, float, float, float]] = {
-    "stay": (0.0, 0.0, 0.0, 0.0),
-    "forward": (1.0, 0.0, 0.0, 0.0),
-    "forward_left": (_HALF, _HALF, 0.0, 0.0),
-    "left": (0.0, 1.0, 0.0, 0.0),
-    "back_left": (-_HALF, _HALF, 0.0, 0.0),
-    "back": (-1.0, 0.0, 0.0, 0.0),
-    "back_right": (-_HALF, -_HALF, 0.0, 0.0),
-    "right": (0.0, -1.0, 0.0, 0.0),
-    "forward_right": (_HALF, -_HALF, 0.0, 0.0),
-    "turn_left": (0.0, 0.0, 1.0, 0.0),
-    "turn_right": (0.0, 0.0, -1.0, 0.0),
-    "hold": (0.0, 0.0, 0.0, 1.0),
-    "open": (0.0, 0.0, 0.0, -1.0),
-}
-
-
 STAY, ACTION_MASK = 0, "action_mask"
-_DIRECTIONS = {name: row for name, row in ACTIONS.items() if row[2] == 0.0}  # without turns
 
 
 class DiscreteActions(Wrapper):
@@ -227,16 +208,13 @@ class DiscreteActions(Wrapper):
                 "be around vectors"
             )
         self._is_of_motion = space.shape == (len(OUTPUTS),)
-        rows = _DIRECTIONS if self._is_of_motion else ACTIONS
-        self.actions = tuple(rows)
+        table = MOTION_ACTIONS if self._is_of_motion else ACTIONS
+        rows = np.array(list(table.values()))
+        self.actions = tuple(table)
         self._space = Discrete(len(rows))
         self._commands = np.zeros((len(rows), *space.shape))
-        if self._is_of_motion:
-            self._commands[:] = np.delete(list(rows.values()), 2, axis=1)
-        else:
-            self._commands[:, :4] = list(rows.values())
-        self._grippers = np.array([row[3] for row in rows.values()])
-        self._goes_aside = np.array([row[1] != 0.0 for row in rows.values()])
+        self._commands[:, : rows.shape[1]] = rows
+        self._grippers, self._goes_aside = rows[:, -1], rows[:, 1] != 0.0
 
     def action_space(self, agent: str) -> Discrete:
         """Return the numbers of `actions`; the same space for all."""

@@ -10,21 +10,26 @@ import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.cli.policy_choice import policies_of
 from swarm_logistics_env.cli.study_choice import study_of
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import PolicyError, StudyError
+from swarm_logistics_env.motion import INPUTS
 from swarm_logistics_env.policies import Policy, PolicySpec
 from swarm_logistics_env.questions.specification import read_study_file
+from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame
+from tests.wrappers.conftest import brief
 
 pytest.importorskip("stable_baselines3")
+
+from swarm_logistics_env.adapters import SwarmVecEnv, SwarmVecNormalize
 
 
 def saved(path: Path, **fields: Any) -> Path:
     """Save an untrained model."""
     from stable_baselines3 import PPO
 
-    from swarm_logistics_env.adapters import SwarmVecEnv
-
-    env = SwarmVecEnv(n_worlds=1, n_robots=2, **fields)
+    env = SwarmVecEnv(n_worlds=1, **(fields or {"n_robots": 2}))
     small = {"net_arch": [4]}
     PPO("MlpPolicy", env, policy_kwargs=small, n_steps=8, batch_size=8, device="cpu").save(path)
     return path
@@ -65,7 +70,7 @@ def test_a_study_reads_it_where_somebody_trusts_it_and_no_file_says_so(
     with pytest.raises(PolicyError, match="executes the code in it"):
         PolicySpec.of(text).load({"of another task": object})
     assert isinstance(PolicySpec.of(text).replace(trusted=True).load(), Policy)
-    study = study_of("quick", None, 1, [text], trust_code=True)
+    study = study_of("quick", None, 1, policies_of([text], True), trust_code=True)
     assert study.plan().cases[0].policy.trusted
     with pytest.raises(ValueError, match="'trusted' is no field of a table"):
         PolicySpec.of({"name": text, "trusted": True})
@@ -81,11 +86,61 @@ def test_a_study_reads_it_where_somebody_trusts_it_and_no_file_says_so(
 
 
 def test_what_is_no_model_or_one_of_other_spaces_is_refused(model: Path, tmp_path: Path) -> None:
-    broken, other = tmp_path / "broken.zip", saved(tmp_path / "other.zip", message_size=2)
+    broken = tmp_path / "broken.zip"
     broken.write_bytes(model.read_bytes()[:500])
-    for path, sentence in (
-        (broken, "is no PPO model of stable-baselines3"),
-        (other, r"to commands \(6,\): should map \(140,\) to \(4,\)"),
+    framed = saved(tmp_path / "framed.zip", make_env=lambda _: MotionFrame(brief(n_robots=2)))
+    for path, frame, sentence in (
+        (broken, False, "is no model of stable-baselines3: File is not a zip file"),
+        (framed, False, "learned through MotionFrame: should be read with frame=True, or --frame"),
+        (model, True, r"rows of shape .*: with frame=True, or --frame, should be 9\d inputs"),
     ):
         with pytest.raises(PolicyError, match=sentence):
-            policies.load(str(path), trust_code=True)
+            policies.load(str(path), trust_code=True, frame=frame)
+    with pytest.raises(PolicyError, match="executes the code in it"):
+        policies.from_sb3(model)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "form"),
+    [("PPO", MotionFrame), ("A2C", MotionFrame), ("DQN", lambda env: DiscreteActions(env)),
+     ("DQN", lambda env: DiscreteActions(MotionFrame(env)))],
+)  # fmt: skip
+def test_a_model_plays_as_in_the_environment_that_it_learned_in(
+    algorithm: str, form: Any, tmp_path: Path
+) -> None:
+    import stable_baselines3
+
+    def make_env(world: int = 0) -> Any:
+        return form(brief(n_robots=3))
+
+    env = SwarmVecNormalize(SwarmVecEnv(make_env=make_env, n_worlds=1), clip_obs=2.0)
+    kind = getattr(stable_baselines3, algorithm)
+    learned = kind("MlpPolicy", env, policy_kwargs={"net_arch": [4]}, seed=0)
+    learned.learn(300)
+    learned.save(tmp_path / "model.zip")
+    env.save(str(tmp_path / "rows.pkl"))
+    env.training = False
+    frame = env.observation_space.shape == (len(INPUTS),)
+    files: dict[str, Any] = {"frame": frame, "normalize": tmp_path / "rows.pkl"}
+    policy = policies.from_sb3(tmp_path / "model.zip", trust_code=True, **files)
+    of_object = policies.of(learned, frame=frame, normalize=env)
+
+    world = make_env()
+    rows, play = world.reset_arrays(5), [Play(brief().scenario.replace(n_robots=3), policy, 5)]
+    play.append(Play(brief().scenario.replace(n_robots=3), of_object, 5))
+    for _ in range(15):
+        actions, _ = learned.predict(env.normalize_obs(rows), deterministic=True)
+        rows, *_ = world.step_arrays(actions)
+        for each in play:
+            each.step()
+            np.testing.assert_array_equal(
+                each.world.state.robot_position, world.warehouse.state.robot_position
+            )
+    options = ["--frame"] * frame + ["--normalize", str(tmp_path / "rows.pkl"), "--trust-code"]
+    arguments = ["run", "--policy", str(tmp_path / "model.zip"), "--set", "duration=1", *options]
+    assert app.run(arguments) == 0
+
+
+def test_options_for_models_are_refused_without_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["run", "--policy", "homing", "--frame"]) == 2
+    assert "--frame: is for a model of stable-baselines3, a .zip file" in capsys.readouterr().err

@@ -11,10 +11,10 @@ import pytest
 from swarm_logistics_env import Fault, Scenario, motion
 from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.motion.actions import ACTIONS
 from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, ParameterChange, SwarmSize
-from swarm_logistics_env.wrappers.action_forms import ACTIONS
 from tests.wrappers.conftest import small
 
 NUMBERS = {name: number for number, name in enumerate(ACTIONS)}

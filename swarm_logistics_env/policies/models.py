@@ -1,0 +1,245 @@
+"""Policies of a learner's model: any network that turns rows into outputs.
+
+What `MotionFrame`, `DiscreteActions` and a normaliser do around an environment is done here around
+the model, by the same code, so that it plays as it learned.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+from collections.abc import Callable
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError
+from swarm_logistics_env.fingerprint import fingerprint, package_code
+from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
+from swarm_logistics_env.motion.frame import MotionView
+from swarm_logistics_env.policies.policy import Described
+from swarm_logistics_env.records import canonical_json
+from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.streams import row_keys
+
+Rows = NDArray[np.float32]
+Decide = Callable[[Rows], Any]
+_CODE = ("policies/models.py", "policies/sb3_files.py")
+
+
+def of(
+    network: Any, *, frame: bool = False, listens: bool = True, normalize: Any = None
+) -> ModelPolicy:
+    """Return the policy of a model: whatever turns rows of inputs (N, D) into outputs (N, k).
+
+    Args:
+        network: a function of rows, a torch module, a model of stable-baselines3 (its most likely
+            action), or an InferenceSession of onnxruntime. It has no memory of its own.
+        frame: whether it learned through `MotionFrame`: it reads rows of `motion.INPUTS` and gives
+            rows of `motion.OUTPUTS`. Else it reads observations (N, D) and gives commands (N, 4).
+            Whole numbers (N,) are actions of `DiscreteActions`, in either case.
+        listens: as of `MotionFrame`.
+        normalize: what its rows went through: None, a function of rows, a pair (mean, standard
+            deviation), or a `VecNormalize` of stable-baselines3.
+
+    Raises:
+        PolicyError: `network` or `normalize` is none of these.
+
+    Example:
+        >>> policy = of(lambda rows: np.tanh(rows[:, :3]), frame=True)
+        >>> policy.reset(n_robots=2, seed=0)
+        >>> policy.act(np.zeros((2, 141), np.float32)).shape
+        (2, 4)
+    """
+    decide, content = decider_of(network)
+    prepare, normalizer = normalizer_of(normalize)
+    parts = {"network": content, "frame": frame, "listens": listens, "normalize": normalizer}
+    about = type(network).__name__
+    return ModelPolicy(decide, prepare, parts, about=about, frame=frame, listens=listens)
+
+
+class ModelPolicy(Described):
+    """A model between what a robot senses and its command; made by `of` and `from_sb3`.
+
+    Args:
+        decide: turns rows (N, D) into outputs.
+        prepare: turns rows into what the model learned to read.
+        parts: what its behaviour depends on, for its identity.
+        about: what people call the model.
+        frame, listens: as `of`.
+
+    Attributes:
+        identity: text that changes with the model, its form, or the code of this module.
+    """
+
+    def __init__(
+        self,
+        decide: Decide,
+        prepare: Decide,
+        parts: dict[str, Any],
+        *,
+        about: str,
+        frame: bool,
+        listens: bool,
+    ) -> None:
+        self._decide, self._prepare = decide, prepare
+        self._has_frame, self._listens, self._about = frame, listens, about
+        self.identity = canonical_json({"model": parts, "code": package_code(*_CODE)})
+        self.configure(Scenario())
+        self.reset(0, 0)
+
+    def __repr__(self) -> str:
+        return f"policies.of({self._about}, frame={self._has_frame})"
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        # Each run has a memory of its own; the model has none.
+        other = copy.copy(self)
+        other._view = copy.deepcopy(self._view, memo)
+        return other
+
+    def configure(self, scenario: Scenario) -> None:
+        """Take what a robot's maker knows: its control period and its body."""
+        self._view = MotionView(scenario, self._listens)
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode, with the memories that `MotionFrame` would begin with."""
+        self._view.begin(row_keys(seed, "motion frame", n_robots))
+
+    def act(self, observations: Rows) -> NDArray[np.float64]:
+        """Return commands (N, 4) for observation rows (N, D).
+
+        Raises:
+            PolicyError: the model fails, or its outputs are no commands.
+        """
+        rows = self._view.read(observations) if self._has_frame else observations
+        outputs = self._outputs(rows)
+        n_robots = len(observations)
+        actions = _actions_of(self._has_frame)
+        if outputs.dtype.kind in "iu" and outputs.size == n_robots:
+            numbers = outputs.reshape(n_robots)
+            if not ((numbers >= 0) & (numbers < len(actions))).all():
+                raise PolicyError(
+                    f"{self._about} gave actions {numbers}: should be 0 to {len(actions) - 1}, as "
+                    "those of DiscreteActions"
+                )
+            outputs = actions[numbers]
+        wanted = (n_robots, actions.shape[1])
+        is_message = not self._has_frame and outputs.ndim == 2 and outputs.shape[1] > wanted[1]
+        if outputs.shape != wanted and not is_message:
+            raise PolicyError(
+                f"{self._about} gave outputs of shape {outputs.shape}: should be {wanted}, "
+                + ("along, aside and gripper" if self._has_frame else "commands of each robot")
+            )
+        return self._view.command(outputs) if self._has_frame else outputs
+
+    def _outputs(self, rows: Rows) -> NDArray[Any]:
+        try:
+            outputs: Any = self._decide(self._prepare(rows))
+            if hasattr(outputs, "detach"):  # a tensor, which may have a gradient or be on a GPU
+                outputs = outputs.detach().cpu()
+            return np.asarray(outputs)
+        except RAISED_BY_OTHERS as error:
+            kind = type(error).__name__
+            hint = "" if self._has_frame else "; if it learned through MotionFrame: frame=True"
+            raise PolicyError(
+                f"{self._about} failed with rows of shape {rows.shape} ({kind}: {error}){hint}"
+            ) from error
+
+
+def _actions_of(frame: bool) -> NDArray[np.float64]:
+    rows = MOTION_ACTIONS if frame else ACTIONS
+    return np.array(list(rows.values()))
+
+
+def decider_of(network: Any) -> tuple[Decide, str]:
+    """Return what turns rows into outputs, and text that changes with it."""
+    policy = getattr(network, "policy", network)  # of a model of stable-baselines3
+    if hasattr(policy, "predict") and hasattr(policy, "state_dict"):
+        return _Predicting(policy), _content_of(policy)
+    if hasattr(network, "state_dict") and callable(network):
+        return _OfTorch(network), _content_of(network)
+    if hasattr(network, "run") and hasattr(network, "get_inputs"):
+        return _OfOnnx(network), fingerprint(network)["value"]
+    if not callable(network) or isinstance(network, type):
+        raise PolicyError(
+            f"network = {network!r}: should be a function of rows, a torch module, a model of "
+            "stable-baselines3 or an InferenceSession of onnxruntime"
+        )
+    return network, canonical_json(fingerprint(network))
+
+
+def _content_of(module: Any) -> str:
+    """Return text that changes with a torch module's class and numbers."""
+    digest = hashlib.sha256()
+    for name, tensor in sorted(module.state_dict().items()):
+        digest.update(name.encode() + np.ascontiguousarray(tensor.cpu().numpy()).tobytes())
+    return canonical_json([repr(module), digest.hexdigest(), fingerprint(type(module))])
+
+
+class _OfTorch:
+    def __init__(self, module: Any) -> None:
+        self._module = module
+
+    def __call__(self, rows: Rows) -> Any:
+        import torch
+
+        device = next((p.device for p in self._module.parameters()), None)
+        with torch.no_grad():
+            return self._module(torch.as_tensor(rows, device=device))
+
+
+class _Predicting:
+    def __init__(self, policy: Any) -> None:
+        self._policy = policy
+
+    def __call__(self, rows: Rows) -> Any:
+        actions, _ = self._policy.predict(rows, deterministic=True)
+        return actions
+
+
+class _OfOnnx:
+    def __init__(self, session: Any) -> None:
+        self._session, self._name = session, session.get_inputs()[0].name
+
+    def __call__(self, rows: Rows) -> Any:
+        return self._session.run(None, {self._name: rows})[0]
+
+
+def normalizer_of(normalize: Any) -> tuple[Decide, Any]:
+    """Return what prepares rows, and what identifies it."""
+    if normalize is None:
+        return _Scaled(0.0, 1.0, np.inf), None
+    statistics = getattr(normalize, "obs_rms", normalize)
+    if hasattr(statistics, "mean") and hasattr(statistics, "var"):
+        epsilon = getattr(normalize, "epsilon", 1e-8)
+        deviation = np.sqrt(np.asarray(statistics.var) + epsilon)
+        scaled = _Scaled(statistics.mean, deviation, getattr(normalize, "clip_obs", np.inf))
+    elif isinstance(normalize, tuple | list) and len(normalize) == 2:
+        mean, deviation = normalize
+        scaled = _Scaled(mean, deviation, np.inf)
+    elif callable(normalize) and not isinstance(normalize, type):
+        return normalize, fingerprint(normalize)
+    else:
+        raise PolicyError(
+            f"normalize = {normalize!r}: should be None, a function of rows, a pair (mean, "
+            "standard deviation) or a VecNormalize of stable-baselines3"
+        )
+    return scaled, scaled.digest()
+
+
+class _Scaled:
+    """Rows less their mean, in standard deviations, cut at a limit; rows of zeros stay zeros."""
+
+    def __init__(self, mean: Any, deviation: Any, limit: float) -> None:
+        self._mean = np.asarray(mean, np.float64)
+        self._deviation, self._limit = np.asarray(deviation, np.float64), limit
+
+    def __call__(self, rows: Rows) -> Rows:
+        scaled = np.clip((rows - self._mean) / self._deviation, -self._limit, self._limit)
+        return np.where(rows.any(axis=1, keepdims=True), scaled, 0.0).astype(np.float32)
+
+    def digest(self) -> str:
+        """Return text that changes with its numbers."""
+        numbers = (self._mean.tobytes(), self._deviation.tobytes(), str(self._limit).encode())
+        return hashlib.sha256(b"|".join(numbers)).hexdigest()

@@ -1,0 +1,144 @@
+"""Policies of any network: torch, ONNX, a function; what identifies them, and what is refused."""
+
+from __future__ import annotations
+
+import copy
+import doctest
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.policies import models
+from swarm_logistics_env.policies.spec import PolicySpec
+
+BRIEF = Scenario(n_robots=3, n_items=10, duration=2.0)
+WEIGHTS = np.random.default_rng(0).normal(0.0, 0.3, (95, 3)).astype(np.float32)
+
+
+def ahead(rows: Any) -> Any:
+    return np.tanh(rows @ WEIGHTS)
+
+
+def test_a_trained_network_plays_as_its_policy_file_does() -> None:
+    """Without noise, and deciding each step, both are the same network in the same frame."""
+    learned: Any = policies.load("ppo-delivery")
+    card = learned.card.replace(
+        network=learned.card.network.replace(exploration=0.0, decides_every=1)
+    )
+    same: Any = type(learned)(card, learned.tensors)
+    policy = policies.of(same.outputs_of, frame=True)
+    rows = np.random.default_rng(0).normal(size=(40, 5, N_COLUMNS)).astype(np.float32)
+    policy.reset(5, 3)
+    same.reset(5, 3)
+    same._frame.begin(policy._view.keys.copy())
+    for step in rows:
+        np.testing.assert_array_equal(policy.act(step), same.act(step))
+
+
+def test_torch_onnx_and_a_function_of_one_network_give_the_same_commands() -> None:
+    torch = pytest.importorskip("torch")
+    layer = torch.nn.Linear(95, 3, bias=False)
+    layer.weight.data = torch.from_numpy(WEIGHTS.T.copy())
+    module = torch.nn.Sequential(layer, torch.nn.Tanh())
+
+    def with_gradient(rows: Any) -> Any:
+        return module(torch.as_tensor(rows))
+
+    class Session:  # as onnxruntime's
+        def get_inputs(self) -> Any:
+            return [type("Input", (), {"name": "inputs"})]
+
+        def run(self, _: None, rows: dict[str, Any]) -> Any:
+            return [ahead(rows["inputs"])]
+
+    rows = np.random.default_rng(1).normal(size=(4, N_COLUMNS)).astype(np.float32)
+    commands = []
+    for network in (ahead, module, with_gradient, Session()):
+        policy = policies.of(network, frame=True)
+        policy.reset(4, 0)
+        commands.append(policy.act(rows))
+    for other in commands[1:]:
+        np.testing.assert_allclose(other, commands[0], atol=1e-6)
+
+
+def test_whole_numbers_are_discrete_actions() -> None:
+    def numbers(rows: Any) -> Any:
+        return np.arange(len(rows)) + 10
+
+    policy = policies.of(numbers)
+    policy.reset(3, 0)
+    commands = policy.act(np.zeros((3, N_COLUMNS), np.float32))
+    assert commands.tolist() == [[0, 0, -1, 0], [0, 0, 0, 1], [0, 0, 0, -1]]
+    policy.reset(4, 0)
+    with pytest.raises(PolicyError, match="should be 0 to 12, as those of DiscreteActions"):
+        policy.act(np.zeros((4, N_COLUMNS), np.float32))
+
+
+def test_rows_are_normalized_as_they_were_in_training() -> None:
+    seen = []
+
+    def network(rows: Any) -> Any:
+        seen.append(rows)
+        return rows[:, :4]
+
+    mean, deviation = np.full(N_COLUMNS, 2.0), np.full(N_COLUMNS, 4.0)
+    for normalize in ((mean, deviation), lambda rows: (rows - 2.0) / 4.0):
+        policies.of(network, normalize=normalize).act(np.ones((0, N_COLUMNS), np.float32))
+        policy = policies.of(network, normalize=normalize)
+        policy.act(np.full((2, N_COLUMNS), 6.0, np.float32))
+        assert (seen[-1] == 1.0).all()
+
+
+def test_a_model_is_known_by_its_numbers_and_its_form_and_each_run_has_a_memory() -> None:
+    torch = pytest.importorskip("torch")
+    module = torch.nn.Linear(95, 3)
+    policy: Any = policies.of(module, frame=True)
+    identity = policies.identity(policy)
+    assert policies.identity(policies.of(copy.deepcopy(module), frame=True)) == identity
+    assert policies.identity(policies.of(module, frame=True, listens=False)) != identity
+    with torch.no_grad():
+        module.bias += 1.0
+    assert policies.identity(policies.of(module, frame=True)) != identity
+    first = PolicySpec.of(policy).load()
+    again = PolicySpec.of(pickle.loads(pickle.dumps(policy))).load()
+    run_episode(BRIEF, first, seed=0)
+    assert run_episode(BRIEF, first, seed=1).digest == run_episode(BRIEF, again, seed=1).digest
+
+
+@pytest.mark.parametrize(
+    ("network", "options", "message"),
+    [
+        (ahead, {}, "failed with rows of shape .*; if it learned through MotionFrame: frame=True"),
+        (lambda rows: rows[:, :2], {"frame": True}, r"shape \(3, 2\): should be \(3, 3\), along"),
+        (lambda rows: rows[:, :3], {}, r"shape \(3, 3\): should be \(3, 4\), commands"),
+        (None, {}, "network = None: should be a function of rows, a torch module"),
+        (dict, {}, "network = <class 'dict'>: should be a function of rows"),
+        (ahead, {"normalize": 3.0}, "normalize = 3.0: should be None, a function of rows, a pair"),
+    ],
+)
+def test_what_is_no_model_is_refused(network: Any, options: Any, message: str) -> None:
+    with pytest.raises(PolicyError, match=message):
+        run_episode(BRIEF, policies.of(network, **options), seed=0)
+
+
+def test_a_class_where_an_object_belongs_is_told_so() -> None:
+    with pytest.raises(PolicyError, match=r"the class SwarmDT: should be an object, as S"):
+        run_episode(BRIEF, policies.SwarmDT, seed=0)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"is the class SwarmDT: should be an object"):
+        PolicySpec.of(policies.SwarmDT)
+
+
+def test_a_policy_says_what_it_is() -> None:
+    assert repr(policies.SwarmDT(taxis_gain=0.5)) == "SwarmDT(taxis_gain=0.5)"
+    policy: Any = policies.load("homing")
+    assert policy._repr_html_().startswith("<b>Homing()</b><br>Every robot remembers")
+    assert repr(policies.of(ahead, frame=True)) == "policies.of(function, frame=True)"
+
+
+def test_the_example_of_its_docstring_runs() -> None:
+    assert doctest.testmod(models).failed == 0
