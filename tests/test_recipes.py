@@ -56,7 +56,7 @@ from .half_speed import HalfSpeed
     "weak": FailureMode("drives slowly and lifts nothing", speed=0.2, lifts=False),
 ### A reward term
 @ environment/rewards.py @REWARD_TERMS:
-def presence(world: Warehouse, before: Before) -> Earned:
+def presence(world: Warehouse, before: Moment, after: Moment) -> Earned:
     return np.ones(world.state.n_robots)
 @ environment/rewards.py @    "own_delivery": own
     "presence": presence,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import SetupError, suggest
+from swarm_logistics_env.floor.floor_plan import NO_DOCK
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
 
@@ -42,24 +43,31 @@ class RewardTerms:
 
     def begin(self, world: Warehouse) -> None:
         """Store the state at the start of an episode."""
-        self._before = Before(world)
+        self._before = Moment(world)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
         """Return the reward of the step just taken, (N,): one number for each robot."""
+        before, after = self._before, Moment(world)
         total = np.zeros(world.state.n_robots)
         for term, weight in self._terms:
-            earned = term(world, self._before)
+            earned = term(world, before, after)
             if earned is not None:
                 total += weight * earned
-        self._before = Before(world)
+        self._before = after
         return total
 
 
-class Before:
-    """The state before a step, with which the terms compare the state after it.
+class Moment:
+    """The state between two steps: the terms compare that before a step with that after it.
 
     Args:
         world: the world in that state.
+
+    Attributes:
+        delivered: the number of items delivered so far.
+        requested: which items are asked for (I,).
+        carriers: the robot that carries each item (I,), or NOBODY.
+        item_position, robot_position: (I, 2) and (N, 2) [m].
     """
 
     def __init__(self, world: Warehouse) -> None:
@@ -69,6 +77,12 @@ class Before:
         self.carriers = state.item_carrier.copy()
         self.item_position = state.item_position.copy()
         self.robot_position = state.robot_position.copy()
+
+    def carries_requested(self, state: WarehouseState) -> NDArray[np.bool_]:
+        """Return which robots carry an item that is asked for (N,), as `state` does."""
+        items = state.robot_item
+        carries: NDArray[np.bool_] = (items != NOBODY) & self.requested[items]
+        return carries
 
     def keeps(self, state: WarehouseState, robots: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which of these robots carried what they carry already, and it was requested."""
@@ -80,27 +94,26 @@ class Before:
 Earned = NDArray[np.float64] | float | None  # per robot, the same for all, or nothing
 
 
-def delivery(world: Warehouse, before: Before) -> Earned:
+def delivery(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """Items delivered in this step, to every robot of the team."""
-    return float(world.state.delivered - before.delivered) or None
+    return float(after.delivered - before.delivered) or None
 
 
-def own_delivery(world: Warehouse, before: Before) -> Earned:
+def own_delivery(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """Items that the robot itself delivered in this step."""
-    deliverers = world.state.delivered_by[before.delivered :]
-    if not deliverers:
+    if after.delivered == before.delivered:
         return None
+    deliverers = world.state.delivered_by[before.delivered :]
     return np.bincount(deliverers, minlength=world.state.n_robots).astype(np.float64)
 
 
-def lift_requested(world: Warehouse, before: Before) -> Earned:
+def lift_requested(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """1 to the robot that took up a requested item, -1 to the one that let go of it.
 
     Nothing to one that cannot deliver (privileged: as `approach`).
     """
-    state = world.state
-    carriers = world.state.item_carrier
-    items = np.flatnonzero(before.requested & state.item_requested & (carriers != before.carriers))
+    state, carriers = world.state, after.carriers
+    items = np.flatnonzero(before.requested & after.requested & (carriers != before.carriers))
     if not items.size:
         return None
     reward = np.zeros(state.n_robots)
@@ -108,7 +121,7 @@ def lift_requested(world: Warehouse, before: Before) -> Earned:
     for item in items.tolist():
         carrier, previous_carrier = int(carriers[item]), int(before.carriers[item])
         # One that was delivered and is asked for again does not lie where its carrier stands.
-        is_back = state.delivered != before.delivered and carrier == NOBODY
+        is_back = after.delivered != before.delivered and carrier == NOBODY
         if is_back and (state.item_position[item] != state.robot_position[previous_carrier]).any():
             continue
         if carrier != NOBODY and delivers[carrier]:
@@ -118,7 +131,7 @@ def lift_requested(world: Warehouse, before: Before) -> Earned:
     return reward
 
 
-def approach(world: Warehouse, before: Before) -> Earned:
+def approach(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """Metres that the carrier of a requested item came nearer to the dock, on free floor.
 
     To the one that the request names, or else to the nearest.
@@ -126,7 +139,7 @@ def approach(world: Warehouse, before: Before) -> Earned:
     Privileged: no robot can sense it, so it may shape a reward but not an observation.
     """
     state, floor = world.state, world.floor
-    robots = np.flatnonzero(state.carries_requested)
+    robots = np.flatnonzero(after.carries_requested(state))
     robots = robots[before.keeps(state, robots)]
     if not robots.size:
         return None
@@ -137,7 +150,7 @@ def approach(world: Warehouse, before: Before) -> Earned:
     return reward
 
 
-def stocking(world: Warehouse, before: Before) -> Earned:
+def stocking(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """Metres that the item a robot carries, requested or not, came nearer to the delivery area.
 
     The way counts from where the item lay, so no circle earns: carrying it back costs as much.
@@ -145,32 +158,34 @@ def stocking(world: Warehouse, before: Before) -> Earned:
     """
     state, floor = world.state, world.floor
     # The step in which a robot lets go still moves the item; one that was delivered lies elsewhere.
-    carriers = np.where(state.item_carrier == NOBODY, before.carriers, state.item_carrier)
-    delivered = np.isin(before.carriers, state.delivered_by[before.delivered :])
-    items = np.flatnonzero((carriers != NOBODY) & ~delivered)
+    carriers = np.where(after.carriers == NOBODY, before.carriers, after.carriers)
+    if after.delivered != before.delivered:
+        deliverers = state.delivered_by[before.delivered :]
+        carriers[np.isin(before.carriers, deliverers)] = NOBODY
+    items = np.flatnonzero(carriers != NOBODY)
     if not items.size:
         return None
-    docks = state.item_docks[items]
-    metres = np.minimum(floor.along(state.item_position[items], docks), floor.edge)
+    names_docks = (state.requested_docks != NOBODY).any()
+    docks = state.item_docks[items] if names_docks else NO_DOCK
+    metres = np.minimum(floor.along(after.item_position[items], docks), floor.edge)
     metres -= np.minimum(floor.along(before.item_position[items], docks), floor.edge)
-    reward = np.zeros(state.n_robots)
-    np.add.at(reward, carriers[items], metres)  # who lets go of one may lift another at once
-    return reward
+    # Who lets go of one may lift another at once: both count.
+    return np.asarray(np.bincount(carriers[items], metres, state.n_robots), np.float64)
 
 
-def contact(world: Warehouse, before: Before) -> Earned:
+def contact(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """Seconds that the robot touched a robot, a wall or an obstacle; weigh it negatively."""
     return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
 
 
-def blocked_request(world: Warehouse, before: Before) -> Earned:
+def blocked_request(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """Seconds that a robot that cannot deliver held a requested item; weigh it negatively.
 
     A metre into the delivery area counts `SECONDS_A_METRE`, and the way out gives them back: an
     item that is let go there is found by nobody. Privileged: as `approach`.
     """
     state, floor = world.state, world.floor
-    robots = np.flatnonzero(state.carries_requested & ~state.delivers)
+    robots = np.flatnonzero(after.carries_requested(state) & ~state.delivers)
     if not robots.size:
         return None
     reward = np.zeros(state.n_robots)
@@ -184,7 +199,7 @@ def blocked_request(world: Warehouse, before: Before) -> Earned:
 
 SECONDS_A_METRE = 2.0
 
-REWARD_TERMS: dict[str, Callable[[Warehouse, Before], Earned]] = {
+REWARD_TERMS: dict[str, Callable[[Warehouse, Moment, Moment], Earned]] = {
     "delivery": delivery,
     "own_delivery": own_delivery,
     "lift_requested": lift_requested,

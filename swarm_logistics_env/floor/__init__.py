@@ -1,4 +1,4 @@
-"""Floors: plans of warehouses with racks, walls and docks, and ways in them."""
+"""Floors: plans of warehouses with racks, walls and docks. `ways`, which is compiled, is apart."""
 
 from .floor_plan import (
     PLAN_SIZES,
@@ -9,17 +9,13 @@ from .floor_plan import (
     plan_text,
     with_plan_sizes,
 )
-from .ways import FloorMap, OpenFloor, planned_floor
 
 __all__ = [
     "PLAN_SIZES",
-    "FloorMap",
     "FloorPlan",
-    "OpenFloor",
     "floor_plan",
     "floor_title",
     "plan_names",
     "plan_text",
-    "planned_floor",
     "with_plan_sizes",
 ]

@@ -8,6 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.kernels import inlined_kernel, kernel
+
 from .floor_plan import NO_DOCK, RACK, FloorPlan, Mask, floor_plan
 
 Numbers = NDArray[np.float64]
@@ -73,7 +75,7 @@ class PlannedFloor:
     def __init__(self, plan: FloorPlan) -> None:
         self._plan = plan
         self._is_open = plan.kind > RACK
-        self._fields: dict[int, tuple[Numbers, Numbers]] = {}
+        self._fields: dict[int, tuple[Numbers, Numbers, Mask]] = {}
 
     def is_free(self, points: ArrayLike) -> Mask:
         """Return whether points lie inside the plan and outside of walls and racks (n,)."""
@@ -87,34 +89,32 @@ class PlannedFloor:
     def along(self, points: ArrayLike, docks: ArrayLike = NO_DOCK) -> Numbers:
         """Return the depth in a dock, or less than 0, the way to it (n,) [m]; see `FloorMap`."""
         cells = _points(points) / self._plan.cell_size
-        numbers = np.broadcast_to(np.asarray(docks), len(cells))
+        numbers = np.asarray(docks)
         along = np.empty(len(cells))
+        if numbers.ndim == 0:
+            self._fill(along, cells, int(numbers))
+            return along
         for dock in np.unique(numbers).tolist():
             is_for_dock = numbers == dock
-            along[is_for_dock] = self._along(cells[is_for_dock], dock)
+            of_dock = np.empty(is_for_dock.sum())
+            self._fill(of_dock, cells[is_for_dock], dock)
+            along[is_for_dock] = of_dock
         return along
 
-    def _along(self, cells: Numbers, dock: int) -> Numbers:
-        rows, columns = self._cells(cells)
-        is_dock = self._is_dock(dock)
-        # A dock begins half a cell before the centre of its first cell.
-        half = 0.5 * self._plan.cell_size
-        way, depth = (_at_points(far, self._is_open, cells) - half for far in self._far(dock))
-        is_inside = is_dock[rows, columns]
-        return np.where(is_inside, np.maximum(depth, 0.0), -np.maximum(way, 0.0))
+    def _fill(self, along: Numbers, cells: Numbers, dock: int) -> None:
+        """Fill how far along the way into a dock points are (n,) [m], given in cells (n, 2)."""
+        to_dock, to_outside, is_dock = self._far(dock)
+        _fill_along(to_dock, to_outside, is_dock, self._is_open, self._plan.cell_size, cells, along)
 
-    def _is_dock(self, dock: int) -> Mask:
-        return self._plan.dock >= 0 if dock == NO_DOCK else self._plan.dock == dock
-
-    def _far(self, dock: int) -> tuple[Numbers, Numbers]:
-        """Return how far each cell is from a dock, and from what is outside of it [m]."""
+    def _far(self, dock: int) -> tuple[Numbers, Numbers, Mask]:
+        """Return how far cells are from a dock and from what is outside of it [m]; which it has."""
         if dock not in self._fields:
-            is_dock = self._is_dock(dock)
+            is_dock = self._plan.dock >= 0 if dock == NO_DOCK else self._plan.dock == dock
             goals = is_dock, self._is_open & ~is_dock
             to_dock, to_outside = (
                 _distances(self._is_open, goal, self._plan.cell_size) for goal in goals
             )
-            self._fields[dock] = to_dock, to_outside
+            self._fields[dock] = to_dock, to_outside, is_dock
         return self._fields[dock]
 
     def _cells(self, cells: Numbers) -> tuple[Indices, Indices]:
@@ -173,29 +173,61 @@ def _distances(may_pass: Mask, is_goal: Mask, cell_size: float) -> Numbers:
     return np.asarray(np.minimum(far, farthest).reshape(may_pass.shape))
 
 
-def _at_points(far: Numbers, is_open: Mask, cells: Numbers) -> Numbers:
-    """Return the distances of points, bilinear between the centres of the cells around them.
+@kernel
+def _fill_along(
+    to_dock: Numbers,
+    to_outside: Numbers,
+    is_dock: Mask,
+    is_open: Mask,
+    cell_size: float,
+    cells: Numbers,
+    along: Numbers,
+) -> None:
+    """Fill how far along the way into a dock points are (n,) [m]; see `FloorMap.along`.
 
-    Beside a rack they are those of the cell itself, so that nothing leaks through.
+    Args:
+        to_dock, to_outside: distances of each cell's centre [m].
+        is_dock, is_open: which cells are the dock's, and which are no racks.
+        cell_size: [m].
+        cells: x and y of the points (n, 2) in cells.
+    """
+    # A dock begins half a cell before the centre of its first cell.
+    half = 0.5 * cell_size
+    n_rows, n_columns = is_open.shape
+    for point in range(len(cells)):
+        x, y = cells[point, 0], cells[point, 1]
+        column, row = min(max(int(x), 0), n_columns - 1), min(max(int(y), 0), n_rows - 1)
+        if is_dock[row, column]:
+            along[point] = max(_at_point(to_outside, is_open, row, column, x, y) - half, 0.0)
+        else:
+            along[point] = -max(_at_point(to_dock, is_open, row, column, x, y) - half, 0.0)
+
+
+@inlined_kernel
+def _at_point(far: Numbers, is_open: Mask, row: int, column: int, x: float, y: float) -> float:
+    """Return the distance of a point, bilinear between the centres of the cells around it.
+
+    Beside a rack it is that of the cell itself, so that nothing leaks through.
 
     Args:
         far: distance of each cell's centre [m].
         is_open: which cells are no racks.
-        cells: x and y of the points (n, 2) in cells.
+        row, column: of the cell that the point lies in.
+        x, y: of the point, in cells.
     """
-    shape = np.array(far.shape[::-1])
-    own = np.clip(cells.astype(np.int64), 0, shape - 1)
-    aside = np.clip(cells, 0.0, shape) - own - 0.5  # from the cell's centre, within +-0.5
-    weight_x, weight_y = np.abs(aside).T
-    column, row = own.T
-    next_column, next_row = np.clip(own + np.where(aside < 0.0, -1, 1), 0, shape - 1).T
-    may_x, may_y = is_open[row, next_column], is_open[next_row, column]
+    n_rows, n_columns = is_open.shape
+    # From the cell's centre, within +-0.5.
+    aside_x = min(max(x, 0.0), n_columns) - column - 0.5
+    aside_y = min(max(y, 0.0), n_rows) - row - 0.5
+    weight_x, weight_y = abs(aside_x), abs(aside_y)
+    next_column = min(max(column + (-1 if aside_x < 0.0 else 1), 0), n_columns - 1)
+    next_row = min(max(row + (-1 if aside_y < 0.0 else 1), 0), n_rows - 1)
     here = far[row, column]
-    along_x = np.where(may_x, far[row, next_column], here)
-    along_y = np.where(may_y, far[next_row, column], here)
-    may_both = may_x & may_y & is_open[next_row, next_column]
-    askew = np.where(may_both, far[next_row, next_column], along_x + along_y - here)
+    along_x = far[row, next_column] if is_open[row, next_column] else here
+    along_y = far[next_row, column] if is_open[next_row, column] else here
+    askew = along_x + along_y - here
+    if is_open[row, next_column] and is_open[next_row, column] and is_open[next_row, next_column]:
+        askew = far[next_row, next_column]
     near_y = (1.0 - weight_x) * here + weight_x * along_x
-    return np.asarray(
-        (1.0 - weight_y) * near_y + weight_y * ((1.0 - weight_x) * along_y + weight_x * askew)
-    )
+    far_y = (1.0 - weight_x) * along_y + weight_x * askew
+    return float((1.0 - weight_y) * near_y + weight_y * far_y)

@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 
-from swarm_logistics_env.floor import FloorMap, OpenFloor, floor_plan, planned_floor
+from swarm_logistics_env.floor import floor_plan
 from swarm_logistics_env.floor.floor_plan import RACK, STORAGE, merged_boxes
+from swarm_logistics_env.floor.ways import FloorMap, OpenFloor, planned_floor
 from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
 from swarm_logistics_env.scenario import Scenario
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.bodies import load_bodies
 from swarm_logistics_env.errors import ScenarioError, SetupError
-from swarm_logistics_env.floor import FloorMap
+from swarm_logistics_env.floor.ways import FloorMap
 from swarm_logistics_env.observations import n_columns
 from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
 
