@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,15 +73,28 @@ class Play:
         faults: Sequence[FaultLike] = (),
         policy_seed: int | None = None,
     ) -> None:
-        self.world = Warehouse(scenario)
         self._policy = policy
-        self.world.reset(seed, faults)
+        wrap = getattr(policy, "wrap", None)
+        if wrap is None:
+            self._env = None
+            self.world = Warehouse(scenario)
+            self._rows = self.world.reset(seed, faults)
+        else:
+            self._env, self._rows = _begun(wrap, scenario, seed, faults)
+            self.world = self._env.warehouse
         start(policy, scenario, seed if policy_seed is None else policy_seed)
 
     @property
     def is_over(self) -> bool:
         """Whether the time is up or everything is delivered."""
+        if self._env is not None and not self._env.agents:
+            return True
         return self.world.is_over_time or self.world.all_delivered
+
+    @property
+    def may_be_over(self) -> bool:
+        """Whether to ask `is_over` after a step: without an event no world's episode ends."""
+        return self.world.is_eventful or self._env is not None
 
     def step(self) -> None:
         """Take one control period, or do nothing once the episode is over.
@@ -89,22 +103,44 @@ class Play:
             PolicyError: the policy returned commands of the wrong shape, or not finite.
         """
         if not self.is_over:
-            self.advance(self.world.observe())
+            if self._env is None:
+                self._rows = self.world.observe()  # others, if the caller changed the world
+            self.advance()
 
-    def advance(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Take one control period upon observation rows (N, D); return what is sensed after it.
-
-        Raises:
-            PolicyError: as `step`.
-        """
+    def advance(self) -> None:
+        """Do as `step` where nobody changed the world and the episode is not over."""
         world = self.world
-        commands = decide(self._policy, rows, world.state)
+        commands = decide(self._policy, self._rows, world.state)
         try:
-            return world.step(commands)
+            if self._env is None:
+                self._rows = world.step(commands)
+            else:
+                self._rows = self._env.step_arrays(commands)[0]
         except CommandError as error:
             raise PolicyError(
                 f"{type(self._policy).__name__} at {world.state.time:g} s: {error}"
             ) from error
+
+
+def _begun(
+    wrap: Callable[[Any], Any], scenario: Scenario, seed: int, faults: Sequence[FaultLike]
+) -> tuple[Any, NDArray[np.float32]]:
+    """Return the environment that a policy plays in, and its first rows (N, D)."""
+    from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+
+    core = SwarmLogisticsEnv(scenario, faults=faults)
+    env = wrap(core)
+    if getattr(env, "unwrapped", None) is not core or not hasattr(env, "reset_arrays"):
+        raise PolicyError(
+            f"wrap made {env!r} of the environment: should be wrappers around it (wrappers.Wrapper)"
+        )
+    rows = env.reset_arrays(seed, {"scenario": {"n_robots": scenario.n_robots}})
+    if (core.warehouse.scenario, core.warehouse.faults) != (scenario, core.faults):
+        raise PolicyError(
+            "wrap changed the conditions of the episode: should add sensors, rewards or actions, "
+            "and leave scenario and faults to the study"
+        )
+    return env, rows
 
 
 def run_episode(
@@ -136,12 +172,11 @@ def run_episode(
     digest = hashlib.blake2b(digest_size=16)
     with one_thread():  # once for all steps, as each change takes a while
         play = Play(scenario, policy, seed, faults, policy_seed)
-        world, rows = play.world, play.world.observe()
-        is_over = play.is_over
+        world, is_over = play.world, play.is_over
         while not is_over:
-            rows = play.advance(rows)
+            play.advance()
             digest.update(world.state.robot_position.data)
-            is_over = world.is_eventful and play.is_over  # no end without an event
+            is_over = play.may_be_over and play.is_over
     return episode_of(world, seed, digest)
 
 

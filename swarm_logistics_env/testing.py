@@ -73,7 +73,8 @@ def check_wrapper(
 
     Args:
         make: returns a new `SwarmLogisticsEnv` in any parallel wrappers.
-        policy: who plays: a name, a path, or the object.
+        policy: who plays: a name, a path, or the object. Where actions are no commands of the
+            warehouse they are drawn.
         steps: the largest number of steps to play.
 
     Raises:
@@ -102,8 +103,12 @@ def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[
         commands = np.asarray(decide(player, rows, world.state))
         actions = {}
         for agent in env.agents:
-            robot, action = int(agent.removeprefix("robot_")), env.action_space(agent)
-            actions[agent] = np.zeros(action.shape, np.float32)
+            robot, space = int(agent.removeprefix("robot_")), env.action_space(agent)
+            if space != env.unwrapped.action_space(agent):  # it has a form of commands of its own
+                space.seed(step)
+                actions[agent] = space.sample()
+                continue
+            actions[agent] = np.zeros(space.shape, np.float32)
             if robot < len(commands):  # with FixedAgents there are agents without a robot
                 actions[agent][: commands.shape[1]] = commands[robot]
         observations, rewards, *_ = env.step(actions)
@@ -112,13 +117,32 @@ def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[
 
 def _check_observations(env: Any, step: int, observations: Moment) -> Moment:
     for agent in env.agents:
-        space: Box = env.observation_space(agent)
-        observation = observations.get(agent)
-        if not isinstance(observation, np.ndarray) or not space.contains(observation):
-            raise CheckError(
-                f"{agent}'s observation at step {step} is outside of {space}: {observation}"
-            )
+        fault = _fault_of(observations.get(agent), env.observation_space(agent))
+        if fault:
+            raise CheckError(f"{agent}'s observation at step {step} {fault}")
     return {agent: value.tobytes() for agent, value in observations.items()}
+
+
+def _fault_of(observation: Any, space: Box) -> str:
+    """Return what is wrong with an observation, in words; empty: nothing."""
+    if not isinstance(observation, np.ndarray):
+        return f"is {observation!r:.80}: should be an array"
+    if observation.shape != space.shape or not np.can_cast(observation.dtype, space.dtype):
+        return (
+            f"has shape {observation.shape} and type {observation.dtype}: should have "
+            f"{space.shape} and {space.dtype}, as observation_space says; a wrapper that adds "
+            "numbers overrides that, too"
+        )
+    is_outside = ~((space.low <= observation) & (observation <= space.high))
+    if not is_outside.any():
+        return ""
+    places = np.argwhere(is_outside)
+    first = tuple(places[0].tolist())
+    more = f", and {len(places) - 1} more columns" if len(places) > 1 else ""
+    return (
+        f"has {observation[first]} in column {', '.join(map(str, first))}{more}: should be "
+        f"{space.low[first]} to {space.high[first]}, as observation_space says"
+    )
 
 
 def _compare(first: list[Any], second: list[Any], situation: str) -> None:

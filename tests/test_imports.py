@@ -43,13 +43,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "bodies": FOUNDATION | {"code_files"},
     "warehouse": FOUNDATION | {"bodies", "observations"},
     "rendering": FOUNDATION | {"warehouse"},
-    "environment": WORLD | {"rendering"},
+    "environment": WORLD | {"code_files", "rendering"},  # a reward may be a function of the user's
     "swarm_logistics_v0": WORLD | {"environment"},
     "motion": FOUNDATION | {"observations"},
     "wrappers": ENVIRONMENT | {"motion", "spi"},
     "policies": WORLD | {"code_files", "fingerprint", "motion"},
     "adapters": ENVIRONMENT | {"motion", "policies", "wrappers"},
-    "episode": WORLD | {"policies"},
+    "episode": WORLD | {"policies", "environment"},  # that a policy names
     "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
     "tasks": RUNS | {"code_files", "fingerprint"},

@@ -11,7 +11,14 @@ import pytest
 from swarm_logistics_env import Scenario, testing
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.swarm_logistics_v0 import parallel_env
-from swarm_logistics_env.wrappers import FaultInjection, FixedAgents, SwarmSize, Wrapper
+from swarm_logistics_env.wrappers import (
+    DiscreteActions,
+    FaultInjection,
+    FixedAgents,
+    MotionFrame,
+    SwarmSize,
+    Wrapper,
+)
 
 SMALL = Scenario(n_robots=6, n_items=12, warehouse_width=5.0, warehouse_height=4.0, duration=60.0)
 
@@ -30,6 +37,13 @@ class Magnifies(Wrapper):
         return rows * np.float32(100.0), *rest
 
 
+class Adds(Wrapper):
+    """Adds a number that it does not declare."""
+
+    def reset_arrays(self, seed: Any = None, options: Any = None) -> Any:
+        return np.pad(super().reset_arrays(seed, options), ((0, 0), (0, 1)))
+
+
 class Counts(Wrapper):
     steps = 0  # of any world
 
@@ -46,13 +60,15 @@ def test_what_the_package_has_passes() -> None:
         return FixedAgents(SwarmSize(env, [6, 9], leave=[(1, 3.0)]))
 
     testing.check_wrapper(make, steps=60)
+    testing.check_wrapper(lambda: DiscreteActions(MotionFrame(make().env)), steps=60)
     testing.check_policy("swarm-dt", SMALL, steps=60)
 
 
 @pytest.mark.parametrize(
     ("wrapper", "sentence"),
     [
-        (Magnifies, "outside"),
+        (Magnifies, r"has .* in column \d+, and \d+ more columns: should be -?\d.* to \d"),
+        (Adds, r"at step 0 has shape \(142,\) .*: should have \(141,\) .*overrides that, too$"),
         (Counts, "another episode"),
         (lambda _: SimpleNamespace(unwrapped=None), "should be a SwarmLogisticsEnv"),
     ],

@@ -37,7 +37,7 @@ from .app import (
     scenario_of,
 )
 from .judge_trials import judge_trials, pairs
-from .policy_choice import FrameOption, NormalizeOption, policies_of
+from .policy_choice import EnvOption, FrameOption, NormalizeOption, policies_of
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .study_commands import (
     ClearingOption,
@@ -143,6 +143,7 @@ def judge_command(
     trust_code: TrustOption = False,
     frame: FrameOption = False,
     normalize: NormalizeOption = None,
+    env: EnvOption = None,
 ) -> None:
     """Judge a policy until its verdicts are clear, or recorded trials.
 
@@ -161,6 +162,7 @@ def judge_command(
         "--seeds": seeds, "--minutes": minutes, "--clearing": clearing,
         "--set": changes, "--bodies": bodies, "--benchmark": as_benchmark,
         "--run-limit": run_limit, "--frame": frame, "--normalize": normalize,
+        "--env": env,
     }  # fmt: skip
     if not names_policy(policy_or_trials):
         _refuse(policy_options, policy_or_trials, "a file of trials")
@@ -188,7 +190,7 @@ def judge_command(
     if as_benchmark and (options := [option for option, value in conditions.items() if value]):
         raise StudyError(f"{options[0]}: the benchmark has the same conditions for everybody")
     engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
-    (policy,) = policies_of([policy_or_trials], trust_code, frame, normalize)
+    (policy,) = policies_of([policy_or_trials], trust_code, frame, normalize, env)
     tally = judge_policy(
         policy,
         out,

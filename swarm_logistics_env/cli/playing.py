@@ -32,7 +32,7 @@ from .app import (
     faults_of,
     scenario_of,
 )
-from .policy_choice import FrameOption, NormalizeOption, policies_of
+from .policy_choice import EnvOption, FrameOption, NormalizeOption, policies_of
 
 FRAME_RATE = 25.0  # frames a second
 
@@ -69,11 +69,12 @@ def run_command(
     trust_code: TrustOption = False,
     frame: FrameOption = False,
     normalize: NormalizeOption = None,
+    env: EnvOption = None,
 ) -> None:
     """Play one episode and print what it delivered, or write a film."""
     scenario = scenario_of(preset, scenario_file, changes, bodies)
     scheduled = faults_of(faults, scenario)
-    players = policies_of(policies or ["swarm-dt"], trust_code, frame, normalize)
+    players = policies_of(policies or ["swarm-dt"], trust_code, frame, normalize, env)
     if film is not None:
         variants = [(faults or [], scheduled)]
         if twin:
@@ -137,6 +138,7 @@ def watch_command(
     trust_code: TrustOption = False,
     frame: FrameOption = False,
     normalize: NormalizeOption = None,
+    env: EnvOption = None,
 ) -> None:
     """Watch two runs in the browser; inspect, break and repair robots."""
     import webbrowser
@@ -149,7 +151,7 @@ def watch_command(
     if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
         raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
     scenario = scenario_of(preset, scenario_file, changes, bodies)
-    players = policies_of(filter(None, (policy, against)), trust_code, frame, normalize)
+    players = policies_of(filter(None, (policy, against)), trust_code, frame, normalize, env)
     typed = {display_name(player.name): player for player in players}
     session = Session(
         scenario,

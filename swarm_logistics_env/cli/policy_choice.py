@@ -22,23 +22,41 @@ NormalizeOption = Annotated[
 ]
 
 
+EnvOption = Annotated[
+    str | None,
+    Option(
+        metavar="my.py:NAME",
+        help="What wraps the environment that the policies play in: their own sensors or actions.",
+    ),
+]
+
+
 def policies_of(
-    texts: Iterable[str], trust_code: bool, frame: bool = False, normalize: Path | None = None
+    texts: Iterable[str],
+    trust_code: bool,
+    frame: bool = False,
+    normalize: Path | None = None,
+    env: str | None = None,
 ) -> list[PolicySpec]:
-    """Return the policies that `--policy`, `--trust-code`, `--frame` and `--normalize` describe.
+    """Return the policies that `--policy` and the options of policies describe.
 
     Raises:
-        SetupError: the last two are given, but no model that they could be for.
+        SetupError: `--frame` or `--normalize`, but no model that it could be for.
     """
     policies = [PolicySpec.of(text).replace(trusted=trust_code) for text in texts]
-    options: dict[str, JsonValue] = {"frame": True} if frame else {}
+    of_all: dict[str, JsonValue] = {} if env is None else {"env": env}
+    of_models: dict[str, JsonValue] = {"frame": True} if frame else {}
     if normalize is not None:
-        options["normalize"] = str(normalize)
-    if options and not any(policy.name.endswith(SB3_SUFFIX) for policy in policies):
+        of_models["normalize"] = str(normalize)
+    if of_models and not any(map(_is_model, policies)):
         raise SetupError(
-            f"--{next(iter(options))}: is for a model of stable-baselines3, a {SB3_SUFFIX} file"
+            f"--{next(iter(of_models))}: is for a model of stable-baselines3, a {SB3_SUFFIX} file"
         )
     return [
-        policy.replace(parameters=options) if policy.name.endswith(SB3_SUFFIX) else policy
+        policy.replace(parameters=of_all | of_models if _is_model(policy) else of_all)
         for policy in policies
     ]
+
+
+def _is_model(policy: PolicySpec) -> bool:
+    return policy.name.endswith(SB3_SUFFIX)

@@ -23,7 +23,7 @@ from swarm_logistics_env.verdicts.gate import SUBJECTS, Gate, GateAnswer, answer
 from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 
 from .app import BodiesOption, Repeated, SetOption, TrustOption, changed_fields
-from .policy_choice import FrameOption, NormalizeOption, policies_of
+from .policy_choice import EnvOption, FrameOption, NormalizeOption, policies_of
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .terminal import (
     AnswerSoFar,
@@ -120,6 +120,7 @@ def run_command(
     trust_code: TrustOption = False,
     frame: FrameOption = False,
     normalize: NormalizeOption = None,
+    env: EnvOption = None,
 ) -> None:
     """Play what is missing, print the answer, write the report."""
     part = Shard.parse(shard) if shard else None
@@ -127,7 +128,7 @@ def run_command(
         seeds = MOST_SEEDS_UNTIL_CLEAR
     looks = until_clear or None
     fields = changed_fields(changes, bodies)
-    policy_specs = policies_of(policies or (), trust_code, frame, normalize)
+    policy_specs = policies_of(policies or (), trust_code, frame, normalize, env)
     study = study_of(
         study_name, out, seeds, policy_specs, trust_code, first_seed=first_seed, until_clear=looks
     )

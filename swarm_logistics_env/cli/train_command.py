@@ -33,11 +33,14 @@ def train_command(
     device: Annotated[
         str | None, Option(help="cpu or cuda; the GPU where there is one if not given.")
     ] = None,
+    trust_code: Annotated[
+        bool, Option("--trust-code", help="Let the file name reward terms of your own code.")
+    ] = False,
 ) -> None:
     """Train a policy; the same command goes on where it was stopped."""
     options = {"seed": seed, "agent_steps": steps}
     fields = {name: value for name, value in options.items() if value is not None}
-    training = load_training(preset, **fields)
+    training = load_training(preset, trust_code=trust_code, **fields)
     try:
         import_module("tensorboard")  # missed before anything is written
         from swarm_logistics_env.train.trainer import train

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import SetupError, suggest
+from swarm_logistics_env.code_files import import_named
+from swarm_logistics_env.errors import RAISED_BY_OTHERS, SetupError, suggest
 from swarm_logistics_env.floor.floor_plan import NO_DOCK
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
@@ -19,7 +21,10 @@ class RewardTerms:
     """The weighted sum of named terms, one value per robot and step.
 
     Args:
-        weights: term -> weight; see `REWARD_TERMS` for the terms.
+        weights: term -> weight; see `REWARD_TERMS` for the terms. "my.py:term" or
+            "package.module:term" is one of your own, whose module is imported, and so executed:
+            a function of (world, before, after), see `Moment`, that returns what each robot earned
+            in the step (N,), or one number for all.
 
     Attributes:
         pays_steadily: whether a step without a delivery may pay.
@@ -35,11 +40,23 @@ class RewardTerms:
             )
         weights = DEFAULT_WEIGHTS if weights is None else weights
         for name, weight in weights.items():
-            if name not in REWARD_TERMS:
-                raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
+            term_of(name)
             finite_number(f"rewards[{name!r}]", weight)
-        self._terms = [(REWARD_TERMS[name], weight) for name, weight in weights.items()]
+        self.reweigh(weights)
+
+    def reweigh(self, weights: Mapping[str, float]) -> None:
+        """Pay by other terms or weights from the next step on."""
+        self._weights = dict(weights)
+        self._terms = [(term_of(name), weight) for name, weight in weights.items()]
         self.pays_steadily = not _AT_DELIVERIES.issuperset(weights)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A function of the user's file is imported anew.
+        return {name: value for name, value in vars(self).items() if name != "_terms"}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        self.__dict__.update(saved)
+        self.reweigh(self._weights)
 
     def begin(self, world: Warehouse) -> None:
         """Store the state at the start of an episode."""
@@ -199,7 +216,8 @@ def blocked_request(world: Warehouse, before: Moment, after: Moment) -> Earned:
 
 SECONDS_A_METRE = 2.0
 
-REWARD_TERMS: dict[str, Callable[[Warehouse, Moment, Moment], Earned]] = {
+Term = Callable[[Warehouse, Moment, Moment], Earned]
+REWARD_TERMS: dict[str, Term] = {
     "delivery": delivery,
     "own_delivery": own_delivery,
     "lift_requested": lift_requested,
@@ -209,6 +227,26 @@ REWARD_TERMS: dict[str, Callable[[Warehouse, Moment, Moment], Earned]] = {
     "blocked_request": blocked_request,
 }
 _AT_DELIVERIES = {"delivery", "own_delivery"}
+
+
+def term_of(name: str) -> Term:
+    """Return the reward term of that name, or the one that "my.py:term" names.
+
+    Raises:
+        SetupError: there is none.
+    """
+    if name in REWARD_TERMS:
+        return REWARD_TERMS[name]
+    if ":" not in name:
+        raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
+    try:
+        term: Term = import_named(name)
+    except RAISED_BY_OTHERS as error:  # of code that is not ours, too
+        kind = type(error).__name__
+        raise SetupError(f"reward term {name!r} cannot be imported: {kind}: {error}") from error
+    if not callable(term):
+        raise SetupError(f"reward term {name!r} is a {type(term).__name__}: should be a function")
+    return term
 
 
 def finite_number(name: str, value: float) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from swarm_logistics_env.policies.files import read_card, write_onnx
     from swarm_logistics_env.policies.learned import PolicyCard
-    from swarm_logistics_env.policies.models import of
+    from swarm_logistics_env.policies.models import of, within
     from swarm_logistics_env.policies.policy import Policy, identity
     from swarm_logistics_env.policies.sb3_files import from_sb3
     from swarm_logistics_env.policies.spec import (
@@ -39,6 +39,7 @@ __all__ = [
     "load",
     "of",
     "read_card",
+    "within",
     "write_onnx",
 ]
 
@@ -46,7 +47,7 @@ __all__ = [
 _HOMES = {
     "files": {"read_card", "write_onnx"},
     "learned": {"PolicyCard"},
-    "models": {"of"},
+    "models": {"of", "within"},
     "policy": {"Policy", "identity"},
     "sb3_files": {"from_sb3"},
     "spec": {"NAMES", "SUFFIXES", "PolicySpec", "display_name", "known_policies", "load"},

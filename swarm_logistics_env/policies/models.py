@@ -18,7 +18,8 @@ from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError
 from swarm_logistics_env.fingerprint import fingerprint, package_code
 from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
 from swarm_logistics_env.motion.frame import MotionView
-from swarm_logistics_env.policies.policy import Described
+from swarm_logistics_env.motion.network_inputs import INPUTS
+from swarm_logistics_env.policies.policy import Described, Policy, check_policy, identity
 from swarm_logistics_env.records import canonical_json
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -57,6 +58,86 @@ def of(
     parts = {"network": content, "frame": frame, "listens": listens, "normalize": normalizer}
     about = type(network).__name__
     return ModelPolicy(decide, prepare, parts, about=about, frame=frame, listens=listens)
+
+
+def within(model: Any, wrap: Callable[[Any], Any], *, normalize: Any = None) -> Within:
+    """Return a policy that plays in an environment of its own: its sensors, its form of commands.
+
+    Episodes and studies then play it through that environment, with their faults, sizes and
+    parameters as ever.
+
+    Args:
+        model: a network, as of `of`, or a policy: what turns that environment's rows into actions.
+        wrap: returns wrappers around the environment that it gets; it leaves the conditions alone.
+        normalize: of a network, as of `of`.
+
+    Raises:
+        PolicyError: one of them is something else.
+
+    Example:
+        >>> from swarm_logistics_env import Scenario, run_episode
+        >>> from swarm_logistics_env.wrappers import DiscreteActions
+        >>> forward = within(lambda rows: np.ones(len(rows), int), DiscreteActions)
+        >>> run_episode(Scenario(n_robots=2, duration=1.0), forward, seed=0).ended_at
+        1.0
+    """
+    if not callable(wrap):
+        raise PolicyError(f"wrap = {wrap!r}: should be a function of an environment")
+    if hasattr(model, "act"):
+        check_policy(model)
+        if normalize is not None:
+            raise PolicyError(f"normalize: is for a network, and {model!r} is a policy")
+        return Within(model, wrap)
+    return Within(_BareModel(model, normalize), wrap)
+
+
+class _BareModel(Described):
+    """A network whose outputs are actions as they are."""
+
+    def __init__(self, network: Any, normalize: Any) -> None:
+        self._decide, content = decider_of(network)
+        self._prepare, normalizer = normalizer_of(normalize)
+        self._about = type(network).__name__
+        parts = {"network": content, "normalize": normalizer, "code": package_code(*_CODE)}
+        self.identity = canonical_json(parts)
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode; nothing here is random."""
+
+    def act(self, observations: Rows) -> NDArray[Any]:
+        """Return an action for each row of observations (N, D)."""
+        return _outputs_of(self._decide, self._prepare, observations, self._about)
+
+
+class Within(Described):
+    """A policy and the wrappers that it plays in; made by `within`.
+
+    Attributes:
+        wrap: as given.
+        identity: text that changes with the policy, or with the code of the wrappers.
+    """
+
+    def __init__(self, policy: Policy, wrap: Callable[[Any], Any]) -> None:
+        self._policy, self.wrap = policy, wrap
+        self.needs_state = getattr(policy, "needs_state", False)
+        parts = {"policy": identity(policy), "wrap": fingerprint(wrap)}
+        self.identity = canonical_json(parts)
+
+    def __repr__(self) -> str:
+        return f"policies.within({self._policy!r}, {self.wrap!r})"
+
+    def configure(self, scenario: Scenario) -> None:
+        """Let the policy take what a robot's maker knows."""
+        if hasattr(self._policy, "configure"):
+            self._policy.configure(scenario)
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Let the policy begin an episode."""
+        self._policy.reset(n_robots, seed)
+
+    def act(self, *seen: Any) -> NDArray[Any]:
+        """Return the policy's actions for the environment's rows, and the state if need be."""
+        return self._policy.act(*seen)
 
 
 class ModelPolicy(Described):
@@ -113,7 +194,7 @@ class ModelPolicy(Described):
             PolicyError: the model fails, or its outputs are no commands.
         """
         rows = self._view.read(observations) if self._has_frame else observations
-        outputs = self._outputs(rows)
+        outputs = _outputs_of(self._decide, self._prepare, rows, self._about)
         n_robots = len(observations)
         actions = _actions_of(self._has_frame)
         if outputs.dtype.kind in "iu" and outputs.size == n_robots:
@@ -133,18 +214,20 @@ class ModelPolicy(Described):
             )
         return self._view.command(outputs) if self._has_frame else outputs
 
-    def _outputs(self, rows: Rows) -> NDArray[Any]:
-        try:
-            outputs: Any = self._decide(self._prepare(rows))
-            if hasattr(outputs, "detach"):  # a tensor, which may have a gradient or be on a GPU
-                outputs = outputs.detach().cpu()
-            return np.asarray(outputs)
-        except RAISED_BY_OTHERS as error:
-            kind = type(error).__name__
-            hint = "" if self._has_frame else "; if it learned through MotionFrame: frame=True"
-            raise PolicyError(
-                f"{self._about} failed with rows of shape {rows.shape} ({kind}: {error}){hint}"
-            ) from error
+
+def _outputs_of(decide: Decide, prepare: Decide, rows: Rows, about: str) -> NDArray[Any]:
+    try:
+        outputs: Any = decide(prepare(rows))
+        if hasattr(outputs, "detach"):  # a tensor, which may have a gradient or be on a GPU
+            outputs = outputs.detach().cpu()
+        return np.asarray(outputs)
+    except RAISED_BY_OTHERS as error:
+        kind = type(error).__name__
+        is_framed = rows.shape[1] == len(INPUTS)
+        hint = "" if is_framed else "; if it learned through MotionFrame: frame=True"
+        raise PolicyError(
+            f"{about} failed with rows of shape {rows.shape} ({kind}: {error}){hint}"
+        ) from error
 
 
 def _actions_of(frame: bool) -> NDArray[np.float64]:

@@ -31,6 +31,8 @@ class Policy(Protocol):
       `mask_unreachable_commands`;
     * `configure(scenario)`: called before `reset`, for what a robot's maker writes into it, such
       as its control period;
+    * `wrap(env)`: returns wrappers around `env`, an environment: what the policy senses and how it
+      commands, if not by rows and commands of the warehouse (see `policies.within`);
     * `identity`: text that names everything its behaviour depends on (see `identity`).
     """
 

@@ -7,6 +7,7 @@ import importlib
 import json
 import pickle
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,14 @@ from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError, how_to_ins
 from swarm_logistics_env.motion.frame import OUTPUTS
 from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.observations import N_COLUMNS, N_NEIGHBOURS
-from swarm_logistics_env.policies.models import ModelPolicy, Rows, decider_of, normalizer_of
+from swarm_logistics_env.policies.models import (
+    ModelPolicy,
+    Rows,
+    Within,
+    decider_of,
+    normalizer_of,
+    within,
+)
 from swarm_logistics_env.policies.policy import one_thread
 
 SB3_SUFFIX = ".zip"
@@ -30,14 +38,16 @@ def from_sb3(
     frame: bool = False,
     listens: bool = True,
     normalize: Any = None,
+    wrap: Callable[[Any], Any] | None = None,
     trust_code: bool = False,
-) -> ModelPolicy:
+) -> ModelPolicy | Within:
     """Return the policy of a model that stable-baselines3, or its contrib package, saved.
 
     Args:
         path: of the .zip file.
         frame, listens: as `of`.
         normalize: as `of`, or the path of the file that `VecNormalize.save` wrote.
+        wrap: as `within`, of a model that plays in an environment of its own.
         trust_code: whether to read the files, which executes the code in them.
 
     Raises:
@@ -47,13 +57,15 @@ def from_sb3(
     path = Path(path)
     refuse_untrusted(path, trust_code)
     model = read_model(path)
-    _check_spaces(path, model, frame)
-    parts: dict[str, Any] = {"sha256": _digest_of(path), "frame": frame, "listens": listens}
     if isinstance(normalize, str | Path):
-        parts["normalize"] = _digest_of(Path(normalize))
         normalize = _unpickled(Path(normalize))
+    if wrap is not None:
+        return within(model, wrap, normalize=normalize)
+    _check_spaces(path, model, frame)
     prepare, normalizer = normalizer_of(normalize)
-    parts.setdefault("normalize", normalizer)
+    parts = {
+        "sha256": _digest_of(path), "frame": frame, "listens": listens, "normalize": normalizer,
+    }  # fmt: skip
     decide, _ = decider_of(model)
     return ModelPolicy(decide, prepare, parts, about=path.name, frame=frame, listens=listens)
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Self, cast
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
@@ -34,6 +34,7 @@ from swarm_logistics_env.policies.files import (
 )
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
+from swarm_logistics_env.policies.models import within
 from swarm_logistics_env.policies.policy import Policy, check_policy, identity_parts
 from swarm_logistics_env.policies.sb3_files import (
     SB3_SUFFIX,
@@ -68,7 +69,9 @@ NAMES: dict[str, Callable[..., Policy]] = {
 }
 
 
-def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
+def load(
+    name: str, *, trust_code: bool = False, env: str | None = None, **parameters: Any
+) -> Policy:
     """Return the policy called `name`.
 
     Args:
@@ -78,6 +81,7 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
             train` wrote (.safetensors) executes nothing; a model that stable-baselines3 saved
             (.zip) does.
         trust_code: whether to read a file although that executes the code in it.
+        env: what wraps the environment that it plays in, as "my.py:wrap" (see `within`).
         parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
 
     Raises:
@@ -96,10 +100,13 @@ def load(name: str, *, trust_code: bool = False, **parameters: Any) -> Policy:
         hint = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, names)
         kinds = "a name, 'my.py:Class', 'package.module:Class', or a .safetensors or .zip file"
         raise PolicyError(f"no policy {name!r} ({kinds}){hint}")
+    wrap = None if env is None else _imported("env", env)
     try:
+        if wrap is not None and name.endswith(SB3_SUFFIX):
+            return make(wrap=wrap, **parameters)
         policy: Policy = make(**parameters)
         check_policy(policy)
-        return policy
+        return policy if wrap is None else within(policy, wrap)
     except SwarmLogisticsError:
         raise
     except RAISED_BY_OTHERS as error:  # of code that is not ours
@@ -203,7 +210,8 @@ class PolicySpec(Record):
     @property
     def runs_code(self) -> bool:
         """Whether to load it runs code that its name leads to, so that somebody has to trust it."""
-        return self.made is None and (":" in self.name or self.name.endswith(SB3_SUFFIX))
+        names_code = ":" in self.name or self.name.endswith(SB3_SUFFIX)
+        return self.made is None and (names_code or "env" in self.parameters)
 
     def load(self, makers: Makers = NO_MAKERS, planned: str | None = None) -> Policy:
         """Return the policy as no run has used it: an object is copied, a file read once a plan.
@@ -272,7 +280,7 @@ class PolicySpec(Record):
         if makers and self.name.endswith(SB3_SUFFIX):
             refuse_untrusted(Path(self.name), self.trusted)
             return StableBaselinesModel(Path(self.name))
-        return load(self.name, trust_code=self.trusted, **self.parameters)
+        return load(self.name, trust_code=self.trusted, **cast("dict[str, Any]", self.parameters))
 
     def identity(self, makers: Makers = NO_MAKERS) -> str:
         """Return text that changes whenever the policy's behaviour may have; `makers` as `load`.
@@ -370,15 +378,20 @@ def _entry_point_maker(name: str) -> Callable[..., Policy] | None:
 
 
 def _import_maker(name: str) -> Callable[..., Policy] | None:
+    return _imported("policy", name) if ":" in name else None
+
+
+def _imported(kind: str, name: str) -> Callable[..., Any]:
+    """Return the class or function that "package.module:NAME" or "my.py:NAME" names."""
     if ":" not in name:
-        return None
+        raise PolicyError(f"{kind} {name!r}: should be 'my.py:NAME' or 'package.module:NAME'")
     try:
-        maker: Callable[..., Policy] = import_named(name)
+        maker: Callable[..., Any] = import_named(name)
     except MissingNameError as error:
-        raise PolicyError(f"policy {name!r}: {error}") from None
+        raise PolicyError(f"{kind} {name!r}: {error}") from None
     except RAISED_BY_OTHERS as error:  # of code that is not ours, too
-        kind = type(error).__name__
-        raise PolicyError(f"policy {name!r} cannot be imported: {kind}: {error}") from error
+        error_name = type(error).__name__
+        raise PolicyError(f"{kind} {name!r} cannot be imported: {error_name}: {error}") from error
     if not callable(maker):
-        raise PolicyError(f"policy {name!r} is a {type(maker).__name__}: should be a class")
+        raise PolicyError(f"{kind} {name!r} is a {type(maker).__name__}: should be a class")
     return maker

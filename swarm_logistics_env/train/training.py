@@ -129,16 +129,27 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in PRESETS_FOLDER.glob("*.toml"))
 
 
-def load_training(source: str, **fields: object) -> Training:
+def load_training(source: str, *, trust_code: bool = False, **fields: object) -> Training:
     """Return a preset by its name, or the training in a TOML file, with some fields changed.
 
+    Args:
+        trust_code: whether a file may name reward terms that are code, which runs it.
+
     Raises:
-        TrainingError: there is none, it is not TOML, or a field of it is unknown or cannot be.
+        TrainingError: there is none, it is not TOML, or a field of it is unknown or cannot be; or
+            it names code that nobody trusts.
     """
     path = Path(source) if source.endswith(".toml") else PRESETS_FOLDER / f"{source}.toml"
     if path.parent == PRESETS_FOLDER and path.stem not in preset_names():
         raise TrainingError(f"no training preset {source!r}{suggest(source, preset_names())}")
     fields_of_file = read_table(path, "training", TrainingError)
+    terms = fields_of_file.get("rewards", {})
+    code = [str(term) for term in terms if ":" in str(term)] if isinstance(terms, dict) else []
+    if code and not trust_code:
+        raise TrainingError(
+            f"{path.name}: the reward term {code[0]!r} is code, which runs when it is loaded: "
+            "should be allowed by --trust-code (trust_code=True)"
+        )
     try:
         return Training(**{"name": path.stem, **fields_of_file, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses

@@ -98,6 +98,11 @@ class MotionFrame(Wrapper):
             )
         return self._read(super().reset_arrays(seed, options))
 
+    @property
+    def turned(self) -> NDArray[np.float64]:
+        """How far the frame of each robot's motion is turned from its body (N,) [rad]."""
+        return self._frame.turned
+
     def begun(self, seed: int) -> None:
         """Begin an episode of empty memories and random headings."""
         self._frame = motion.MotionView(self.warehouse.scenario, self._listens)

@@ -1,12 +1,17 @@
 from __future__ import annotations
 
+import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import REWARD_TERMS, STOCK_DISTANCE, RewardTerms
+from swarm_logistics_env.errors import SetupError, TrainingError
+from swarm_logistics_env.train import load_training
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 STORAGE = 8.0  # [m], its width
@@ -183,3 +188,24 @@ def test_with_several_requests_it_pays(case: str) -> None:
         for act, *arguments in acts:
             act(world, *arguments)
         assert terms.pay(world).tolist() == pytest.approx(paid)
+
+
+def test_a_reward_of_ones_own_is_a_term_by_its_name(tmp_path: Path) -> None:
+    file = tmp_path / "terms.py"
+    file.write_text(
+        "def moved(world, before, after):\n    return world.state.robot_velocity[:, 0]\n"
+    )
+    env = SwarmLogisticsEnv(n_robots=3, rewards={f"{file}:moved": 2.0, "delivery": 1.0})
+    env.reset_arrays(0)
+    _, rewards, *_ = env.step_arrays(np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)))
+    np.testing.assert_allclose(rewards, 2.0 * env.warehouse.state.robot_velocity[:, 0])
+    again = pickle.loads(pickle.dumps(env))
+    np.testing.assert_equal(again.step_arrays(np.ones((3, 4))), env.step_arrays(np.ones((3, 4))))
+    for name, message in ((f"{file}:moves", "moves"), ("none.py:term", "cannot be imported")):
+        with pytest.raises(SetupError, match=message):
+            RewardTerms({name: 1.0})
+    training = tmp_path / "training.toml"
+    training.write_text(f"rewards = {{ '{file}:moved' = 1.0 }}\n")
+    with pytest.raises(TrainingError, match=r"is code, which runs .* allowed by --t"):
+        load_training(str(training))
+    assert load_training(str(training), trust_code=True).rewards == {f"{file}:moved": 1.0}

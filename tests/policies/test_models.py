@@ -5,16 +5,23 @@ from __future__ import annotations
 import copy
 import doctest
 import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 
 from swarm_logistics_env import Scenario, policies, run_episode
+from swarm_logistics_env.cli import app
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.policies import models
 from swarm_logistics_env.policies.spec import PolicySpec
+from swarm_logistics_env.studies import Study
+from swarm_logistics_env.wrappers import FaultInjection, SwarmSize, Wrapper
 
 BRIEF = Scenario(n_robots=3, n_items=10, duration=2.0)
 WEIGHTS = np.random.default_rng(0).normal(0.0, 0.3, (95, 3)).astype(np.float32)
@@ -124,6 +131,90 @@ def test_a_model_is_known_by_its_numbers_and_its_form_and_each_run_has_a_memory(
 def test_what_is_no_model_is_refused(network: Any, options: Any, message: str) -> None:
     with pytest.raises(PolicyError, match=message):
         run_episode(BRIEF, policies.of(network, **options), seed=0)
+
+
+class Beacon(Wrapper):
+    """Adds to each row how far the robot is from the western wall [m]."""
+
+    def observation_space(self, agent: str) -> Box:
+        inner = self.env.observation_space(agent)
+        return Box(np.append(inner.low, 0.0), np.append(inner.high, 20.0), dtype=np.float32)
+
+    def reset_arrays(self, seed: Any = None, options: Any = None) -> Any:
+        return self._added(super().reset_arrays(seed, options))
+
+    def after_step(self, outcome: Any) -> Any:
+        return (self._added(outcome[0]), *outcome[1:])
+
+    def _added(self, rows: Any) -> Any:
+        x = self.warehouse.state.robot_position[:, :1]
+        return np.hstack([rows, x.astype(np.float32)])
+
+
+class Eastward:
+    """Drives until it is 3 m from the western wall."""
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        pass
+
+    def act(self, rows: Any) -> Any:
+        return np.stack([rows[:, -1] < 3.0, *np.zeros((3, len(rows)))], axis=1)
+
+
+def test_a_policy_with_a_sensor_of_its_own_is_judged_as_any_other(tmp_path: Path) -> None:
+    policy = policies.within(Eastward(), Beacon)
+    episode = run_episode(BRIEF, policy, seed=0, faults=["removed:1@1"])
+    assert episode.failed_robots
+    assert run_episode(BRIEF, policy, seed=0, faults=["removed:1@1"]).digest == episode.digest
+    # A film and the live view play it, too; a fault may come while it plays.
+    play = Play(BRIEF, policy, seed=0)
+    for _ in range(5):
+        play.step()
+    play.world.set_faults(["dead:3"])
+    while not play.is_over:
+        play.step()
+    assert play.world.state.step == 20
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import sys\nsys.path.insert(0, '.')\n"
+        "from tests.policies.test_models import Beacon, Eastward\n"
+        "def wrap(env):\n    return Beacon(env)\n"
+    )
+    named = {"name": f"{file}:Eastward", "parameters": {"env": f"{file}:wrap"}}
+    study = Study(
+        out=tmp_path / "out", policies=[named], seeds=3, sizes=[{"values": [2, 3]}],
+        scenario={"duration": 2.0, "n_items": 10},
+    )  # fmt: skip
+    assert not study.run(processes=2).failed
+    assert app.run(["run", "--policy", f"{file}:Eastward", "--env", f"{file}:wrap",
+                    "--set", "duration=1"]) == 0  # fmt: skip
+    spec = PolicySpec.of(named)
+    assert spec.runs_code
+    identity = spec.identity()
+    file.write_text(file.read_text() + "\nSPEED = 2\n")
+    assert spec.identity() != identity
+
+
+@pytest.mark.parametrize(
+    ("wrap", "message"),
+    [
+        (lambda env: SwarmSize(FaultInjection(env, "FM1"), 3), "wrap changed the conditions"),
+        (lambda env: None, "wrap made None of the environment: should be wrappers around it"),
+        (lambda env: SwarmLogisticsEnv(n_robots=3), "should be wrappers around it"),
+    ],
+)
+def test_wrappers_leave_conditions_to_the_study(wrap: Any, message: str) -> None:
+    with pytest.raises(PolicyError, match=message):
+        run_episode(BRIEF, policies.within(Eastward(), wrap), seed=0)
+
+
+def test_what_cannot_be_within_is_refused() -> None:
+    with pytest.raises(PolicyError, match="wrap = 3: should be a function of an environment"):
+        policies.within(Eastward(), 3)  # type: ignore[arg-type]
+    with pytest.raises(PolicyError, match="normalize: is for a network"):
+        policies.within(Eastward(), Beacon, normalize=(0.0, 1.0))
+    with pytest.raises(PolicyError, match=r"env 'homing': should be 'my.py:NAME'"):
+        policies.load("homing", env="homing")
 
 
 def test_a_class_where_an_object_belongs_is_told_so() -> None:
