@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         testing,
         wrappers,
     )
+    from swarm_logistics_env.demonstrations import record
     from swarm_logistics_env.episode import Episode, run_episode
     from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
     from swarm_logistics_env.trial_study import judge
@@ -39,6 +40,7 @@ __all__ = [
     "adapters",
     "judge",
     "policies",
+    "record",
     "run_episode",
     "spi",
     "studies",
@@ -57,6 +59,7 @@ _MODULES = {
     "Scenario": "scenario",
     "Warehouse": "warehouse",
     "judge": "trial_study",
+    "record": "demonstrations",
     "run_episode": "episode",
 }
 

@@ -70,6 +70,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "trial_study": {"runs", "spi", "studies", "verdicts"},
     "attack": RUNS | {"questions", "runs", "spi", "tasks", "verdicts"},
     "testing": RUNS | ENVIRONMENT | {"spi"},
+    "demonstrations": RUNS | ENVIRONMENT | {"progress_bar", "wrappers"},
 }
 MAY_IMPORT["train"] = RUNS | ENVIRONMENT | MAY_IMPORT["studies"] | MAY_IMPORT["report"]
 MAY_IMPORT["train"] |= {"adapters", "fingerprint", "progress_bar", "studies", "wrappers"}

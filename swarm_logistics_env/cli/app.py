@@ -31,6 +31,7 @@ COMMANDS = {
     "train": ("train_command", "train_command"),
     "judge": ("judging", "judge_command"),
     "attack": ("judging", "attack_command"),
+    "record": ("recording", "record_command"),
     "list": ("playing", "list_command"),
     "study": ("study_commands", "study_app"),
 }
