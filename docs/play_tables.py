@@ -54,7 +54,7 @@ COSTS = ("microseconds_per_step", "processor")
 
 def play(studies: Iterable[Study]) -> list[StudyResults]:
     """Play what is missing of each study; return what the runs say, or exit if one failed."""
-    results = []
+    results: list[StudyResults] = []
     for study in studies:
         tally = study.run(processes=PROCESSES)
         if tally.failed:

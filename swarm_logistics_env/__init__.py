@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
     from swarm_logistics_env.trial_study import judge
     from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
+    from swarm_logistics_env.watch.embedded import film
 
     __version__: str
 
@@ -38,6 +39,7 @@ __all__ = [
     "Scenario",
     "Warehouse",
     "adapters",
+    "film",
     "judge",
     "policies",
     "record",
@@ -58,6 +60,7 @@ _MODULES = {
     "SCENARIO_PRESETS": "scenario",
     "Scenario": "scenario",
     "Warehouse": "warehouse",
+    "film": "watch.embedded",
     "judge": "trial_study",
     "record": "demonstrations",
     "run_episode": "episode",

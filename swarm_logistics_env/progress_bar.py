@@ -1,9 +1,10 @@
-"""Progress of long work, of a study or a training: a bar at a terminal, a sparse line elsewhere."""
+"""Progress of long work: a bar at a terminal or in a notebook, a sparse line elsewhere."""
 
 from __future__ import annotations
 
+import sys
 from time import monotonic
-from typing import Self
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -39,6 +40,7 @@ class ProgressBar:
         )
         self._task = self._bar.add_task(label, total=total, completed=done)
         self._last_line = monotonic()
+        self._cell_bar = _bar_of_a_notebook(label, total, unit, done)
 
     def __enter__(self) -> Self:
         self._bar.start()
@@ -46,10 +48,14 @@ class ProgressBar:
 
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
+        if self._cell_bar is not None:
+            self._cell_bar.close()
 
     def extend(self, total: int) -> None:
         """Show that there is so much to do in all."""
         self._bar.update(self._task, total=total)
+        if self._cell_bar is not None:
+            self._cell_bar.reset(total)
 
     def reach(self, done: int, note: str = "") -> None:
         """Show that so much is done.
@@ -58,7 +64,9 @@ class ProgressBar:
             note: what plain lines say besides.
         """
         self._bar.update(self._task, completed=done)
-        if self._bar.disable and monotonic() - self._last_line >= LINE_EVERY:
+        if self._cell_bar is not None:
+            self._cell_bar.update(done - self._cell_bar.n)
+        elif self._bar.disable and monotonic() - self._last_line >= LINE_EVERY:
             self.say(note)
 
     def say(self, note: str = "") -> None:
@@ -74,6 +82,18 @@ class ProgressBar:
             parts.append(f"{clock(seconds * task.remaining / gained)} left")
         line = f"{task.description}: {', '.join(filter(None, [*parts, note]))}"
         self._bar.console.print(line, soft_wrap=True, markup=False)
+
+
+def _bar_of_a_notebook(label: str, total: int, unit: str, done: int) -> Any:
+    """Return a bar of tqdm, which notebooks draw in the cell; None: this is no notebook."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    if type(shell).__name__ != "ZMQInteractiveShell":
+        return None
+    try:
+        from tqdm.auto import tqdm
+    except ModuleNotFoundError:
+        return None
+    return tqdm(desc=label, total=total, unit=f" {unit}", initial=done)
 
 
 def clock(seconds: float) -> str:

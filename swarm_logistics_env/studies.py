@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 from weakref import finalize
@@ -27,6 +28,8 @@ from swarm_logistics_env.verdicts.until_clear import latest_look
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from swarm_logistics_env.report.findings import Findings
 
 
 def _changes(store: Runs, plan: Plan) -> tuple[str, ...]:
@@ -280,17 +283,28 @@ class Study:
         with self._store(existing=True) as store:
             return not self._declared(store).covers(self.plan())
 
-    def findings(self) -> StudyResults:
+    def __repr__(self) -> str:
+        where = "in memory" if self.out is None else f"in {self.out}"
+        return f"Study({self.plan()}, {where})"
+
+    def _repr_html_(self) -> str:
+        policies = ", ".join(policy.title for policy in self.specification.policies)
+        done, of_all = self.finished()
+        return f"<b>{escape(repr(self))}</b><br>{escape(policies)}; {done} of {of_all} runs done"
+
+    def findings(self) -> Findings:
         """Return every cell and every verdict, from the runs that are there.
 
         Raises:
             StudyError: nothing has been run, or the store is another study's.
         """
+        from swarm_logistics_env.report.findings import Findings
+
         plan = self.plan()
         with self._store(existing=True) as store:
             declared = self._declared(store)
             results = judge(plan, store.outcomes(plan.runs), declared)
-            return replace(results, damage=store.damage())
+            return replace(Findings.of(results), damage=store.damage())
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error.

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 from swarm_logistics_env.runs.recorded import import_results
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.results import StudyResults
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from swarm_logistics_env.report.findings import Findings
 
 
 def judge(
@@ -22,7 +23,7 @@ def judge(
     out: str | Path | None = None,
     setup: Mapping[str, str] | None = None,
     **reading: Any,
-) -> StudyResults:
+) -> Findings:
     """Judge trials: S, R, FT and A of what varies in them.
 
     Args:

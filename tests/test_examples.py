@@ -22,9 +22,16 @@ def main(name: str, **sizes: Any) -> Any:
     return runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](**sizes)
 
 
-def test_evolution_and_the_search_for_constants_end_with_a_change() -> None:
-    rates = main("evolve_arrays", generations=1, pairs=2, duration=40.0)
-    assert set(rates) == {"taxis_gain", "drop_rate"}
+def test_evolution_ends_with_a_front_of_both_indicators(tmp_path: Path) -> None:
+    pytest.importorskip("cma", reason="needs cma")
+    picture = tmp_path / "front.png"
+    front = main("evolve_front", prices=(2.0,), evaluations=8, seeds=2, fresh=3, out=picture)
+    assert list(front) == ["start", "price of R 2"]
+    assert all(len(p) == 3 and robustness.n_seeds == 3 for p, robustness in front.values())
+    assert picture.stat().st_size > 10_000
+
+
+def test_the_search_for_constants_ends_with_a_change() -> None:
     scenario = Scenario(n_robots=10, duration=100.0, restock=True)
     assert main("tune_swarm_dt", rounds=2, seeds=2, confirm=2, scenario=scenario).n_seeds == 2
 

@@ -103,6 +103,11 @@ class SwarmLogisticsEnv(DictView):
             most = checked_count("max_robots", max_robots, self.scenario.n_robots)
             self.declare_spaces(self.scenario.replace(n_robots=most))
 
+    def __repr__(self) -> str:
+        changed = self.scenario.model_dump(exclude_defaults=True)
+        fields = ", ".join(f"{name}={value!r}" for name, value in changed.items())
+        return f"{type(self).__name__}({fields})"
+
     def observation_space(self, agent: str) -> Box:
         """Return the space of an observation row (D,), the same for every agent."""
         return self._spaces.observation

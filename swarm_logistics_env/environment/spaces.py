@@ -4,6 +4,7 @@ play, the whole warehouse as one vector, and PettingZoo's dicts over the array m
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
@@ -166,6 +167,11 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
     agents: list[str]
     warehouse: Warehouse
     is_begun: bool
+
+    def _repr_html_(self) -> str:
+        rows, actions = (form("robot_0") for form in (self.observation_space, self.action_space))
+        spaces = f"{len(self.possible_agents)} robots; observations {rows.shape}, actions {actions}"
+        return f"<b>{html.escape(repr(self))}</b><br>{html.escape(spaces)}"
 
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None

@@ -152,6 +152,11 @@ class Wrapper(DictView, BaseParallelWrapper):  # type: ignore[misc]  # PettingZo
             )
         super().__init__(env)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.env!r})"
+
+    __str__ = __repr__
+
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options of the wrapped environment's reset, made from the given options.
 
