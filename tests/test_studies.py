@@ -8,6 +8,7 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -79,6 +80,21 @@ def stored(directory: Path) -> int:
             return len(runs)
     except StudyError:  # there is no store yet, or no table in it
         return 0
+
+
+def test_another_thread_may_ask_a_study_and_play_it(tmp_path: Path) -> None:
+    for out in (None, tmp_path / "out"):
+        study, answers = Study(out=out, **SMALL), list[Any]()
+
+        def ask(study: Study = study, answers: list[Any] = answers) -> None:
+            answers.append(study.run().failed)
+            answers.append(len(study.findings().verdicts))
+
+        study.run()
+        thread = threading.Thread(target=ask)
+        thread.start()
+        thread.join()
+        assert answers == [0, len(study.findings().verdicts)]
 
 
 def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import sqlite3
+import threading
 import time
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -60,12 +61,10 @@ class Runs:
 
     Args:
         path: the file, made with its folder where it is missing; None: kept in memory only.
-        read_only: write nothing, neither into the file nor beside it, for a file that nobody else
-            writes.
+        read_only: write neither into the file nor beside it; nobody else may write it.
 
     Raises:
-        StudyError: the file is not a store, its schema is not this version's, more of it than rows
-            is damaged, or its folder cannot be made.
+        StudyError: the file is no store of this version, damaged beyond rows, or has no folder.
     """
 
     def __init__(self, path: Path | None, *, read_only: bool = False) -> None:
@@ -78,9 +77,10 @@ class Runs:
         elif path is not None:
             _make_folder(path.parent)
         with self._explained():
-            # Autocommit: transactions are opened by hand, one per run.
+            # Autocommit: transactions are opened by hand, one per run, and by one thread at a time.
+            self._writing = threading.RLock()
             self._connection = sqlite3.connect(
-                database, timeout=TIMEOUT, isolation_level=None, uri=read_only
+                database, TIMEOUT, isolation_level=None, uri=read_only, check_same_thread=False
             )
             # What is not UTF-8 is damaged, and told by its digest.
             self._connection.text_factory = lambda text: text.decode("utf-8", "backslashreplace")
@@ -285,7 +285,7 @@ class Runs:
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         """Keep all that the block writes or, if it fails, nothing of it."""
-        with self._explained(), self._connection:
+        with self._writing, self._explained(), self._connection:
             self._execute("BEGIN IMMEDIATE")
             yield
 
