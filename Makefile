@@ -17,6 +17,7 @@ TORCHRL   := .venvs/torchrl
 BENCHMARL := .venvs/benchmarl
 RLLIB     := .venvs/rllib
 SUPERSUIT := .venvs/supersuit
+LEARNERS  := .venvs/learners
 TASKS     := .venvs/tasks
 DOTBOTS   := .venvs/dotbots
 
@@ -49,7 +50,7 @@ help:
 	@echo "make canary          golden trajectories, both ways of compiling, with the newest numba and the newest everything"
 	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
 	@echo "make interop         four learners of other people's code, three trainings each (1.4 core-hours): results/interop"
-	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; see interop/"
+	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; six learners for two minutes each; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make dotbots         bodies in the DotBots' simulator: the tests, and 20 DotBots for 20 s (half a minute, once pydotbot is installed)"
 	@echo "make bodies          how far results carry to MuJoCo and to the DotBots' simulator: the tables of docs/bodies.md (a core-hour)"
@@ -135,10 +136,11 @@ benchmark: $(BENCHMARK)/installed
 interop: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed
 	$(DEV)/bin/python -m interop
 
-interop-calls: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed
+interop-calls: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed $(RLLIB)/installed $(SUPERSUIT)/installed $(LEARNERS)/installed
 	for library in dev torchrl benchmarl rllib supersuit; do \
 		.venvs/$$library/bin/python -m pytest -rs tests/test_interop.py || exit 1; \
 	done
+	$(LEARNERS)/bin/python -m interop.learners
 
 tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py
@@ -201,6 +203,10 @@ $(RLLIB)/installed: OTHERS := hypothesis pytest torch "ray[rllib]"
 # shimmy: the Gymnasium door of VMAS asks for it.
 $(TASKS)/installed: OTHERS := hypothesis pytest mpe2 rware shimmy vmas
 $(SUPERSUIT)/installed: OTHERS := hypothesis pytest supersuit
+# imitation asks for an older Gymnasium than the newest, and works with that.
+$(LEARNERS)/installed: EXTRAS := train,minari
+$(LEARNERS)/installed: OTHERS := cma sb3-contrib skrl
+$(LEARNERS)/installed: BARE := imitation
 $(DOTBOTS)/installed: EXTRAS := dotbots
 $(DOTBOTS)/installed: OTHERS := hypothesis pytest
 
