@@ -205,7 +205,7 @@ def record(
         >>> demonstrations = record("homing", 1, scenario=Scenario(n_robots=2, duration=10.0))
         >>> observations, actions, following, ends = demonstrations.transitions()
         >>> observations.shape, actions.shape
-        ((200, 141), (200, 4))
+        ((200, 140), (200, 4))
     """
     player = load(policy) if isinstance(policy, str) else policy
     scenario = scenario or Scenario()

@@ -29,7 +29,7 @@ def test_they_hold_every_decision_of_every_robot_that_is_there() -> None:
     for robot in recorded.episodes:
         n_steps = len(robot.actions)
         assert robot.terminated == (n_steps == 50)
-        assert robot.observations.shape == (n_steps + 1, 141)
+        assert robot.observations.shape == (n_steps + 1, 140)
         assert robot.actions.shape == (n_steps, 4)
         assert recorded.observation_space.contains(robot.observations[0])
     # The robot that fails first also leaves first, 2 s later.

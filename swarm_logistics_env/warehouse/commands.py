@@ -26,11 +26,7 @@ def as_array(commands: ArrayLike, shape: tuple[int, int]) -> NDArray[np.float64]
     """
     try:
         array = np.asarray(commands)
-    except (
-        TypeError,
-        ValueError,
-        RuntimeError,
-    ) as error:  # the last is of a tensor with a gradient
+    except (TypeError, ValueError, RuntimeError) as error:  # a tensor with a gradient: the last
         raise CommandError(f"commands should be an array of numbers: {error}") from None
     if array.dtype.kind not in "fiub":  # NumPy makes numbers of texts and times, too
         raise CommandError(f"commands should be numbers: real ones, not {array.dtype}")
