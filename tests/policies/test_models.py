@@ -32,11 +32,9 @@ def ahead(rows: Any) -> Any:
 
 
 def test_a_trained_network_plays_as_its_policy_file_does() -> None:
-    """Without noise, and deciding each step, both are the same network in the same frame."""
+    """Without noise both are the same network in the same frame."""
     learned: Any = policies.load("ppo-delivery")
-    card = learned.card.replace(
-        network=learned.card.network.replace(exploration=0.0, decides_every=1)
-    )
+    card = learned.card.replace(network=learned.card.network.replace(exploration=0.0))
     same: Any = type(learned)(card, learned.tensors)
     policy = policies.of(same.outputs_of, frame=True)
     rows = np.random.default_rng(0).normal(size=(40, 5, N_COLUMNS)).astype(np.float32)
