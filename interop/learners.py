@@ -1,7 +1,7 @@
 """Six learners of other people's code, two minutes each: what each takes, and P before and after.
 
-`make interop-calls` plays it. Rows (N, 95) and outputs (N, 3) are in the frame of each robot's
-motion; the world is small, so that an untrained robot meets the requested item by chance.
+`make interop-calls` plays it. Rows of `motion.INPUTS` and outputs (N, 3) are in the frame of each
+robot's motion; the world is small, so that an untrained robot meets the requested item by chance.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def cleanrl_loop(updates: int = 120, n_steps: int = 128) -> Row:
     """Learn by PPO in one file, as CleanRL writes it, on Gymnasium's vector environment."""
     torch.manual_seed(0)
     env = SwarmRows(12, make_env=make_env, autoreset_mode="same_step")
-    n_rows, (n_inputs,), (n_outputs,) = env.num_envs, (95,), (3,)
+    n_rows, (n_inputs,), (n_outputs,) = env.num_envs, (len(INPUTS),), (3,)
     actor, critic = network(n_inputs, n_outputs), network(n_inputs, 1)
     deviations = nn.Parameter(torch.full((n_outputs,), -0.7))
     parameters = [*actor.parameters(), *critic.parameters(), deviations]
@@ -120,7 +120,7 @@ def skrl_ppo(timesteps: int = 6_000) -> Row:
         def __init__(self, *spaces: Any, device: Any) -> None:
             Model.__init__(self, observation_space=spaces[0], action_space=spaces[1], device=device)
             GaussianMixin.__init__(self, clip_actions=True)
-            self.net = network(95, 3)
+            self.net = network(len(INPUTS), 3)
             self.log_std = nn.Parameter(torch.full((3,), -0.7))
 
         def compute(self, inputs: Any, role: str) -> Any:
@@ -130,7 +130,7 @@ def skrl_ppo(timesteps: int = 6_000) -> Row:
         def __init__(self, *spaces: Any, device: Any) -> None:
             Model.__init__(self, observation_space=spaces[0], action_space=spaces[1], device=device)
             DeterministicMixin.__init__(self)
-            self.net = network(95, 1)
+            self.net = network(len(INPUTS), 1)
 
         def compute(self, inputs: Any, role: str) -> Any:
             return self.net(inputs["observations"]), {}

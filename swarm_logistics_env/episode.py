@@ -58,6 +58,7 @@ class Play:
 
     Attributes:
         world: the world; its scenario and faults may be changed between two steps.
+        is_wrapped: whether the policy plays in an environment of its own.
 
     Raises:
         FaultError: a fault names robots that are not there.
@@ -75,6 +76,7 @@ class Play:
     ) -> None:
         self._policy = policy
         wrap = getattr(policy, "wrap", None)
+        self.is_wrapped = wrap is not None
         if wrap is None:
             self._env = None
             self.world = Warehouse(scenario)
@@ -90,11 +92,6 @@ class Play:
         if self._env is not None and not self._env.agents:
             return True
         return self.world.is_over_time or self.world.all_delivered
-
-    @property
-    def may_be_over(self) -> bool:
-        """Whether to ask `is_over` after a step: without an event no world's episode ends."""
-        return self.world.is_eventful or self._env is not None
 
     def step(self) -> None:
         """Take one control period, or do nothing once the episode is over.
@@ -176,19 +173,11 @@ def run_episode(
         while not is_over:
             play.advance()
             digest.update(world.state.robot_position.data)
-            is_over = play.may_be_over and play.is_over
-    return episode_of(world, seed, digest)
-
-
-def episode_of(world: Warehouse, seed: int, positions: hashlib.blake2b) -> Episode:
-    """Return the results of the episode that a world has ended.
-
-    Args:
-        positions: the hash of all robots' positions so far.
-    """
+            # No end without an event, but for wrappers that end it sooner.
+            is_over = (world.is_eventful or play.is_wrapped) and play.is_over
     state = world.state
     delivery_times = np.array(state.delivery_times, dtype=np.float64)
-    positions.update(delivery_times.tobytes())
+    digest.update(delivery_times.tobytes())
     return Episode(
         seed=seed,
         delivery_times=delivery_times,
@@ -196,6 +185,6 @@ def episode_of(world: Warehouse, seed: int, positions: hashlib.blake2b) -> Episo
         all_delivered=world.all_delivered,
         failed_robots=world.struck_robots,
         anchoring_seconds=round(state.anchoring_seconds, 9),
-        digest=positions.hexdigest(),
+        digest=digest.hexdigest(),
         contacts=state.contact_measures,
     )

@@ -67,7 +67,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "warehouse",
     },
     "studies": {"errors", "questions", "report", "runs", "tasks", "verdicts"},
-    "trial_study": {"runs", "spi", "studies", "verdicts"},
+    "trial_study": {"report", "runs", "spi", "studies", "verdicts"},
     "attack": RUNS | {"questions", "runs", "spi", "tasks", "verdicts"},
     "testing": RUNS | ENVIRONMENT | {"spi"},
     "demonstrations": RUNS | ENVIRONMENT | {"progress_bar", "wrappers"},

@@ -68,7 +68,7 @@ def test_what_the_package_has_passes() -> None:
     ("wrapper", "sentence"),
     [
         (Magnifies, r"has .* in column \d+, and \d+ more columns: should be -?\d.* to \d"),
-        (Adds, r"at step 0 has shape \(142,\) .*: should have \(141,\) .*overrides that, too$"),
+        (Adds, r"at step 0 has shape .*: should have .*overrides that, too$"),
         (Counts, "another episode"),
         (lambda _: SimpleNamespace(unwrapped=None), "should be a SwarmLogisticsEnv"),
     ],

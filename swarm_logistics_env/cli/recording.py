@@ -52,7 +52,7 @@ def record_command(
     ] = False,
     trust_code: TrustOption = False,
 ) -> None:
-    """Record what policies read and do, for imitation and offline learning."""
+    """Record what policies do, to learn from it."""
     scenario = scenario_of(preset, scenario_file, changes)
     scheduled = faults_of(faults, scenario)
     players = [(p, p.load()) for p in policies_of(policies or DEFAULT_POLICIES, trust_code)]

