@@ -156,7 +156,8 @@ class Demonstrations:
                 rewards=episode.rewards.tolist(),
                 terminations=_ends(len(episode.actions), episode.terminated).tolist(),
                 truncations=_ends(len(episode.actions), not episode.terminated).tolist(),
-                infos={"failed": np.append(episode.failed, episode.failed[-1])},
+                # A column, because Minari cannot read plain numbers of an info again.
+                infos={"failed": np.append(episode.failed, episode.failed[-1])[:, None]},
             )
             for number, episode in enumerate(self.episodes)
         ]
