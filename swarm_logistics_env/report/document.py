@@ -113,10 +113,18 @@ def document(results: StudyResults) -> Document:
         Chapter("Methods", "", (Section("", lines=(method,)),)),
     ]
     shown = tuple(chapter for chapter in chapters if chapter.sections)
-    title = f"Study {plan.specification.name!r}"
-    report = Document(title, tuple(text), study_answer, shown, sentences)
+    report = Document(_title(results), tuple(text), study_answer, shown, sentences)
     _make_names_differ(report.figures)
     return report
+
+
+def _title(results: StudyResults) -> str:
+    """Return the study's name with its policies in front of it, e.g. "homing: study 'paper'"."""
+    policies, name = results.policies, results.plan.specification.name
+    if policies == (name,):  # of trials: nobody named it
+        return f"Study {name!r}"
+    names = join_names(policies) if len(policies) < 4 else f"{len(policies)} policies"
+    return f"{names}: study {name!r}"
 
 
 def _make_names_differ(figures: Iterable[Figure]) -> None:

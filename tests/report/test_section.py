@@ -117,7 +117,7 @@ def test_every_surface_names_the_level_that_it_prints(
     assert f"{common} intervals, or as said behind them" in surfaces["terminal"]
     assert f"| question | value | {common} interval |" in surfaces["report"]
     assert f"R [{common}]" in surfaces["report"]
-    assert f'<th scope="col">{common}</th>' in page
+    assert f">value [{common}]</th>" in page
     assert f"{levels(stopped.verdicts)} intervals" in surfaces["captions"]
     assert f" = -0.55, {own['R FM4']} interval [-0." in surfaces["sentence"]
     view = r'role="img" aria-label="(.).*?<p class="legend"><span>bar: (.*?) interval'
