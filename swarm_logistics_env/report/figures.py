@@ -236,6 +236,9 @@ def _rows(results: StudyResults, verdicts: Sequence[Verdict]) -> pd.DataFrame:
     return results.verdict_table.iloc[rows].reset_index(drop=True)[_COLUMNS]
 
 
+CAPPED = "†: P is capped, every item was delivered in a run."
+
+
 def _marks(verdicts: Sequence[Verdict]) -> str:
     return (
         "Filled: the Holm-adjusted verdict is decided; hollow: it is not; bars: "
@@ -245,9 +248,7 @@ def _marks(verdicts: Sequence[Verdict]) -> str:
 
 
 def _note_on_caps(verdicts: Sequence[Verdict]) -> str:
-    if any(verdict.saturated for verdict in verdicts):
-        return " †: P is capped, every item was delivered in a run."
-    return ""
+    return f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
 
 
 def _definitions(verdicts: Sequence[Verdict]) -> list[Definition]:

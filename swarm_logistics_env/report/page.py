@@ -92,8 +92,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str],
     data = _page_data(results, runs, document.sentences)
     rows, axis = forest(results, document.answer)
     environment.filters["values_unbroken"] = values_unbroken
-    environment.filters["options_unbroken"] = options_unbroken
-    environment.filters["words_coloured"] = words_coloured
+    environment.filters["marked_up"] = marked_up
     return environment.get_template("page.html.jinja").render(
         document=document,
         paired=results.plan.paired,
@@ -111,20 +110,13 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str],
     )
 
 
-def options_unbroken(text: str) -> Markup:
-    """Return a text as HTML; no line of it ends within an option, as at a hyphen of --clearing."""
+def marked_up(text: str) -> Markup:
+    """Return a text as HTML: counted verdicts have their colours, and no line ends in an option."""
     from markupsafe import Markup, escape
 
-    option = r'<span class="option">\g<0></span>'
-    return Markup(re.sub(r"--[a-z][\w-]*", option, str(escape(text))))
-
-
-def words_coloured(text: str) -> Markup:
-    """Return counted verdicts as HTML, each in its colour, e.g. "1 supported, 2 open"."""
-    from markupsafe import Markup, escape
-
+    html = re.sub(r"--[a-z][\w-]*", r'<span class="option">\g<0></span>', str(escape(text)))
     counted = rf"\d+ ({'|'.join(_COLOURS)})\b"
-    return Markup(re.sub(counted, r'<span class="word \1">\g<0></span>', str(escape(text))))
+    return Markup(re.sub(counted, r'<span class="word \1">\g<0></span>', html))
 
 
 def _views(

@@ -21,7 +21,7 @@ import pytest
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
-from swarm_logistics_env.report.page import options_unbroken, watch_command, words_coloured
+from swarm_logistics_env.report.page import marked_up, watch_command
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.watch import Session, messages
@@ -70,9 +70,9 @@ def test_policies_stand_in_the_title_and_no_line_ends_within_an_option(made: Mad
     title = f"swarm-dt and {html.escape(HOSTILE, quote=False)}: study &#39;study&#39;"
     assert f"<title>{title}</title>" in made.page
     assert f"<h1>{title}</h1>" in made.page
-    shown = options_unbroken("a < b: --clearing has no cap")
+    shown = marked_up("a < b: --clearing has no cap")
     assert shown == 'a &lt; b: <span class="option">--clearing</span> has no cap'
-    shown = words_coloured("1 supported, 2 open")
+    shown = marked_up("1 supported, 2 open")
     assert shown == (
         '<span class="word supported">1 supported</span>, <span class="word open">2 open</span>'
     )
