@@ -48,10 +48,9 @@ _STYLE: Any = {  # matplotlib types each of its names
 }  # fmt: skip
 # What matplotlib writes into a file besides the drawing, and what differs at every drawing.
 _METADATA = {
-    "svg": ("Creator", "Date", "Format", "Type"),
+    "svg": ("Creator", "Date", "Format", "Type"), "png": ("Software",),
     "pdf": ("Creator", "Producer", "CreationDate"),
-    "png": ("Software",),
-}
+}  # fmt: skip
 DOTS_PER_INCH = 300
 
 
@@ -63,7 +62,7 @@ class FigureStyle(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """The factor of letters and heights: a narrow figure has smaller ones."""
+        """The factor of letters, marks and heights: a narrow figure has smaller ones."""
         return min(1.0, math.sqrt(self.width / WIDTH))
 
 
@@ -102,7 +101,8 @@ def _canvas(draw: Draw, height: float, style: FigureStyle) -> Iterator[Canvas]:
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         mpl.rcParams["font.family"] = style.fonts
-        mpl.rcParams["font.size"] *= style.scale
+        for size in ("font.size", "lines.linewidth", "lines.markersize", "errorbar.capsize"):
+            mpl.rcParams[size] *= style.scale
         canvas = NewCanvas(figsize=(style.width, height * style.scale), layout="constrained")
         draw(canvas)
         yield canvas
@@ -244,6 +244,7 @@ def _mark(axes: Axes, at: float, point: Point, marker: str = "", shrink: float =
     value, low, high = point.value, point.low, point.high
     if value is None:
         return
+    sizes = _matplotlib().rcParams
     colour = COLOURS[point.style % len(COLOURS)]
     error = None
     if low is not None and high is not None:
@@ -257,8 +258,8 @@ def _mark(axes: Axes, at: float, point: Point, marker: str = "", shrink: float =
         fmt=marker or marker_of(point.style),
         color=colour,
         markerfacecolor=colour if point.decided else PAPER,
-        markersize=5.0 * shrink,
-        capsize=3.0 * shrink,
+        markersize=sizes["lines.markersize"] * shrink,
+        capsize=sizes["errorbar.capsize"] * shrink,
         label=point.series,
     )
     for artist in (line, *caps, *bars):

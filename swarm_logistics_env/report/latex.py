@@ -31,7 +31,6 @@ _SPECIAL = re.compile(rf"({_SIGNS})|((?<![\w.-])-\d+(?:\.\d+)?|\b[Nm] = \d+)|([^
 
 def latex_tables(results: StudyResults, report: Document) -> str:
     """Return the tables of a study, each a table environment with caption and label."""
-    name = results.plan.specification.name
     about = f"P is {what_p_is(results.plan)}. {_world(results.plan)}; {results.seeds_text}."
     labels = {
         verdict.after.name: parameter_label(verdict)
@@ -39,10 +38,9 @@ def latex_tables(results: StudyResults, report: Document) -> str:
         if verdict.after.kind == "parameter"
     }
     sections = [_answer(results, report), *tables(results, for_paper=True), *report.beyond]
-    shown = [_readable(section, labels) for section in sections if section.rows]
     keys: list[str] = []
-    parts = [rf"% The study {plain(name)!r}. In the preamble: \usepackage{{booktabs}}" + "\n"]
-    for section in shown:
+    parts = ["% In the preamble: \\usepackage{booktabs}\n"]
+    for section in (_readable(section, labels) for section in sections if section.rows):
         key = slug(section.title).lower()
         keys.append(key)
         number = f"-{keys.count(key)}" * (keys.count(key) > 1)
@@ -63,9 +61,8 @@ def _answer(results: StudyResults, report: Document) -> Section:
         )
         for question, line in zip(answer.questions, answer.lines)
     )
-    several = "Of several values the interval holds all of theirs."
     is_grouped = any(len(line.verdicts) > 1 for line in answer.lines)
-    lines = (several, _HOLM) if is_grouped else ()
+    lines = ("Of several values the interval holds all of theirs.", _HOLM) if is_grouped else ()
     return Section(f"{join_names(results.policies)}: indicators", columns, rows, lines)
 
 
@@ -81,8 +78,7 @@ def _world(plan: Plan) -> str:
         if " (default" in value and name not in ("n_robots", "duration")
     )
     changed = "".join(text.removesuffix(" True") for text in words)
-    size = f"N = {scenario.n_robots} unless said otherwise"
-    return f"World: {scenario.duration:g} s{changed}; {size}"
+    return f"World: {scenario.duration:g} s{changed}; N = {scenario.n_robots} unless said otherwise"
 
 
 def _readable(section: Section, labels: Mapping[str, str]) -> Section:
@@ -110,14 +106,14 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
         caption.append(CAPPED)
     columns = [_aligned(column) for column in zip(*section.rows)]
     columns[0] = [_escape(row[0]) for row in section.rows]
-    is_wide = len(columns) > 4
-    environment = "table*" if is_wide else "table"  # over both columns of a page that has two
+    # Over both columns of a page that has two.
+    environment = "table*" if len(columns) > 4 else "table"
     yield rf"\begin{{{environment}}}"
     yield r"\centering"
     yield rf"\caption{{{_escape(' '.join(filter(None, caption)))}}}"
     yield rf"\label{{{label}}}"
     yield r"\smallskip"
-    yield r"\footnotesize" if is_wide else r"\small"
+    yield r"\footnotesize" if environment == "table*" else r"\small"
     yield r"\setlength{\tabcolsep}{3pt}"
     yield rf"\begin{{tabular}}{{@{{}}{'l' * len(columns)}@{{}}}}"
     yield r"\toprule"

@@ -17,8 +17,6 @@ from .drawing import MARKERS, Point, limits
 from .figures import forest_label, forest_points
 from .section import ratio
 
-_AXIS_HEIGHT = 34  # px
-
 
 class _Axis(NamedTuple):
     """The axis of the values, from `low` to `high`."""
@@ -51,9 +49,9 @@ def forest(results: StudyResults, answer: Answer) -> tuple[list[str], str]:
         f'{axis.upright(tick, 0, 4, "axis")}<text x="{axis.place(tick)}" y="15">{tick:g}</text>'
         for tick in axis.ticks
     ).replace(">-", ">\N{MINUS SIGN}")
-    title = f'<text x="50%" y="30">{escape(forest_label(answer))}</text>'
+    numbers += f'<text x="50%" y="30">{escape(forest_label(answer))}</text>'
     line = '<line class="axis" x1="0" x2="100%" y1="0.5" y2="0.5"/>'
-    return drawn, f'<svg height="{_AXIS_HEIGHT}">{line}{numbers}{title}</svg>'
+    return drawn, f'<svg height="34">{line}{numbers}</svg>'
 
 
 def _row(axis: _Axis, points: Sequence[Point], verdicts: Sequence[Verdict]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 from more_itertools import map_reduce
@@ -63,7 +64,7 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
         has_contacts = any(cell.contacts.value >= 0.0 for cell in cells)  # NaN: not counted
         verdicts = verdicts_of.get((policy, table), [])
         layouts = _layouts(verdicts, published=has_published, contacts=has_contacts)
-        if for_paper:
+        if for_paper and verdicts:
             layouts = _paper_layout(verdicts, published=has_published)
         for title, columns, arms in layouts:
             rows = tuple(
@@ -83,14 +84,10 @@ def _paper_layout(verdicts: Sequence[Verdict], *, published: bool) -> Iterator[L
     *performance, _ = _performance_columns(published=published, contacts=False)
     columns: list[CellColumn] = [("", lambda cell: cell.words), *performance]
     by_indicator: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.indicator)
+    holm: Callable[[Verdict], str] = attrgetter("on_property.adjusted")
     for indicator, of_indicator in by_indicator.items():
-        columns += _answers(indicator, of_indicator, _holm, published=published)
-    if verdicts:
-        yield "", columns, None
-
-
-def _holm(verdict: Verdict) -> str:
-    return verdict.on_property.adjusted
+        columns += _answers(indicator, of_indicator, holm, published=published)
+    yield "", columns, None
 
 
 def _layouts(verdicts: Sequence[Verdict], *, published: bool, contacts: bool) -> Iterator[Layout]:

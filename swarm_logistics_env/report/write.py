@@ -15,14 +15,17 @@ from swarm_logistics_env.records import atomic_write, plain, write_csv
 from swarm_logistics_env.verdicts.results import StudyResults
 
 from .document import Document, document
-from .drawing import images
+from .drawing import PAGE_STYLE, FigureStyle, images, svg_image
 from .latex import latex_tables
 from .page import html
 from .section import Section
 
 
 def write_report(
-    results: StudyResults, directory: Path, report: Document | None = None
+    results: StudyResults,
+    directory: Path,
+    report: Document | None = None,
+    style: FigureStyle = PAGE_STYLE,
 ) -> tuple[Path, ...]:
     """Write report.md, cells.csv, claims.csv, tables.tex, every figure's data, and with the extra
     `study` report.html and every figure as SVG, PDF and PNG; return the paths of report and tables.
@@ -38,7 +41,7 @@ def write_report(
     try:
         pictures.mkdir(parents=True, exist_ok=True)
         drawn = () if advice else report.figures
-        drawings = {figure.name: images(figure.draw, figure.height) for figure in drawn}
+        drawings = {figure.name: images(figure.draw, figure.height, style) for figure in drawn}
         write_csv(paths[1], results.cell_table, StudyError)
         write_csv(paths[2], results.verdict_table, StudyError)
         for figure in report.figures:
@@ -55,6 +58,8 @@ def write_report(
                     part.write_bytes(content)
         write_text(paths[0], markdown(report, pictures=pictures.name))
         svgs = {name: drawing.svg for name, drawing in drawings.items()}
+        if style != PAGE_STYLE:
+            svgs = {figure.name: svg_image(figure.draw, figure.height) for figure in drawn}
         write_text(page, html(results, report, svgs, latex))
     except OSError as error:
         raise StudyError(f"cannot write {error.filename}: {error.strerror}") from error

@@ -66,7 +66,7 @@ def test_each_table_has_a_label_of_its_own_and_a_caption_that_can_stay(latex: st
         assert "12 paired seeds (0 to 11). 95\\,\\% intervals in brackets." in caption
         assert caption.endswith("by Holm's method over all comparisons of an indicator.")
     assert "continued" not in latex
-    assert latex.startswith("% The study 'lab_1'. In the preamble: \\usepackage{booktabs}\n")
+    assert latex.startswith("% In the preamble: \\usepackage{booktabs}\n")
 
 
 def test_minus_signs_are_minus_signs_and_points_stand_below_each_other(latex: str) -> None:

@@ -78,6 +78,7 @@ def test_every_figure_comes_as_drawing_and_data(few: StudyResults, directory: Pa
     for name in names:
         file = directory / "figures" / name
         assert file.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+        assert file.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
         drawing = file.with_suffix(".svg").read_text()
         assert ElementTree.fromstring(drawing).tag.endswith("svg")
         assert len(file.with_suffix(".csv").read_text().splitlines()) > 1
