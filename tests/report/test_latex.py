@@ -94,6 +94,7 @@ def test_names_are_those_that_a_reader_uses(latex: str) -> None:
         r"\textbar{} $<$y$>$ -{}- \texttt{U+03BC} $\to$"
     )
     assert f"homing {name}: Scalability." in latex
+    assert f"\nhoming {name}: S N 10 to 25 & " in latex
     assert "more seeds tell" not in latex
 
 
