@@ -16,7 +16,7 @@ from .section import SATURATED, Section, Texts, conclusion_text, join_names, slu
 from .tables import tables
 
 _HOLM = "Verdicts are adjusted by Holm's method over all comparisons of an indicator."
-_NUMBER = re.compile(r"(?<![\w.-])-?(?:\d+(?:\.\d+)?|∞)(?![\w.]| [a-z])")
+_NUMBER = re.compile(r"(?<![\w.-])-?(?:\d+(?:\.\d+)?|∞)(?![\w.]| (?!to )[a-z])")
 _ROOM = r"(?:\\phantom\{[^}]*\})+"
 _ESCAPES = {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
@@ -42,8 +42,8 @@ def latex_tables(results: StudyResults, report: Document) -> str:
     parts = ["% In the preamble: \\usepackage{booktabs}\n"]
     for section in (_readable(section, labels) for section in sections if section.rows):
         key = slug(section.title).lower()
+        number = f"-{keys.count(key) + 1}" if key in keys else ""
         keys.append(key)
-        number = f"-{keys.count(key)}" * (keys.count(key) > 1)
         parts.append("\n".join(_table(section, about, f"tab:{key}{number}")) + "\n")
     return "\n".join(parts)
 
@@ -101,9 +101,8 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     intervals = f"{levels[0]} intervals in brackets." if levels else ""
     if len(levels) > 1:
         intervals = "Intervals in brackets, at the levels in the headings."
-    caption = [f"{section.title}.", about, intervals, *(section.lines or [_HOLM])]
-    if any(SATURATED in cell for row in section.rows for cell in row):
-        caption.append(CAPPED)
+    capped = CAPPED * any(SATURATED in cell for row in section.rows for cell in row)
+    caption = [f"{section.title}.", about, intervals, *(section.lines or [_HOLM]), capped]
     columns = [_aligned(column) for column in zip(*section.rows)]
     columns[0] = [_escape(row[0]) for row in section.rows]
     # Over both columns of a page that has two.
@@ -115,18 +114,18 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     yield r"\smallskip"
     yield r"\footnotesize" if environment == "table*" else r"\small"
     yield r"\setlength{\tabcolsep}{3pt}"
-    yield rf"\begin{{tabular}}{{@{{}}{'l' * len(columns)}@{{}}}}"
-    yield r"\toprule"
-    yield _row(map(_escape, section.columns))
-    yield r"\midrule"
+    long = [max(map(len, column)) > 40 for column in zip(*section.rows)]
+    layout = "".join(r"p{0.3\linewidth}" if is_long else "l" for is_long in long)
+    yield rf"\begin{{tabular}}{{@{{}}{layout}@{{}}}}"
+    yield from (r"\toprule", _row(map(_escape, section.columns)), r"\midrule")
     yield from map(_row, zip(*columns))
     yield from (r"\bottomrule", r"\end{tabular}", rf"\end{{{environment}}}")
 
 
 def _row(cells: Iterable[str]) -> str:
     row = " & ".join(cells)
-    # A row that starts with "[" would be read as an option of the line break before it.
-    return f"{'{}' * row.startswith('[')}{row} \\\\"
+    # A row that starts so would be read as an option of the line break before it.
+    return f"{'{}' * row.startswith(('[', '*'))}{row} \\\\"
 
 
 def _aligned(cells: Texts) -> list[str]:
