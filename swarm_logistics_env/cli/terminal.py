@@ -18,8 +18,8 @@ from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, answer
 from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.report.drawing import PAGE_STYLE, FigureStyle
+from swarm_logistics_env.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.report.section import NOTHING, Section, Texts, levels, number
 from swarm_logistics_env.report.write import how_to_get_figures, section_markdown, write_report
 from swarm_logistics_env.runs.engines import Tally
@@ -97,6 +97,9 @@ def show_report(
     else:
         echo(f"Figure: {out / 'figures' / 'answer.svg'}")
         echo(f"Tables: {out / 'tables.tex'}")
+    names_modes = any(verdict.after.kind == "fault" for verdict in results.verdicts)
+    if names_modes and "FM1" in results.plan.specification.played.failure_modes:
+        echo("Failure modes: swarm-logistics list faults")
     if is_finished and any(verdict.estimate for verdict in results.verdicts):
         say(f"For a paper: {plain(in_a_sentence(results))}")
 
