@@ -50,7 +50,7 @@ help:
 	@echo "make canary          golden trajectories, both ways of compiling, with the newest numba and the newest everything"
 	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
 	@echo "make interop         four learners of other people's code, three trainings each (1.4 core-hours): results/interop"
-	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; six learners for two minutes each; see interop/"
+	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; six learners with P before and after; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make dotbots         bodies in the DotBots' simulator: the tests, and 20 DotBots for 20 s (half a minute, once pydotbot is installed)"
 	@echo "make bodies          how far results carry to MuJoCo and to the DotBots' simulator: the tables of docs/bodies.md (a core-hour)"

@@ -59,8 +59,9 @@ def main(prices=(0.0, 1.0, 4.0), evaluations=100, seeds=6, fresh=30, out="front.
     for name, logarithms in points.items():
         p_o, robustness = front[name] = measure(logarithms, new)
         mean = spi.mean_interval(p_o)
-        p, p_low, p_high = mean.value, mean.low or 0.0, mean.high or 0.0
-        r, r_low, r_high = robustness.value, robustness.low or 0.0, robustness.high or 0.0
+        # Where there is no limit it is NaN, which no line is drawn to.
+        p, p_low, p_high = np.array([mean.value, mean.low, mean.high], float)
+        r, r_low, r_high = np.array([robustness.value, robustness.low, robustness.high], float)
         axes.plot([r_low, r_high], [p, p], "-", [r, r], [p_low, p_high], "-", color="grey")
         axes.plot(r, p, "o", label=name)
         constants = dict(zip(CONSTANTS, np.exp(logarithms).round(2).tolist()))

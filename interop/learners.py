@@ -1,4 +1,4 @@
-"""Six learners of other people's code, two minutes each: what each takes, and P before and after.
+"""Six learners of other people's code: what each takes, and P before and after.
 
 `make interop-calls` plays it. Rows of `motion.INPUTS` and outputs (N, 3) are in the frame of each
 robot's motion; the world is small, so that an untrained robot meets the requested item by chance.
@@ -116,7 +116,7 @@ def skrl_ppo(timesteps: int = 6_000) -> Row:
     from skrl.models.torch import DeterministicMixin, GaussianMixin, Model
     from skrl.trainers.torch import SequentialTrainer
 
-    class Actor(GaussianMixin, Model):  # type: ignore[misc]
+    class Actor(GaussianMixin, Model):  # type: ignore[misc]  # skrl is not in the gate
         def __init__(self, *spaces: Any, device: Any) -> None:
             Model.__init__(self, observation_space=spaces[0], action_space=spaces[1], device=device)
             GaussianMixin.__init__(self, clip_actions=True)
@@ -126,7 +126,7 @@ def skrl_ppo(timesteps: int = 6_000) -> Row:
         def compute(self, inputs: Any, role: str) -> Any:
             return self.net(inputs["observations"]), {"log_std": self.log_std}
 
-    class Critic(DeterministicMixin, Model):  # type: ignore[misc]
+    class Critic(DeterministicMixin, Model):  # type: ignore[misc]  # as above
         def __init__(self, *spaces: Any, device: Any) -> None:
             Model.__init__(self, observation_space=spaces[0], action_space=spaces[1], device=device)
             DeterministicMixin.__init__(self)
@@ -231,7 +231,7 @@ def pycma(evaluations: int = 300) -> Row:
     search = cma.CMAEvolutionStrategy(start, 1.0, {"seed": 1, "verbose": -9})
     while search.countevals < evaluations:
         candidates = search.ask()
-        search.tell(candidates, [cost(each, search.countiter) for each in candidates])
+        search.tell(candidates, [cost(weights, search.countiter) for weights in candidates])
     best = search.result.xfavorite
     after = performance(lambda rows: outputs(best, rows))
     return "pycma", f"{search.countevals} evaluations of 2 episodes", before, after

@@ -36,7 +36,7 @@ from pathlib import Path
 from types import CodeType, FrameType, ModuleType
 from typing import Any
 
-from swarm_logistics_env.errors import suggest
+from swarm_logistics_env.errors import RAISED_BY_OTHERS, SwarmLogisticsError, suggest
 
 PACKAGE = Path(__file__).parent
 _lock = threading.RLock()
@@ -83,6 +83,20 @@ def import_named(text: str) -> Any:
     except AttributeError:
         hint = suggest(attribute, vars(code))
         raise MissingNameError(f"{module} has no {attribute}{hint}") from None
+
+
+def import_callable(kind: str, name: str, error_type: type[SwarmLogisticsError]) -> Any:
+    """Return the class or function of a name; raise `error_type` if it cannot be had."""
+    try:
+        maker = import_named(name)
+    except MissingNameError as error:
+        raise error_type(f"{kind} {name!r}: {error}") from None
+    except RAISED_BY_OTHERS as error:  # of code that is not ours, too
+        reason = f"{type(error).__name__}: {error}"
+        raise error_type(f"{kind} {name!r} cannot be imported: {reason}") from error
+    if not callable(maker):
+        raise error_type(f"{kind} {name!r} is a {type(maker).__name__}: should be a class")
+    return maker
 
 
 def file_of_name(text: str) -> Path | None:

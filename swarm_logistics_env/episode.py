@@ -58,7 +58,6 @@ class Play:
 
     Attributes:
         world: the world; its scenario and faults may be changed between two steps.
-        is_wrapped: whether the policy plays in an environment of its own.
 
     Raises:
         FaultError: a fault names robots that are not there.
@@ -76,7 +75,6 @@ class Play:
     ) -> None:
         self._policy = policy
         wrap = getattr(policy, "wrap", None)
-        self.is_wrapped = wrap is not None
         if wrap is None:
             self._env = None
             self.world = Warehouse(scenario)
@@ -174,7 +172,7 @@ def run_episode(
             play.advance()
             digest.update(world.state.robot_position.data)
             # No end without an event, but for wrappers that end it sooner.
-            is_over = (world.is_eventful or play.is_wrapped) and play.is_over
+            is_over = (world.is_eventful or play._env is not None) and play.is_over
     state = world.state
     delivery_times = np.array(state.delivery_times, dtype=np.float64)
     digest.update(delivery_times.tobytes())

@@ -285,12 +285,13 @@ class Study:
 
     def __repr__(self) -> str:
         where = "in memory" if self.out is None else f"in {self.out}"
-        return f"Study({self.plan()}, {where})"
+        return f"Study({self.specification.name!r}, {where})"
 
     def _repr_html_(self) -> str:
         policies = ", ".join(policy.title for policy in self.specification.policies)
         done, of_all = self.finished()
-        return f"<b>{escape(repr(self))}</b><br>{escape(policies)}; {done} of {of_all} runs done"
+        words = f"{self.plan()}; {policies}; {done} of {of_all} runs done"
+        return f"<b>{escape(repr(self))}</b><br>{escape(words)}"
 
     def findings(self) -> Findings:
         """Return every cell and every verdict, from the runs that are there.

@@ -50,8 +50,8 @@ def test_outputs_in_the_frame_ask_for_the_motion_of_the_policy(drive: Any) -> No
     seen = np.stack([robot.observations for robot in recorded.episodes], axis=1)
     np.testing.assert_array_equal(rows, seen)
     # And as far as the policy itself would have gone.
-    own = run_episode(scenario, policies.load("homing"), 0)
-    assert abs(recorded.delivered[0] - own.delivered) <= 1
+    episode = run_episode(scenario, policies.load("homing"), 0)
+    assert abs(recorded.delivered[0] - episode.delivered) <= 1
 
 
 def test_files_hold_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -134,8 +134,8 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             seed = checked_count("seed", seed, least=0)
             seeds = {world: key(seed, "world", world) >> 1 for world in worlds}
         for world in worlds:
-            env = self.worlds[world]
-            env.conditions_of(seeds[world] or env.next_seed, options)
+            env, world_seed = self.worlds[world], seeds[world]
+            env.conditions_of(env.next_seed if world_seed is None else world_seed, options)
         for world in worlds:
             self._worlds.begin(world, self._observations, seeds[world], options)
         return self._observations.copy(), self._infos()
@@ -247,5 +247,5 @@ def _mode_of(mode: AutoresetMode | str) -> AutoresetMode:
     try:
         return mode if isinstance(mode, AutoresetMode) else AutoresetMode[str(mode).upper()]
     except KeyError:
-        names = ", ".join(each.name for each in AutoresetMode)
+        names = ", ".join(member.name for member in AutoresetMode)
         raise SetupError(f"autoreset_mode = {mode!r}: should be one of {names}") from None

@@ -34,8 +34,6 @@ from .app import (
 )
 from .policy_choice import EnvOption, FrameOption, NormalizeOption, policies_of
 
-FRAME_RATE = 25.0  # frames a second
-
 
 def run_command(
     policies: Annotated[
@@ -189,7 +187,7 @@ def _write_film(out: Path, runs: list[tuple[str, Play]], until: float, speed: fl
     from rich.console import Console
     from rich.progress import Progress
 
-    from swarm_logistics_env.rendering.renderer import load_pygame, write_film
+    from swarm_logistics_env.rendering.renderer import FRAME_RATE, load_pygame, write_film
 
     load_pygame()
     from swarm_logistics_env.watch.film import Film, Take

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.code_files import import_named
-from swarm_logistics_env.errors import RAISED_BY_OTHERS, SetupError, suggest
+from swarm_logistics_env.code_files import import_callable
+from swarm_logistics_env.errors import SetupError, suggest
 from swarm_logistics_env.floor.floor_plan import NO_DOCK
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
@@ -248,13 +248,7 @@ def term_of(name: str) -> Term:
         return REWARD_TERMS[name]
     if ":" not in name:
         raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
-    try:
-        term: Term = import_named(name)
-    except RAISED_BY_OTHERS as error:  # of code that is not ours, too
-        kind = type(error).__name__
-        raise SetupError(f"reward term {name!r} cannot be imported: {kind}: {error}") from error
-    if not callable(term):
-        raise SetupError(f"reward term {name!r} is a {type(term).__name__}: should be a function")
+    term: Term = import_callable("reward term", name, SetupError)
     return term
 
 

@@ -53,7 +53,7 @@ def act_homing(
 ) -> None:
     """Fill the commands (N, 4) of a step of `Homing`; memories and counts go on.
 
-    One kernel a step: each call of one costs some microseconds.
+    One kernel a step, because each call of a kernel costs more than a microsecond.
     """
     turn_frames(rows, period, memories, turned)
     counts += 1

@@ -27,6 +27,8 @@ from swarm_logistics_env.streams import row_keys
 Rows = NDArray[np.float32]
 Decide = Callable[[Rows], Any]
 _CODE = ("policies/models.py", "policies/sb3_files.py")
+_COMMANDS_BY_NUMBER = np.array(list(ACTIONS.values()))
+_OUTPUTS_BY_NUMBER = np.array(list(MOTION_ACTIONS.values()))
 
 
 def of(
@@ -196,7 +198,7 @@ class ModelPolicy(Described):
         rows = self._view.read(observations) if self._has_frame else observations
         outputs = _outputs_of(self._decide, self._prepare, rows, self._about)
         n_robots = len(observations)
-        actions = _actions_of(self._has_frame)
+        actions = _OUTPUTS_BY_NUMBER if self._has_frame else _COMMANDS_BY_NUMBER
         if outputs.dtype.kind in "iu" and outputs.size == n_robots:
             numbers = outputs.reshape(n_robots)
             if not ((numbers >= 0) & (numbers < len(actions))).all():
@@ -228,11 +230,6 @@ def _outputs_of(decide: Decide, prepare: Decide, rows: Rows, about: str) -> NDAr
         raise PolicyError(
             f"{about} failed with rows of shape {rows.shape} ({kind}: {error}){hint}"
         ) from error
-
-
-def _actions_of(frame: bool) -> NDArray[np.float64]:
-    rows = MOTION_ACTIONS if frame else ACTIONS
-    return np.array(list(rows.values()))
 
 
 def decider_of(network: Any) -> tuple[Decide, str]:
@@ -292,7 +289,7 @@ class _OfOnnx:
 def normalizer_of(normalize: Any) -> tuple[Decide, Any]:
     """Return what prepares rows, and what identifies it."""
     if normalize is None:
-        return _Scaled(0.0, 1.0, np.inf), None
+        return _unchanged, None
     statistics = getattr(normalize, "obs_rms", normalize)
     if hasattr(statistics, "mean") and hasattr(statistics, "var"):
         epsilon = getattr(normalize, "epsilon", 1e-8)
@@ -309,6 +306,10 @@ def normalizer_of(normalize: Any) -> tuple[Decide, Any]:
             "standard deviation) or a VecNormalize of stable-baselines3"
         )
     return scaled, scaled.digest()
+
+
+def _unchanged(rows: Rows) -> Rows:
+    return rows
 
 
 class _Scaled:

@@ -16,7 +16,7 @@ from typing import Any, Self, cast
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
-from swarm_logistics_env.code_files import MissingNameError, file_of_name, import_named
+from swarm_logistics_env.code_files import file_of_name, import_callable
 from swarm_logistics_env.errors import (
     RAISED_BY_OTHERS,
     PolicyError,
@@ -100,7 +100,9 @@ def load(
         hint = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, names)
         kinds = "a name, 'my.py:Class', 'package.module:Class', or a .safetensors or .zip file"
         raise PolicyError(f"no policy {name!r} ({kinds}){hint}")
-    wrap = None if env is None else _imported("env", env)
+    if env is not None and ":" not in env:
+        raise PolicyError(f"env {env!r}: should be 'my.py:NAME' or 'package.module:NAME'")
+    wrap = None if env is None else import_callable("env", env, PolicyError)
     try:
         if wrap is not None and name.endswith(SB3_SUFFIX):
             return make(wrap=wrap, **parameters)
@@ -378,20 +380,4 @@ def _entry_point_maker(name: str) -> Callable[..., Policy] | None:
 
 
 def _import_maker(name: str) -> Callable[..., Policy] | None:
-    return _imported("policy", name) if ":" in name else None
-
-
-def _imported(kind: str, name: str) -> Callable[..., Any]:
-    """Return the class or function that "package.module:NAME" or "my.py:NAME" names."""
-    if ":" not in name:
-        raise PolicyError(f"{kind} {name!r}: should be 'my.py:NAME' or 'package.module:NAME'")
-    try:
-        maker: Callable[..., Any] = import_named(name)
-    except MissingNameError as error:
-        raise PolicyError(f"{kind} {name!r}: {error}") from None
-    except RAISED_BY_OTHERS as error:  # of code that is not ours, too
-        error_name = type(error).__name__
-        raise PolicyError(f"{kind} {name!r} cannot be imported: {error_name}: {error}") from error
-    if not callable(maker):
-        raise PolicyError(f"{kind} {name!r} is a {type(maker).__name__}: should be a class")
-    return maker
+    return import_callable("policy", name, PolicyError) if ":" in name else None

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 RenderMode = Literal["rgb_array", "human"]
 LEAST_SIZE, LARGEST_SIZE = 100, 8000  # of a picture's longer side [px]
 
+FRAME_RATE = 25.0  # of films, frames a second
+
 
 class Renderer:
     """Draws states of a warehouse.

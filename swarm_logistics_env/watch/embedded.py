@@ -12,11 +12,9 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.spec import load
 from swarm_logistics_env.records import atomic_write
-from swarm_logistics_env.rendering.renderer import load_pygame, write_film
+from swarm_logistics_env.rendering.renderer import FRAME_RATE, load_pygame, write_film
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.faults import FaultLike
-
-FRAME_RATE = 25.0  # frames a second
 
 
 class EmbeddedFilm:

@@ -99,13 +99,13 @@ def test_evaluations_count_the_episodes_of_robots_alone() -> None:
         def predict(self, rows: Any, **_: object) -> Any:
             return np.zeros((len(rows), 4)), None
 
-    env, own = in_padding(), in_padding()
+    env, twin = in_padding(), in_padding()
     returns, lengths = evaluate_policy(Still(), env, 48, return_episode_rewards=True)
     assert env.env_is_wrapped(Monitor) == [True] * 24
     ended: list[list[Any]] = [[] for _ in range(24)]
-    own.reset()
+    twin.reset()
     while min(map(len, ended)) < 2:
-        for row, info in enumerate(own.step(np.zeros((24, 4)))[-1]):
+        for row, info in enumerate(twin.step(np.zeros((24, 4)))[-1]):
             if "episode" in info:
                 ended[row].append((info["episode"]["r"], info["episode"]["l"]))
     counted = sorted(pair for row in ended for pair in row[:2])

@@ -49,12 +49,12 @@ def test_gymnasium_makes_it_by_its_name() -> None:
 
 
 def trace(mode: AutoresetMode, steps: int) -> list[list[Any]]:
-    """Return what each world told, first observations among them, whatever the mode."""
+    """Return what each world parts, first observations among them, whatever the mode."""
     env = SwarmRows(2, autoreset_mode=mode, make_env=wrapped)
     slices = [slice(0, 6), slice(6, 12)]
     rngs = [np.random.default_rng(world) for world in range(2)]
     observations, _ = env.reset(seed=0)
-    told: list[list[Any]] = [[observations[rows]] for rows in slices]
+    parts: list[list[Any]] = [[observations[rows]] for rows in slices]
     waiting: set[int] = set()
     for _ in range(steps):
         actions = np.zeros((12, 4))
@@ -74,23 +74,23 @@ def trace(mode: AutoresetMode, steps: int) -> list[list[Any]]:
             if world in waiting:
                 assert not ended[rows].any()
                 assert not rewards[rows].any()
-                told[world].append(observations[rows])
+                parts[world].append(observations[rows])
                 waiting.remove(world)
                 continue
-            told[world].append((last, rewards[rows], terminations[rows], truncations[rows]))
+            parts[world].append((last, rewards[rows], terminations[rows], truncations[rows]))
             if ended[rows].all() and mode is AutoresetMode.NEXT_STEP:
                 waiting.add(world)
             elif ended[rows].all():
-                told[world].append(first[rows])
-    return told
+                parts[world].append(first[rows])
+    return parts
 
 
 def test_all_modes_play_the_same_episodes() -> None:
     next_step = trace(AutoresetMode.NEXT_STEP, 3 * N_STEPS + 3)
     for mode in (AutoresetMode.SAME_STEP, AutoresetMode.DISABLED):
-        for world, told in enumerate(trace(mode, 3 * N_STEPS)):
-            assert len(told) == 1 + 3 * N_STEPS + 3
-            np.testing.assert_equal(told, next_step[world])
+        for world, parts in enumerate(trace(mode, 3 * N_STEPS)):
+            assert len(parts) == 1 + 3 * N_STEPS + 3
+            np.testing.assert_equal(parts, next_step[world])
 
 
 def test_rewards_and_ends_are_those_of_the_rows_of_stable_baselines3() -> None:

@@ -27,7 +27,7 @@ BRIEF = Scenario(n_robots=3, n_items=10, duration=2.0)
 WEIGHTS = np.random.default_rng(0).normal(0.0, 0.3, (95, 3)).astype(np.float32)
 
 
-def ahead(rows: Any) -> Any:
+def linear(rows: Any) -> Any:
     return np.tanh(rows @ WEIGHTS)
 
 
@@ -61,11 +61,11 @@ def test_torch_onnx_and_a_function_of_one_network_give_the_same_commands() -> No
             return [type("Input", (), {"name": "inputs"})]
 
         def run(self, _: None, rows: dict[str, Any]) -> Any:
-            return [ahead(rows["inputs"])]
+            return [linear(rows["inputs"])]
 
     rows = np.random.default_rng(1).normal(size=(4, N_COLUMNS)).astype(np.float32)
     commands = []
-    for network in (ahead, module, with_gradient, Session()):
+    for network in (linear, module, with_gradient, Session()):
         policy = policies.of(network, frame=True)
         policy.reset(4, 0)
         commands.append(policy.act(rows))
@@ -120,12 +120,12 @@ def test_a_model_is_known_by_its_numbers_and_its_form_and_each_run_has_a_memory(
 @pytest.mark.parametrize(
     ("network", "options", "message"),
     [
-        (ahead, {}, "failed with rows of shape .*; if it learned through MotionFrame: frame=True"),
+        (linear, {}, "failed with rows of shape .*; if it learned through MotionFrame: frame=True"),
         (lambda rows: rows[:, :2], {"frame": True}, r"shape \(3, 2\): should be \(3, 3\), along"),
         (lambda rows: rows[:, :3], {}, r"shape \(3, 3\): should be \(3, 4\), commands"),
         (None, {}, "network = None: should be a function of rows, a torch module"),
         (dict, {}, "network = <class 'dict'>: should be a function of rows"),
-        (ahead, {"normalize": 3.0}, "normalize = 3.0: should be None, a function of rows, a pair"),
+        (linear, {"normalize": 3.0}, "normalize = 3.0: should be None, a function of rows, a pair"),
     ],
 )
 def test_what_is_no_model_is_refused(network: Any, options: Any, message: str) -> None:
@@ -228,7 +228,7 @@ def test_a_policy_says_what_it_is() -> None:
     assert repr(policies.SwarmDT(taxis_gain=0.5)) == "SwarmDT(taxis_gain=0.5)"
     policy: Any = policies.load("homing")
     assert policy._repr_html_().startswith("<b>Homing()</b><br>Every robot remembers")
-    assert repr(policies.of(ahead, frame=True)) == "policies.of(function, frame=True)"
+    assert repr(policies.of(linear, frame=True)) == "policies.of(function, frame=True)"
 
 
 def test_the_example_of_its_docstring_runs() -> None:

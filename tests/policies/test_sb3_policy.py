@@ -127,15 +127,15 @@ def test_a_model_plays_as_in_the_environment_that_it_learned_in(
     of_object = policies.of(learned, frame=frame, normalize=env)
 
     world = make_env()
-    rows, play = world.reset_arrays(5), [Play(brief().scenario.replace(n_robots=3), policy, 5)]
-    play.append(Play(brief().scenario.replace(n_robots=3), of_object, 5))
+    rows, plays = world.reset_arrays(5), [Play(brief().scenario.replace(n_robots=3), policy, 5)]
+    plays.append(Play(brief().scenario.replace(n_robots=3), of_object, 5))
     for _ in range(15):
         actions, _ = learned.predict(env.normalize_obs(rows), deterministic=True)
         rows, *_ = world.step_arrays(actions)
-        for each in play:
-            each.step()
+        for run in plays:
+            run.step()
             np.testing.assert_array_equal(
-                each.world.state.robot_position, world.warehouse.state.robot_position
+                run.world.state.robot_position, world.warehouse.state.robot_position
             )
     options = ["--frame"] * frame + ["--normalize", str(tmp_path / "rows.pkl"), "--trust-code"]
     arguments = ["run", "--policy", str(tmp_path / "model.zip"), "--set", "duration=1", *options]
