@@ -1,26 +1,21 @@
-"""The application: which commands there are, errors in one sentence, options that they share."""
+"""The application: which commands there are, and errors in one sentence."""
 
 from __future__ import annotations
 
 import gc
-import json
 import os
 import shlex
 import sys
 from collections.abc import Iterable
 from importlib import import_module
-from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 import typer
 from typer import Exit, Option, echo
 
-from swarm_logistics_env.bodies import BODIES
 from swarm_logistics_env.code_files import search_current_folder
-from swarm_logistics_env.errors import FaultError, ScenarioError, SwarmLogisticsError
-from swarm_logistics_env.records import plain, read_table
-from swarm_logistics_env.scenario import CHIPMUNK, SCENARIO_PRESETS, Scenario
-from swarm_logistics_env.warehouse.faults import Fault, fault_of
+from swarm_logistics_env.errors import SwarmLogisticsError
+from swarm_logistics_env.records import plain
 
 from .output import prepare_output
 
@@ -30,7 +25,7 @@ COMMANDS = {
     "run": ("playing", "run_command"),
     "train": ("train_command", "train_command"),
     "judge": ("judging", "judge_command"),
-    "attack": ("judging", "attack_command"),
+    "attack": ("attacking", "attack_command"),
     "record": ("recording", "record_command"),
     "list": ("playing", "list_command"),
     "study": ("study_commands", "study_app"),
@@ -134,96 +129,3 @@ def _sentence(error: Exception) -> str | None:
 def _complain(sentence: str, code: int) -> int:
     sys.stderr.write(f"swarm-logistics: {plain(sentence)}\n")  # it may repeat what was typed
     return code
-
-
-Repeated: TypeAlias = list[str] | None  # the texts of an option that may be given several times
-PresetOption = Annotated[
-    str, Option(help=f"Scenario to start from: {', '.join(SCENARIO_PRESETS)}.")
-]
-ScenarioOption = Annotated[
-    Path | None,
-    Option(
-        "--scenario",
-        metavar="FILE",
-        help="TOML or JSON file of fields to change, as `list scenario --json` writes it.",
-    ),
-]
-SetOption = Annotated[
-    Repeated, Option("--set", metavar="FIELD=VALUE", help="Change a field; may be repeated.")
-]
-BodiesOption = Annotated[
-    str | None,
-    Option(
-        help=f"What moves the robots: {', '.join([CHIPMUNK, *BODIES])}, module:Class or "
-        "my.py:Class; as --set bodies=.."
-    ),
-]
-FaultOption = Annotated[
-    Repeated,
-    Option(
-        "--fault",
-        metavar="FAULT",
-        help="Such as FM1:2@200: two robots from 200 s on (`list faults`); may be repeated.",
-    ),
-]
-PolicyOption = Annotated[
-    str, Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
-]
-SeedOption = Annotated[int, Option(help="Decides everything random.")]
-TrustOption = Annotated[
-    bool,
-    Option(
-        "--trust-code",
-        help="Let a file run code: a .zip policy, or what a study names as package.mod:NAME.",
-    ),
-]
-
-
-def scenario_of(
-    preset: str, file: Path | None, changes: Repeated, bodies: str | None = None
-) -> Scenario:
-    """Return the scenario that `--preset`, `--scenario`, `--set` and `--bodies` describe.
-
-    A file changes fields of the preset, and `--set` those of both.
-
-    Raises:
-        ScenarioError: no such preset, file or field, or a value that cannot be.
-    """
-    fields = {} if file is None else read_table(file, "file of --scenario", ScenarioError)
-    preset = str(fields.pop("preset", preset))
-    return Scenario.preset(preset).replace(**{**fields, **changed_fields(changes, bodies)})
-
-
-def changed_fields(changes: Repeated, bodies: str | None) -> dict[str, Any]:
-    """Return the fields that `--set` and `--bodies` change, with their values.
-
-    Raises:
-        ScenarioError: a change is not FIELD=VALUE.
-    """
-    fields: dict[str, Any] = {}
-    for change in changes or []:
-        name, equals, value = change.partition("=")
-        if not equals:
-            raise ScenarioError(f"--set {change}: should be FIELD=VALUE")
-        try:
-            fields[name] = json.loads(value)
-        except (json.JSONDecodeError, RecursionError):
-            fields[name] = value
-    if bodies is not None:
-        fields["bodies"] = bodies
-    return fields
-
-
-def faults_of(texts: Repeated, scenario: Scenario) -> list[Fault]:
-    """Return the faults that `--fault` describes, see `faults.fault_of`.
-
-    Raises:
-        FaultError: a text does not read so, there is no such fault, or the episode ends before.
-    """
-    faults = [fault_of(text) for text in texts or []]
-    for fault, text in zip(faults, texts or []):
-        if fault.onset >= scenario.duration:
-            raise FaultError(
-                f"--fault {text}: should begin before the episode ends at {scenario.duration:g} s"
-            )
-    return faults

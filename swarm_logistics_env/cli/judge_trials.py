@@ -19,8 +19,8 @@ from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.spi.trials import NO_FAULT_WORD, Column, Trial, Trials
 from swarm_logistics_env.studies import Study
 
-from .app import Repeated
 from .terminal import show_report, show_table
+from .world_choice import Repeated
 
 _LONGEST_VALUE = 12  # characters that show what a column holds
 _MOST_ROWS = 20  # of conditions that are shown before the answer

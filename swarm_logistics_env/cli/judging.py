@@ -1,4 +1,4 @@
-"""`swarm-logistics judge`: trials of real robots, or a policy; `attack`, its worst fault."""
+"""`swarm-logistics judge`: trials of real robots, or a policy."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import join
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 from typer import Argument, Exit, Option, echo
@@ -14,30 +14,21 @@ from typer import Argument, Exit, Option, echo
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES, PolicySpec
 from swarm_logistics_env.policies.spec import SCRIPTED
+from swarm_logistics_env.questions.presets import load_preset
 from swarm_logistics_env.questions.specification import FIRST_LOOK
 from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.section import bracketed, fixed, percent, slug
+from swarm_logistics_env.report.section import slug
 from swarm_logistics_env.report.write import write_report
 from swarm_logistics_env.runs.engines import Engine, Tally, engine_named
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.spi.trials.readers.folder import TRIAL_SUFFIXES
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.warehouse.faults import text_of
 
-from .app import (
-    BodiesOption,
-    PresetOption,
-    Repeated,
-    ScenarioOption,
-    SetOption,
-    TrustOption,
-    changed_fields,
-    scenario_of,
-)
 from .judge_trials import judge_trials, pairs
-from .policy_choice import EnvOption, FrameOption, NormalizeOption, policies_of
-from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
+from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption, policies_of
+from .study_choice import ask_in_world, study_of, switch_to_clearing
 from .study_commands import (
     ClearingOption,
     FullOption,
@@ -46,10 +37,20 @@ from .study_commands import (
     run_study,
     say_what_a_pilot_shows,
 )
-from .terminal import say, say_what_was_played, show, show_report, show_table
+from .terminal import say, say_what_was_played, show, show_report
+from .world_choice import (
+    BodiesOption,
+    PresetOption,
+    Repeated,
+    ScenarioOption,
+    SetOption,
+    changed_fields,
+    options_of_world,
+    scenario_of,
+)
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.attack import AttackResult
+    pass
 
 STUDY = "scorecard"
 JUDGE_SEEDS = 60  # of a policy that is judged
@@ -83,6 +84,8 @@ def judge_command(
         float | None, Option(help="Play for so long; the same command goes on.")
     ] = None,
     clearing: ClearingOption = False,
+    preset: PresetOption = None,
+    scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     bodies: BodiesOption = None,
     as_benchmark: Annotated[
@@ -150,7 +153,8 @@ def judge_command(
     delivered (or performance); where they apply seed, policy, onset and any parameter; or time,
     with a delivery a row. Without seeds the study is unpaired.
 
-    A policy is played in a warehouse in which delivered items come back, so that P has no cap.
+    A policy is played in a warehouse in which delivered items come back, so that P has no cap: that
+    in which a policy file was trained, or the paper's. Sizes and failures follow from it.
     """
     trials_options = {
         "--column": columns, "--ignore": ignore, "--duration": duration, "--value": values,
@@ -158,8 +162,9 @@ def judge_command(
         "--setup": setup,
     }  # fmt: skip
     policy_options = {
-        "--seeds": seeds, "--minutes": minutes, "--clearing": clearing,
-        "--set": changes, "--bodies": bodies, "--benchmark": as_benchmark,
+        "--seeds": seeds, "--minutes": minutes, "--clearing": clearing, "--preset": preset,
+        "--scenario": scenario_file, "--set": changes, "--bodies": bodies,
+        "--benchmark": as_benchmark,
         "--run-limit": run_limit, "--frame": frame, "--normalize": normalize,
         "--env": env,
     }  # fmt: skip
@@ -184,21 +189,30 @@ def judge_command(
         return
     _refuse(trials_options, policy_or_trials, "a policy")
     conditions = {
-        "--seeds": seeds, "--clearing": clearing, "--set": changes, "--bodies": bodies,
+        "--seeds": seeds, "--clearing": clearing, "--preset": preset, "--scenario": scenario_file,
+        "--set": changes, "--bodies": bodies,
     }  # fmt: skip
     if as_benchmark and (options := [option for option, value in conditions.items() if value]):
         raise StudyError(f"{options[0]}: the benchmark has the same conditions for everybody")
     engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
     (policy,) = policies_of([policy_or_trials], trust_code, frame, normalize, env)
+    world = None
+    if not as_benchmark:
+        usual = Scenario.model_validate(load_preset(STUDY).scenario)
+        scenario = scenario_of(
+            preset, scenario_file, changes, bodies, policies=[policy], usual=usual
+        )
+        if "restock" not in changed_fields(changes, bodies):
+            scenario = scenario.replace(restock=True)
+        options = options_of_world(preset, scenario_file, changes, bodies)
+        world = JudgedWorld(scenario, clearing, options)
     tally = judge_policy(
         policy,
         out,
+        world=world,
         most_seeds=seeds or JUDGE_SEEDS,
         until_clear=until_clear,
         minutes=minutes,
-        clearing=clearing,
-        fields=changed_fields(changes, bodies),
-        as_benchmark=as_benchmark,
         engine=engine,
         full=full,
         command=str(context.obj),
@@ -213,16 +227,37 @@ def _refuse(options: Mapping[str, object], policy_or_trials: str, kind: str) -> 
             raise StudyError(f"{option} is not for {kind}, and {policy_or_trials!r} is one")
 
 
+class JudgedWorld(NamedTuple):
+    """Where a policy is judged.
+
+    Attributes:
+        scenario: the world, in which nothing fails yet.
+        clearing: whether P is the rate at which its items are cleared.
+        options: what was typed to choose the scenario, e.g. ["--preset", "realistic"].
+    """
+
+    scenario: Scenario
+    clearing: bool
+    options: list[str]
+
+    @property
+    def words(self) -> list[str]:
+        """What names the directory of its study."""
+        words = [
+            value if option == "--set" else f"{option[2:]} {value}"
+            for option, value in zip(self.options[::2], self.options[1::2])
+        ]
+        return ["clearing"] * self.clearing + [slug(word)[:40] for word in words]
+
+
 def judge_policy(
     policy: PolicySpec,
     out: Path | None,
     *,
+    world: JudgedWorld | None,
     most_seeds: int,
     until_clear: bool,
     minutes: float | None,
-    clearing: bool,
-    fields: Mapping[str, Any],
-    as_benchmark: bool,
     engine: Engine,
     full: bool,
     command: str,
@@ -231,29 +266,29 @@ def judge_policy(
 
     Args:
         policy: as it was typed, and whether its code is trusted.
-        fields: of the scenario that are changed in all conditions.
         out: directory of the study; None: results/judged/NAME or results/benchmark/NAME.
+        world: where it is judged; None: in the worlds of the benchmark.
         command: the command line, which goes on where it was stopped.
     """
     for training in policy.trainings or (policy,):
         training.load()  # what is wrong with it is said before anything is written
-    if as_benchmark:
+    if world is None:
         directory = out or Path("results", "benchmark", slug(policy.title))
         study = study_of(benchmark.STUDY, directory, None, [policy], policy.trusted)
     else:
-        parts = [slug(policy.title), *["clearing"] * clearing, *changes_in_words(fields)]
+        parts = [slug(policy.title), *world.words]
         directory = out or Path("results", "judged", "-".join(parts))
         looks = until_clear and most_seeds > FIRST_LOOK
         study = study_of(STUDY, directory, most_seeds, [policy], policy.trusted, until_clear=looks)
-    if clearing:
-        switch_to_clearing(study)
-    change_scenario(study, fields)
+        ask_in_world(study, world.scenario)
+        if world.clearing:
+            switch_to_clearing(study)
     say(f"{study.plan()}, kept in {directory}")
     echo()
     say_what_a_pilot_shows(study)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
-    if as_benchmark and not (tally.left or tally.failed):
+    if world is None and not (tally.left or tally.failed):
         _show_benchmark(results, directory)
     else:
         show_report(results, directory, full=full, is_finished=not tally.left)
@@ -262,10 +297,8 @@ def judge_policy(
         reason = f"Stopped after {minutes:g} min, {tally.left} runs are left"
         say(f"{reason}; the same command goes on:", command)
     # Several trainings and untrusted code need options that the suggested command does not have.
-    elif is_open and not (tally.left or as_benchmark or policy.trainings or policy.trusted):
-        options = [policy.name, *(["--clearing"] if clearing else [])]
-        for name, value in fields.items():
-            options += ["--set", f"{name}={value if isinstance(value, str) else json.dumps(value)}"]
+    elif world and is_open and not (tally.left or policy.trainings or policy.trusted):
+        options = [policy.name, *["--clearing"] * world.clearing, *world.options]
         _suggest_more_seeds(options, directory, max(JUDGE_SEEDS, 2 * most_seeds))
     say_what_was_played(tally)
     return tally
@@ -297,78 +330,3 @@ def _show_benchmark(results: StudyResults, out: Path) -> None:
     score = benchmark.score(results, entries.references)
     show(benchmark.leaderboard({**entries.scores, results.policies[0]: score}))
     echo(f"Report: {write_report(results, out, document(results))[0]}")
-
-
-def attack_command(
-    policy: Annotated[
-        str,
-        Argument(metavar="POLICY", help="Name, .safetensors file, module:Class or my.py:Class."),
-    ],
-    robots: Annotated[int, Option(min=1, help="How many robots fail.")] = 2,
-    modes: Annotated[Repeated, Option("--mode", help="Mode to search; may be repeated.")] = None,
-    budget: Annotated[int, Option(min=10, help="Runs of faults in the search.")] = 200,
-    fresh: Annotated[int, Option(min=3, help="Other seeds, for the estimates.")] = 30,
-    seed: Annotated[int, Option(help="Of the search's own choices.")] = 0,
-    preset: PresetOption = "paper",
-    file: ScenarioOption = None,
-    changes: SetOption = None,
-    out: Annotated[
-        Path | None, Option(help="Directory; results/attack-POLICY if not given.")
-    ] = None,
-    processes: ProcessesOption = None,
-) -> None:
-    """Search for the fault that costs most.
-
-    It tries modes, roles at the onset, times and durations. What it finds bounds the worst fault
-    from one side: there may be worse ones.
-    """
-    from swarm_logistics_env.attack import MODES, Attack, attack
-
-    search = Attack(
-        policy=policy,
-        scenario=scenario_of(preset, file, changes),
-        robots=robots,
-        modes=tuple(modes) if modes else MODES,
-        budget=budget,
-        fresh=fresh,
-        seed=seed,
-    )
-    engine = engine_named("local" if processes == 1 else "process", processes)
-    directory = out or Path("results") / f"attack-{Path(policy).stem}"
-    try:
-        result = attack(search, engine, directory)
-    except KeyboardInterrupt:
-        echo(
-            f"\nStopped. What is finished is kept in {directory}; the same command goes on.",
-            err=True,
-        )
-        raise Exit(130) from None
-    _show_attack(result, policy, robots, fresh)
-
-
-def _show_attack(result: AttackResult, policy: str, robots: int, fresh: int) -> None:
-    rows = [
-        (
-            candidate.by,
-            str(text_of(candidate.fault)),
-            bracketed(candidate.robustness, 3),
-            str(candidate.runs),
-        )
-        for candidate in result.found
-    ]
-    worst = min(result.found, key=lambda candidate: candidate.robustness.value)
-    capped = (
-        "Capped: without a fault every item was delivered in a run or more, so R may be lower than "
-        "shown. --set restock=true has no cap."
-    )
-    show_table(
-        f"{policy}: worst faults found",
-        ("found by", "--fault", f"R [{percent(worst.robustness.confidence)}]", "runs"),
-        rows,
-        f"Worst fault of {robots} robots found: {text_of(worst.fault)}, R = "
-        f"{fixed(worst.robustness.value, 3, [0.0])} on {fresh} seeds that the search has not met. "
-        "`run` and `watch` play it with --fault.",
-        f"{result.tried} of {result.searched} faults were tried. What is found bounds "
-        "the worst from one side: it proves no other fault harmless.",
-        *([capped] if result.is_capped else ()),
-    )

@@ -19,20 +19,26 @@ from swarm_logistics_env.scenario import SOURCES
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import ROLES
 
-from .app import (
+from .policy_choice import (
+    EnvOption,
+    FrameOption,
+    NormalizeOption,
+    PolicyOption,
+    TrustOption,
+    policies_of,
+)
+from .world_choice import (
+    USUAL_PRESET,
     BodiesOption,
     FaultOption,
-    PolicyOption,
     PresetOption,
     Repeated,
     ScenarioOption,
     SeedOption,
     SetOption,
-    TrustOption,
     faults_of,
     scenario_of,
 )
-from .policy_choice import EnvOption, FrameOption, NormalizeOption, policies_of
 
 
 def run_command(
@@ -45,7 +51,7 @@ def run_command(
         ),
     ] = None,
     seed: SeedOption = 0,
-    preset: PresetOption = "paper",
+    preset: PresetOption = None,
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     bodies: BodiesOption = None,
@@ -70,9 +76,9 @@ def run_command(
     env: EnvOption = None,
 ) -> None:
     """Play one episode and print what it delivered, or write a film."""
-    scenario = scenario_of(preset, scenario_file, changes, bodies)
-    scheduled = faults_of(faults, scenario)
     players = policies_of(policies or ["swarm-dt"], trust_code, frame, normalize, env)
+    scenario = scenario_of(preset, scenario_file, changes, bodies, policies=players)
+    scheduled = faults_of(faults, scenario)
     if film is not None:
         variants = [(faults or [], scheduled)]
         if twin:
@@ -117,7 +123,7 @@ def watch_command(
         str | None, Option(help="Policy of the run beside it; left out: the same without faults.")
     ] = None,
     seed: Annotated[int, Option(help="Seed of the first episode.")] = 0,
-    preset: PresetOption = "paper",
+    preset: PresetOption = None,
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     bodies: BodiesOption = None,
@@ -148,8 +154,8 @@ def watch_command(
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
     if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
         raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
-    scenario = scenario_of(preset, scenario_file, changes, bodies)
     players = policies_of(filter(None, (policy, against)), trust_code, frame, normalize, env)
+    scenario = scenario_of(preset, scenario_file, changes, bodies, policies=players)
     typed = {display_name(player.name): player for player in players}
     session = Session(
         scenario,
@@ -207,7 +213,7 @@ def list_command(
         Literal["policies", "trainings", "faults", "studies", "scenario"],
         Argument(help="What to list."),
     ],
-    preset: PresetOption = "paper",
+    preset: PresetOption = None,
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     as_json: Annotated[
@@ -231,7 +237,8 @@ def list_command(
         )
         sources = "; ".join(f"{name}: {address}" for name, address in SOURCES.items())
         columns = ("condition", "value", "unit, meaning; source")
-        show_table(f"Preset {preset}", columns, scenario.conditions(), marks, sources)
+        title = f"Preset {preset or USUAL_PRESET}"
+        show_table(title, columns, scenario.conditions(), marks, sources)
     elif what == "policies":
         line = "Your own is package.module:Class, or the path of a file that `train` wrote."
         show_table("Policies", ("name", "kind", "about"), known_policies(), line)

@@ -13,6 +13,18 @@ from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.sb3_files import SB3_SUFFIX
 
+PolicyOption = Annotated[
+    str, Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
+]
+TrustOption = Annotated[
+    bool,
+    Option(
+        "--trust-code",
+        help="Let a file run code: a .zip policy, or what a study names as package.mod:NAME.",
+    ),
+]
+
+
 FrameOption = Annotated[
     bool, Option("--frame", help="A .zip model learned through MotionFrame, so it plays in one.")
 ]
@@ -20,8 +32,6 @@ NormalizeOption = Annotated[
     Path | None,
     Option(metavar="FILE", help="What VecNormalize.save wrote beside a .zip model."),
 ]
-
-
 EnvOption = Annotated[
     str | None,
     Option(

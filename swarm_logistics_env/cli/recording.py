@@ -11,18 +11,17 @@ from swarm_logistics_env.demonstrations import record
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.report.section import slug
 
-from .app import (
+from .policy_choice import TrustOption, policies_of
+from .world_choice import (
     FaultOption,
     PresetOption,
     Repeated,
     ScenarioOption,
     SeedOption,
     SetOption,
-    TrustOption,
     faults_of,
     scenario_of,
 )
-from .policy_choice import policies_of
 
 DEFAULT_POLICIES = ["homing", "ppo-robust", "swarm-dt"]
 
@@ -37,7 +36,7 @@ def record_command(
     ] = None,
     episodes: Annotated[int, Option(min=1, help="Of each policy.")] = 10,
     seed: SeedOption = 0,
-    preset: PresetOption = "paper",
+    preset: PresetOption = None,
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
     faults: FaultOption = None,
@@ -53,9 +52,10 @@ def record_command(
     trust_code: TrustOption = False,
 ) -> None:
     """Record what policies do, to learn from it."""
-    scenario = scenario_of(preset, scenario_file, changes)
+    specs = policies_of(policies or DEFAULT_POLICIES, trust_code)
+    scenario = scenario_of(preset, scenario_file, changes, policies=specs)
     scheduled = faults_of(faults, scenario)
-    players = [(p, p.load()) for p in policies_of(policies or DEFAULT_POLICIES, trust_code)]
+    players = [(spec, spec.load()) for spec in specs]
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import contextlib
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from more_itertools import partition
 
 from swarm_logistics_env.bodies.bodies import load_bodies
-from swarm_logistics_env.errors import StudyError
+from swarm_logistics_env.errors import ScenarioError, StudyError
 from swarm_logistics_env.floor.floor_plan import PLAN_SIZES
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.sb3_files import SB3_SUFFIX
+from swarm_logistics_env.questions.specification import Parameter
 from swarm_logistics_env.report.section import slug
+from swarm_logistics_env.scenario import CHIPMUNK, Scenario
 from swarm_logistics_env.studies import Study
 
 from .terminal import say
@@ -73,6 +76,61 @@ def changes_in_words(fields: Mapping[str, Any]) -> list[str]:
     return [slug(name, value)[:40] for name, value in fields.items()]
 
 
+def ask_in_world(study: Study, scenario: Scenario) -> None:
+    """Ask what a study asks of one world of another one: its numbers follow in proportion.
+
+    Swarm sizes and failures are in proportion to the number of robots, where the robots fit and at
+    most a third of them fails; values of a parameter to its value in the scenario.
+
+    Raises:
+        SwarmLogisticsError: a package that the robots' bodies need is not installed.
+    """
+    if scenario.bodies != CHIPMUNK:
+        load_bodies(scenario.bodies)  # what is wrong with them is said before anything is written
+    specification = study.specification
+    original, n_robots = specification.scenario, scenario.n_robots
+    share = n_robots / original.n_robots
+    sizes = [
+        factor.replace(values=values)
+        for factor in specification.sizes
+        if len(values := _sizes_that_fit(scenario, [share * size for size in factor.values])) > 1
+    ]
+    faults = []
+    for factor in specification.faults:
+        numbers = [m * max(1, round(share)) for m in factor.robots]
+        fewest = numbers[0] if numbers[0] < n_robots else None
+        robots = [m for m in numbers if m == fewest or 3 * m <= n_robots]
+        faults += [factor.replace(robots=tuple(robots))] if robots else []
+    parameters = []
+    for parameter in specification.parameters:
+        scale = getattr(scenario, parameter.name) / getattr(original, parameter.name)
+        values = tuple(scale * value for value in parameter.values)
+        parameters.append(parameter.replace(values=values))
+    if scenario.floor is not None:
+        parameters = _without_sizes_of_plan(parameters)
+    study.specification = specification.replace(
+        scenario=scenario, sizes=tuple(sizes), faults=tuple(faults), parameters=tuple(parameters)
+    )
+
+
+def _sizes_that_fit(scenario: Scenario, sizes: Iterable[float]) -> tuple[int, ...]:
+    """Return the sizes, rounded, ascending and each once, of swarms that fit into the world."""
+    fitting = set()
+    for size in sizes:
+        n_robots = max(1, round(size))
+        with contextlib.suppress(ScenarioError):
+            fitting.add(scenario.replace(n_robots=n_robots).n_robots)
+    return tuple(sorted(fitting))
+
+
+def _without_sizes_of_plan(parameters: Iterable[Parameter]) -> list[Parameter]:
+    """Return the parameters that do not follow from a floor plan; tell which ones do."""
+    from_plan, others = partition(lambda parameter: parameter.name not in PLAN_SIZES, parameters)
+    for parameter in from_plan:
+        say(f"No question of {parameter.name}, which follows from the floor plan.")
+    return list(others)
+
+
 def change_scenario(study: Study, fields: Mapping[str, Any]) -> None:
     """Change fields of the scenario in every condition of a study.
 
@@ -86,10 +144,6 @@ def change_scenario(study: Study, fields: Mapping[str, Any]) -> None:
         load_bodies(fields["bodies"])  # what is wrong with them is said before anything is written
     specification = study.specification
     if fields.get("floor") is not None:
-        from_plan, others = partition(
-            lambda parameter: parameter.name not in PLAN_SIZES, specification.parameters
-        )
-        for parameter in from_plan:
-            say(f"No question of {parameter.name}, which follows from the floor plan.")
+        others = _without_sizes_of_plan(specification.parameters)
         specification = specification.replace(parameters=tuple(others))
     study.specification = specification.varying(fields)

@@ -22,8 +22,7 @@ from swarm_logistics_env.tasks.task import Run
 from swarm_logistics_env.verdicts.gate import SUBJECTS, Gate, GateAnswer, answers, match
 from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 
-from .app import BodiesOption, Repeated, SetOption, TrustOption, changed_fields
-from .policy_choice import EnvOption, FrameOption, NormalizeOption, policies_of
+from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption, policies_of
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .terminal import (
     AnswerSoFar,
@@ -33,6 +32,7 @@ from .terminal import (
     show_report,
     show_table,
 )
+from .world_choice import BodiesOption, Repeated, SetOption, changed_fields
 
 StudyArgument = Annotated[
     str,

@@ -316,13 +316,14 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
 
 def _card(training: Training, agent_steps: int, log: TrainingLog, command: str = "") -> PolicyCard:
+    scenario = training.scenario.replace(n_robots=training.evaluation.n_robots)
     return PolicyCard(
         name=training.name,
         about=training.about,
         network=training.network,
         command=command,
         versions=log.versions,
-        scenario=training.scenario.model_dump(mode="json", exclude_defaults=True),
+        scenario=scenario.model_dump(mode="json", exclude_defaults=True),
         training=training.model_dump(mode="json", exclude_defaults=True),
         seed=training.seed,
         agent_steps=agent_steps,

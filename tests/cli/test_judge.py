@@ -10,6 +10,7 @@ import pytest
 from swarm_logistics_env.cli import judge_trials
 from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.report import benchmark
+from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
 from tests.cli.conftest import Command
 
@@ -183,7 +184,7 @@ def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(command: Command
 def test_a_policy_is_judged_on_other_bodies_and_floors(command: Command) -> None:
     printed = command("judge homing --bodies mujoco --seeds 3 --processes 1")
     folder = "results/judged/homing-bodies-mujoco"
-    assert f"homing --set bodies=mujoco --seeds 60 --out {folder}-60" in printed
+    assert f"homing --bodies mujoco --seeds 60 --out {folder}-60" in printed
     report = Path(folder, "report.md").read_text()
     assert "| bodies | mujoco (default chipmunk) |" in report
     refused = command("judge homing --benchmark --bodies mujoco", code=2)
@@ -191,6 +192,47 @@ def test_a_policy_is_judged_on_other_bodies_and_floors(command: Command) -> None
     plan = "--set floor=two_docks --set n_robots=3 --set duration=5"
     command(f"judge homing {plan} --seeds 3 --processes 1 --out floor")
     assert "| floor | two_docks (default None) |" in Path("floor", "report.md").read_text()
+
+
+def test_a_policy_file_is_judged_in_the_world_in_which_it_was_trained(command: Command) -> None:
+    training = """name = "mine"
+agent_steps = 400
+scenario = { warehouse_width = 4.0, warehouse_height = 3.0, delivery_width = 0.8, n_items = 6, duration = 10.0 }
+worlds = [{ count = 2, n_robots = 10 }]
+evaluation = { every = 400, seeds = 1, n_robots = 10 }
+scores = { seeds = 0 }
+ppo = { n_steps = 20, n_minibatches = 2 }
+"""  # noqa: E501
+    Path("mine.toml").write_text(training)
+    command("train mine.toml")
+    file = "results/train/mine/mine.safetensors"
+    printed = command(f"judge {file} --seeds 3 --processes 1")
+    assert "In the world in which mine was trained; --preset names another." in printed
+    specification = Study.stored("results/judged/mine").specification
+    world = specification.scenario
+    assert isinstance(world, Scenario)
+    assert (world.warehouse_width, world.n_robots) == (4.0, 10)
+    assert world.restock  # so that P has no cap
+    # Sizes and failures are in proportion to those of the scorecard: 2 and 4, 1 of 4.
+    assert specification.sizes[0].values == (5, 10)
+    assert specification.faults[0].robots == (2,)
+    assert "10 robots" in command(f"run --policy {file}")
+    assert "25 robots" in command(f"run --policy {file} --preset paper --set duration=1")
+
+
+def test_a_policy_is_judged_in_a_world_of_a_preset_and_a_file(command: Command) -> None:
+    Path("hall.toml").write_text("n_robots = 3\nn_items = 5\nduration = 5\n")
+    printed = command("judge homing --preset dots --scenario hall.toml --seeds 3 --processes 1")
+    folder = "results/judged/homing-preset-dots-scenario-hall-toml"
+    assert f"kept in {folder}" in printed
+    specification = Study.stored(folder).specification
+    assert specification.scenario == Scenario.preset("dots").replace(
+        n_robots=3, n_items=5, duration=5.0, restock=True
+    )
+    assert specification.faults[0].robots == (1,)
+    refused = command("judge homing --benchmark --preset dots", code=2)
+    assert "--preset: the benchmark has" in refused
+    assert "--preset is not for a file of trials" in command(f"{TRIALS} --preset dots", code=2)
 
 
 def test_the_benchmark_gives_a_table_and_a_place_and_goes_on(command: Command) -> None:
