@@ -15,9 +15,10 @@ from typer import echo
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.records import plain
-from swarm_logistics_env.report.answer import MOST_LINES, answer, in_a_sentence
+from swarm_logistics_env.report.answer import MOST_LINES, answer
 from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.report.section import NOTHING, Section, Texts, levels, number
 from swarm_logistics_env.report.write import how_to_get_figures, section_markdown, write_report
 from swarm_logistics_env.runs.engines import Tally

@@ -74,14 +74,18 @@ def scenario_of(
     Args:
         policies: where neither preset nor file is named, the scenario is the one in which the first
             policy file among these was trained, which is told.
-        usual: the scenario where there is no such policy; None: the preset `USUAL_PRESET`.
+        usual: the scenario where there is no such policy, which is told; None: the preset
+            `USUAL_PRESET`.
 
     Raises:
         ScenarioError: no such preset, file or field, or a value that cannot be.
     """
     fields = {} if file is None else read_table(file, "file of --scenario", ScenarioError)
     preset = fields.pop("preset", preset)
-    base = None if preset or file else _training_scenario(policies) or usual
+    base = None if preset or file else _training_scenario(policies)
+    if base is None and usual is not None and not (preset or file):
+        say(f"In the world of the preset {USUAL_PRESET}; --preset or --scenario names another.")
+        base = usual
     base = base or Scenario.preset(str(preset or USUAL_PRESET))
     return base.replace(**{**fields, **changed_fields(changes, bodies)})
 

@@ -164,7 +164,8 @@ def _check_spaces(path: Path, model: Any, frame: bool) -> None:
     if rows != expected or n_messages < 0 or not (is_number or commands == taken):
         raise PolicyError(
             f"{path} maps observations {rows} to commands {commands}: should map ({N_COLUMNS},) "
-            f"to (4,), or through MotionFrame ({len(INPUTS)},) to ({len(OUTPUTS)},)"
+            f"to (4,), or through MotionFrame ({len(INPUTS)},) to ({len(OUTPUTS)},); wrappers in "
+            "which it learned are named by --env, or policies.within"
         )
 
 

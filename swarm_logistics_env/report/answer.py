@@ -128,6 +128,11 @@ class Line(NamedTuple):
         return "words", {"words": words}
 
     @property
+    def needs_runs(self) -> bool:
+        """Whether the verdict in words says how many more runs it takes."""
+        return self._case()[0] == "more_runs"
+
+    @property
     def contradicts(self) -> bool:
         """Whether a verdict contradicts what the study's reference claims."""
         decisions = [verdict.on_claim for verdict in self.verdicts]
@@ -189,7 +194,7 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     lines: list[Line] = []
     for sharing in range(4):
         groups = map_reduce(enumerate(results.verdicts), partial(_what_a_line_shares, sharing))
-        lines = [_line(group) for group in groups.values()]
+        lines = [line_of(group) for group in groups.values()]
         if most is None or len(lines) <= most:
             break
     # Recorded trials may ask one question in several tables, at other values of a parameter.
@@ -201,7 +206,8 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     policies = results.policies
     indicators = list(DEFINITIONS)
     lines.sort(key=lambda line: (policies.index(line.policy), indicators.index(line.indicator)))
-    return Answer(_scope(results), _performance(results), tuple(lines), notes(results))
+    notes_text = notes(results, needs_runs=any(line.needs_runs for line in lines))
+    return Answer(_scope(results), performance_of(results), tuple(lines), notes_text)
 
 
 def _part_of_title(table: str) -> str:
@@ -228,7 +234,8 @@ def _what_a_line_shares(sharing: int, numbered: tuple[int, Verdict]) -> tuple[ob
     return (*indicator, after.name, after.onset, comparison.threshold)
 
 
-def _line(numbered: Sequence[tuple[int, Verdict]]) -> Line:
+def line_of(numbered: Sequence[tuple[int, Verdict]]) -> Line:
+    """Return the line of verdicts, each with its index among those of the study."""
     numbers, verdicts = zip(*numbered)
     comparison = verdicts[0].compared
     case, slots = _question(verdicts)
@@ -277,7 +284,8 @@ def _scope(results: StudyResults) -> str:
     )
 
 
-def _performance(results: StudyResults) -> str:
+def performance_of(results: StudyResults) -> str:
+    """Return P of every policy where the swarm is as it should be, in a sentence."""
     played = [cell for cell in results.cells if cell.n_seeds]
     if not played:
         return templates.PERFORMANCE["nothing"]
@@ -334,39 +342,3 @@ def _mean(cell: Cell) -> str:
             "problem": cell.problem,
         }
     return "".join(fill(templates.MEAN, slots))
-
-
-def in_a_sentence(results: StudyResults) -> str:
-    """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
-    verdicts = results.verdicts
-    with_interval = [v for v in verdicts if v.interval and v.interval.low is not None]
-    # A change of P has another scale than the indicators.
-    candidates = [v for v in with_interval if v.compared.indicator != "change"] or with_interval
-    lowest = min(candidates or verdicts, key=lambda verdict: verdict.value or 0.0)
-    line = _line([(0, lowest)])
-    words = section.conclusion_text(*verdicts)
-    if len(verdicts) == 1:
-        case = "one_question"
-    else:
-        case = "several_questions" if candidates else "no_value"
-        if words == lowest.on_property.adjusted:  # all are alike
-            words = f"{len(verdicts)} {words}"
-    return templates.FOR_A_PAPER[case].format(
-        policies=", ".join(results.policies),
-        performance=_performance(results)[:-1],
-        seeds=results.seeds_text,
-        lowest=_question_with_value(line, level_of([lowest])),
-        property=f"{line.indicator} > {lowest.compared.threshold:.3g}",
-        n_questions=len(verdicts),
-        words=words,
-    )
-
-
-def _question_with_value(line: Line, level: float) -> str:
-    interval = line.interval(level)
-    return templates.QUESTION_WITH_VALUE["interval" if interval else "value"].format(
-        question=line.question,
-        value=line.value,
-        level=section.percent(level),
-        interval=interval,
-    )

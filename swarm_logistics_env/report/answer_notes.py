@@ -14,14 +14,18 @@ from .collapse_tables import collapsed_in_words
 from .templates import Slots, fill
 
 
-def notes(results: StudyResults) -> str:
-    """Return the notes on the answer of a study, in one line."""
-    slots_by_case = dict(_notes_that_apply(results))
+def notes(results: StudyResults, needs_runs: bool) -> str:
+    """Return the notes on the answer of a study, in one line.
+
+    Args:
+        needs_runs: whether a line of it says how many more runs it takes.
+    """
+    slots_by_case = dict(_notes_that_apply(results, needs_runs))
     line = "; ".join(fill(templates.NOTES, slots_by_case))
     return f"{line[0].upper()}{line[1:]}."
 
 
-def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
+def _notes_that_apply(results: StudyResults, needs_runs: bool) -> Iterator[tuple[str, Slots]]:
     """Yield the notes on an answer that apply, each with its slots; `NOTES` has their order."""
     verdicts = results.verdicts
     is_paired = results.plan.paired
@@ -56,7 +60,12 @@ def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
         yield "collapsed_runs", {"conditions": words}
     open_verdicts = [verdict for verdict in verdicts if verdict.conclusion == "open"]
     if open_verdicts:
-        yield "open", {"runs": "seeds" if is_paired else "trials a condition"}
+        yield "open", {"runs": "seeds" if is_paired else "trials"}
+    has_faults = any(verdict.after.kind == "fault" for verdict in verdicts)
+    if has_faults and "FM1" in results.plan.specification.played.failure_modes:
+        yield "faults", {}
+    if needs_runs:
+        yield "more_runs", {"runs": "seeds" if is_paired else "trials a condition"}
     reasons = list(_reasons_to_be_open(open_verdicts))
     if reasons:
         yield "open_at_an_interval_on_one_side", {"reasons": " or ".join(reasons)}

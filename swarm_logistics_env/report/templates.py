@@ -68,12 +68,12 @@ LINE = {
     "unaffected": "{words}, exact",
     "untestable": "{words}: it cannot be below {threshold:g}",
     "unbounded": "{words} by its test; P_o is too near 0 for an interval",
-    "more_runs": "open: {n_more} more {runs} tell {effect:g}",
+    "more_runs": "open; {n_more} more {runs} would show {effect:g}",
 }
 
 # How to read the answer, and what limits it: the cases that apply, with "; " between them.
 NOTES = {
-    "indicators": "{indicators}: good above 0",
+    "indicators": "{indicators}: supported if above 0 (good), refuted if below",
     "intervals": "{level} intervals",
     "intervals_of_several_levels": "{level} intervals, or as said behind them",
     "adjusted": "verdicts are Holm-adjusted",
@@ -86,7 +86,9 @@ NOTES = {
     "collapsed": "of the trainings at worst {collapsed}",
     "capped": "{mark} P is capped: --clearing or --restock has no cap",
     "collapsed_runs": "runs collapse {conditions}",
-    "open": "so many more {runs} would tell such a value from the threshold in 4 of 5 studies",
+    "open": "open: not decided by these {runs}",
+    "more_runs": "about so many more {runs} decide it in 4 of 5 studies, if its true value is that",
+    "faults": "failure modes: swarm-logistics list faults",
     "open_at_an_interval_on_one_side": "open beside an interval on one side of it: {reasons}",
     "claims_of_the_text": "of {claims} in the paper's text {counts}",
     "claims_beside_the_text": "of {claims} beside it {counts}",
@@ -97,13 +99,21 @@ REASONS_TO_BE_OPEN = {
     "holm": "Holm counts all questions",
 }
 
-# The sentence that a paper can quote.
+# The sentence that a paper can quote: the cases that apply, one after the other.
 FOR_A_PAPER = {
-    "one_question": "{policies}: {performance} over {seeds}; {lowest}; {property}: {words} (Holm).",
-    "several_questions": "{policies}: {performance} over {seeds}; of {n_questions} questions "
-    "{words} (Holm); the lowest is {lowest}.",
-    "no_value": "{policies}: {performance} over {seeds}; of {n_questions} questions {words} "
-    "(Holm).",
+    "performance": "{policies}{world}: {performance} over {seeds}",
+    "one_question": "; {lowest}; {property}: {words} ({method})",
+    "several_questions": "; of {n_questions} questions {words} ({method})",
+    "not_decided": "; not decided: {questions}",
+    "lowest": "; the lowest is {lowest}",
+    "end": ".",
+}
+METHOD = "Holm's method, {error} error"
+WORLD = {
+    "warehouse": " in a warehouse of {width:g} m x {height:g} m{floor} with {n_items} items"
+    "{restock}, robots of {speed:g} m/s{drive}{handling}",
+    "task": " in the task {task}",
+    "trials": ", trials of {file}{setup}",
 }
 QUESTION_WITH_VALUE = {
     "value": "{question} = {value}",

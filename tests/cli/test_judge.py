@@ -66,7 +66,8 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     assert "| none |  | 8 | 3 |" in printed
     assert "| wheel, m = 1 | 10.6 [8.4, 12.8] | [6.2, 14.9] | -0.013 [" in printed
     assert "No FT: it needs trials without the robots, fault = removed" in printed
-    assert "For a paper: lab: P (boxes) [95 %] at N = 8, no fault: 12.3 [" in printed
+    performance = "P (boxes) [95 %] at N = 8, no fault: 12.3 ["
+    assert f"For a paper: lab, trials of lab.csv, robots 8, floor tiles: {performance}" in printed
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
     assert f"Figure: {out / 'figures' / 'answer.svg'}\nTables: {out / 'tables.tex'}\n" in printed
@@ -90,7 +91,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
         with pytest.raises(ZeroDivisionError):
             command(words)
     first = command(words)
-    assert "For a paper: lab: " in first
+    assert "For a paper: lab, trials of lab.csv: " in first
     assert first.endswith(command(words))
     (out,) = {path.parent for path in Path().rglob("study.sqlite")}
     assert (out / "report.html").is_file()
@@ -138,7 +139,9 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     study = Study.stored("results/judged/homing")
     cells = study.performance()
     p = cells[cells["factor"] == "none"]["mean"].iloc[0]
-    assert f"For a paper: homing: P [95 %], items in 20 s, at N = 4, no fault: {p:.1f} [" in printed
+    world = "in a warehouse of 3 m x 3 m with 6 items that come back, robots of 2 m/s"
+    performance = f"P [95 %], items in 20 s, at N = 4, no fault: {p:.1f} ["
+    assert f"For a paper: homing {world}: {performance}" in printed
     assert "from the start: swarm-logistics judge homing --seeds" in printed
     last = printed.splitlines()[-1]
     assert last.startswith(f"{5 * len(study.plan().cases) - 1} runs played in ")

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import Setting
-from swarm_logistics_env.report.answer import answer, in_a_sentence
+from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.report.section import bracketed, conclusion_text, fixed, levels, percent
 from swarm_logistics_env.report.write import latex_tables, markdown, write_report
 from swarm_logistics_env.studies import Study
@@ -114,7 +115,8 @@ def test_every_surface_names_the_level_that_it_prints(
         (row,) = re.findall(rf"^{question}, .*$", surfaces["terminal"], re.MULTILINE)
         assert (f"] {level}" in row) == (level != common)
         assert f", {level} interval [" in surfaces["report"]
-    assert f"{common} intervals, or as said behind them" in surfaces["terminal"]
+    unfolded = re.sub(r"\s+", " ", surfaces["terminal"])
+    assert f"{common} intervals, or as said behind them" in unfolded
     assert f"| question | value | {common} interval |" in surfaces["report"]
     assert f"R [{common}]" in surfaces["report"]
     assert f'<th scope="col">{common}</th>' in page
@@ -156,6 +158,16 @@ def test_one_question_is_answered_in_a_sentence() -> None:
     one = looked_at(["FM2"])
     told = in_a_sentence(one)
     asked = r"; R FM2, 1 of 25 = 0\.01, 97\.84 % interval \[-0\.06, 0\.08\]; R > 0: "
-    assert re.search(rf"{asked}open; P changes by less than 10 % \(Holm\)\.$", told)
+    verdict = r"open; P changes by less than 10 % \(Holm's method, 5 % error\)\.$"
+    assert re.search(asked + verdict, told)
     assert "lowest" not in told
     assert "question" not in told
+
+
+def test_a_paper_is_told_the_world_and_what_is_not_decided() -> None:
+    results = looked_at(["FM2", "FM4"])
+    sentence = in_a_sentence(results)
+    world = "a warehouse of 10 m x 10 m with 60 items, robots of 2 m/s"
+    assert sentence.startswith(f"swarm-dt in {world}: P [95 %]")
+    n_open = sum(verdict.conclusion == "open" for verdict in results.verdicts)
+    assert ("not decided: R of " in sentence) == (n_open > 0)

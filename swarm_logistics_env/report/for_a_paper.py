@@ -1,0 +1,105 @@
+"""The sentence that a paper can quote: policy, world, P, verdicts, and what is not decided."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from swarm_logistics_env.questions.comparison import CONFIDENCE
+from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.verdicts.verdict import Verdict, level_of
+
+from . import section, templates
+from .answer import Line, answer, line_of, performance_of
+from .templates import Slots, fill
+
+
+def in_a_sentence(results: StudyResults) -> str:
+    """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
+    verdicts = results.verdicts
+    with_interval = [v for v in verdicts if v.interval and v.interval.low is not None]
+    # A change of P has another scale than the indicators.
+    candidates = [v for v in with_interval if v.compared.indicator != "change"] or with_interval
+    lowest = min(candidates or verdicts, key=lambda verdict: verdict.value or 0.0)
+    line = line_of([(0, lowest)])
+    words = section.conclusion_text(*verdicts)
+    lowest_text = _question_with_value(line, level_of([lowest]))
+    slots: dict[str, Slots] = {
+        "performance": {
+            "policies": ", ".join(results.policies),
+            "world": _world(results),
+            "performance": performance_of(results)[:-1],
+            "seeds": results.seeds_text,
+        }
+    }
+    method = templates.METHOD.format(error=section.percent(1.0 - CONFIDENCE))
+    if len(verdicts) == 1:
+        name = f"{line.indicator} > {lowest.compared.threshold:.3g}"
+        slots["one_question"] = {
+            "lowest": lowest_text,
+            "property": name,
+            "words": words,
+            "method": method,
+        }
+    else:
+        if words == lowest.on_property.adjusted:  # all are alike
+            words = f"{len(verdicts)} {words}"
+        slots["several_questions"] = {
+            "n_questions": len(verdicts),
+            "words": words,
+            "method": method,
+        }
+        if any(verdict.conclusion == "open" for verdict in verdicts):
+            slots["not_decided"] = {"questions": _undecided(results)}
+        if candidates:
+            slots["lowest"] = {"lowest": lowest_text}
+    return "".join(fill(templates.FOR_A_PAPER, {**slots, "end": {}}))
+
+
+def _question_with_value(line: Line, level: float) -> str:
+    interval = line.interval(level)
+    return templates.QUESTION_WITH_VALUE["interval" if interval else "value"].format(
+        question=line.question,
+        value=line.value,
+        level=section.percent(level),
+        interval=interval,
+    )
+
+
+def _undecided(results: StudyResults) -> str:
+    """Return what is open of each indicator, e.g. "FT of FM1, FM4 (1 of 3) and S of N 4→10"."""
+    verdicts: dict[str, dict[str, list[Verdict]]] = {}
+    for line in answer(results).lines:
+        policy = f"{line.policy}'s " if len(results.policies) > 1 else ""
+        name = line.question.removeprefix(f"{line.indicator} ").partition(",")[0]
+        by_name = verdicts.setdefault(policy + line.indicator, {})
+        by_name.setdefault(name, []).extend(line.verdicts)
+    clauses = []
+    for indicator, by_name in verdicts.items():
+        names = []
+        for name, alike in by_name.items():
+            n_open = sum(verdict.conclusion == "open" for verdict in alike)
+            count = "" if n_open == len(alike) else f" ({n_open} of {len(alike)})"
+            names += [name + count] if n_open else []
+        clauses += [f"{indicator} of {', '.join(names)}"] if names else []
+    return section.join_names(clauses)
+
+
+def _world(results: StudyResults) -> str:
+    """Return in words where it was played."""
+    plan = results.plan
+    if plan.origin is not None:
+        stated = "".join(f", {name} {value}" for name, value in plan.origin.setup)
+        return templates.WORLD["trials"].format(file=plan.origin.file, setup=stated)
+    scenario: Any = plan.specification.scenario
+    if not hasattr(scenario, "warehouse_width"):
+        return templates.WORLD["task"].format(task=plan.specification.played.name)
+    return templates.WORLD["warehouse"].format(
+        width=scenario.warehouse_width,
+        height=scenario.warehouse_height,
+        floor=f" (floor {scenario.floor})" if scenario.floor else "",
+        n_items=scenario.n_items,
+        restock=" that come back" if scenario.restock else "",
+        speed=scenario.max_speed,
+        drive="" if scenario.drive == "holonomic" else f" and {scenario.drive} drive",
+        handling=f" that lift in {scenario.handling_time:g} s" if scenario.handling_time else "",
+    )
