@@ -48,6 +48,7 @@ CONTENTS = {
         "bodies",
         "training",
         "faults",
+        "own",
     ),
     "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
     "Research": (
@@ -56,7 +57,12 @@ CONTENTS = {
         "research/readings_and_tries",
         "research/paper_fit",
     ),
-    "Look up": ("reference", "Comparison <comparison>"),
+    "Look up": (
+        "Commands and files <reference>",
+        "python",
+        "What cannot be done <limits>",
+        "Comparison <comparison>",
+    ),
 }
 
 

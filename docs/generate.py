@@ -1,4 +1,4 @@
-"""Writes what two pages tell of the code, between their markers: `python docs/generate.py`."""
+"""Writes what three pages tell of the code, between their markers: `python docs/generate.py`."""
 
 import inspect
 import json
@@ -8,6 +8,7 @@ from typing import Any, get_args, get_origin
 
 import numpy as np
 from pydantic_core import PydanticUndefined
+from python_reference import python_names
 from tables import ROOT, table, with_blocks
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
@@ -177,7 +178,12 @@ def summary(text: str | None) -> str:
     return " ".join((text or "").split("\n\n")[0].split())
 
 
-PAGES = {"environment": environment, "reference": reference}
+def python() -> dict[str, str]:
+    """Return the block of the page about Python."""
+    return {"python": python_names()}
+
+
+PAGES = {"environment": environment, "reference": reference, "python": python}
 
 
 def page_text(page: str) -> str:

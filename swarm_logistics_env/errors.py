@@ -77,7 +77,9 @@ def users_line(traceback: str) -> tuple[str, str] | None:
 
 def how_to_install(extra: str) -> str:
     """Return the end of an error message about a package of one of the extras that is missing."""
-    return f"in a clone, pip install -c constraints.txt '.[{extra}]'"
+    if (Path(__file__).parents[1] / "constraints.txt").is_file():  # in a clone
+        return f"pip install -c constraints.txt -e '.[{extra}]'"
+    return f"pip install 'swarm-logistics-env[{extra}]'"
 
 
 def suggest(name: str, names: Iterable[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 import runpy
@@ -30,6 +31,19 @@ def test_generated_tables_are_current(script: Callable[[str], Any]) -> None:
     generate = script("generate")
     for page in generate.PAGES:
         assert PAGES[f"{page}.md"] == generate.page_text(page), "run `python docs/generate.py`"
+
+
+def test_what_examples_import_is_in_the_list_of_stable_names(script: Callable[[str], Any]) -> None:
+    reference = script("python_reference")
+    names = [name for names in reference.STABLE.values() for name in names] + [*reference.VALUES]
+    stable = {f"swarm_logistics_env.{name}" for name in names}
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("swarm_logistics"):
+                for alias in node.names:
+                    imported = f"{node.module}.{alias.name}"
+                    is_module = any(name.startswith(f"{imported}.") for name in stable)
+                    assert imported in stable or is_module, f"{path.name}: {imported}"
 
 
 @pytest.mark.parametrize("page", BLOCKS["pages"](), ids=lambda page: page.name)

@@ -119,7 +119,9 @@ def _sentence(error: Exception) -> str | None:
     # These are Typer's own errors of usage, whichever click they come from.
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
-        return str(format_message())
+        sentence = " ".join(str(format_message()).split())
+        context = getattr(error, "ctx", None)
+        return f"{sentence} Help: {context.command_path} --help" if context else sentence
     # The operating system refuses for reasons of its own: a disk that is full, a name too long.
     if isinstance(error, SwarmLogisticsError | IndicatorError | OSError):
         return str(error)

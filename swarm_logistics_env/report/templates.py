@@ -68,7 +68,7 @@ LINE = {
     "unaffected": "{words}, exact",
     "untestable": "{words}: it cannot be below {threshold:g}",
     "unbounded": "{words} by its test; P_o is too near 0 for an interval",
-    "more_runs": "open; {n_more} more {runs} would show {effect:g}",
+    "more_runs": "open; {n_more} more {runs} to see {effect:g}",
 }
 
 # How to read the answer, and what limits it: the cases that apply, with "; " between them.

@@ -117,7 +117,7 @@ def test_without_the_extra_the_markdown_still_comes_and_one_seed_gives_values_al
     names = {path.name for path in write_report(paper(seeds=1), tmp_path)}
     assert names == {"report.md", "cells.csv", "claims.csv", "tables.tex"}
     text = (tmp_path / "report.md").read_text()
-    assert f"need {package}: in a clone, pip install" in text
+    assert f"need {package}: pip install -c constraints.txt -e" in text
     assert "![" not in text
     assert "S = 0.611 (no interval) over one seed (0). Unadjusted: open; Holm-adj" in text
     with (tmp_path / "claims.csv").open(newline="") as file:
