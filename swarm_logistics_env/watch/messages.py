@@ -229,6 +229,7 @@ def _selected(session: Session) -> Message | None:
                 column.name,
                 column.unit,
                 [round(value, 2) + 0.0 for value in observation[column.name].tolist()],
+                column.high,
             )
             for column in columns(session.scenario)
         ],
@@ -294,6 +295,7 @@ FILES = {
     "page.css": "text/css",
     "plan.js": "text/javascript",
     "draw.js": "text/javascript",
+    "legend.js": "text/javascript",
     "panel.js": "text/javascript",
     "page.js": "text/javascript",
 }

@@ -17,7 +17,7 @@ from swarm_logistics_env.floor import floor_title
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.rendering.palette import Event
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES, failure_mode
+from swarm_logistics_env.warehouse.failure_modes import failure_mode
 from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults
 from swarm_logistics_env.warehouse.state import WarehouseState
 
@@ -180,7 +180,7 @@ class Session:
         self._change_faults(lambda faults: [*faults, fault])
         self._deselect_absent_robot()
         self.events.append(Event(self.state.time, robot, self.mode))
-        self.note = f"robot {robot} fails: {self.mode}, {FAILURE_MODES[self.mode].description}"
+        self.note = f"robot {robot} fails in mode {self.mode}"
 
     def repair_robot(self) -> None:
         """End all failures of the selected robot."""

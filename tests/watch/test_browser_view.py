@@ -32,6 +32,8 @@ return [box.left + place.left + place.scale * pose[0] / 1000,
 box.top + place.bottom - place.scale * pose[1] / 1000];
 }})()"""
 
+ENABLED = "['break', 'repair'].map((id) => !element(id).disabled)"
+
 
 def test_robot_is_broken_by_click_and_by_touch(served: Served, browser: Browser) -> None:
     browser.open(served.server.address)
@@ -40,8 +42,10 @@ def test_robot_is_broken_by_click_and_by_touch(served: Served, browser: Browser)
     browser.wait_for("latest.paused && Math.abs(playhead - latest.time) < 0.01")
     browser.click(*browser.value(AT.format(robot=4)))
     browser.wait_for("latest.selected && latest.selected.robot === 4")
+    assert browser.value(ENABLED) == [True, False]
     browser.click_on("#break")
     browser.wait_for("latest.robots0[4][2] === '4' && latest.robots1[4][2] === ''")
+    assert browser.value(ENABLED) == [False, True]
     x, y = browser.value(AT.format(robot=2))
     browser.call("Emulation.setTouchEmulationEnabled", enabled=True)
     browser.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
@@ -52,6 +56,45 @@ def test_robot_is_broken_by_click_and_by_touch(served: Served, browser: Browser)
     browser.press("n")
     browser.wait_for("latest.seed === 1 && latest.events.length === 0")
     assert browser.console == []
+
+
+SCALE = "placeOf(element('arena0'), latest.scenario).scale"
+CUT_OFF = """[...document.querySelectorAll('button, #legend li, label')]
+.filter((entry) => entry.scrollWidth > entry.clientWidth).map((entry) => entry.textContent)"""
+
+
+def device(size: tuple[int, int]) -> dict[str, float]:
+    return {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
+
+
+@pytest.mark.parametrize(
+    ("size", "room", "is_stacked", "least"),
+    [
+        ((1280, 800), (10, 10), False, 14.0),
+        ((1280, 800), (40, 8), True, 7.0),
+        ((390, 844), (10, 10), True, 7.0),
+        ((390, 844), (4, 16), False, 7.0),
+    ],
+)
+def test_arenas_take_the_room_that_the_window_has_and_nothing_is_cut_off(
+    size: tuple[int, int], room: tuple[int, int], is_stacked: bool, least: float, browser: Browser
+) -> None:
+    width, height = room
+    scenario = SMALL.replace(warehouse_width=width, warehouse_height=height, n_obstacles=0)
+    session = Session(scenario, "homing")
+    session.pause()
+    session.select(1)
+    served = Served(session)
+    browser.call("Emulation.setDeviceMetricsOverride", **device(size))
+    try:
+        browser.open(served.server.address)
+        browser.wait_for("drawn && element('state').hidden")
+        assert browser.value("element('arenas').classList.contains('stacked')") == is_stacked
+        assert browser.value(f"{SCALE} * 2 * latest.scenario.robot_radius") >= least
+        assert browser.value("document.documentElement.scrollWidth") <= size[0]
+        assert browser.value(CUT_OFF) == []
+    finally:
+        served.stop()
 
 
 def test_page_tells_that_the_server_has_gone(browser: Browser) -> None:

@@ -198,8 +198,9 @@ def test_what_the_selected_robot_senses_is_shown() -> None:
         session.select(robot)
         shown = frame_message(session)["selected"]
         parts = observations.unflatten(session.run.world.observe()[robot], scenario)
-        assert [name for name, _, _ in shown["row"]] == list(parts)
-        for name, _, values in shown["row"]:
+        assert [name for name, *_ in shown["row"]] == list(parts)
+        for name, _, values, highest in shown["row"]:
+            assert max(values) <= highest
             assert values == pytest.approx(parts[name].tolist(), abs=0.0051)
         beams = [parts[f"range_{what}"] for what in ("robots", "walls", "items")]
         nearest = np.min(beams, axis=0).tolist()

@@ -3,7 +3,7 @@
 // Draws an arena: what stands still on a sheet of its own, robots from pictures made once.
 
 const ACTIVITIES = { searching: "SEARCHING", shuffling: "SHUFFLING", delivering: "DELIVERING" };
-const TIMER_STEPS = 8, NOBODY = -1, MARGIN = 6;
+const TIMER_STEPS = 8, NOBODY = -1, MARGIN = 4;
 const sheets = new Map();
 let colours = {}, sprites = new Map();
 
@@ -47,6 +47,15 @@ function item(pen, x, y, half, isRequested) {
   pen.fillRect(x - half, y - half, 2 * half, 2 * half);
   pen.fillStyle = isRequested ? colours.REQUESTED : colours.ITEM;
   pen.fillRect(x - half + edge, y - half + edge, 2 * (half - edge), 2 * (half - edge));
+}
+
+// As a column on a plan: a failed robot's mark is dark, with a letter.
+function obstacle(pen, x, y, radius) {
+  const arm = (radius - 1) * Math.SQRT1_2;
+  disc(pen, x, y, radius, colours.INK);
+  disc(pen, x, y, radius - 1.5, colours.OBSTACLE);
+  line(pen, [[x - arm, y - arm], [x + arm, y + arm]], 1.5, colours.INK);
+  line(pen, [[x - arm, y + arm], [x + arm, y - arm]], 1.5, colours.INK);
 }
 
 function body(pen, x, y, radius, colour, isFaulty) {
@@ -155,10 +164,7 @@ function floorOf(canvas, now, number, ratio) {
   for (let y = 1; y < scenario.warehouse_height; y++) line(pen, [at([0, 1000 * y]), at([1000 * scenario.warehouse_width, 1000 * y])], 1, colours.FLOOR_LINE);
   if (fixed.plan) docksAndSolids(pen, fixed.plan, at);
   else deliveryArea(pen, left + across - scale * scenario.delivery_width, top, left + across, bottom);
-  for (const obstacle of obstacles) {
-    disc(pen, ...at(obstacle), scale * scenario.obstacle_radius, colours.INK);
-    disc(pen, ...at(obstacle), scale * scenario.obstacle_radius - 2, colours.OBSTACLE);
-  }
+  for (const centre of obstacles) obstacle(pen, ...at(centre), Math.max(4, scale * scenario.obstacle_radius));
   for (const one of items) item(pen, ...at(one), Math.max(2, 0.8 * scale * scenario.item_radius), false);
   sheets.set(number, { sheet, parts });
   return sheet;
@@ -175,7 +181,7 @@ function deliveryArea(pen, left, top, right, bottom) {
   line(pen, [[left, top], [left, bottom]], 3, colours.DELIVERY_WORD);
   pen.translate((left + right) / 2, (top + bottom) / 2);
   pen.rotate(-Math.PI / 2);
-  pen.font = "600 15px system-ui, sans-serif";
+  pen.font = "600 14px system-ui, sans-serif";
   pen.textAlign = "center";
   pen.textBaseline = "middle";
   pen.fillStyle = colours.DELIVERY_WORD;
@@ -209,7 +215,13 @@ function drawArena(canvas, number, now, next, share, options) {
     pen.drawImage(picture, x - size, y - size, picture.width / ratio, picture.height / ratio);
   };
   pen.drawImage(floorOf(canvas, now, number, ratio), 0, 0, width, height);
-  for (const trail of options.trails) line(pen, trail.map(at), 1, colours.TRAIL);
+  for (const trail of options.trails) {
+    for (let nth = 1; nth < trail.length; nth++) {
+      pen.globalAlpha = nth / trail.length;
+      line(pen, [at(trail[nth - 1]), at(trail[nth])], 1.5, colours.TRAIL);
+    }
+  }
+  pen.globalAlpha = 1;
   poses.forEach((pose, robot) => {
     const age = pose && robots[robot] ? robots[robot][1] : null;
     if (age !== null) stamp(`halo ${age}`, ...at(pose), 2.6 * radius, (ink, mid) => halo(ink, mid, mid, radius, age / TIMER_STEPS));
@@ -235,7 +247,7 @@ function drawArena(canvas, number, now, next, share, options) {
     pen.rotate(pose[2]);
     pen.translate(-x, -y);
   });
-  if (watched) ring(pen, ...at(watched), 1.6 * radius + 2, 2.5, colours.INK);
+  if (watched) selection(pen, ...at(watched), radius);
   for (const place of requested) {
     const isCarried = place[2] !== NOBODY && poses[place[2]];
     const [x, y] = at(isCarried ? poses[place[2]] : place);
@@ -248,9 +260,13 @@ function drawArena(canvas, number, now, next, share, options) {
   poses.forEach((pose, robot) => {
     const mark = pose && robots[robot] ? robots[robot][2] : "";
     if (mark === "") return;
-    const [x, y] = at(pose), away = 0.8 * radius + 0.3 * tall, size = tall * (0.8 + 0.4 * mark.length);
-    stamp(`badge ${mark}`, x + away, y - away, size, (ink, mid) => badge(ink, mid, mid, tall, mark));
+    const [x, y] = at(pose), away = 0.8 * radius + 0.3 * tall, size = tall * (0.8 + 0.4 * mark.length), rim = tall * (0.3 + 0.3 * mark.length);
+    stamp(`badge ${mark}`, Math.min(x + away, width - rim), Math.max(y - away, 0.6 * tall), size, (ink, mid) => badge(ink, mid, mid, tall, mark));
   });
+}
+
+function selection(pen, x, y, radius) {
+  ring(pen, x, y, 1.6 * radius + 2, 2.5, colours.INK);
 }
 
 function drawBeams(pen, selected, pose, at, scale) {
@@ -262,24 +278,4 @@ function drawBeams(pen, selected, pose, at, scale) {
     if (reach < selected.reach) disc(pen, ...end, 3, colour);
   });
   if (selected.view > 0) ring(pen, x, y, scale * selected.view, 1.5, colour);
-}
-
-function showLegend(list) {
-  const entries = [
-    ["searching", (pen) => body(pen, 11, 11, 7, colours.SEARCHING, false)],
-    ["shuffling", (pen) => { body(pen, 11, 11, 7, colours.SHUFFLING, false); item(pen, 11, 11, 3, false); }],
-    ["delivering", (pen) => { body(pen, 11, 11, 7, colours.DELIVERING, false); item(pen, 11, 11, 3.5, true); }],
-    ["requested item", (pen) => item(pen, 11, 11, 6.5, true)],
-    ["timer", (pen) => { halo(pen, 11, 11, 4.4, 0); body(pen, 11, 11, 4, colours.SEARCHING, false); }],
-    ["failed, by mode", (pen) => badge(pen, 11, 11, 15, "4")],
-  ];
-  list.replaceChildren(...entries.map(([name, draw]) => {
-    const entry = document.createElement("li"), canvas = document.createElement("canvas");
-    [canvas.width, canvas.height] = [44, 44];
-    const pen = canvas.getContext("2d");
-    pen.scale(2, 2);
-    draw(pen);
-    entry.append(canvas, name);
-    return entry;
-  }));
 }

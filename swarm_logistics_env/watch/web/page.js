@@ -14,6 +14,7 @@ const KEYS = [
   ["0", "0", "this seed again", () => order({ do: "again" })],
   ["m", "m", "next failure mode", () => nextMode(1)],
   ["M", "M", "failure mode before", () => nextMode(-1)],
+  ["s", "s", "select the next robot", () => selectNext()],
   ["b", "b", "break the selected robot", () => order({ do: "break" })],
   ["r", "r", "repair the selected robot", () => order({ do: "repair" })],
   ["Escape", "Esc", "select no robot", () => order({ do: "select", robot: null })],
@@ -28,7 +29,7 @@ const KEYS = [
   [null, "right click, shift click, long press", "break it in the chosen mode, or repair it", null],
 ];
 const element = (id) => document.getElementById(id);
-const dark = matchMedia("(prefers-color-scheme: dark)");
+const dark = matchMedia("(prefers-color-scheme: dark)"), touched = matchMedia("(pointer: coarse)");
 const recorded = element("recording");
 let fixed = null, latest = null, frames = [], socket = null, retries = 0;
 let playhead = 0, before = 0, drawn = null, shown = null, problem = { text: "", until: 0 };
@@ -50,14 +51,14 @@ function tell(text, kind) {
   element("state").textContent = text;
   element("state").hidden = !text;
   for (const one of ["lost", "failed"]) document.body.classList.toggle(one, kind === one);
+  layOut();
 }
 
 function receive(message) {
   if (message.colours) {
     begin(message);
   } else if (message.problem) {
-    problem = { text: message.problem, until: Date.now() + 5000 };
-    showWords();
+    say(message.problem);
   } else {
     take(message);
     showWords();
@@ -66,13 +67,20 @@ function receive(message) {
   }
 }
 
+function say(text) {
+  problem = { text, until: Date.now() + 8000 };
+  showWords();
+}
+
 function take(change) {
   const next = { ...latest, ...change };
   if (latest && (next.time < latest.time || next.poses0.length !== latest.poses0.length || next.seed !== latest.seed)) frames = [];
   if (!frames.length) playhead = next.time;
   if (frames.length && frames.at(-1).time === next.time) frames[frames.length - 1] = next;
   else frames.push(next);
+  const isFirst = !latest;
   latest = next;
+  if (isFirst) paint();
   if (!recorded && frames.length > KEPT) frames.shift();
 }
 
@@ -103,6 +111,19 @@ function animate(moment) {
   if (recorded && playhead === last) { latest.paused = true; element("pause").textContent = "play"; }
 }
 
+// Arenas as large as the window allows: side by side, or one above the other where they are larger so.
+function layOut() {
+  if (!latest) return;
+  const { warehouse_width: across, warehouse_height: down } = latest.scenario, arenas = element("arenas"), gap = 8;
+  const top = arenas.getBoundingClientRect().top + scrollY, head = element("arena0").offsetTop - arenas.offsetTop + 2 * MARGIN;
+  const wide = arenas.clientWidth, high = Math.max(240, innerHeight - top - 2 * gap - 2 - parseFloat(getComputedStyle(element("below")).minHeight));
+  const scaleOf = (width, height) => Math.min((width - 2 * MARGIN) / across, (height - head) / down);
+  const sideBySide = scaleOf((wide - gap) / 2, high), stacked = scaleOf(wide, (high - gap) / 2);
+  arenas.classList.toggle("stacked", stacked > sideBySide);
+  for (const number of [0, 1]) element(`arena${number}`).style.height = `${Math.max(sideBySide, stacked) * down + 2 * MARGIN}px`;
+  drawn = null;
+}
+
 function frameAt(time) {
   let [low, high] = [0, frames.length - 1];
   while (low < high) {
@@ -121,9 +142,15 @@ function trailsUntil(nth, number) {
 function showNow(now) {
   drawn = now;
   element("clock").textContent = `${now.time.toFixed(1)} s`;
-  drawStrip(element("strip"), now, now.time, recorded ? frames.at(-1).time : now.scenario.duration, fixed.curves);
+  drawStrip(element("strip"), now, fixed.curves, endOfStrip());
   const total = now.scenario.restock ? "" : ` of ${now.scenario.n_items}`;
   for (const number of [0, 1]) element(`delivered${number}`).textContent = `${now[`deliveries${number}`].length}${total} delivered`;
+}
+
+// The time at the right end of the chart [s].
+function endOfStrip() {
+  const { duration } = latest.scenario;
+  return recorded ? frames.at(-1).time : Math.min(duration, ROUND.find((end) => end >= Math.max(50, latest.time)) ?? duration);
 }
 
 // Words and panels
@@ -143,23 +170,25 @@ function showWords() {
   for (const name of ["n_robots", "delivery_width"]) {
     if (document.activeElement !== element(name)) element(name).value = scenario[name];
   }
-  element("meaning").textContent = fixed.modes.find(({ name }) => name === latest.mode).meaning;
-  element("robot").textContent = selected ? `Robot ${selected.robot}` : "Tap a robot";
-  for (const id of ["break", "repair"]) element(id).disabled = !selected;
-  element("senses").hidden = !selected;
-  if (selected) {
-    element("sensed").textContent = `Robot ${selected.robot}: ${selected.activity}, ${selected.modes.join(" ") || "sound"}`;
-    drawSenses(element("bars"), selected.row);
-  }
+  const { meaning } = fixed.modes.find(({ name }) => name === latest.mode);
+  const does = selected ? `It is ${selected.activity} and ${selected.modes.length ? `fails: ${selected.modes.join(", ")}` : "sound"}. ` : "";
+  element("meaning").textContent = `${does}${latest.mode}: ${meaning}.`;
+  element("robot").textContent = selected ? `Robot ${selected.robot}` : `${touched.matches ? "Tap" : "Click"} a robot`;
+  element("break").disabled = !selected || latest.over || selected.modes.includes(latest.mode);
+  element("repair").disabled = !selected || latest.over || !selected.modes.length;
+  element("indicators").hidden = Boolean(selected);
+  element("bars").hidden = !selected;
+  if (selected) drawSenses(element("bars"), selected.row);
 }
 
 function paint() {
-  if (!fixed) return;
+  if (!latest) return;
   colours = { ...fixed.colours[dark.matches ? "dark" : "light"] };
   sprites = new Map();
-  drawn = null;
-  showLegend(element("legend"));
+  for (const [name, colour] of Object.entries(colours)) document.documentElement.style.setProperty(`--${name}`, colour);
+  showLegend(element("legend"), legendEntries(fixed, latest), say);
   fixed.curves.forEach(([name], number) => { element(`swatch${number}`).style.background = colours[name]; });
+  layOut();
   showWords();
 }
 
@@ -176,8 +205,7 @@ function begin(message) {
   fill(element("speed"), fixed.speeds.map((speed) => [speed, `${speed}×`]));
   fill(element("mode"), fixed.modes.map(({ name, mark }) => [name, mark ? `${name} (${mark})` : name]));
   fill(element("policy"), fixed.choices.map((name) => [name, name]));
-  fill(element("against"), [["", "the same without faults"], ...fixed.choices.map((name) => [name, `against ${name}`])]);
-  paint();
+  fill(element("against"), [["", "the same, no faults"], ...fixed.choices.map((name) => [name, `against ${name}`])]);
 }
 
 function pause() {
@@ -203,6 +231,12 @@ function nextMode(by) {
 
 function resize(by) {
   order({ do: "resize", n_robots: latest.scenario.n_robots + by });
+}
+
+function selectNext() {
+  const poses = posesBetween(shown.now, shown.now, 0, 0), last = latest.selected?.robot ?? -1;
+  const present = [...poses.keys()].filter((robot) => poses[robot]);
+  order({ do: "select", robot: present.find((robot) => robot > last) ?? present[0] });
 }
 
 function widen(by) {
@@ -246,19 +280,20 @@ function listen() {
   for (const name of ["policy", "against"]) {
     element(name).addEventListener("change", () => order({ do: "compare", policy: element("policy").value, against: element("against").value || null }));
   }
-  element("n_robots").addEventListener("change", (event) => order({ do: "resize", n_robots: Math.round(event.target.valueAsNumber) }));
-  element("delivery_width").addEventListener("change", (event) => order({ do: "widen", width: event.target.valueAsNumber }));
+  const onNumber = (name, act) => element(name).addEventListener("change", ({ target }) => target.value && act(target.valueAsNumber));
+  onNumber("n_robots", (count) => order({ do: "resize", n_robots: Math.round(count) }));
+  onNumber("delivery_width", (width) => order({ do: "widen", width }));
   element("help_button").addEventListener("click", help);
   element("help").addEventListener("click", () => element("help").close());
   element("strip").addEventListener("click", ({ offsetX, target }) => {
-    if (recorded) playhead = ((offsetX - 30) / (target.clientWidth - 46)) * frames.at(-1).time;
+    if (recorded) playhead = momentAt(offsetX, target.clientWidth, endOfStrip());
   });
   for (const [, label, meaning] of KEYS) {
     const row = element("keys").insertRow();
     for (const text of [label, meaning]) row.insertCell().textContent = text;
   }
   dark.addEventListener("change", paint);
-  addEventListener("resize", () => { drawn = null; showWords(); });
+  addEventListener("resize", () => { layOut(); showWords(); });
   document.addEventListener("keydown", press);
   // After a click with the mouse, keys mean the session again, not the button.
   document.addEventListener("click", (event) => {
