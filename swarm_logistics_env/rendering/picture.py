@@ -8,12 +8,13 @@ from collections import Counter
 import numpy as np
 import pygame
 from numpy.typing import NDArray
-from pygame import Rect, Surface, Vector2
+from pygame import Rect, Surface
 
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
+from .legend import OBSTACLE, legend
 from .plan_picture import PlanPicture
 from .plan_shapes import dock_hue
 from .sprites import new_canvas, words
@@ -34,10 +35,8 @@ class Picture:
     """
 
     def __init__(self, scenario: Scenario, size: int) -> None:
-        self._margin = max(6, round(0.025 * size))
+        self._margin = max(4, round(size / 80))
         self._longer_side = size - 2 * self._margin
-        self._text_height = max(13, round(size / 38))
-        self._line = round(1.35 * self._text_height)
         self._lay_out(scenario)
 
     def draw(self, state: WarehouseState, scenario: Scenario) -> Surface:
@@ -56,7 +55,7 @@ class Picture:
             self._stamp(sprites.item(self._item_half, False), items[number])
         for carrier in np.flatnonzero(state.carries_requested).tolist():
             if (leader := palette.leader_of(state, scenario, carrier)) != NOBODY:
-                self._draw_arrow(robots[carrier], robots[leader])
+                sprites.arrow(self._canvas, robots[carrier], robots[leader], self._robot_radius)
         self._canvas.set_clip(None)
         self._draw_robots(state, robots)
         for number in np.flatnonzero(state.item_requested).tolist():
@@ -74,6 +73,11 @@ class Picture:
         margin = self._margin
         across, down = scenario.warehouse_width, scenario.warehouse_height
         self._scale = scale = self._longer_side / max(across, down)
+        # In a long warehouse words are as small as in a square of twice its shorter side.
+        side = min(self._longer_side, 2.0 * scale * min(across, down))
+        self._text_height = max(13, round(side / 37))
+        self._line = round(1.35 * self._text_height)
+        self._wall = max(2, self._text_height // 5)
         self.floor = Rect(0, margin, round(scale * across), round(scale * down))
         # A warehouse that is narrower than its caption stands in the middle above it.
         width = max(self.floor.width, words(_WIDEST, self._text_height).get_width()) + 2 * margin
@@ -84,18 +88,17 @@ class Picture:
         self._item_half = max(2.0, 0.8 * scale * scenario.item_radius)
         self._obstacle_radius = max(3.0, scale * scenario.obstacle_radius)
         self._caption = self.floor.bottom + margin + self._text_height // 2
-        legend = self._legend()
-        height = max(y for _, (_, y) in legend) + self._line
+        entries, height = self._legend()
         self.height = height + height % 2
         self._canvas = new_canvas(self.width, self.height)
         self._background = new_canvas(self.width, self.height)
         self._draw_floor(scenario)
-        for picture, at in legend:
+        for picture, at in entries:
             self._background.blit(picture, picture.get_rect(midleft=at))
 
     def _draw_floor(self, scenario: Scenario) -> None:
         picture, floor, scale = self._background, self.floor, self._scale
-        wall = max(2, self._margin // 5)
+        wall = self._wall
         picture.fill(palette.SURROUNDINGS)
         picture.fill(palette.INK, floor.inflate(2 * wall, 2 * wall))
         picture.fill(palette.FLOOR, floor)
@@ -108,18 +111,18 @@ class Picture:
         for y in range(1, math.ceil(scenario.warehouse_height)):
             picture.fill(palette.FLOOR_LINE, (floor.left, floor.bottom - scale * y, floor.width, 1))
         if plan_picture is None:
-            self._draw_delivery_area(floor.move(round(scale * scenario.storage_width), 0), wall)
+            self._draw_delivery_area(floor.move(round(scale * scenario.storage_width), 0))
         else:
             plan_picture.draw_docks_and_solids(picture)
 
-    def _draw_delivery_area(self, area: Rect, wall: int) -> None:
+    def _draw_delivery_area(self, area: Rect) -> None:
         picture, area = self._background, area.clip(self.floor)
         picture.set_clip(area)
         picture.fill(palette.DELIVERY_AREA)
-        for x in range(area.left, area.right + area.height, max(8, self._margin)):
+        for x in range(area.left, area.right + area.height, 2 * max(4, self._margin)):
             ends = (x, area.top), (x - area.height, area.bottom)
-            pygame.draw.line(picture, palette.DELIVERY_HATCH, *ends, 1 + self._margin // 20)
-        picture.fill(palette.DELIVERY_WORD, (*area.topleft, max(1, wall // 2), area.height))
+            pygame.draw.line(picture, palette.DELIVERY_HATCH, *ends, 1 + self._margin // 10)
+        picture.fill(palette.DELIVERY_WORD, (*area.topleft, max(1, self._wall // 2), area.height))
         name = words("DELIVERY", self._text_height, palette.DELIVERY_WORD)
         name = pygame.transform.rotate(name, 90)
         box = name.get_rect(center=area.center)
@@ -127,23 +130,22 @@ class Picture:
         picture.blit(name, box)
         picture.set_clip(None)
 
-    def _legend(self) -> list[tuple[Surface, PixelPoint]]:
-        """Return the legend of colours: pictures and words, each with its left end."""
+    def _legend(self) -> tuple[list[tuple[Surface, PixelPoint]], int]:
+        """Return pictures and words of the legend, each with its left end, and where it ends."""
         height = self._text_height
-        radius, gap = 0.42 * height, height // 4
-        pictures = {name: sprites.robot(radius, name, 0, False) for name in palette.ACTIVITIES}
-        pictures["requested item"] = sprites.item(0.9 * radius, True)
-        pictures["timer"] = sprites.halo(0.6 * radius, 0)
+        marks = legend(self._scenario, height)
         entries = []
         x, y = self._margin, self._caption + 2 * self._line
-        for name, picture in pictures.items():
+        for name, picture in marks.items():
             word = words(name, height)
-            wide = picture.get_width() + gap
+            wide = picture.get_width() + height // 3
             if x + wide + word.get_width() > self.width - self._margin:
                 x, y = self._margin, y + self._line
-            entries += [(picture, (x, y)), (word, (x + wide, y))]
-            x += wide + word.get_width() + height
-        return entries
+            # Its height does not depend on whether there are obstacles.
+            if name != OBSTACLE or self._scenario.n_obstacles:
+                entries += [(picture, (x, y)), (word, (x + wide, y))]
+            x += wide + word.get_width() + round(0.8 * height)
+        return entries, y + self._line
 
     def _pixels(self, positions: NDArray[np.float64]) -> list[PixelPoint]:
         """Return positions (K, 2) [m] as K pixels."""
@@ -167,25 +169,6 @@ class Picture:
             is_faulty = bool(state.failed[robot])
             sprite = sprites.robot(self._robot_radius, activity, headings[robot], is_faulty)
             self._stamp(sprite, robots[robot])
-
-    def _draw_arrow(self, start: PixelPoint, end: PixelPoint) -> None:
-        width = max(2.0, self._robot_radius / 3.5)
-        head = 4.0 + 2.5 * width
-        offset = Vector2(end) - start
-        # The tip stops short of the robot; robots that touch leave no room for an arrow.
-        tip = offset.length() - self._robot_radius - 2.0
-        if tip < self._robot_radius + head:
-            return
-        half = width / 2
-        neck = tip - head
-        side = [(0.0, half), (neck, half), (neck, 0.45 * head), (tip, 0.0)]
-        corners = side + [(x, -y) for x, y in reversed(side)]
-        angle = Vector2(1.0, 0.0).angle_to(offset)
-        vertices = [Vector2(corner).rotate(angle) + start for corner in corners]
-        # Whole pixels: else the smooth edges lie beside the shape.
-        shape = [(round(x), round(y)) for x, y in vertices]
-        pygame.draw.polygon(self._canvas, palette.LINK, shape)
-        pygame.draw.aalines(self._canvas, palette.LINK, True, shape)
 
     def _draw_badges(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
         height = max(11, round(1.2 * self._robot_radius))

@@ -7,6 +7,7 @@ smooths no shape, and draws small letters without the dot of an i.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -14,7 +15,7 @@ import pygame
 from numpy.typing import NDArray
 from pygame import Rect, Surface, Vector2
 
-from .palette import ACTIVITIES, FLOOR, INK, ITEM, ITEM_EDGE, OBSTACLE, REQUESTED, RGB, TIMER
+from .palette import ACTIVITIES, FLOOR, INK, ITEM, ITEM_EDGE, LINK, OBSTACLE, REQUESTED, RGB, TIMER
 
 Pixels = NDArray[np.uint8]  # (H, W, 3), red, green, blue
 
@@ -125,11 +126,36 @@ def target(radius: float) -> Surface:
 
 @lru_cache(maxsize=256)
 def obstacle(radius: float) -> Surface:
-    """Return a solid disc of that radius [px]."""
+    """Return a disc of that radius [px] with a cross, as a column on a plan."""
     sheet = _sheet(radius, INK)
     _disc(sheet, INK, radius)
-    _disc(sheet, OBSTACLE, radius - 2.0)
+    _disc(sheet, OBSTACLE, radius - 1.5)
+    middle, arm = Vector2(sheet.get_rect().center), Vector2(_LARGER * (radius - 1.0), 0.0)
+    for angle in (45, 135):
+        ends = middle + arm.rotate(angle), middle - arm.rotate(angle)
+        pygame.draw.line(sheet, INK, *ends, round(1.5 * _LARGER))
     return _shrink(sheet)
+
+
+def arrow(canvas: Surface, start: Sequence[int], end: Sequence[int], radius: float) -> None:
+    """Draw an arrow from a robot to another, whose radius is `radius`, all in [px]."""
+    width = max(2.0, radius / 3.5)
+    head = 4.0 + 2.5 * width
+    offset = Vector2(end) - start
+    # The tip stops short of the robot; robots that touch leave no room for an arrow.
+    tip = offset.length() - radius - 2.0
+    if tip < radius + head:
+        return
+    half = width / 2
+    neck = tip - head
+    side = [(0.0, half), (neck, half), (neck, 0.45 * head), (tip, 0.0)]
+    corners = side + [(x, -y) for x, y in reversed(side)]
+    angle = Vector2(1.0, 0.0).angle_to(offset)
+    vertices = [Vector2(corner).rotate(angle) + start for corner in corners]
+    # Whole pixels: else the smooth edges lie beside the shape.
+    shape = [(round(x), round(y)) for x, y in vertices]
+    pygame.draw.polygon(canvas, LINK, shape)
+    pygame.draw.aalines(canvas, LINK, True, shape)
 
 
 def _render_text(text: str, height: float, colour: RGB) -> Surface:

@@ -38,7 +38,8 @@ class Film:
         until: the time of the runs at which the film ends [s].
         speed: how many times real time it plays.
         frame_rate: the number of frames per second of film [1/s].
-        size: the longer side of each warehouse [px].
+        size: the longer side of each warehouse [px]; twice that of wide warehouses, which stand
+            one above the other.
 
     Attributes:
         n_frames: the number of frames, if the runs last until the end.
@@ -53,7 +54,7 @@ class Film:
         until: float,
         speed: float,
         frame_rate: float,
-        size: int = 480,
+        size: int = 600,
     ) -> None:
         if not 1 <= len(takes) <= MOST_TAKES:
             raise SetupError(f"{len(takes)} runs: should be 1 to {MOST_TAKES} side by side")
@@ -64,11 +65,17 @@ class Film:
         self._takes = tuple(takes)
         self._until = min(until, max(take.play.world.scenario.duration for take in takes))
         self._period = speed / frame_rate
-        self._pictures = [Picture(take.play.world.scenario, size) for take in takes]
-        self._text_height = max(13, round(size / 26))
-        self._head_height = 2 * round(1.5 * self._text_height)
-        self._picture_height = max(picture.height for picture in self._pictures)
-        self._width = sum(picture.width for picture in self._pictures)
+        scenarios = [take.play.world.scenario for take in takes]
+        self._is_stacked = all(s.warehouse_width > 2.0 * s.warehouse_height for s in scenarios)
+        longer_side = 2 * size if self._is_stacked else size
+        self._pictures = [Picture(scenario, longer_side) for scenario in scenarios]
+        self._text_height = max(13, round(size / 33))
+        self._head_height = 2 * round(1.2 * self._text_height)
+        widths = [picture.width for picture in self._pictures]
+        heights = [self._head_height + picture.height for picture in self._pictures]
+        self._size = (
+            (max(widths), sum(heights)) if self._is_stacked else (sum(widths), max(heights))
+        )
         self._n_last_frames = round(LAST_FRAME * frame_rate)
         self.n_frames = math.ceil(self._until / self._period) + 1 + self._n_last_frames
 
@@ -91,20 +98,23 @@ class Film:
             yield frame
 
     def _draw(self) -> Pixels:
-        canvas = new_canvas(self._width, self._head_height + self._picture_height)
+        canvas = new_canvas(*self._size)
         canvas.fill(SURROUNDINGS)
-        x = 0
+        x = y = 0
         for take, picture in zip(self._takes, self._pictures):
             world = take.play.world
-            heading = pygame.Rect(x, 0, picture.width, self._head_height).inflate(
+            heading = pygame.Rect(x, y, picture.width, self._head_height).inflate(
                 -self._text_height, 0
             )
             # Large, so that it can be read where the film is small.
-            count = words(str(world.state.delivered), round(2.4 * self._text_height))
+            count = words(str(world.state.delivered), round(2.0 * self._text_height))
             canvas.blit(count, count.get_rect(midright=heading.midright))
-            name = words(take.name, self._text_height + 4)
+            name = words(take.name, round(1.2 * self._text_height))
             heading.width -= count.get_width()
             canvas.blit(name, name.get_rect(midleft=heading.midleft), (0, 0, *heading.size))
-            canvas.blit(picture.draw(world.state, world.scenario), (x, self._head_height))
-            x += picture.width
+            canvas.blit(picture.draw(world.state, world.scenario), (x, y + self._head_height))
+            if self._is_stacked:
+                y += self._head_height + picture.height
+            else:
+                x += picture.width
         return to_array(canvas)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Frame = NDArray[np.uint8]
 CELL = 40  # [px]
-SIZE = 420  # of which 2 * 10 px are margins: 10 cells of 40 px
+SIZE = 410  # of which 2 * 5 px are margins: 10 cells of 40 px
 
 HALL = """
 A.::::::.B

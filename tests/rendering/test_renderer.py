@@ -59,11 +59,11 @@ def test_frame_is_an_rgb_array_as_large_as_asked_for() -> None:
     world.reset(0)
     picture = frame(world.state, scenario, 800)
     assert picture.dtype == np.uint8
-    assert picture.shape[1:] == (420, 3)
+    assert picture.shape[1:] == (410, 3)
     assert picture.shape[0] > 760
     assert picture.shape[0] % 2 == 0  # as films want it
     # Its size depends on the warehouse alone.
-    other = scenario.replace(n_items=4, delivery_width=1.0)
+    other = scenario.replace(n_items=4, n_obstacles=2, delivery_width=1.0)
     world.reset(1, [Fault(mode, 1) for mode in FAILURE_MODES if mode != "removed"], other)
     assert frame(world.state, other, 800).shape == picture.shape
 
@@ -126,8 +126,8 @@ def test_requested_item_is_plain_to_see() -> None:
             give(state, 0, 1)
         rows, columns = np.nonzero((arena(state, scenario, 800) == palette.REQUESTED).all(axis=2))
         assert len(rows) > 250
-        assert rows.mean() == pytest.approx((1.0 - place) * 760, abs=2)  # y points up
-        assert columns.mean() == pytest.approx(place * 760, abs=2)
+        assert rows.mean() == pytest.approx((1.0 - place) * 780, abs=2)  # y points up
+        assert columns.mean() == pytest.approx(place * 780, abs=2)
     state.open_requests[0], state.robot_item[0] = NOBODY, NOBODY
     state.item_status[:] = DELIVERED
     assert count(arena(state, scenario, 800), palette.REQUESTED) == 0
@@ -146,7 +146,7 @@ def test_every_request_and_every_robot_that_carries_one_is_plain_to_see() -> Non
     floor = arena(state, scenario, 800)
 
     def orange(x: float, y: float) -> int:
-        around = floor[int(760 - 76 * y) - 20 :, int(76 * x) - 20 :][:40, :40]
+        around = floor[int(780 - 78 * y) - 20 :, int(78 * x) - 20 :][:40, :40]
         return count(around, palette.REQUESTED)
 
     assert all(orange(*places[item]) > 200 for item in (0, 1, 2, 4))
@@ -154,6 +154,14 @@ def test_every_request_and_every_robot_that_carries_one_is_plain_to_see() -> Non
     assert orange(*robots[1]) == 0
     assert [palette.activity(state, robot) for robot in (0, 1)] == ["delivering", "shuffling"]
     assert min(count(floor, palette.DELIVERING), count(floor, palette.SHUFFLING)) > 50
+
+
+def test_the_legend_has_an_obstacle_only_where_there_are_some() -> None:
+    for n_obstacles in (0, 3):
+        world = Warehouse(Scenario(n_robots=2, n_items=2, n_obstacles=n_obstacles))
+        world.reset(0)
+        below = frame(world.state, world.scenario)[395:]
+        assert (count(below, palette.OBSTACLE) > 20) == (n_obstacles > 0)
 
 
 def test_what_a_robot_does_its_timer_and_its_heading_show() -> None:

@@ -45,6 +45,14 @@ def test_same_runs_give_the_same_frames_and_faults_show() -> None:
     np.testing.assert_equal([np.hstack(pair) for pair in zip(sound, broken)], wide)
 
 
+def test_runs_in_wide_warehouses_stand_one_above_the_other() -> None:
+    wide = SMALL.replace(warehouse_width=16)
+    takes = [Take("a", Play(wide, policies.load("homing"), seed, [])) for seed in (0, 1)]
+    height, width, _ = next(Film(takes, 1.0, 1.0, 5.0, 300).frames()).shape
+    assert width == 600
+    assert height > 2 * 145
+
+
 def test_wrong_arguments() -> None:
     right: dict[str, Any] = {"takes": [take()], "until": 5.0, "speed": 1.0, "frame_rate": 9.0}
     for name, wrong, words in (
