@@ -40,11 +40,11 @@ function legendEntries({ modes, plan }, { obstacles }) {
     ["shuffling", "A robot that carries an item that is not requested.", robot("SHUFFLING", true)],
     ["delivering", "A robot that carries a requested item.", robot("DELIVERING", true)],
     ["heading", "The nose of a robot shows where it heads.", robot("FLOOR", false)],
-    ["timer", "Timer: the time since the robot left the delivery area, which it tells by radio. The halo fades with it, and goes when the timer falls silent.", (pen) => { halo(pen, MID, MID, 4.4, 0); body(pen, MID, MID, 4, colours.SEARCHING, false); }],
-    ["lowest timer heard", "Points from a robot to the neighbour whose timer is the lowest that it hears. Robots that carry a requested item show it; with \"all links\" all do.", (pen) => arrow(pen, [1, 19], [26, -6], 4, 2, colours.LINK)],
+    ["timer", "Timer: the time since the robot left the delivery area, which it tells by radio. The halo fades meanwhile.", (pen) => { halo(pen, MID, MID, 4.4, 0); body(pen, MID, MID, 4, colours.SEARCHING, false); }],
+    ["lowest timer heard", "Points to the neighbour whose timer is the lowest that the robot hears. With \"all links\", all robots show it.", (pen) => arrow(pen, [1, 19], [26, -6], 4, 2, colours.LINK)],
     ["failed", `A robot that fails. The mark names the failure mode:\n${marks.join("\n")}`, (pen) => badge(pen, MID, MID, 15, "4")],
     ["selected", "The robot that is inspected.", (pen) => selection(pen, MID, MID, 4)],
-    ["its sensors", "How far the beams of the selected robot reach, with a dot where they meet something; the circle is how far it sees items and robots.", (pen) => drawBeams(pen, { beams: Array(8).fill(10), reach: 10, view: 6 }, [0, 0, 0], () => [MID, MID], 1)],
+    ["its sensors", "The beams of the selected robot, with a dot where they meet something. The circle is how far it sees.", (pen) => drawBeams(pen, { beams: Array(8).fill(10), reach: 10, view: 6 }, [0, 0, 0], () => [MID, MID], 1)],
     ["item", "An item in store that is not requested.", (pen) => item(pen, MID, MID, 5.5, false)],
     ["requested item", "An item that has to be brought to the delivery area. The sight about it goes with it.", (pen) => { target(pen, MID, MID, 6.5); item(pen, MID, MID, 3.5, true); }],
   ];
@@ -62,7 +62,7 @@ function showLegend(list, entries, explain) {
     draw(pen);
     entry.append(canvas, name);
     entry.title = about;
-    entry.addEventListener("click", () => explain(about));
+    entry.addEventListener("click", () => explain(about.split("\n")[0]));
     return entry;
   }));
 }

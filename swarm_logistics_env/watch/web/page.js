@@ -4,7 +4,7 @@
 
 const LAG = 0.15; // [s] behind the newest frame, so that there is a next one to move to
 const KEPT = 60; // frames of a live run
-const FRAMES_OF_TRAIL = 12;
+const TRAIL = 2.5; // [s] of a run
 const KEYS = [
   [" ", "space", "pause, or go on", () => pause()],
   ["ArrowRight", "right arrow", "one step", () => order({ do: "step" })],
@@ -134,7 +134,8 @@ function frameAt(time) {
 }
 
 function trailsUntil(nth, number) {
-  const past = frames.slice(Math.max(0, nth - FRAMES_OF_TRAIL), nth + 1).map((frame) => frame[`poses${number}`]);
+  const first = Math.min(frameAt(frames[nth].time - TRAIL), Math.max(0, nth - 1));
+  const past = frames.slice(first, nth + 1).map((frame) => frame[`poses${number}`]);
   return Array.from({ length: past[0].length / 3 }, (_, robot) =>
     past.filter((poses) => poses[3 * robot] !== null).map((poses) => [poses[3 * robot], poses[3 * robot + 1]]));
 }
