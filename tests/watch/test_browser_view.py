@@ -143,5 +143,7 @@ def test_recording_plays_from_a_file(browser: Browser, tmp_path: Path) -> None:
     browser.open(file.as_uri())
     browser.wait_for("latest && playhead > 6")
     assert browser.value("latest.time") == 20.0
+    browser.click_on("#legend li:nth-child(5)")
+    browser.wait_for("element('note').textContent.startsWith('Timer: the time since')")
     assert browser.value("frames[frameAt(6)].robots0[1][2]") == "4"
     assert browser.console == []

@@ -69,6 +69,7 @@ function receive(message) {
 
 function say(text) {
   problem = { text, until: Date.now() + 8000 };
+  setTimeout(showWords, 8000);
   showWords();
 }
 
@@ -166,7 +167,7 @@ function showWords() {
   element("mode").value = latest.mode;
   element("policy").value = latest.policy;
   element("against").value = latest.against ?? "";
-  const over = latest.over ? "The episode is over: take the next seed, or this one again." : latest.note;
+  const over = latest.over && !recorded ? "The episode is over: take the next seed, or this one again." : latest.note;
   element("note").textContent = Date.now() < problem.until ? problem.text : over;
   for (const name of ["n_robots", "delivery_width"]) {
     if (document.activeElement !== element(name)) element(name).value = scenario[name];
