@@ -309,7 +309,7 @@ def estimate_rows(
         yield row("realistic", "P", policy, cell.mean, section.digits_of(cell.mean.value))
         yield row("realistic", "contacts", policy, cell.contacts, 2)
     for policy, share in shares_of_script(realistic, best_script(cells)).items():
-        yield row("realistic", "times the best script", policy, share, 2, 1.0)
+        yield row("realistic", front_page.SHARE, policy, share, 2, 1.0)
     n_seeds = len(leans.plan.seeds)
     for title, cells in leans_cells(leans).items():
         for policy in leans.policies:
