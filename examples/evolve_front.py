@@ -24,7 +24,7 @@ CONSTANTS = {
 START, LOW, HIGH = np.log(list(CONSTANTS.values())).T
 SCENARIO = Scenario(n_robots=10, warehouse_width=8.0, warehouse_height=7.0, n_items=22,
                     duration=250.0, restock=True)  # fmt: skip
-MODE, M = "FM2", 2  # two robots that can lift, but not deliver
+MODE, M = "FM4", 2  # two robots that lift items, and cannot deliver them
 
 
 def deliveries(logarithms, seed, faults):
@@ -68,8 +68,8 @@ def main(prices=(0.0, 1.0, 4.0), evaluations=100, seeds=6, fresh=30, out="front.
         print(f"{name}: P {p:.1f} [{p_low:.1f}, {p_high:.1f}], "
               f"R {r:.2f} [{r_low:.2f}, {r_high:.2f}], {constants}")  # fmt: skip
     axes.set(xlabel=f"robustness R, {MODE}, m = {M}", ylabel="P [items]")
-    axes.legend()
-    figure.savefig(Path(out), dpi=200)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))  # beside the axes, over no interval
+    figure.savefig(Path(out), dpi=200, bbox_inches="tight")
     return front
 
 
