@@ -179,7 +179,7 @@ def draw(rows: Rows, path: Path) -> None:
         panels[0].set_yticks(range(len(names)), names)
         panels[0].set_xlim(left=0.0)
 
-    path.write_text(drawing.images(draw_panels, 2.7)[0], encoding="utf-8")
+    path.write_text(drawing.svg_image(draw_panels, 2.7), encoding="utf-8")
 
 
 def _mark(axes: "Axes", height: float, interval: Interval, is_learned: bool) -> None:

@@ -14,7 +14,7 @@ from tables import table
 
 from swarm_logistics_env.questions.comparison import Setting
 from swarm_logistics_env.report import section
-from swarm_logistics_env.report.drawing import images
+from swarm_logistics_env.report.drawing import svg_image
 from swarm_logistics_env.report.figures import indicator_figures
 from swarm_logistics_env.report.tables import claims, sentences
 from swarm_logistics_env.spi import relative_change
@@ -225,5 +225,5 @@ def draw_figures(parts: Sequence[StudyResults], media: Path) -> None:
     """Draw the paper's figures with its values as crosses and ours with their intervals."""
     for figure in chain.from_iterable(map(indicator_figures, parts[:2])):
         if figure.name.startswith(("S-", "FT-", "A-")):
-            svg, _ = images(figure.draw, figure.height)
+            svg = svg_image(figure.draw, figure.height)
             (media / f"paper-{figure.name}.svg").write_text(svg, encoding="utf-8")

@@ -114,7 +114,7 @@ def main(names: list[str]) -> None:
     for name in names or QUESTIONS:
         (results,) = play([example(OUT, f"questions/{name}")])
         blocks, draw, height = QUESTIONS[name](results)
-        svg, _ = drawing.images(draw, height)
+        svg = drawing.svg_image(draw, height)
         (DOCS / "media" / f"{name}.svg").write_text(svg, encoding="utf-8")
         page_blocks = {f"{name} {part}": block for part, block in blocks.items()}
         rewrite(DOCS / "research" / "questions_of_the_field.md", page_blocks)

@@ -236,13 +236,13 @@ def draw_ladder(restocked: StudyResults, path: Path) -> None:
     ]
 
     def draw(canvas: "Figure") -> None:
-        drawing.forest(canvas, rows)
+        drawing.forest(canvas, rows, "P, items delivered in 500 s where items come back")
         (axes,) = canvas.axes
-        axes.set(xlabel="P, items delivered in 500 s where items come back", xlim=(0.0, None))
+        axes.set_xlim(left=0.0)
         marks, names = axes.get_legend_handles_labels()
         axes.legend(marks[: len(worlds)], names[: len(worlds)], loc="upper right")
 
-    path.write_text(drawing.images(draw, 2.9)[0], encoding="utf-8")
+    path.write_text(drawing.svg_image(draw, 2.9), encoding="utf-8")
 
 
 def costs_block(costs: Mapping[str, Any]) -> str:

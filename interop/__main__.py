@@ -19,7 +19,7 @@ import typer
 
 from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning
 from swarm_logistics_env import policies, spi
-from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, images
+from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, svg_image
 from swarm_logistics_env.report.section import Section, bracketed
 from swarm_logistics_env.report.write import section_markdown
 from swarm_logistics_env.train.evaluation import performances
@@ -62,7 +62,7 @@ def main(processes: int = 1) -> None:
     beside = references()
     text = table(beside)
     (RESULTS / "table.md").write_text(text, encoding="utf-8")
-    picture, _ = images(lambda canvas: draw(canvas, beside), 5.2)
+    picture = svg_image(lambda canvas: draw(canvas, beside), 5.2)
     (RESULTS / "learners.svg").write_text(picture, encoding="utf-8")
     print(text)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from typer import Argument, Exit, Option, echo
@@ -13,6 +13,7 @@ from typer import Argument, Exit, Option, echo
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.records import plain
+from swarm_logistics_env.report.drawing import PAGE_STYLE, SERIF, FigureStyle
 from swarm_logistics_env.report.section import NOTHING, bracketed, percent, slug
 from swarm_logistics_env.runs.engines import Engine, Shard, Tally, engine_named
 from swarm_logistics_env.runs.notes import merge
@@ -235,13 +236,21 @@ def plan_command(
 
 @study_app.command("report")
 def report_command(
-    directory: DirectoryArgument, full: FullOption = False, trust_code: TrustOption = False
+    directory: DirectoryArgument,
+    full: FullOption = False,
+    figure_width: Annotated[
+        float,
+        Option(metavar="INCH", min=2, max=20, help="Of the files of figures; 3.5: of a column."),
+    ] = PAGE_STYLE.width,
+    font: Annotated[Literal["sans", "serif"], Option(help="Of these files.")] = "sans",
+    trust_code: TrustOption = False,
 ) -> None:
     """Print the answer and write the report again. Nothing is played."""
     stored = Study.stored(directory, trust_code=trust_code)
     say(str(stored.plan()))
     echo()
-    show_report(stored.findings(), directory, full=full)
+    style = FigureStyle(figure_width, SERIF if font == "serif" else PAGE_STYLE.fonts)
+    show_report(stored.findings(), directory, full=full, style=style)
 
 
 @study_app.command("compare")

@@ -18,6 +18,7 @@ from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.answer import MOST_LINES, answer
 from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.drawing import PAGE_STYLE, FigureStyle
 from swarm_logistics_env.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.report.section import NOTHING, Section, Texts, levels, number
 from swarm_logistics_env.report.write import how_to_get_figures, section_markdown, write_report
@@ -63,12 +64,20 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Texts], *lines
     show(Section(title, tuple(columns), tuple(rows), lines))
 
 
-def show_report(results: StudyResults, out: Path, *, full: bool, is_finished: bool = True) -> None:
+def show_report(
+    results: StudyResults,
+    out: Path,
+    *,
+    full: bool,
+    is_finished: bool = True,
+    style: FigureStyle = PAGE_STYLE,
+) -> None:
     """Print the answer of a study and a sentence for a paper, and write its report into `out`.
 
     Args:
         full: print every table, and a line a question.
         is_finished: whether all is played; else no sentence is for a paper.
+        style: of the files of figures; those in the page have its own.
     """
     report = document(results)
     if full:
@@ -82,12 +91,15 @@ def show_report(results: StudyResults, out: Path, *, full: bool, is_finished: bo
     else:
         text = digest(report.answer, width, MOST_LINES)
     echo("\n".join(map(plain, text.split("\n"))))
-    echo(f"Report: {write_report(results, out, report)[0]}")
+    echo(f"Report: {write_report(results, out, report, style)[0]}")
     if advice := how_to_get_figures():
         echo(advice)
     else:
         echo(f"Figure: {out / 'figures' / 'answer.svg'}")
         echo(f"Tables: {out / 'tables.tex'}")
+    names_modes = any(verdict.after.kind == "fault" for verdict in results.verdicts)
+    if names_modes and "FM1" in results.plan.specification.played.failure_modes:
+        echo("Failure modes: swarm-logistics list faults")
     if is_finished and any(verdict.estimate for verdict in results.verdicts):
         say(f"For a paper: {plain(in_a_sentence(results))}")
 

@@ -59,13 +59,10 @@ def _notes_that_apply(results: StudyResults, needs_runs: bool) -> Iterator[tuple
         words = collapsed_in_words(named, names_policies=len(results.policies) > 1)
         yield "collapsed_runs", {"conditions": words}
     open_verdicts = [verdict for verdict in verdicts if verdict.conclusion == "open"]
-    if open_verdicts:
-        yield "open", {"runs": "seeds" if is_paired else "trials"}
-    has_faults = any(verdict.after.kind == "fault" for verdict in verdicts)
-    if has_faults and "FM1" in results.plan.specification.played.failure_modes:
-        yield "faults", {}
     if needs_runs:
         yield "more_runs", {"runs": "seeds" if is_paired else "trials a condition"}
+    elif open_verdicts:
+        yield "open", {"runs": "seeds" if is_paired else "trials"}
     reasons = list(_reasons_to_be_open(open_verdicts))
     if reasons:
         yield "open_at_an_interval_on_one_side", {"reasons": " or ".join(reasons)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from textwrap import wrap
@@ -9,6 +10,8 @@ from textwrap import wrap
 from more_itertools import map_reduce
 
 from .answer import MOST_LINES, Answer, Line
+
+_NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def digest(answer: Answer, width: int, most: int | None = MOST_LINES) -> str:
@@ -46,13 +49,26 @@ def _in_columns(answer: Answer, widths: Sequence[int], width: int) -> Iterator[s
         if len(lines_by_policy) > 1:
             yield f"{policy}:"
         for line in lines:
-            question, *question_rest = wrap(line.question, widths[0], subsequent_indent="  ")
+            question, *question_rest = _fold_question(line.question, widths[0])
             interval = line.interval(answer.level)
             left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {interval:{widths[2]}}"
             verdict, *verdict_rest = wrap(line.verdict_text, max(10, width - len(left) - 2)) or [""]
             yield f"{left}  {verdict}".rstrip()
             for question, verdict in zip_longest(question_rest, verdict_rest, fillvalue=""):
                 yield f"{question:{len(left)}}  {verdict}".rstrip()
+
+
+def _fold_question(question: str, width: int) -> list[str]:
+    unbroken = values_unbroken(question)
+    if max(map(len, unbroken.split(" "))) + 2 > width:  # where there is no room for that
+        unbroken = question
+    folded = wrap(unbroken, width, subsequent_indent="  ")
+    return [part.replace(_NO_BREAK, " ") for part in folded]
+
+
+def values_unbroken(question: str) -> str:
+    """Return a question that is folded beside its values, "1, 2, 3 of 25", not within them."""
+    return re.sub(r"(?<= )[\d., ]+ of \d+", lambda m: m[0].replace(" ", _NO_BREAK), question)
 
 
 def _fold(text: str, width: int) -> list[str]:

@@ -54,6 +54,11 @@ class Document(NamedTuple):
         )
 
     @property
+    def beyond(self) -> tuple[Section, ...]:
+        """The measures that the paper does not define."""
+        return next((c.sections for c in self.chapters if c.title == "Beyond the paper"), ())
+
+    @property
     def figures(self) -> list[Figure]:
         """Every figure, in the order of the report."""
         return [
@@ -99,7 +104,7 @@ def document(results: StudyResults) -> Document:
         ),
         Chapter(
             "Results",
-            f"P is {_what_p_is(plan)}. Square brackets hold intervals at the "
+            f"P is {what_p_is(plan)}. Square brackets hold intervals at the "
             "level that the heading gives, or at that behind them; "
             '"one run" is where a single further run falls.',
             result_tables,
@@ -113,10 +118,18 @@ def document(results: StudyResults) -> Document:
         Chapter("Methods", "", (Section("", lines=(method,)),)),
     ]
     shown = tuple(chapter for chapter in chapters if chapter.sections)
-    title = f"Study {plan.specification.name!r}"
-    report = Document(title, tuple(text), study_answer, shown, sentences)
+    report = Document(_title(results), tuple(text), study_answer, shown, sentences)
     _make_names_differ(report.figures)
     return report
+
+
+def _title(results: StudyResults) -> str:
+    """Return the study's name with its policies in front of it, e.g. "homing: study 'paper'"."""
+    policies, name = results.policies, results.plan.specification.name
+    if policies == (name,):  # of trials: nobody named it
+        return f"Study {name!r}"
+    names = join_names(policies) if len(policies) < 4 else f"{len(policies)} policies"
+    return f"{names}: study {name!r}"
 
 
 def _make_names_differ(figures: Iterable[Figure]) -> None:
@@ -171,7 +184,8 @@ def _variations(plan: Plan) -> Iterator[str]:
             yield f"{faults.title or 'Faults'}: robots fail {manner}."
 
 
-def _what_p_is(plan: Plan) -> str:
+def what_p_is(plan: Plan) -> str:
+    """Return what the performance P of a study is, e.g. "the number of items delivered"."""
     if plan.origin is None:
         return plan.specification.played.performance
     return f"{plan.origin.performance!r} of {plan.origin.file}"

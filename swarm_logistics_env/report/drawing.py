@@ -38,62 +38,81 @@ _STYLE: Any = {  # matplotlib types each of its names
     "axes.grid": True, "axes.grid.axis": "y", "grid.alpha": 0.25, "grid.linewidth": 0.5,
     "axes.spines.right": False, "axes.spines.top": False,
     "axes.titlelocation": "left", "axes.titlesize": "medium",
-    "font.family": "DejaVu Sans", "font.size": 9.5, "lines.linewidth": 1.6,
-    "xtick.labelsize": 8.0, "ytick.labelsize": 8.0, "errorbar.capsize": 3.0,
+    "font.size": 9.5, "lines.linewidth": 1.6,
+    "xtick.labelsize": "small", "ytick.labelsize": "small", "errorbar.capsize": 3.0,
     "lines.markersize": 5.0,
-    "legend.columnspacing": 1.2, "legend.fontsize": 9.0, "legend.frameon": False,
+    "legend.columnspacing": 1.2, "legend.fontsize": "medium", "legend.frameon": False,
     "legend.handletextpad": 0.5,
     "svg.fonttype": "none", "svg.hashsalt": "swarm-logistics-env", "text.parse_math": False,
+    "pdf.fonttype": 42,  # many publishers refuse Type 3
 }  # fmt: skip
-_NO_METADATA = {"Creator": None, "Date": None, "Format": None, "Type": None}
-DOTS_PER_INCH = 200
+# What matplotlib writes into a file besides the drawing, and what differs at every drawing.
+_METADATA = {
+    "svg": ("Creator", "Date", "Format", "Type"), "png": ("Software",),
+    "pdf": ("Creator", "Producer", "CreationDate"),
+}  # fmt: skip
+DOTS_PER_INCH = 300
+
+
+class FigureStyle(NamedTuple):
+    """Width of a figure [inch], and the families of its letters, which matplotlib brings."""
+
+    width: float = WIDTH
+    fonts: tuple[str, ...] = ("DejaVu Sans",)
+
+    @property
+    def scale(self) -> float:
+        """The factor of letters, marks and heights: a narrow figure has smaller ones."""
+        return min(1.0, math.sqrt(self.width / WIDTH))
+
+
+PAGE_STYLE = FigureStyle()
+SERIF = "STIXGeneral", "DejaVu Serif"  # the first looks like Times
 
 
 class Images(NamedTuple):
-    """One drawing as SVG and as PNG."""
+    """One drawing as SVG, as PDF and as PNG."""
 
     svg: str
+    pdf: bytes
     png: bytes
 
 
-def images(draw: Draw, height: float) -> Images:
-    """Return a drawing of the given height [inch] as SVG and as PNG; equal ones as equal bytes."""
-    png = io.BytesIO()
-    with _style():
-        canvas = _canvas(draw, height)
-        svg = _svg(canvas)
+def images(draw: Draw, height: float, style: FigureStyle = PAGE_STYLE) -> Images:
+    """Return a drawing of the given height [inch] in each format; equal ones as equal bytes."""
+    with _canvas(draw, height, style) as canvas:
+        svg = _file(canvas, "svg")
         canvas.set_layout_engine("none")  # the same layout, which takes long to find
-        canvas.savefig(png, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
-    return Images(svg, png.getvalue())
+        return Images(svg.decode(), _file(canvas, "pdf"), _file(canvas, "png"))
 
 
 def svg_image(draw: Draw, height: float) -> str:
     """Return a drawing of the given height [inch] as SVG alone."""
-    with _style():
-        return _svg(_canvas(draw, height))
+    with _canvas(draw, height, PAGE_STYLE) as canvas:
+        return _file(canvas, "svg").decode()
 
 
 @contextlib.contextmanager
-def _style() -> Iterator[None]:
+def _canvas(draw: Draw, height: float, style: FigureStyle) -> Iterator[Canvas]:
     mpl = _matplotlib()
+    from matplotlib.figure import Figure as NewCanvas
+
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
-        yield
+        mpl.rcParams["font.family"] = style.fonts
+        for size in ("font.size", "lines.linewidth", "lines.markersize", "errorbar.capsize"):
+            mpl.rcParams[size] *= style.scale
+        canvas = NewCanvas(figsize=(style.width, height * style.scale), layout="constrained")
+        draw(canvas)
+        yield canvas
 
 
-def _canvas(draw: Draw, height: float) -> Canvas:
-    from matplotlib.figure import Figure as NewCanvas
-
-    canvas = NewCanvas(figsize=(WIDTH, height), layout="constrained")
-    draw(canvas)
-    return canvas
-
-
-def _svg(canvas: Canvas) -> str:
-    svg = io.StringIO()
-    canvas.savefig(svg, format="svg", metadata=_NO_METADATA)
-    return svg.getvalue()
+def _file(canvas: Canvas, ending: str) -> bytes:
+    file = io.BytesIO()
+    metadata = dict.fromkeys(_METADATA[ending])
+    canvas.savefig(file, format=ending, dpi=DOTS_PER_INCH, metadata=metadata)
+    return file.getvalue()
 
 
 def _matplotlib() -> ModuleType:
@@ -160,6 +179,8 @@ def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
         _panel(axes, panel)
     if len({point.style for point in panels[0].points}) > 1:
         _legend(canvas, grid[0, 0])
+    elif not panels[0].title:
+        grid[0, 0].set_title(panels[0].points[0].series)
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
@@ -177,17 +198,18 @@ def _panel(axes: Axes, panel: Panel) -> None:
         _dots(axes, x, 0.4 * spread / len(styles), point)
         _mark(axes, x, point)
         if point.value is not None and point.saturated:
-            axes.annotate("†", (x, point.value), (-9, 3), textcoords="offset points", fontsize=9)
+            axes.annotate("†", (x, point.value), (-9, 3), textcoords="offset points")
     axes.set_xticks(range(len(categories)), categories)
-    if sum(len(category) + 2 for category in categories) > 80:
+    width = axes.bbox.width / axes.figure.dpi
+    if sum(len(category) + 2 for category in categories) > 20 * width:
         axes.tick_params(axis="x", rotation=40)
-    axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=_limits(panel.points))
+    axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=limits(panel.points))
     if not panel.thresholds:  # P is never below 0
         axes.set_ylim(bottom=0.0)
     axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
 
 
-def _limits(points: Sequence[Point]) -> tuple[float, float]:
+def limits(points: Sequence[Point]) -> tuple[float, float]:
     """Return axis limits: 0, all values, and intervals up to twice the values' span beyond."""
     values = [0.0, *(x for p in points for x in (p.value, p.published) if x is not None)]
     values += [p for point in points for p in point.runs if p is not None]
@@ -217,61 +239,57 @@ def _dots(axes: Axes, x: float, reach: float, point: Point) -> None:
         )
 
 
-def _mark(axes: Axes, at: float, point: Point, *, level: bool = False, n_beside: int = 1) -> None:
-    """Draw a value, if there is one, with its interval, upright or level.
-
-    Args:
-        n_beside: how many marks share the row: many of them are small.
-    """
+def _mark(axes: Axes, at: float, point: Point, marker: str = "", shrink: float = 1.0) -> None:
+    """Draw a value, if there is one, with its interval: upright, or level with a marker named."""
     value, low, high = point.value, point.low, point.high
     if value is None:
         return
+    sizes = _matplotlib().rcParams
     colour = COLOURS[point.style % len(COLOURS)]
     error = None
     if low is not None and high is not None:
         # An infinite end is drawn far outside.
         error = np.clip([[value - low], [high - value]], 0.0, 1e3)
-    shrink = min(1.0, 4.0 / n_beside)
     line, caps, bars = axes.errorbar(
-        value if level else at,
-        at if level else value,
-        xerr=error if level else None,
-        yerr=None if level else error,
-        fmt="o" if level else marker_of(point.style),
+        value if marker else at,
+        at if marker else value,
+        xerr=error if marker else None,
+        yerr=None if marker else error,
+        fmt=marker or marker_of(point.style),
         color=colour,
         markerfacecolor=colour if point.decided else PAPER,
-        markersize=5.0 * shrink,
-        capsize=3.0 * shrink,
+        markersize=sizes["lines.markersize"] * shrink,
+        capsize=sizes["errorbar.capsize"] * shrink,
         label=point.series,
     )
     for artist in (line, *caps, *bars):
         artist.set_gid(point.link or None)
 
 
-def forest(canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]]) -> None:
+def forest(
+    canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]], x_label: str, title: str = ""
+) -> None:
     """Draw a row for each question: its values with their intervals, from top to bottom.
 
     Args:
         canvas: to draw on.
         rows: the label of each, and its points; a point's `published` is its threshold.
+        x_label: of the axis of the values.
+        title: above the axes.
     """
     axes = canvas.subplots()
     for row, (_, points) in enumerate(rows):
         for index, point in enumerate(points):
             height = row + 0.6 * ((index + 0.5) / len(points) - 0.5)
-            _mark(axes, height, point, level=True, n_beside=len(points))
+            _mark(axes, height, point, MARKERS[index % len(MARKERS)], min(1.0, 4.0 / len(points)))
             if point.published:
-                threshold = axes.vlines(
-                    point.published, row - 0.4, row + 0.4, color=INK, linewidth=0.8
-                )
-                threshold.set_gid(point.link or None)
-    axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1, gid="zero")
-    axes.patch.set_gid("frame")
+                axes.vlines(point.published, row - 0.4, row + 0.4, color=INK, linewidth=0.8)
+    axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     axes.set_yticks(range(len(rows)), [label for label, _ in rows])
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
-    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel="indicator")
-    axes.set_xlim(_limits([point for _, points in rows for point in points]))
+    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel=x_label, title=title)
+    axes.set_xlim(limits([point for _, points in rows for point in points]))
 
 
 def trade_off(canvas: Canvas, panels: Mapping[str, Sequence[tuple[Point, Interval]]]) -> None:
@@ -294,9 +312,9 @@ def trade_off(canvas: Canvas, panels: Mapping[str, Sequence[tuple[Point, Interva
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
         grid[-2, -1].tick_params(labelbottom=True)
-    canvas.supxlabel("contacts per robot-minute", fontsize=9.5)
-    canvas.supylabel("performance P", fontsize=9.5)
-    grid[0, 0].set_ylim(_limits([point for points in panels.values() for point, _ in points]))
+    canvas.supxlabel("contacts per robot-minute", fontsize="medium")
+    canvas.supylabel("performance P", fontsize="medium")
+    grid[0, 0].set_ylim(limits([point for points in panels.values() for point, _ in points]))
     grid[0, 0].set_ylim(bottom=0.0)
     grid[0, 0].set_xlim(left=0.0)
     _legend(canvas, grid[0, 0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
@@ -30,21 +31,34 @@ _COLUMNS = [
 ]  # fmt: skip
 
 
-def forest_figure(results: StudyResults, answer: Answer) -> Figure:
-    """Return the lines of the answer as a forest of intervals."""
-    points = [
+def forest_points(results: StudyResults, answer: Answer) -> list[list[Point]]:
+    """Return the values of each line of the answer; `published` is the threshold of each."""
+    return [
         [_point(results, verdict, "", verdict.compared.threshold) for verdict in line.verdicts]
         for line in answer.lines
     ]
-    rows = list(zip(answer.questions, points))
+
+
+def forest_label(answer: Answer) -> str:
+    """Return the label of the values' axis, e.g. "R, FT: value"."""
+    return f"{', '.join(dict.fromkeys(line.indicator for line in answer.lines))}: value"
+
+
+def forest_figure(results: StudyResults, answer: Answer) -> Figure:
+    """Return the lines of the answer as a forest of intervals."""
+    rows = list(zip(answer.questions, forest_points(results, answer)))
     verdicts = answer.verdicts
+    n_most = max(len(points) for _, points in rows)
+    order = " Marks in one row stand from top to bottom in the order of its label." * (n_most > 1)
+    # Where there are several, each row names its own.
+    title = results.policies[0] if len(results.policies) == 1 else ""
     return Figure(
         "answer",
-        f"{answer.scope} Every question with its interval. {_marks(verdicts)}."
+        f"{answer.scope} Every question with its interval. {_marks(verdicts)}.{order}"
         f"{_note_on_caps(verdicts)}",
         _rows(results, verdicts),
-        0.9 + 0.27 * len(rows),
-        partial(drawing.forest, rows=rows),
+        1.1 + (0.21 + 0.05 * min(n_most, 4)) * len(rows),
+        partial(drawing.forest, rows=rows, x_label=forest_label(answer), title=title),
     )
 
 
@@ -168,7 +182,7 @@ def _panel(results: StudyResults, verdicts: Sequence[Verdict], definition: Defin
     # 0 first: it is the threshold that always stands in the picture.
     thresholds = [verdict.compared.threshold for verdict in of_indicator]
     shown = tuple(dict.fromkeys([0.0, *definition.adjectives, *thresholds]))
-    x_label = f"{after.name}, x_o → x_new" if after.kind == "parameter" else X_LABELS[after.kind]
+    x_label = X_LABELS.get(after.kind, f"{parameter_label(of_indicator[0])}, x_o → x_new")
     return Panel("", definition.heading, points, shown, x_label)
 
 
@@ -177,6 +191,14 @@ X_LABELS = {
     "fault": "failure mode and number m of faulty robots",
     "policy": "in its place",
 }
+
+
+def parameter_label(verdict: Verdict) -> str:
+    """Return a parameter as a reader calls it, with its unit, e.g. "delivery width [m]"."""
+    name = verdict.after.name
+    description = verdict.compared.original.case.task.fields.get(name, "")
+    unit = re.search(r"\[.+?\]", description)
+    return f"{name.replace('_', ' ')} {unit[0] if unit else ''}".rstrip()
 
 
 def _category(verdict: Verdict) -> str:
@@ -214,6 +236,9 @@ def _rows(results: StudyResults, verdicts: Sequence[Verdict]) -> pd.DataFrame:
     return results.verdict_table.iloc[rows].reset_index(drop=True)[_COLUMNS]
 
 
+CAPPED = "†: P is capped, every item was delivered in a run."
+
+
 def _marks(verdicts: Sequence[Verdict]) -> str:
     return (
         "Filled: the Holm-adjusted verdict is decided; hollow: it is not; bars: "
@@ -223,9 +248,7 @@ def _marks(verdicts: Sequence[Verdict]) -> str:
 
 
 def _note_on_caps(verdicts: Sequence[Verdict]) -> str:
-    if any(verdict.saturated for verdict in verdicts):
-        return " †: P is capped, every item was delivered in a run."
-    return ""
+    return f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
 
 
 def _definitions(verdicts: Sequence[Verdict]) -> list[Definition]:
@@ -283,7 +306,7 @@ def rate_figures(measures: Iterable[Resilience], seeds: str) -> Iterator[Figure]
                 0.6 + 2.3 * len(panels),
                 partial(
                     drawing.rates,
-                    panels=panels,
+                    panels={f"{first.policy}, {title}": panels[title] for title in panels},
                     onset=setting.onset,
                     y_label=f"deliveries in {window:g} s",
                 ),

@@ -31,50 +31,6 @@ def inline(svg: str, name: str, titles: Mapping[str, str]) -> str:
         name: begins its ids, which have to differ from those of other drawings of the page.
         titles: what is shown beside the pointer, by the id of a mark.
     """
-    return _text(_for_page(svg, name, titles))
-
-
-def forest_rows(svg: str, links: Sequence[Sequence[tuple[str, str]]]) -> list[str]:
-    """Return each row of a forest (`drawing.forest`) as an element of the page.
-
-    Args:
-        svg: the forest.
-        links: for each row the ids of its marks, each with the class that colours it.
-    """
-    root = _for_page(svg, "forest", {})
-    left, top, right, bottom = _frame(root)
-    height = (bottom - top) / (len(links) + 0.2)  # 0.1 of a row above the first, and below the last
-    zero = _text(next(root.iterfind(".//g[@data-mark='zero']")))
-    marks: dict[str, list[Element]] = {}
-    for group in root.iterfind(".//g[@data-question]"):
-        marks.setdefault(f"question-{group.get('data-question')}", []).append(group)
-    rows = []
-    for row, row_links in enumerate(links):
-        groups = "".join(
-            f'<g class="{css_class}">{"".join(map(_text, marks[link]))}</g>'
-            for link, css_class in row_links
-            if link in marks
-        )
-        y = top + (row + 0.1) * height
-        box = f"{left:.2f} {y:.2f} {right - left:.2f} {height:.2f}"
-        # The colour is that of the verdict, not of the policy.
-        groups = re.sub(r"var\(--p\d\)", "var(--c)", groups)
-        row_svg = f'<svg viewBox="{box}" preserveAspectRatio="none" aria-hidden="true">'
-        # What lies outside of the row is not shown, and the clip path of the axes is not here.
-        rows.append(row_svg + re.sub(' clip-path="[^"]*"', "", zero + groups) + "</svg>")
-    return rows
-
-
-def _frame(root: Element) -> tuple[float, float, float, float]:
-    """Return left, top, right and bottom of the axes."""
-    path = next(root.iterfind(".//g[@data-mark='frame']/path"))
-    numbers = [float(number) for number in re.findall(r"-?[\d.]+", path.get("d", ""))]
-    xs, ys = numbers[0::2], numbers[1::2]
-    return min(xs), min(ys), max(xs), max(ys)
-
-
-def _for_page(svg: str, name: str, titles: Mapping[str, str]) -> Element:
-    """Return the tree of a drawing, as `inline` describes it."""
     root = ElementTree.fromstring(svg)
     for style in root.iterfind(".//{*}style/.."):  # it would hold for the whole page
         for child in style.findall("{*}style"):
@@ -95,7 +51,7 @@ def _for_page(svg: str, name: str, titles: Mapping[str, str]) -> Element:
     for size in ("width", "height", "version"):
         root.attrib.pop(size, None)
     root.set("stroke-linejoin", "round")
-    return root
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _for_attribute(value: str) -> str:
@@ -119,8 +75,6 @@ def _name(element: Element, name: str, titles: Mapping[str, str]) -> None:
         element.set(f"data-{kind}", number)
         if seeds:
             _name_dots(element, seeds.split("-"))
-    elif identity in ("zero", "frame"):
-        element.set("data-mark", identity)
     elif element.tag != "g" and identity:
         element.set("id", f"{name}-{identity}")
     if identity in titles:
@@ -135,7 +89,3 @@ def _name_dots(element: Element, seeds: Sequence[str]) -> None:
         element.set("style", _for_attribute(style.partition(";")[0]))
         dot.set("class", "dot")
         dot.set("data-seed", seed)
-
-
-def _text(element: Element) -> str:
-    return ElementTree.tostring(element, encoding="unicode")

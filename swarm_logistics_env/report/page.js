@@ -5,6 +5,8 @@ const repeat = data.paired ? "seed" : "trial";
 const at = (id) => document.getElementById(id);
 const colour = (place) => `var(--p${place % 6})`;
 const escaped = (text) => String(text).replace(/[&<>"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
+// No line ends within an option, as at its hyphens.
+const unbroken = (text) => text.replace(/--[a-z][\w-]*/g, '<span class="option">$&</span>');
 const tidy = (x) => String(Number(x.toPrecision(6)));
 
 // Axes
@@ -127,15 +129,22 @@ function drawCurves() {
   const x = (time) => box.left + (time / end) * (box.right - box.left);
   for (const tick of ticks(0, end, 5)) drawn += `<text x="${x(tick)}" y="${height - 6}" text-anchor="middle" class="soft">${tidy(tick)}${tick ? "" : " s"}</text>`;
   const line = (points) => points.map(([time, count]) => `${x(time).toFixed(1)},${y(count).toFixed(1)}`).join(" ");
-  curves.forEach((runs, i) => {
-    runs.forEach((times, k) => {
-      if (!times) return;
-      const steps = [[0, 0], ...times.flatMap((time, count) => [[time, count], [time, count + 1]]), [end, times.length]];
-      drawn += `<polyline class="thin${k === chosen.seed ? " chosen" : ""}" points="${line(steps)}" stroke="${colour(i)}" data-seed="${k}"><title>seed ${data.seeds[k]}</title></polyline>`;
-    });
+  const single = (i, k) => {
+    const times = curves[i][k];
+    if (!times) return "";
+    const steps = [[0, 0], ...times.flatMap((time, count) => [[time, count], [time, count + 1]]), [end, times.length]];
+    return `<polyline class="thin${k === chosen.seed ? " chosen" : ""}" points="${line(steps)}" stroke="${colour(i)}" data-seed="${k}"><title>seed ${data.seeds[k]}</title></polyline>`;
+  };
+  const mean = (runs) => {
     const all = runs.filter(Boolean).flat().sort((a, b) => a - b), n = runs.filter(Boolean).length;
-    if (n) drawn += `<polyline fill="none" points="${line([[0, 0], ...all.map((time, count) => [time, (count + 1) / n]), [end, all.length / n]])}" stroke="${colour(i)}" stroke-width="3"/>`;
-  });
+    return n ? line([[0, 0], ...all.map((time, count) => [time, (count + 1) / n]), [end, all.length / n]]) : "";
+  };
+  // Seed by seed in turn, those of the chosen seed above them and the means last: no condition hides another.
+  const seeds = [...Array(Math.max(...curves.map((runs) => runs.length))).keys()].filter((k) => k !== chosen.seed);
+  for (const k of [...seeds, chosen.seed]) drawn += curves.map((_, i) => single(i, k)).join("");
+  const means = curves.map(mean);
+  drawn += means.map((points) => `<polyline class="halo" points="${points}"/>`).join("");
+  drawn += means.map((points, i) => `<polyline class="mean" points="${points}" stroke="${colour(i)}" stroke-dasharray="${["none", "9 5", "3 3"][i]}"/>`).join("");
   put(place, width, height, drawn, "deliveries over time");
 }
 
@@ -144,7 +153,7 @@ function showRun() {
   place.hidden = !data.paired;  // unpaired trials have nothing in common but their place
   const runs = chosen.arms.map(([symbol, name, condition]) => {
     const { p, command } = data.conditions[condition];
-    const shown = command ? `<code>${escaped(command)} --seed ${seed}</code>` : ". No command plays this run.";
+    const shown = command ? `<code>${unbroken(`${escaped(command)} --seed ${seed}`)}</code>` : ". No command plays this run.";
     return `${escaped(symbol)}, ${escaped(name)}: P = ${p[chosen.seed] ?? "no run"}${shown}`;
   });
   place.innerHTML = `<b>Seed ${seed}</b><br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;

@@ -9,7 +9,7 @@ import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib.resources import files
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from more_itertools import map_reduce
@@ -24,12 +24,17 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from . import drawing
-from .answer import Answer, name_of_p
+from .answer import name_of_p
+from .digest import values_unbroken
 from .document import Document
 from .drawing import Panel, Point
 from .figures import X_LABELS
-from .inline_svg import forest_rows, inline
+from .inline_svg import inline
+from .page_forest import forest
 from .section import P_LEVEL, Figure, Sentence, bracketed, digits_of, percent, width_of
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 Json: TypeAlias = dict[str, JsonValue]
 # P seed by seed of every condition, by the key of its case; None: a run failed, or is missing.
@@ -85,12 +90,16 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str],
     )
     runs = _p_by_seed(results)
     data = _page_data(results, runs, document.sentences)
+    rows, axis = forest(results, document.answer)
+    environment.filters["values_unbroken"] = values_unbroken
+    environment.filters["marked_up"] = marked_up
     return environment.get_template("page.html.jinja").render(
         document=document,
         paired=results.plan.paired,
         answer=document.answer,
         level=percent(document.answer.level),
-        forest=_forest(document.answer, drawings["answer"]),
+        forest=rows,
+        axis=axis,
         views=list(_views(results, runs, document.figures, drawings)),
         colours=_COLOURS,
         drawings={name: base64.b64encode(svg.encode()).decode() for name, svg in drawings.items()},
@@ -99,6 +108,15 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str],
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         script=files(__package__).joinpath("page.js").read_text(encoding="utf-8"),
     )
+
+
+def marked_up(text: str) -> Markup:
+    """Return a text as HTML: counted verdicts have their colours, and no line ends in an option."""
+    from markupsafe import Markup, escape
+
+    html = re.sub(r"--[a-z][\w-]*", r'<span class="option">\g<0></span>', str(escape(text)))
+    counted = rf"\d+ ({'|'.join(_COLOURS)})\b"
+    return Markup(re.sub(counted, r'<span class="word \1">\g<0></span>', html))
 
 
 def _views(
@@ -181,22 +199,6 @@ def _titles(panels: Sequence[Panel]) -> dict[str, str]:
             if point.published is not None:
                 titles[f"published-{point.link}"] = f"published: {point.published:g}"
     return titles
-
-
-def _forest(answer: Answer, svg: str) -> list[str]:
-    """Return the intervals of each line of the answer as a part of the page.
-
-    Args:
-        svg: the forest of all lines.
-    """
-    links = [
-        [
-            (f"question-{number}", verdict.conclusion)
-            for number, verdict in zip(line.numbers, line.verdicts)
-        ]
-        for line in answer.lines
-    ]
-    return forest_rows(svg, links)
 
 
 def _page_data(results: StudyResults, runs: Runs, sentences: Sequence[Sentence]) -> Json:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from operator import attrgetter
 
 import numpy as np
 from more_itertools import map_reduce
@@ -30,6 +31,8 @@ from .figures import rate_figures
 from .section import NOTHING, Section, Sentence, Texts
 
 CellColumn = tuple[str, Callable[[Cell], str]]
+# What stands behind a table's title, its columns, and the arms of its rows; None: all.
+Layout = tuple[str, list[CellColumn], set[Arm] | None]
 
 
 def verdict_sections(
@@ -46,8 +49,12 @@ def verdict_sections(
         )
 
 
-def tables(results: StudyResults) -> Iterator[Section]:
-    """Yield the tables of a study's results, policy by policy; then how near each comes."""
+def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Section]:
+    """Yield the tables of a study's results, policy by policy; then how near each comes.
+
+    Args:
+        for_paper: whether all indicators stand in one table beside P alone, Holm's verdicts alone.
+    """
     verdicts_of: dict[tuple[str, str], list[Verdict]] = map_reduce(
         results.verdicts, lambda verdict: (verdict.compared.policy, verdict.compared.table)
     )
@@ -56,9 +63,10 @@ def tables(results: StudyResults) -> Iterator[Section]:
         has_published = any(cell.published is not None for cell in cells)
         has_contacts = any(cell.contacts.value >= 0.0 for cell in cells)  # NaN: not counted
         verdicts = verdicts_of.get((policy, table), [])
-        for title, columns, arms in _layouts(
-            verdicts, published=has_published, contacts=has_contacts
-        ):
+        layouts = _layouts(verdicts, published=has_published, contacts=has_contacts)
+        if for_paper and verdicts:
+            layouts = _paper_layout(verdicts, published=has_published)
+        for title, columns, arms in layouts:
             rows = tuple(
                 tuple(text(cell) for _, text in columns)
                 for cell in cells
@@ -72,9 +80,17 @@ def tables(results: StudyResults) -> Iterator[Section]:
     yield from edge_sections(results.cells)
 
 
-def _layouts(
-    verdicts: Sequence[Verdict], *, published: bool, contacts: bool
-) -> Iterator[tuple[str, list[CellColumn], set[Arm] | None]]:
+def _paper_layout(verdicts: Sequence[Verdict], *, published: bool) -> Iterator[Layout]:
+    *performance, _ = _performance_columns(published=published, contacts=False)
+    columns: list[CellColumn] = [("", lambda cell: cell.words), *performance]
+    by_indicator: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.indicator)
+    holm: Callable[[Verdict], str] = attrgetter("on_property.adjusted")
+    for indicator, of_indicator in by_indicator.items():
+        columns += _answers(indicator, of_indicator, holm, published=published)
+    yield "", columns, None
+
+
+def _layouts(verdicts: Sequence[Verdict], *, published: bool, contacts: bool) -> Iterator[Layout]:
     """Yield the tables of one policy and one heading of the plan, without their cells.
 
     The first has P and the first indicator; each further one has an indicator, without P again,
@@ -123,7 +139,11 @@ def _one_run(cell: Cell) -> str:
 
 
 def _answers(
-    indicator: str, verdicts: Sequence[Verdict], *, published: bool
+    indicator: str,
+    verdicts: Sequence[Verdict],
+    decision_text: Callable[[Verdict], str] = section.decision_text,
+    *,
+    published: bool,
 ) -> Iterator[CellColumn]:
     """Yield the columns of one indicator in a table of cells.
 
@@ -137,7 +157,7 @@ def _answers(
         yield _column(f"{indicator} paper", verdicts, lambda v: section.number(v.published))
     by_property: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.property_name)
     for name, of_property in by_property.items():
-        yield _column(name, of_property, section.decision_text)
+        yield _column(name, of_property, decision_text)
         if published:
             yield _column("paper", of_property, _claim_text)
 

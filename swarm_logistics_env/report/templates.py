@@ -73,7 +73,7 @@ LINE = {
 
 # How to read the answer, and what limits it: the cases that apply, with "; " between them.
 NOTES = {
-    "indicators": "{indicators}: supported if above 0 (good), refuted if below",
+    "indicators": "{indicators}: supported above 0 (good), refuted below",
     "intervals": "{level} intervals",
     "intervals_of_several_levels": "{level} intervals, or as said behind them",
     "adjusted": "verdicts are Holm-adjusted",
@@ -86,9 +86,8 @@ NOTES = {
     "collapsed": "of the trainings at worst {collapsed}",
     "capped": "{mark} P is capped: --clearing or --restock has no cap",
     "collapsed_runs": "runs collapse {conditions}",
-    "open": "open: not decided by these {runs}",
-    "more_runs": "about so many more {runs} decide it in 4 of 5 studies, if its true value is that",
-    "faults": "failure modes: swarm-logistics list faults",
+    "open": "open: undecided by these {runs}",
+    "more_runs": "open: undecided; so many {runs} decide in 4 of 5 studies, if that is true",
     "open_at_an_interval_on_one_side": "open beside an interval on one side of it: {reasons}",
     "claims_of_the_text": "of {claims} in the paper's text {counts}",
     "claims_beside_the_text": "of {claims} beside it {counts}",

@@ -1,4 +1,4 @@
-r"""The report as files: HTML, Markdown, LaTeX (\usepackage{booktabs}), drawings, and CSV.
+"""The report as files: HTML, Markdown, LaTeX, drawings, and CSV.
 
 Equal rows give equal bytes.
 """
@@ -6,7 +6,7 @@ Equal rows give equal bytes.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -15,16 +15,20 @@ from swarm_logistics_env.records import atomic_write, plain, write_csv
 from swarm_logistics_env.verdicts.results import StudyResults
 
 from .document import Document, document
-from .drawing import images
+from .drawing import PAGE_STYLE, FigureStyle, images, svg_image
+from .latex import latex_tables
 from .page import html
 from .section import Section
 
 
 def write_report(
-    results: StudyResults, directory: Path, report: Document | None = None
+    results: StudyResults,
+    directory: Path,
+    report: Document | None = None,
+    style: FigureStyle = PAGE_STYLE,
 ) -> tuple[Path, ...]:
     """Write report.md, cells.csv, claims.csv, tables.tex, every figure's data, and with the extra
-    `study` report.html and every figure as SVG and PNG; return the paths of report and tables.
+    `study` report.html and every figure as SVG, PDF and PNG; return the paths of report and tables.
 
     Raises:
         StudyError: a file cannot be written.
@@ -37,22 +41,25 @@ def write_report(
     try:
         pictures.mkdir(parents=True, exist_ok=True)
         drawn = () if advice else report.figures
-        drawings = {figure.name: images(figure.draw, figure.height) for figure in drawn}
+        drawings = {figure.name: images(figure.draw, figure.height, style) for figure in drawn}
         write_csv(paths[1], results.cell_table, StudyError)
         write_csv(paths[2], results.verdict_table, StudyError)
         for figure in report.figures:
             write_csv(pictures / f"{figure.name}.csv", figure.data, StudyError)
-        latex = latex_tables((report.answer.section, *report.summary))
+        latex = latex_tables(results, report)
         write_text(paths[3], latex)
         if advice:
             write_text(paths[0], markdown(report, note=advice))
             return paths
         for name, drawing in drawings.items():
             write_text(pictures / f"{name}.svg", drawing.svg)
-            with atomic_write(pictures / f"{name}.png", StudyError) as part:
-                part.write_bytes(drawing.png)
+            for ending, content in (("pdf", drawing.pdf), ("png", drawing.png)):
+                with atomic_write(pictures / f"{name}.{ending}", StudyError) as part:
+                    part.write_bytes(content)
         write_text(paths[0], markdown(report, pictures=pictures.name))
         svgs = {name: drawing.svg for name, drawing in drawings.items()}
+        if style != PAGE_STYLE:
+            svgs = {figure.name: svg_image(figure.draw, figure.height) for figure in drawn}
         write_text(page, html(results, report, svgs, latex))
     except OSError as error:
         raise StudyError(f"cannot write {error.filename}: {error.strerror}") from error
@@ -128,42 +135,3 @@ def _inert(text: str) -> str:
     """Return a text of which Markdown makes neither a tag, nor a link, nor a picture."""
     live = r"<(?=[A-Za-z/!?])|(?<=\])(?=\()"
     return re.sub(live, lambda match: "&lt;" if match[0] else "\\", plain(text))
-
-
-_ESCAPES = {
-    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
-    "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
-    "->": r"$\to$", "–": "--", "∞": r"$\infty$", "†": r"\dag{}", "<": "$<$", ">": "$>$",
-}  # fmt: skip
-_SPECIAL = re.compile("|".join(map(re.escape, sorted(_ESCAPES, key=len, reverse=True))))
-
-
-def latex_tables(sections: Iterable[Section]) -> str:
-    """Return the tables of sections, each a table environment with its title as caption."""
-    return "\n".join(_latex_table(section) for section in sections if section.rows)
-
-
-def _latex_table(section: Section) -> str:
-    lines = [
-        r"\begin{table}",
-        r"\centering",
-        rf"\caption{{{_escape(section.title)}}}",
-        rf"\begin{{tabular}}{{{'l' * len(section.columns)}}}",
-        r"\toprule",
-        _latex_row(section.columns),
-        r"\midrule",
-        *map(_latex_row, section.rows),
-        r"\bottomrule",
-        r"\end{tabular}",
-        r"\end{table}",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _latex_row(cells: Iterable[str]) -> str:
-    # In braces: a row that starts with "[" would be read as an option of the line break before it.
-    return " & ".join(f"{{{_escape(cell)}}}" for cell in cells) + r" \\"
-
-
-def _escape(text: str) -> str:
-    return _SPECIAL.sub(lambda match: _ESCAPES[match[0]], text)

@@ -232,9 +232,8 @@ class TrainingLog:
             y_label = f"P, mean over {seeds} seeds [items]"
             axes.set(title=title, xlabel="million agent-steps", ylabel=y_label, ylim=(0.0, None))
 
-        _, png = images(curve, 0.62 * WIDTH)
         with atomic_write(picture, TrainingError) as part:
-            part.write_bytes(png)
+            part.write_bytes(images(curve, 0.62 * WIDTH).png)
 
 
 class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the environment of the type check

@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -73,6 +74,22 @@ def test_study_run_prints_and_writes_the_report(file: Path, command: Command) ->
     rows = records("rows.csv")
     assert [row["run"] for row in rows] == sorted(row["run"] for row in rows)
     assert json.loads(rows[0]["scenario"])["duration"] == 0.5
+
+
+def test_figures_are_drawn_as_wide_and_in_the_letters_that_a_paper_needs(
+    command: Command,
+) -> None:
+    command(f"{RUN} --out out")
+    page = Path("out/report.html").read_text()
+    drawing, picture = Path("out/figures/answer.svg"), Path("out/figures/answer.png")
+    assert 'width="374.4pt"' in drawing.read_text()  # 72 a inch
+    command("study report out --figure-width 3.5 --font serif")
+    assert 'width="252pt"' in drawing.read_text()
+    assert "font-family: 'STIXGeneral'" in drawing.read_text()
+    assert struct.unpack(">I", picture.read_bytes()[16:20]) == (1050,)  # 300 an inch
+    assert drawing.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+    # The page has drawings for a screen.
+    assert Path("out/report.html").read_text() == page
 
 
 def test_study_plan_prints_conditions_once_and_what_they_take(file: Path, command: Command) -> None:

@@ -65,6 +65,12 @@ def test_digest_fits_the_screen_and_nothing_is_cut(
         whole = digest(answer(found, most=None), width, most=None).splitlines()
         assert max(map(len, [*lines, *whole])) <= width
         assert len(whole) >= len(found.verdicts)
+        # No line is folded within the values of a question, where there is room for them.
+        values = "1, 2, 3 of 25"
+        questions = [line.question for line in answer(found).lines]
+        assert width < 80 or "\n".join(lines).count(values) == sum(
+            values in text for text in questions
+        )
 
 
 def test_claims_are_counted_and_what_contradicts_the_paper_is_marked(few: StudyResults) -> None:

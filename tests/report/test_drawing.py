@@ -10,9 +10,9 @@ DRAW = """
 import os
 from swarm_logistics_env.report.drawing import images
 
-svg, png = images(lambda canvas: canvas.subplots().plot([1, 2]), 2.0)
+svg, pdf, png = images(lambda canvas: canvas.subplots().plot([1, 2]), 2.0)
 import matplotlib
-assert svg.startswith("<?xml") and png.startswith(b"\\x89PNG")
+assert svg.startswith("<?xml") and pdf.startswith(b"%PDF") and png.startswith(b"\\x89PNG")
 print(os.environ["MPLBACKEND"], matplotlib.rcParams["backend"])
 """
 

@@ -21,7 +21,7 @@ import pytest
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
-from swarm_logistics_env.report.page import watch_command
+from swarm_logistics_env.report.page import marked_up, watch_command
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.watch import Session, messages
@@ -64,6 +64,18 @@ def test_text_of_a_study_cannot_end_the_script(made: Made) -> None:
     assert made.page.count("</script>") == 2
     names = {condition["name"] for condition in made.data["conditions"]}
     assert any(name.startswith(f"{HOSTILE}, ") for name in names)
+
+
+def test_policies_stand_in_the_title_and_no_line_ends_within_an_option(made: Made) -> None:
+    title = f"swarm-dt and {html.escape(HOSTILE, quote=False)}: study &#39;study&#39;"
+    assert f"<title>{title}</title>" in made.page
+    assert f"<h1>{title}</h1>" in made.page
+    shown = marked_up("a < b: --clearing has no cap")
+    assert shown == 'a &lt; b: <span class="option">--clearing</span> has no cap'
+    shown = marked_up("1 supported, 2 open")
+    assert shown == (
+        '<span class="word supported">1 supported</span>, <span class="word open">2 open</span>'
+    )
 
 
 def drawings(page: str) -> dict[str, ElementTree.Element]:
@@ -129,36 +141,41 @@ def test_a_mark_of_an_indicator_shows_its_question(made: Made) -> None:
     assert Scale(heights, values).values(heights) == pytest.approx(values, abs=0.02)
 
 
-def test_intervals_of_the_answer_are_drawn_to_the_ends_of_their_axis(made: Made) -> None:
-    known = {n: test for n, test in enumerate(made.found.verdicts) if test.interval}
-    ends: dict[int, list[float]] = {}
-    centres: dict[int, float] = {}
-    limits = set()
+def test_the_answer_is_drawn_in_the_colours_of_its_verdicts_on_an_axis_with_numbers(
+    made: Made,
+) -> None:
+    axis, rows = None, {}
     for row in re.findall(r'<td class="forest">(.*?)</td>', made.page):
         svg = ElementTree.fromstring(row)
-        left, _, width, _ = map(float, svg.attrib["viewBox"].split())
-        limits.add((left, left + width))
-        for verdict in svg.findall("g[@class]"):
-            groups = verdict.findall("g[@data-question]")
-            number = int(groups[0].attrib["data-question"])
-            assert verdict.attrib["class"] == known[number].conclusion
-            assert {group.attrib["data-question"] for group in groups} == {str(number)}
-            paths = [path for group in groups for path in group.findall("path")]
-            numbers = re.findall(r"-?[\d.]+", paths[0].attrib["d"]) if paths else []
-            ends[number] = [float(x) for x in numbers[0::2]]
-            centres[number] = places(groups[-1:], "x")[0]
-    assert centres.keys() == known.keys()
-    ((left, right),) = limits
-    values = {n: test.value or 0.0 for n, test in known.items()}
-    scale = Scale(centres.values(), (values[n] for n in centres))
-    for number, test in known.items():
-        assert left < centres[number] < right
-        value, low, high = test.interval or (0.0, None, None)
-        assert scale.values([centres[number]]) == pytest.approx([value], abs=0.02)
-        if low is not None and high is not None:
-            for x, end in zip(ends[number], (low, high), strict=True):
-                shown = scale.values([x])[0]
-                assert shown == pytest.approx(end, abs=0.02) or not left < x < right
+        if svg.findall("text"):
+            axis = svg
+        for mark in svg.iterfind("g"):
+            rows[int(mark.attrib["data-question"])] = mark
+    assert axis is not None
+    *numbers, title = axis.findall("text")
+    assert title.text == "FT, R: value"
+
+    def percent(element: ElementTree.Element, name: str) -> float:
+        return float(element.attrib[name].removesuffix("%"))
+
+    scale = Scale(
+        (percent(number, "x") for number in numbers),
+        (float(str(number.text).replace("\N{MINUS SIGN}", "-")) for number in numbers),
+    )
+    verdicts = {n: test for n, test in enumerate(made.found.verdicts) if test.interval}
+    assert rows.keys() == verdicts.keys()
+    for number, test in verdicts.items():
+        assert rows[number].attrib["class"] == test.conclusion
+        (value,) = rows[number].findall("use")
+        assert test.interval is not None
+        assert scale.values([percent(value, "x")]) == pytest.approx([test.interval.value], abs=0.02)
+        if test.interval.low is not None and test.interval.high is not None:
+            line = rows[number].findall("line")[0]
+            for name, end in (("x1", test.interval.low), ("x2", test.interval.high)):
+                inside = 0.0 < percent(line, name) < 100.0
+                assert not inside or scale.values([percent(line, name)]) == pytest.approx(
+                    [end], abs=0.02
+                )
 
 
 def test_command_of_a_run_plays_the_stored_one(

@@ -18,8 +18,9 @@ from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.for_a_paper import in_a_sentence
+from swarm_logistics_env.report.latex import latex_tables
 from swarm_logistics_env.report.section import bracketed, conclusion_text, fixed, levels, percent
-from swarm_logistics_env.report.write import latex_tables, markdown, write_report
+from swarm_logistics_env.report.write import markdown, write_report
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcome
 from swarm_logistics_env.verdicts.results import StudyResults
@@ -103,7 +104,7 @@ def test_every_surface_names_the_level_that_it_prints(
         "terminal": digest(answer(stopped), 80),
         "report": markdown(whole),
         "page": page.split("<script", maxsplit=1)[0],
-        "tables": latex_tables((whole.answer.section, *whole.summary)).replace("\\%", "%"),
+        "tables": latex_tables(stopped, whole).replace("\\,\\%", " %"),
         "sentence": in_a_sentence(stopped),
         "captions": " ".join(figure.caption for figure in whole.figures),
     }
@@ -119,7 +120,7 @@ def test_every_surface_names_the_level_that_it_prints(
     assert f"{common} intervals, or as said behind them" in unfolded
     assert f"| question | value | {common} interval |" in surfaces["report"]
     assert f"R [{common}]" in surfaces["report"]
-    assert f'<th scope="col">{common}</th>' in page
+    assert f">value [{common}]</th>" in page
     assert f"{levels(stopped.verdicts)} intervals" in surfaces["captions"]
     assert f" = -0.55, {own['R FM4']} interval [-0." in surfaces["sentence"]
     view = r'role="img" aria-label="(.).*?<p class="legend"><span>bar: (.*?) interval'

@@ -1,0 +1,171 @@
+r"""The tables of a study for a paper: LaTeX that needs \usepackage{booktabs} and nothing else."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import zip_longest
+
+from swarm_logistics_env.questions.plan import Plan
+from swarm_logistics_env.records import plain
+from swarm_logistics_env.verdicts.results import StudyResults
+
+from .document import Document, what_p_is
+from .figures import CAPPED, parameter_label
+from .section import SATURATED, Section, Texts, conclusion_text, join_names, slug
+from .tables import tables
+
+_HOLM = "Verdicts are adjusted by Holm's method over all comparisons of an indicator."
+_NUMBER = re.compile(r"(?<![\w.-])-?(?:\d+(?:\.\d+)?|∞)(?![\w.]| (?!to )[a-z])")
+_ROOM = r"(?:\\phantom\{[^}]*\})+"
+_ESCAPES = {
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    "&": r"\&", "%": r"\%", " %": r"\,\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{",
+    "}": r"\}", "|": r"\textbar{}", "--": "-{}-", "->": r"$\to$", "→": r"$\to$", "–": "--",
+    "∞": r"$\infty$", "†": r"\dag{}", "<": "$<$", ">": "$>$", "≤": r"$\le$", "…": r"\dots{}",
+}  # fmt: skip
+_SIGNS = "|".join(map(re.escape, sorted(_ESCAPES, key=len, reverse=True)))
+# Besides signs: what stands in math mode, and letters that pdfLaTeX does not know.
+_SPECIAL = re.compile(rf"({_SIGNS})|((?<![\w.-])-\d+(?:\.\d+)?|\b[Nm] = \d+)|([^\x00-\u017f])")
+
+
+def latex_tables(results: StudyResults, report: Document) -> str:
+    """Return the tables of a study, each a table environment with caption and label."""
+    about = f"P is {what_p_is(results.plan)}. {_world(results.plan)}; {results.seeds_text}."
+    labels = {
+        verdict.after.name: parameter_label(verdict)
+        for verdict in results.verdicts
+        if verdict.after.kind == "parameter"
+    }
+    sections = [_answer(results, report), *tables(results, for_paper=True), *report.beyond]
+    keys: list[str] = []
+    parts = ["% In the preamble: \\usepackage{booktabs}\n"]
+    for section in (_readable(section, labels) for section in sections if section.rows):
+        key = slug(section.title).lower()
+        number = f"-{keys.count(key) + 1}" if key in keys else ""
+        keys.append(key)
+        parts.append("\n".join(_table(section, about, f"tab:{key}{number}")) + "\n")
+    return "\n".join(parts)
+
+
+def _answer(results: StudyResults, report: Document) -> Section:
+    """Return the answer: a row a question, or several that are alike."""
+    answer = report.answer
+    columns = "question", "value", answer.section.columns[2], "verdict"
+    rows = tuple(
+        (
+            question,
+            line.value,
+            line.interval(answer.level).removeprefix("in "),
+            conclusion_text(*line.verdicts),
+        )
+        for question, line in zip(answer.questions, answer.lines)
+    )
+    is_grouped = any(len(line.verdicts) > 1 for line in answer.lines)
+    lines = ("Of several values the interval holds all of theirs.", _HOLM) if is_grouped else ()
+    return Section(f"{join_names(results.policies)}: indicators", columns, rows, lines)
+
+
+def _world(plan: Plan) -> str:
+    """Return the conditions of the study, e.g. "World: 500 s; N = 25 unless said otherwise"."""
+    if plan.origin is not None:
+        stated = "".join(f", {name} {value}" for name, value in plan.origin.setup)
+        return f"Trials of {plan.origin.file}{stated}"
+    scenario = plan.specification.scenario
+    words = (
+        f", {name.removeprefix('n_').replace('_', ' ')} {value.partition(' (default')[0]}"
+        for name, value, _ in scenario.conditions()
+        if " (default" in value and name not in ("n_robots", "duration")
+    )
+    changed = "".join(text.removesuffix(" True") for text in words)
+    return f"World: {scenario.duration:g} s{changed}; N = {scenario.n_robots} unless said otherwise"
+
+
+def _readable(section: Section, labels: Mapping[str, str]) -> Section:
+    """Return a section whose parameters are called as a reader does, with their units."""
+    values = r"(?P<values>(?: = | )[\d.]+(?:(?:→| -> )[\d.]+(?:, [\d.]+)*)?)"
+
+    def readable(text: str) -> str:
+        for name, label in labels.items():
+            words, _, unit = label.rstrip("]").partition(" [")
+            with_unit = f"{words}\\g<values> {unit}".rstrip()
+            text = re.sub(rf"\b{re.escape(name)}{values}", with_unit, text).replace(name, words)
+        return re.sub(r"(?<=\d)(→| -> )(?=\d)", " to ", text)
+
+    rows = tuple(tuple(map(readable, row)) for row in section.rows)
+    return section._replace(title=readable(section.title), rows=rows)
+
+
+def _table(section: Section, about: str, label: str) -> Iterator[str]:
+    levels = [*dict.fromkeys(re.findall(r"(?:> )?[\d.]+ %", " ".join(section.columns)))]
+    intervals = f"{levels[0]} intervals in brackets." if levels else ""
+    if len(levels) > 1:
+        intervals = "Intervals in brackets, at the levels in the headings."
+    capped = CAPPED * any(SATURATED in cell for row in section.rows for cell in row)
+    caption = [f"{section.title}.", about, intervals, *(section.lines or [_HOLM]), capped]
+    columns = [_aligned(column) for column in zip(*section.rows)]
+    columns[0] = [_escape(row[0]) for row in section.rows]
+    # Over both columns of a page that has two.
+    environment = "table*" if len(columns) > 4 else "table"
+    yield rf"\begin{{{environment}}}"
+    yield r"\centering"
+    yield rf"\caption{{{_escape(' '.join(filter(None, caption)))}}}"
+    yield rf"\label{{{label}}}"
+    yield r"\smallskip"
+    yield r"\footnotesize" if environment == "table*" else r"\small"
+    yield r"\setlength{\tabcolsep}{3pt}"
+    long = [max(map(len, column)) > 40 for column in zip(*section.rows)]
+    layout = "".join(r"p{0.3\linewidth}" if is_long else "l" for is_long in long)
+    yield rf"\begin{{tabular}}{{@{{}}{layout}@{{}}}}"
+    yield from (r"\toprule", _row(map(_escape, section.columns)), r"\midrule")
+    yield from map(_row, zip(*columns))
+    yield from (r"\bottomrule", r"\end{tabular}", rf"\end{{{environment}}}")
+
+
+def _row(cells: Iterable[str]) -> str:
+    row = " & ".join(cells)
+    # A row that starts so would be read as an option of the line break before it.
+    return f"{'{}' * row.startswith(('[', '*'))}{row} \\\\"
+
+
+def _aligned(cells: Texts) -> list[str]:
+    """Return the cells of a column; their numbers have their points below each other."""
+    numbers = [_NUMBER.findall(cell) for cell in cells]
+    by_rank = list(zip_longest(*numbers, fillvalue=""))
+    aligned = []
+    for cell, of_cell in zip(cells, numbers):
+        texts = map(_escape, _NUMBER.split(cell))
+        padded = [_padded(*pair) for pair in zip(of_cell, by_rank)]
+        row = "".join(map("".join, zip_longest(texts, padded, fillvalue="")))
+        # Room for digits stands outside of brackets and behind a comma.
+        row = re.sub(rf"\[\$({_ROOM})", r"$\1$[$", row)
+        aligned.append(re.sub(rf"({_ROOM})\$([],])", r"$\2$\1$", row))
+    return aligned
+
+
+def _padded(number: str, column: Sequence[str]) -> str:
+    """Return a number in math mode, as wide before its point and behind it as those of `column`."""
+
+    def widths(text: str) -> tuple[int, int]:
+        digits, _, decimals = text.lstrip("-").replace("∞", "00").partition(".")
+        return len(digits), len(decimals) + bool(decimals)
+
+    most_before, most_behind = map(max, zip(*map(widths, column)))
+    before, behind = widths(number)
+    sign = "-" if number.startswith("-") else r"\phantom{-}" * any("-" in text for text in column)
+    left = rf"\phantom{{{'0' * (most_before - before)}}}" * (most_before > before)
+    if left and sign == "-":  # which is binary behind another sign
+        sign = "{-}"
+    zeros = "0" * (most_behind - max(behind, 1))
+    right = rf"\phantom{{{'.' * (not behind)}{zeros}}}" * (most_behind > behind)
+    return f"${left}{sign}{number.lstrip('-')}{right}$".replace("∞", r"\infty ")
+
+
+def _escape(text: str) -> str:
+    def special(match: re.Match[str]) -> str:
+        sign, math, letter = match.groups()
+        if letter and sign is None:
+            return rf"\texttt{{U+{ord(letter):04X}}}"
+        return _ESCAPES[sign] if sign else f"${{{math}}}$" if "=" in math else f"${math}$"
+
+    return _SPECIAL.sub(special, plain(text))
