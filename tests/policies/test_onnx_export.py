@@ -31,7 +31,7 @@ def test_scripts_and_a_missing_package_are_told(
     with pytest.raises(PolicyError, match="policy = SwarmDT: should be a trained one"):
         write_onnx(policies.load("swarm-dt"), tmp_path / "p.onnx")
     monkeypatch.setitem(sys.modules, "onnx", None)
-    with pytest.raises(PolicyError, match=r"pip install -c constraints.txt '.\[onnx\]'"):
+    with pytest.raises(PolicyError, match=r"pip install -c constraints.txt -e '.\[onnx\]'"):
         write_onnx(policies.load("ppo-delivery"), tmp_path / "p.onnx")
 
 

@@ -260,7 +260,7 @@ def test_a_missing_library_is_told_before_anything_is_written(
     assert app.run(["train", "delivery", "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err
     assert package in told
-    assert "pip install -c constraints.txt '.[train]'" in told
+    assert "pip install -c constraints.txt -e '.[train]'" in told
     assert not (tmp_path / "out").exists()
 
 
