@@ -19,6 +19,7 @@ from swarm_logistics_env.records import plain
 
 from .output import prepare_output
 
+PROGRAM = "swarm-logistics"
 # In the order of use, as the help shows them. A module is imported when its command is called.
 COMMANDS = {
     "watch": ("playing", "watch_command"),
@@ -58,8 +59,8 @@ class Application:
         try:
             command = command_line({*typed[:1]} & {*COMMANDS} or COMMANDS)
             # What made a file is recorded in it: the command line is the context's object.
-            words = shlex.join(["swarm-logistics", *typed])
-            code = command(typed, standalone_mode=False, obj=words)
+            words = shlex.join([PROGRAM, *typed])
+            code = command(typed, PROGRAM, standalone_mode=False, obj=words)
             sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
             return _complain("stopped", 130)
@@ -79,7 +80,7 @@ app = Application()
 def command_line(names: Iterable[str] = COMMANDS) -> Any:
     """Return the command line with these commands: click's object, which parses it."""
     application = typer.Typer(
-        name="swarm-logistics",
+        name=PROGRAM,
         help="A warehouse for robot swarms, and the measure of how they cope.",
         add_completion=False,
         pretty_exceptions_enable=False,
@@ -121,7 +122,10 @@ def _sentence(error: Exception) -> str | None:
     if format_message is not None:
         sentence = " ".join(str(format_message()).split())
         context = getattr(error, "ctx", None)
-        return f"{sentence} Help: {context.command_path} --help" if context else sentence
+        if context is None:
+            return sentence
+        end = "" if sentence.endswith((".", "?")) else "."
+        return f"{sentence}{end} Help: {context.command_path} --help"
     # The operating system refuses for reasons of its own: a disk that is full, a name too long.
     if isinstance(error, SwarmLogisticsError | IndicatorError | OSError):
         return str(error)
@@ -129,5 +133,5 @@ def _sentence(error: Exception) -> str | None:
 
 
 def _complain(sentence: str, code: int) -> int:
-    sys.stderr.write(f"swarm-logistics: {plain(sentence)}\n")  # it may repeat what was typed
+    sys.stderr.write(f"{PROGRAM}: {plain(sentence)}\n")  # it may repeat what was typed
     return code

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -53,6 +54,19 @@ def test_bad_input_is_one_sentence_and_exit_code_2(
     assert said in printed.err
     assert len(printed.err.splitlines()) == 1
     assert list(folder.iterdir()) == []
+
+
+def test_an_error_of_usage_is_a_line_and_names_the_help(command: Command) -> None:
+    missing = command("list", code=2)
+    choices = "policies, trainings, faults, studies, scenario"
+    assert missing.rstrip().endswith(f"Choose from: {choices}. Help: swarm-logistics list --help")
+    assert "Help: swarm-logistics run --help" in command("run --sed 3", code=2)
+
+
+def test_the_package_is_the_command() -> None:
+    words = [sys.executable, "-m", "swarm_logistics_env", "--version"]
+    printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert printed.strip() == swarm_logistics_env.__version__
 
 
 def test_fault_of_ours_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
