@@ -122,9 +122,8 @@ class Line(NamedTuple):
             )
             n_needed = spi.seeds_for_power(estimate, effect, POWER)
             if n_needed is not None and n_needed > estimate.n_seeds:
-                runs = "seeds" if estimate.paired else "trials"
-                n_more = n_needed - estimate.n_seeds
-                return "more_runs", {"n_more": n_more, "runs": runs, "effect": effect}
+                n_more, threshold = n_needed - estimate.n_seeds, estimate.threshold
+                return "more_runs", {"n_more": n_more, "effect": effect, "threshold": threshold}
         return "words", {"words": words}
 
     @property

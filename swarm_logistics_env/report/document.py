@@ -219,10 +219,10 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
         runs = "trials" if plan.origin else "simulated runs"
         count = f"at least {n}" if looks else f"{n}"
         trials = f"{count} {runs} of each of {len(plan.cases)} conditions, paired by seed"
-        test = "the paired t-test of a logarithm, which allows for hidden stalls,"
+        test = "the paired t-test of a logarithm, which allows for hidden stalls"
     else:
         trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
-        test = "Welch's t-test of a logarithm, which allows for hidden stalls,"
+        test = "Welch's t-test of a logarithm, which allows for hidden stalls"
     level = percent(CONFIDENCE)
     side = f"{50 * (1 - CONFIDENCE):.3g} %"
     interval = f"the {level} interval"

@@ -23,10 +23,11 @@ def in_a_sentence(results: StudyResults) -> str:
     line = line_of([(0, lowest)])
     words = section.conclusion_text(*verdicts)
     lowest_text = _question_with_value(line, level_of([lowest]))
+    world = world_in_words(results)
     slots: dict[str, Slots] = {
         "performance": {
             "policies": ", ".join(results.policies),
-            "world": _world(results),
+            "world": f", {world}" if results.plan.origin else f" in {world}",
             "performance": performance_of(results)[:-1],
             "seeds": results.seeds_text,
         }
@@ -51,7 +52,7 @@ def in_a_sentence(results: StudyResults) -> str:
         if any(verdict.conclusion == "open" for verdict in verdicts):
             slots["not_decided"] = {"questions": _undecided(results)}
         if candidates:
-            slots["lowest"] = {"lowest": lowest_text}
+            slots["lowest"] = {"lowest": lowest_text, "word": lowest.on_property.adjusted}
     return "".join(fill(templates.FOR_A_PAPER, {**slots, "end": {}}))
 
 
@@ -66,7 +67,7 @@ def _question_with_value(line: Line, level: float) -> str:
 
 
 def _undecided(results: StudyResults) -> str:
-    """Return what is open of each indicator, e.g. "FT of FM1, FM4 (1 of 3) and S of N 4→10"."""
+    """Return what is open of each indicator, e.g. "FT of FM4 (m = 1, 2) and S of N 4→10"."""
     verdicts: dict[str, dict[str, list[Verdict]]] = {}
     for line in answer(results).lines:
         policy = f"{line.policy}'s " if len(results.policies) > 1 else ""
@@ -77,14 +78,16 @@ def _undecided(results: StudyResults) -> str:
     for indicator, by_name in verdicts.items():
         names = []
         for name, alike in by_name.items():
-            n_open = sum(verdict.conclusion == "open" for verdict in alike)
-            count = "" if n_open == len(alike) else f" ({n_open} of {len(alike)})"
-            names += [name + count] if n_open else []
+            undecided = [verdict.after for verdict in alike if verdict.conclusion == "open"]
+            is_fault = any(setting.kind == "fault" for setting in undecided)
+            numbers = ", ".join(f"{setting.value:g}" for setting in undecided)
+            which = f" (m = {numbers})" if is_fault else ""
+            names += [name + which] if undecided else []
         clauses += [f"{indicator} of {', '.join(names)}"] if names else []
     return section.join_names(clauses)
 
 
-def _world(results: StudyResults) -> str:
+def world_in_words(results: StudyResults) -> str:
     """Return in words where it was played."""
     plan = results.plan
     if plan.origin is not None:

@@ -6,12 +6,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 
-from swarm_logistics_env.questions.plan import Plan
 from swarm_logistics_env.records import plain
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.verdicts.results import StudyResults
 
 from .document import Document, what_p_is
 from .figures import CAPPED, parameter_label
+from .for_a_paper import world_in_words
 from .section import SATURATED, Section, Texts, conclusion_text, join_names, slug
 from .tables import tables
 
@@ -31,7 +32,7 @@ _SPECIAL = re.compile(rf"({_SIGNS})|((?<![\w.-])-\d+(?:\.\d+)?|\b[Nm] = \d+)|([^
 
 def latex_tables(results: StudyResults, report: Document) -> str:
     """Return the tables of a study, each a table environment with caption and label."""
-    about = f"P is {what_p_is(results.plan)}. {_world(results.plan)}; {results.seeds_text}."
+    about = f"P is {what_p_is(results.plan)}. {_world(results)}; {results.seeds_text}."
     labels = {
         verdict.after.name: parameter_label(verdict)
         for verdict in results.verdicts
@@ -62,23 +63,23 @@ def _answer(results: StudyResults, report: Document) -> Section:
         for question, line in zip(answer.questions, answer.lines)
     )
     is_grouped = any(len(line.verdicts) > 1 for line in answer.lines)
-    lines = ("Of several values the interval holds all of theirs.", _HOLM) if is_grouped else ()
+    hull = "Of several values the interval holds all of theirs." if is_grouped else ""
+    symbols = dict.fromkeys(line.indicator for line in answer.lines)
+    names = [definition.heading for symbol, definition in DEFINITIONS.items() if symbol in symbols]
+    text = ", ".join(names)
+    meaning = f"{text[:1].upper()}{text[1:]}: supported above 0, refuted below."
+    lines = (answer.performance, meaning, hull, _HOLM)
     return Section(f"{join_names(results.policies)}: indicators", columns, rows, lines)
 
 
-def _world(plan: Plan) -> str:
-    """Return the conditions of the study, e.g. "World: 500 s; N = 25 unless said otherwise"."""
-    if plan.origin is not None:
-        stated = "".join(f", {name} {value}" for name, value in plan.origin.setup)
-        return f"Trials of {plan.origin.file}{stated}"
-    scenario = plan.specification.scenario
-    words = (
-        f", {name.removeprefix('n_').replace('_', ' ')} {value.partition(' (default')[0]}"
-        for name, value, _ in scenario.conditions()
-        if " (default" in value and name not in ("n_robots", "duration")
-    )
-    changed = "".join(text.removesuffix(" True") for text in words)
-    return f"World: {scenario.duration:g} s{changed}; N = {scenario.n_robots} unless said otherwise"
+def _world(results: StudyResults) -> str:
+    """Return the conditions, e.g. "World: a warehouse of .., 500 s; N = 25 unless .."."""
+    world = world_in_words(results)
+    if results.plan.origin is not None:
+        return f"{world[:1].upper()}{world[1:]}"
+    scenario = results.plan.specification.scenario
+    length = f"{scenario.duration:g} s; N = {scenario.n_robots} unless said otherwise"
+    return f"World: {world}, {length}"
 
 
 def _readable(section: Section, labels: Mapping[str, str]) -> Section:
@@ -112,7 +113,7 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     yield rf"\caption{{{_escape(' '.join(filter(None, caption)))}}}"
     yield rf"\label{{{label}}}"
     yield r"\smallskip"
-    yield r"\footnotesize" if environment == "table*" else r"\small"
+    yield r"\footnotesize"
     yield r"\setlength{\tabcolsep}{3pt}"
     long = [max(map(len, column)) > 40 for column in zip(*section.rows)]
     layout = "".join(r"p{0.3\linewidth}" if is_long else "l" for is_long in long)
@@ -162,6 +163,8 @@ def _padded(number: str, column: Sequence[str]) -> str:
 
 
 def _escape(text: str) -> str:
+    text = re.sub(r"(?<!\w)'([^']*)'", r"`\1'", text)  # opening and closing quotes
+
     def special(match: re.Match[str]) -> str:
         sign, math, letter = match.groups()
         if letter and sign is None:

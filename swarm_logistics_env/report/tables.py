@@ -94,7 +94,7 @@ def _layouts(verdicts: Sequence[Verdict], *, published: bool, contacts: bool) ->
     """Yield the tables of one policy and one heading of the plan, without their cells.
 
     The first has P and the first indicator; each further one has an indicator, without P again,
-    and the cells alone for which every indicator before it was asked.
+    and the cells alone for which it was asked.
 
     Yields:
         What stands behind the title, the columns, and the arms of the rows; None: all.
@@ -105,11 +105,11 @@ def _layouts(verdicts: Sequence[Verdict], *, published: bool, contacts: bool) ->
     arms: set[Arm] | None = None
     by_indicator: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.indicator)
     for indicator, same_indicator in by_indicator.items():
+        if title:
+            arms = {verdict.compared.changed for verdict in same_indicator}
         yield title, [*columns, *_answers(indicator, same_indicator, published=published)], arms
         title = ", continued"
         columns = [setting]
-        changed = {verdict.compared.changed for verdict in same_indicator}
-        arms = changed if arms is None else arms & changed
 
 
 def _performance_columns(*, published: bool, contacts: bool) -> Iterator[CellColumn]:

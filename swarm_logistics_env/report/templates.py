@@ -68,7 +68,7 @@ LINE = {
     "unaffected": "{words}, exact",
     "untestable": "{words}: it cannot be below {threshold:g}",
     "unbounded": "{words} by its test; P_o is too near 0 for an interval",
-    "more_runs": "open; {n_more} more {runs} to see {effect:g}",
+    "more_runs": "open; {n_more} more to tell {effect:g} from {threshold:g}",
 }
 
 # How to read the answer, and what limits it: the cases that apply, with "; " between them.
@@ -87,7 +87,7 @@ NOTES = {
     "capped": "{mark} P is capped: --clearing or --restock has no cap",
     "collapsed_runs": "runs collapse {conditions}",
     "open": "open: undecided by these {runs}",
-    "more_runs": "open: undecided; so many {runs} decide in 4 of 5 studies, if that is true",
+    "more_runs": "open: undecided; so many more {runs} would tell in 4 of 5 studies",
     "open_at_an_interval_on_one_side": "open beside an interval on one side of it: {reasons}",
     "claims_of_the_text": "of {claims} in the paper's text {counts}",
     "claims_beside_the_text": "of {claims} beside it {counts}",
@@ -104,15 +104,15 @@ FOR_A_PAPER = {
     "one_question": "; {lowest}; {property}: {words} ({method})",
     "several_questions": "; of {n_questions} questions {words} ({method})",
     "not_decided": "; not decided: {questions}",
-    "lowest": "; the lowest is {lowest}",
+    "lowest": "; the lowest is {lowest} ({word})",
     "end": ".",
 }
 METHOD = "Holm's method, {error} error"
 WORLD = {
-    "warehouse": " in a warehouse of {width:g} m x {height:g} m{floor} with {n_items} items"
+    "warehouse": "a warehouse of {width:g} m x {height:g} m{floor} with {n_items} items"
     "{restock}, robots of {speed:g} m/s{drive}{handling}",
-    "task": " in the task {task}",
-    "trials": ", trials of {file}{setup}",
+    "task": "the task {task}",
+    "trials": "trials of {file}{setup}",
 }
 QUESTION_WITH_VALUE = {
     "value": "{question} = {value}",

@@ -102,7 +102,8 @@ def _without_removed(trials: Trials) -> Iterator[str]:
     faults = {row.fault for row in trials.rows} - {NO_FAULT_WORD, REPEATED}
     if faults and RECORDED.removed not in faults:
         yield (
-            f"No FT: it needs trials without the robots, fault = {RECORDED.removed}; R is asked."
+            f"No FT: it needs trials without the robots, fault = {RECORDED.removed}, robots as "
+            "before they were taken away; R is asked."
         )
 
 
@@ -218,7 +219,8 @@ def _faults(group: Sequence[Trial]) -> _Varied:
     if not any(row.fault == NO_FAULT_WORD for row in group):
         raise StudyError(
             f"line {broken.line}: has the fault {broken.fault!r}, but no row without one (fault "
-            "none) of the same robots and parameters: R and FT are relative to it"
+            "none) of the same robots and parameters: R and FT are relative to it; robots counts "
+            "failed and removed ones, too"
         )
     # What faults are measured against stands first, then the pair that shows chance alone.
     rows = sorted(group, key=lambda row: (row.faulty > 0, row.fault == REPEATED))

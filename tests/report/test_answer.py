@@ -34,7 +34,7 @@ def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
         assert (line.interval(0.95), line.interval(0.9)) == (told, f"{told} 95 %")
         assert line.verdict_text.startswith(test.on_property.adjusted)
         assert line.question.startswith(test.compared.indicator)
-        more = re.fullmatch(r"open; (\d+) more seeds to see -?0.1", line.verdict_text)
+        more = re.fullmatch(r"open; (\d+) more to tell -?0.1 from 0", line.verdict_text)
         if more:
             assert test.estimate is not None
             effect = test.compared.threshold + (0.1 if value > test.compared.threshold else -0.1)
