@@ -62,10 +62,8 @@ def test_each_table_has_a_label_of_its_own_and_a_caption_that_can_stay(latex: st
     for caption in captions:
         assert caption.startswith(("homing", "swarm-dt"))
         assert "P is the number of items delivered in the order requested. " in caption
-        assert (
-            "World: a warehouse of 8 m x 10 m with 60 items that come back, robots of 2 m/s, 500 s; ${N = 25}$ unless said oth"
-            in caption
-        )
+        world = "a warehouse of 8 m x 10 m with 60 items that come back, robots of 2 m/s"
+        assert f"World: {world}, 500 s; ${{N = 25}}$ unless said oth" in caption
         assert "12 paired seeds (0 to 11). 95\\,\\% intervals in brackets." in caption
         assert caption.endswith("by Holm's method over all comparisons of an indicator.")
     assert "continued" not in latex
