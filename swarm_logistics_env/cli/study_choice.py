@@ -77,10 +77,10 @@ def changes_in_words(fields: Mapping[str, Any]) -> list[str]:
 
 
 def ask_in_world(study: Study, scenario: Scenario) -> None:
-    """Ask what a study asks of one world of another one: its numbers follow in proportion.
+    """Ask a study's questions in another world.
 
-    Swarm sizes and failures are in proportion to the number of robots, where the robots fit and at
-    most a third of them fails; values of a parameter to its value in the scenario.
+    Swarm sizes and numbers of failed robots follow from the number of robots in proportion, where
+    the robots fit and at most a third of them fails; values of a parameter from its value there.
 
     Raises:
         SwarmLogisticsError: a package that the robots' bodies need is not installed.
@@ -98,6 +98,7 @@ def ask_in_world(study: Study, scenario: Scenario) -> None:
     faults = []
     for factor in specification.faults:
         numbers = [m * max(1, round(share)) for m in factor.robots]
+        # The fewest fail in a small swarm as well, as long as a robot is left.
         fewest = numbers[0] if numbers[0] < n_robots else None
         robots = [m for m in numbers if m == fewest or 3 * m <= n_robots]
         faults += [factor.replace(robots=tuple(robots))] if robots else []

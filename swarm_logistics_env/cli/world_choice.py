@@ -82,10 +82,12 @@ def scenario_of(
     """
     fields = {} if file is None else read_table(file, "file of --scenario", ScenarioError)
     preset = fields.pop("preset", preset)
-    base = None if preset or file else _training_scenario(policies)
-    if base is None and usual is not None and not (preset or file):
-        say(f"In the world of the preset {USUAL_PRESET}; --preset or --scenario names another.")
-        base = usual
+    base = None
+    if not (preset or file):
+        base = _training_scenario(policies)
+        if base is None and usual is not None:
+            say(f"In the world of the preset {USUAL_PRESET}; --preset or --scenario names another.")
+            base = usual
     base = base or Scenario.preset(str(preset or USUAL_PRESET))
     return base.replace(**{**fields, **changed_fields(changes, bodies)})
 

@@ -33,22 +33,14 @@ def in_a_sentence(results: StudyResults) -> str:
         }
     }
     method = templates.METHOD.format(error=section.percent(1.0 - CONFIDENCE))
+    verdict_slots = {"words": words, "method": method}
     if len(verdicts) == 1:
         name = f"{line.indicator} > {lowest.compared.threshold:.3g}"
-        slots["one_question"] = {
-            "lowest": lowest_text,
-            "property": name,
-            "words": words,
-            "method": method,
-        }
+        slots["one_question"] = {"lowest": lowest_text, "property": name, **verdict_slots}
     else:
         if words == lowest.on_property.adjusted:  # all are alike
-            words = f"{len(verdicts)} {words}"
-        slots["several_questions"] = {
-            "n_questions": len(verdicts),
-            "words": words,
-            "method": method,
-        }
+            verdict_slots["words"] = f"{len(verdicts)} {words}"
+        slots["several_questions"] = {"n_questions": len(verdicts), **verdict_slots}
         if any(verdict.conclusion == "open" for verdict in verdicts):
             slots["not_decided"] = {"questions": _undecided(results)}
         if candidates:
@@ -88,7 +80,7 @@ def _undecided(results: StudyResults) -> str:
 
 
 def world_in_words(results: StudyResults) -> str:
-    """Return in words where it was played."""
+    """Return in words where a study was played, e.g. "a warehouse of 6 m x 5 m with .."."""
     plan = results.plan
     if plan.origin is not None:
         stated = "".join(f", {name} {value}" for name, value in plan.origin.setup)

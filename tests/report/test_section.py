@@ -156,13 +156,13 @@ def test_what_is_asked_is_answered_before_what_else_is_known() -> None:
 
 
 def test_one_question_is_answered_in_a_sentence() -> None:
-    one = looked_at(["FM2"])
-    told = in_a_sentence(one)
-    asked = r"; R FM2, 1 of 25 = 0\.01, 97\.84 % interval \[-0\.06, 0\.08\]; R > 0: "
+    results = looked_at(["FM2"])
+    sentence = in_a_sentence(results)
+    question = r"; R FM2, 1 of 25 = 0\.01, 97\.84 % interval \[-0\.06, 0\.08\]; R > 0: "
     verdict = r"open; P changes by less than 10 % \(Holm's method, 5 % error\)\.$"
-    assert re.search(asked + verdict, told)
-    assert "lowest" not in told
-    assert "question" not in told
+    assert re.search(question + verdict, sentence)
+    assert "lowest" not in sentence
+    assert "question" not in sentence
 
 
 def test_a_paper_is_told_the_world_and_what_is_not_decided() -> None:

@@ -165,7 +165,7 @@ function floorOf(canvas, now, number, ratio) {
   if (fixed.plan) docksAndSolids(pen, fixed.plan, at);
   else deliveryArea(pen, left + across - scale * scenario.delivery_width, top, left + across, bottom);
   for (const centre of obstacles) obstacle(pen, ...at(centre), Math.max(4, scale * scenario.obstacle_radius));
-  for (const one of items) item(pen, ...at(one), Math.max(2, 0.8 * scale * scenario.item_radius), false);
+  for (const position of items) item(pen, ...at(position), Math.max(2, 0.8 * scale * scenario.item_radius), false);
   sheets.set(number, { sheet, parts });
   return sheet;
 }

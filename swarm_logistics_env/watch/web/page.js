@@ -50,7 +50,7 @@ function connect() {
 function tell(text, kind) {
   element("state").textContent = text;
   element("state").hidden = !text;
-  for (const one of ["lost", "failed"]) document.body.classList.toggle(one, kind === one);
+  for (const name of ["lost", "failed"]) document.body.classList.toggle(name, kind === name);
   layOut();
 }
 
