@@ -161,7 +161,8 @@ def realistic_block(results: StudyResults) -> str:
     rows = []
     for policy, cell in cells.items():
         share = section.bracketed(shares[policy], 2, [1.0]) if policy in shares else ""
-        rows.append((f"`{policy}`", section.mean_p(cell), share, contacts_text(cell)))
+        contacts = section.bracketed(cell.contacts, 2)
+        rows.append((f"`{policy}`", section.mean_p(cell), share, contacts))
     return table(
         ("", "P", f"times P of `{best}`", "contacts a robot-minute"),
         rows,
