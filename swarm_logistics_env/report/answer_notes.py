@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.tasks.task import DEFAULT
 from swarm_logistics_env.verdicts.collapses import collapses
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
@@ -12,6 +13,8 @@ from swarm_logistics_env.verdicts.verdict import Verdict
 from . import section, templates
 from .collapse_tables import collapsed_in_words
 from .templates import Slots, fill
+
+_FEW_ITEMS = 1.0  # in a run, of which shares say little
 
 
 def notes(results: StudyResults, needs_runs: bool, reasons: Collection[str]) -> str:
@@ -47,6 +50,8 @@ def _notes_that_apply(
     for flag in ("cannot_fail", "too_few_seeds"):
         if flag in flags:
             yield flag, {}
+    if _delivers_little(results):
+        yield "few_items", {}
     if results.damage:
         yield "damage", {"damage": results.damage}
     if results.exploratory:
@@ -77,6 +82,15 @@ def _notes_that_apply(
     if not_in_text:
         case = "claims_beside_the_text" if claims_of_text else "claims_without_text"
         yield case, _claims(not_in_text)
+
+
+def _delivers_little(results: StudyResults) -> bool:
+    """Return whether swarms in a warehouse that are as they should be deliver hardly anything."""
+    originals = [results.cells_of(v.compared)[v.compared.original] for v in results.verdicts]
+    return any(
+        cell.n_seeds and cell.arm.case.task.name == DEFAULT and cell.mean.value < _FEW_ITEMS
+        for cell in originals
+    )
 
 
 def reason_to_be_open(verdict: Verdict) -> str:

@@ -81,6 +81,7 @@ NOTES = {
     "few_seeds": "provisional (below ten seeds)",
     "cannot_fail": "untestable where it cannot lie below the threshold, as P cannot below 0",
     "too_few_seeds": "two seeds give no verdict",
+    "few_items": "P is small: a longer duration tells more",
     "damage": "{damage}",
     "exploratory": "exploratory: other seeds than were declared, whose report this replaces",
     "late_margin": "equivalence is exploratory: another margin was declared",

@@ -115,6 +115,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
         ("homing --column N=robots", "--column is not for a policy, and 'homing' is one"),
         ("homing --seeds 2", "--seeds"),
         ("homing --benchmark --seeds 5", "same conditions for everybody"),
+        ("homing --benchmark --first-seed 0", "--first-seed: the benchmark has the same"),
     ],
 )
 def test_what_cannot_be_judged_ends_in_one_sentence_before_anything_is_written(
@@ -146,6 +147,12 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     last = printed.splitlines()[-1]
     assert last.startswith(f"{5 * len(study.plan().cases) - 1} runs played in ")
     assert "1 were kept" in last
+
+
+def test_other_seeds_are_judged_in_a_directory_of_their_own(command: Command) -> None:
+    printed = command("judge homing --processes 1 --seeds 3 --first-seed 500")
+    assert Study.stored("results/judged/homing-first-seed-500").plan().seeds == range(500, 503)
+    assert " --first-seed 500 --seeds " in printed
 
 
 def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
