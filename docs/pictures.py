@@ -22,7 +22,7 @@ TINY = Scenario(
     n_robots=8, warehouse_width=5.0, warehouse_height=4.0, delivery_width=1.2, n_items=10,
     restock=True,
 )  # fmt: skip
-RESTOCKED = Scenario(restock=True)
+REALISTIC = Scenario.preset("realistic").replace(restock=True)
 
 
 def run(name: str, scenario: Scenario, seed: int, faults: Sequence[Fault] = ()) -> Play:
@@ -64,10 +64,10 @@ def browser_view(name: str) -> None:
 
 def films() -> None:
     """Film a learned swarm without and with faults, each failure mode, and each kind of policy."""
-    sound = run("ppo-delivery", RESTOCKED, 0)
-    faulty = run("ppo-delivery", RESTOCKED, 0, [Fault("FM4", 2)])
+    sound = run("ppo-delivery", REALISTIC, 0)
+    faulty = run("ppo-delivery", REALISTIC, 0, [Fault("FM4", 2)])
     takes = [Take("25 robots, no fault", sound), Take("two of them deliver nothing (FM4)", faulty)]
-    film = Film(takes, 150.0, speed=16.0, frame_rate=12.5, size=400)
+    film = Film(takes, 240.0, speed=24.0, frame_rate=12.5, size=400)
     write_film(MEDIA / "fm4.gif", film.frames(), 12.5)
     for mode in FAILURE_MODES:
         # Who is late begins when the fault ends; all others fail for good.
@@ -77,8 +77,8 @@ def films() -> None:
         film = Film([take], 30.0, speed=8.0, frame_rate=8.0, size=400)
         write_film(MEDIA / f"mode-{mode}.gif", film.frames(), 8.0)
     for name in ("swarm-dt", "homing", "homing-stock", "central", "ppo-delivery", "ppo-robust"):
-        take = Take(name, run(name, RESTOCKED, 0))
-        film = Film([take], 90.0, speed=20.0, frame_rate=8.0, size=300)
+        take = Take(name, run(name, REALISTIC, 0))
+        film = Film([take], 120.0, speed=20.0, frame_rate=8.0, size=300)
         write_film(MEDIA / f"policy-{name}.gif", film.frames(), 8.0)
 
 
@@ -87,7 +87,7 @@ if __name__ == "__main__":
     scene("warehouse.png", run("swarm-dt", SMALL, 4), 30.0)
     failed = [Fault("FM1", 2), Fault("FM4", [0, 5])]
     scene("faults.png", run("swarm-dt", SMALL, 4, failed), 60.0)
-    scene("stock.png", run("ppo-delivery", RESTOCKED, 4), 300.0)
+    scene("stock.png", run("ppo-delivery", REALISTIC, 4), 300.0)
     aisles = Scenario(floor="aisles", restock=True)
     two_docks = Scenario(floor="two_docks", restock=True, request_docks="random", n_requests=3)
     scene("floor-aisles.png", run("homing", aisles, 1), 40.0)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 PAGE = ROOT / "docs" / "floors.md"
 PICTURE = ROOT / "docs" / "media" / "floors-scaling.png"
 FLOORS = {"open": None, "aisles": "aisles", "two_docks": "two_docks"}
-POLICIES = ("swarm-dt", "homing", "homing-stock", "ppo-robust@all", "ppo-indicator@all")
+POLICIES = ("swarm-dt", "homing", "homing-stock", "ppo-robust@all")
 SIZES = (10, 25, 50, 100, 150)
 COMPARED_AT = (25, 100)
 # Aisles between racks of 0.5 m in a hall of 10 m x 10 m; the shipped plan has 1 m.

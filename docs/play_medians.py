@@ -1,28 +1,27 @@
 """Which of several trainings is the median one: `python docs/play_medians.py FILE ...`.
 
 Declared before the trainings: each is played in all conditions of the development tables of the
-benchmark, over 4 seeds of its own; the one whose P, averaged over these conditions, is the median
-(of an even number the lower one of the two) is shipped under the recipe's name.
+benchmark, over 4 seeds of its own. In each condition P is set beside the mean of all trainings, so
+that no rich condition rules; the training whose mean of these shares is the median (of an even
+number the lower one of the two) is shipped under the recipe's name.
 """
 
 import sys
 from pathlib import Path
 
 import numpy as np
-from more_itertools import map_reduce
 
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.questions.presets import load_preset
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.cell import Cell
 
 
-def means(files: list[str]) -> dict[str, float]:
-    """Return P of each policy, averaged over the development conditions."""
+def shares(files: list[str]) -> dict[str, float]:
+    """Return the share of each policy, averaged over the development conditions."""
     benchmark = load_preset("benchmark")
     tables = {
         kind: [part for part in getattr(benchmark, kind) if part.title.startswith("Development")]
-        for kind in ("faults", "parameters")
+        for kind in ("sizes", "faults", "parameters")
     }
     study = Study(
         name="medians",
@@ -34,15 +33,19 @@ def means(files: list[str]) -> dict[str, float]:
         **tables,
     )
     study.run(processes=2)
-    cells = {(cell.policy, cell.arm.case.key): cell for cell in study.findings().cells}
-    by_policy: dict[str, list[Cell]] = map_reduce(cells.values(), lambda cell: cell.policy)
-    return {file: float(np.mean([cell.mean.value for cell in by_policy[file]])) for file in files}
+    p_of = {
+        (cell.policy, cell.table, cell.arm.setting): cell.mean.value
+        for cell in study.findings().cells
+    }
+    conditions = dict.fromkeys((table, setting) for _, table, setting in p_of)
+    p = np.array([[p_of[file, *condition] for condition in conditions] for file in files])
+    return dict(zip(files, np.mean(p / p.mean(axis=0), axis=1).tolist()))
 
 
 if __name__ == "__main__":
-    mean_of_file = means(sys.argv[1:])
-    ascending = sorted(mean_of_file, key=mean_of_file.__getitem__)
+    share_of_file = shares(sys.argv[1:])
+    ascending = sorted(share_of_file, key=share_of_file.__getitem__)
     for file in ascending:
         seed = read_card(Path(file)).seed
-        print(f"{file}: training seed {seed}, mean P {mean_of_file[file]:.1f}")
+        print(f"{file}: training seed {seed}, mean share {share_of_file[file]:.3f}")
     print(f"Median: {ascending[(len(ascending) - 1) // 2]}")

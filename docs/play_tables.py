@@ -8,19 +8,19 @@ is written from what `make benchmark` left, if it did.
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import front_page
 import numpy as np
 from more_itertools import map_reduce
+from play_benchmark import benchmark_blocks, benchmark_studies
 from play_paper import claim_rows, draw_figures, paper_block, paper_studies, sentences_block
 from tables import ROOT, answer, by_policy, example, rewrite, seeds_from, table, write_rows
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.cli.judging import ENTRIES
-from swarm_logistics_env.report import benchmark, drawing, section
+from swarm_logistics_env.report import drawing, section
 from swarm_logistics_env.report.tables import contacts_text
 from swarm_logistics_env.runs.engines import usable_cores
 from swarm_logistics_env.spi.summaries import Interval, t_interval
@@ -43,8 +43,8 @@ FIRST_SEED = 20_000
 PROCESSES = usable_cores()
 # Studies in examples/ that are tables of the page.
 EXAMPLES = (
-    "clearing", "ladder", "ladder_restocked", "leans", "shipped_policies", "robust_policy",
-    "broken_robots",
+    "clearing", "ladder", "ladder_restocked", "ladder_realistic", "leans", "shipped_policies",
+    "robust_policy", "broken_robots",
 )  # fmt: skip
 ESTIMATES = (
     "study", "row", "policy", "value", "low", "high", "threshold", "digits", "seeds", "collapsed",
@@ -153,6 +153,43 @@ def ladder_block(cleared: StudyResults, restocked: StudyResults) -> str:
     return table(head, rows, f"{seeds_from(cleared)}.")
 
 
+def realistic_block(results: StudyResults) -> str:
+    """Return P, contacts and P over that of the best local script, a row a policy."""
+    (cells,) = ablation_cells(results).values()
+    best = best_script(cells)
+    shares = shares_of_script(results, best)
+    rows = []
+    for policy, cell in cells.items():
+        share = section.bracketed(shares[policy], 2, [1.0]) if policy in shares else ""
+        contacts = section.bracketed(cell.contacts, 2)
+        rows.append((f"`{policy}`", section.mean_p(cell), share, contacts))
+    return table(
+        ("", "P", f"times P of `{best}`", "contacts a robot-minute"),
+        rows,
+        f"{seeds_from(results)}, of each training. `{best}` is the best script that senses what is "
+        "near; `central` and `central-stock` see everything.",
+    )
+
+
+def best_script(cells: Mapping[str, Cell]) -> str:
+    """Return the script with the most deliveries of those that sense what is near."""
+    local = [policy for policy in cells if not policy.startswith(("ppo-", "central"))]
+    return max(local, key=lambda policy: cells[policy].mean.value)
+
+
+def shares_of_script(results: StudyResults, script: str) -> dict[str, Interval]:
+    """Return by which factor each studied policy delivers more than a script, by the change."""
+    shares = {}
+    for verdict in results.verdicts:
+        if verdict.after.name == script and verdict.interval is not None:
+            value, low, high = (
+                None if change is None else 1.0 / (1.0 + change) for change in verdict.interval
+            )
+            assert value is not None
+            shares[verdict.compared.policy] = Interval(value, high, low)
+    return shares
+
+
 def leans_cells(results: StudyResults) -> dict[str, dict[str, Cell]]:
     """Return the cells of each world, by policy."""
     worlds = ablation_cells(results)
@@ -232,51 +269,14 @@ def costs_block(costs: Mapping[str, Any]) -> str:
     )
 
 
-# Other people's learners, where `make interop` has trained them; each in its largest world.
-LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "benchmarl-mappo-small")
-
-
-def benchmark_studies(out: Path) -> tuple[Study, ...]:
-    """Return the benchmark's study of each policy that clears and of the learners, in folders."""
-    folder = ROOT / "results" / "interop"
-    trained = [name for name in LEARNERS if (folder / f"{name}@0.safetensors").exists()]
-    names = [policy.name for policy in example(out, "clearing").specification.policies]
-    names += [f"{folder / name}@all.safetensors" for name in trained]
-    return tuple(
-        Study.preset(
-            benchmark.STUDY,
-            out=out / "benchmark" / section.slug(Path(name).stem),
-            policies=[name],
-        )
-        for name in names
-    )
-
-
-def benchmark_block(studies: Sequence[StudyResults]) -> str:
-    """Return the leaderboard and every entrant's worst cell; note the scores for `judge`."""
-    scores = {results.policies[0]: benchmark.score(results) for results in studies}
-    entries = {name: score.tolist() for name, score in scores.items()}
-    ENTRIES.write_text(json.dumps(entries) + "\n")
-    board = benchmark.leaderboard(scores)
-    worst_cells, contacts = {}, {}
-    for results in studies:
-        test, share = benchmark.worst(results)
-        worst_cells[results.policies[0]] = f"{test.compared.table}, {test.after}: {share:.0%}"
-        contacts[results.policies[0]] = benchmark.contacts(results)
-    return table(
-        (*board.columns, "contacts a robot-minute", "worst cell, share of P without it"),
-        [
-            (f"`{name}`", *columns, contacts[name], worst_cells[name])
-            for name, *columns in board.rows
-        ],
-        f"{seeds_from(studies[0])}, of each training. {' '.join(board.lines)}",
-    )
-
-
 def estimate_rows(
-    policies: StudyResults, clearing: StudyResults, leans: StudyResults, broken: StudyResults
+    policies: StudyResults,
+    clearing: StudyResults,
+    realistic: StudyResults,
+    leans: StudyResults,
+    broken: StudyResults,
 ) -> Iterator[tuple[object, ...]]:
-    """Yield the numbers of four tables, with the columns ESTIMATES."""
+    """Yield the numbers of five tables, with the columns ESTIMATES."""
 
     def row(
         study: str,
@@ -304,6 +304,13 @@ def estimate_rows(
     for cell in clearing.cells:
         if cell.n_seeds:
             yield row("clearing", str(cell.arm.setting), cell.policy, clearing_interval(cell), 0)
+    n_seeds = len(realistic.plan.seeds)
+    (cells,) = ablation_cells(realistic).values()
+    for policy, cell in cells.items():
+        yield row("realistic", "P", policy, cell.mean, section.digits_of(cell.mean.value))
+        yield row("realistic", "contacts", policy, cell.contacts, 2)
+    for policy, share in shares_of_script(realistic, best_script(cells)).items():
+        yield row("realistic", front_page.SHARE, policy, share, 2, 1.0)
     n_seeds = len(leans.plan.seeds)
     for title, cells in leans_cells(leans).items():
         for policy in leans.policies:
@@ -329,7 +336,7 @@ def main() -> None:
     """Play, rewrite the page of results and the files beside it, then the README."""
     paper = play(paper_studies(OUT, FIRST_SEED))
     draw_figures(paper, MEDIA)
-    clearing, cleared, restocked, leans, policies, robust, broken = play(
+    clearing, cleared, restocked, realistic, leans, policies, robust, broken = play(
         example(OUT, name) for name in EXAMPLES
     )
     draw_ladder(restocked, MEDIA / "ladder.svg")
@@ -338,12 +345,13 @@ def main() -> None:
         "paper": paper_block(paper),
         "sentences": sentences_block(paper),
         "ladder": ladder_block(cleared, restocked),
+        "realistic": realistic_block(realistic),
         "leans": leans_block(leans),
         "policies": policies_block(policies),
         "robust": robust_block(robust),
-        "benchmark": benchmark_block(play(benchmark_studies(OUT))),
+        **benchmark_blocks(play(benchmark_studies(OUT))),
     }
-    estimates = estimate_rows(policies, clearing, leans, broken)
+    estimates = estimate_rows(policies, clearing, realistic, leans, broken)
     write_rows(RESULTS / "estimates.csv", ESTIMATES, estimates)
     write_rows(RESULTS / "claims.csv", ("subject", "claim", "verdict"), claim_rows(paper))
     if BENCHMARK.exists():

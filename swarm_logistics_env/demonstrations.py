@@ -206,7 +206,7 @@ def record(
         >>> demonstrations = record("homing", 1, scenario=Scenario(n_robots=2, duration=10.0))
         >>> observations, actions, following, ends = demonstrations.transitions()
         >>> observations.shape, actions.shape
-        ((200, 140), (200, 4))
+        ((200, 141), (200, 4))
     """
     player = load(policy) if isinstance(policy, str) else policy
     scenario = scenario or Scenario()
@@ -275,15 +275,17 @@ def _outputs_of(
     """Return outputs (N, 3) in the frame of motion that ask for the motion of commands (N, 4).
 
     The direction in which a differential robot wants to drive follows from its turn, as
-    `motion.memory.steer` made that. Where it turns as fast as it can, it is taken to want its full
-    speed.
+    `motion.memory.steer` made that. Where it turns as fast as it can, it is taken to want as high a
+    speed as goes with a direction at most a quarter off: beyond that it would drive backwards.
     """
     forward, left, turn, gripper = commands[:, :4].T
     if scenario.drive == "differential":
         turned_by = turn * scenario.max_turn_rate * scenario.control_period
         off = np.arccos(np.clip(np.abs(forward), 0.0, 1.0))  # of the mean direction
-        angle = np.where(np.abs(turn) < 1.0, turned_by, 0.5 * turned_by + np.sign(turn) * off)
-        speed = np.where(np.abs(turn) < 1.0, forward / np.cos(0.5 * turned_by), np.sign(forward))
+        most = 0.5 * np.pi - 1e-4  # as float32 rounds
+        angle = np.minimum(0.5 * np.abs(turned_by) + off, most) * np.sign(turn)
+        angle = np.where(np.abs(turn) < 1.0, turned_by, angle)
+        speed = forward / np.cos(angle - 0.5 * turned_by)
         forward, left = speed * np.cos(angle), speed * np.sin(angle)
     cosine, sine = np.cos(turned), np.sin(turned)
     return np.stack([cosine * forward + sine * left, cosine * left - sine * forward, gripper], 1)

@@ -35,7 +35,8 @@ TIMER_RUNS = CARRYING + 3
 TIMER = CARRYING + 4
 VELOCITY = CARRYING + 5
 CONTACT = CARRYING + 7
-N_COLUMNS = CONTACT + 1  # = 140; after them, per neighbour, the message it broadcasts
+TURN_RATE = CONTACT + 1
+N_COLUMNS = TURN_RATE + 1  # = 141; after them, per neighbour, the message it broadcasts
 MESSAGES = N_COLUMNS
 
 
@@ -60,6 +61,7 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
     """Return the named columns of a row in `scenario`; together they cover it without a gap."""
     reach, view, limit = scenario.ranger_range, scenario.view_range, scenario.timer_limit
     far, speed = max(view, scenario.radio_range), scenario.max_speed
+    turn = scenario.max_turn_rate
     beam = "beam k looks k * 22.5 degrees left of forward; the full range where it meets nothing"
     items = _block(ITEMS, N_ITEMS_IN_VIEW, ITEM_FEATURES)
     neighbours = _block(NEIGHBOURS, N_NEIGHBOURS, NEIGHBOUR_FEATURES)
@@ -99,6 +101,14 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
             "velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; cut at top speed"
         ),
         Column("contact", "flag", _run(CONTACT, 1), 0, 1, "it touches a robot, wall or obstacle"),
+        Column(
+            "turn_rate",
+            "rad/s",
+            _run(TURN_RATE, 1),
+            -turn,
+            turn,
+            "to the left, as its gyro tells: without its drift",
+        ),
         *(messages if scenario.message_size else ()),
     )
 

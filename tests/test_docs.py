@@ -104,16 +104,11 @@ def run(block: str) -> dict[str, Any]:
     return names
 
 
-def test_readme_runs_as_written(capsys: pytest.CaptureFixture[str]) -> None:
-    first, environment = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
-    run(first)
-    printed = capsys.readouterr().out.splitlines()
-    assert [line.partition(" items  ")[2] for line in printed] == [
-        str(faults) for faults in ([], ["FM1:2"], ["FM4:2"], ["FM4_jam:2"])
-    ]
+def test_readme_runs_as_written() -> None:
+    (environment,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     interval = r" \| [\d.]+ \[[\d.]+, [\d.]+\]"
     rows = re.findall(rf"^\| `\S+`, [^|]+(?:{interval}){{5}} \|$", README, re.MULTILINE)
-    assert len(rows) == 5
+    assert len(rows) == 4
     names = run(environment.replace("n_robots=25", "n_robots=25, duration=2.0"))
     assert len(names["observations"]) == 25
     assert all(names["truncations"].values())

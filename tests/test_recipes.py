@@ -98,7 +98,7 @@ from tests.tasks.lane import LANE
     left *= parameters.odometry_scale
 ### An observation column SENSE=sensing
 @ observations.py @MESSAGES =
-SPEED = CONTACT + 1
+SPEED = TURN_RATE + 1
 N_COLUMNS = SPEED + 1
 @ observations.py @        *(messages if
         Column("speed", "m/s", _run(SPEED, 1), 0, speed, "without direction"),
@@ -187,7 +187,7 @@ import generate
 
 page = generate.page_text("environment")
 assert "| `odometry_scale` | `1.0` | factor of velocities; off |" in page
-assert "| 140 | `speed` | m/s | [0, 2] | without direction |" in page
+assert "| 141 | `speed` | m/s | [0, 2] | without direction |" in page
 """
 
 

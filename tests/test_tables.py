@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.report import section
+from swarm_logistics_env.report import benchmark, section
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
@@ -35,7 +35,10 @@ def tables(script: Callable[[str], Any]) -> Any:
 def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A page of markers, and studies of seconds instead of minutes."""
     page = tmp_path / "page.md"
-    names = "paper", "clearing", "sentences", "ladder", "leans", "robust", "benchmark", "policies"
+    names = (
+        "paper", "clearing", "sentences", "ladder", "realistic", "leans", "robust", "benchmark",
+        "policies",
+    )  # fmt: skip
     blocks = (f"<!-- tables: {name} -->\nold\n<!-- end of tables -->\n" for name in names)
     page.write_text("Before.\n\n" + "Between.\n".join(blocks) + "After.\n")
     paper: dict[str, Any] = {"name": "paper", "reference": "paper"}
@@ -55,12 +58,18 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             {**paper, "faults": [{"modes": ["FM3_send"]}]},
             without_faults,
         ],
-        "benchmark": [{"policies": ["homing"], "parameters": [widths]}],
+        "benchmark": [
+            {"policies": [policy], "parameters": [widths]} for policy in ("homing", "swarm-dt")
+        ],
     }
     examples = {
         "clearing": {"task": "clearing", "policies": policies[1:], "scenario": few, **sizes},
         "ladder": {"task": "clearing", **ladder},
         "ladder_restocked": ladder,
+        "ladder_realistic": {
+            "policies": policies[:2],
+            "ablations": [{"policy": policy, "title": "realistic"} for policy in policies[:2]],
+        },
         "leans": ladder,
         "shipped_policies": {"policies": policies, **sizes, **fault},
         "robust_policy": {"seeds": 3, **fault},
@@ -77,8 +86,9 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in studies_fields:
         monkeypatch.setattr(tables, f"{name}_studies", lambda out, *_, n=name: studies(n, out))
     monkeypatch.setattr(tables, "example", lambda out, name: study(out / name, examples[name]))
-    for name in ("OUT", "BENCHMARK", "ENTRIES"):
+    for name in ("OUT", "BENCHMARK"):
         monkeypatch.setattr(tables, name, tmp_path / name)
+    monkeypatch.setattr(benchmark, "ENTRIES", tmp_path / "entries")
     for name, value in {
         "PAGE": page,
         "RESULTS": tmp_path / "csv",
@@ -97,12 +107,12 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     first = page.read_text()
     assert first.startswith("Before.\n\n<!-- tables: paper -->\n\nOf ")
     assert first.endswith("\n\n<!-- end of tables -->\nAfter.\n")
-    assert first.count("Between.\n") == 7
+    assert first.count("Between.\n") == 8
     assert "\nold\n" not in first
     assert {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")} == {"S", "FT", "A"}
     front_page = tables.front_page
     monkeypatch.setattr(front_page, "RESULTS", tmp_path / "csv")
-    for study in ("policies", "clearing", "leans"):
+    for study in ("policies", "clearing", "realistic", "leans"):
         rows = front_page.values(front_page.read("estimates"), study)
         assert rows
         assert all(value.text in first for row in rows.values() for value in row.values())
@@ -119,7 +129,7 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     monkeypatch.setattr(Study, "run", counting_run)
     tables.main()
     assert page.read_text() == first
-    assert played == [0] * 12
+    assert played == [0] * 14
     # Nor does what is played anew change a digit.
     monkeypatch.setattr(tables, "OUT", tmp_path / "anew")
     tables.main()

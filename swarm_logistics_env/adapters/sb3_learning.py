@@ -62,7 +62,7 @@ class SwarmVecNormalize(VecNormalize):  # type: ignore[misc]  # not in the envir
     Example:
         >>> env = SwarmVecNormalize(SwarmVecEnv(n_worlds=2, n_robots=3))
         >>> env.reset().shape
-        (6, 140)
+        (6, 141)
     """
 
     returns: NDArray[np.float64]

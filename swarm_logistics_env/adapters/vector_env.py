@@ -67,7 +67,7 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         ... )
         >>> observations, infos = env.reset(seed=0)
         >>> observations.shape, env.action_space.shape
-        ((6, 140), (6, 4))
+        ((6, 141), (6, 4))
     """
 
     def __init__(

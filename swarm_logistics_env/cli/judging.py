@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import join
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
-import numpy as np
 import typer
 from typer import Argument, Exit, Option, echo
 
@@ -32,6 +30,7 @@ from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption,
 from .study_choice import ask_in_world, study_of, switch_to_clearing
 from .study_commands import (
     ClearingOption,
+    FirstSeedOption,
     FullOption,
     LimitOption,
     ProcessesOption,
@@ -49,9 +48,6 @@ from .world_choice import (
     options_of_world,
     scenario_of,
 )
-
-if TYPE_CHECKING:
-    pass
 
 STUDY = "scorecard"
 JUDGE_SEEDS = 60  # of a policy that is judged
@@ -77,6 +73,7 @@ def judge_command(
         # Fewer runs are alike by chance.
         Option(min=LEAST_SEEDS, help=f"Seeds of a policy at most; {JUDGE_SEEDS} if not given."),
     ] = None,
+    first_seed: FirstSeedOption = None,
     until_clear: Annotated[
         bool,
         Option("--until-clear/--all-seeds", help="Stop each question where its verdict is clear."),
@@ -163,7 +160,8 @@ def judge_command(
         "--setup": setup,
     }  # fmt: skip
     policy_options = {
-        "--seeds": seeds, "--minutes": minutes, "--clearing": clearing, "--preset": preset,
+        "--seeds": seeds, "--first-seed": first_seed, "--minutes": minutes,
+        "--clearing": clearing, "--preset": preset,
         "--scenario": scenario_file, "--set": changes, "--bodies": bodies,
         "--benchmark": as_benchmark,
         "--run-limit": run_limit, "--frame": frame, "--normalize": normalize,
@@ -190,10 +188,10 @@ def judge_command(
         return
     _refuse(trials_options, policy_or_trials, "a policy")
     conditions = {
-        "--seeds": seeds, "--clearing": clearing, "--preset": preset, "--scenario": scenario_file,
-        "--set": changes, "--bodies": bodies,
+        "--seeds": seeds, "--first-seed": first_seed, "--clearing": clearing, "--preset": preset,
+        "--scenario": scenario_file, "--set": changes, "--bodies": bodies,
     }  # fmt: skip
-    if as_benchmark and (options := [option for option, value in conditions.items() if value]):
+    if as_benchmark and (options := _options_in_use(conditions)):
         raise StudyError(f"{options[0]}: the benchmark has the same conditions for everybody")
     engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
     (policy,) = policies_of([policy_or_trials], trust_code, frame, normalize, env)
@@ -206,7 +204,9 @@ def judge_command(
         if "restock" not in changed_fields(changes, bodies):
             scenario = scenario.replace(restock=True)
         options = options_of_world(preset, scenario_file, changes, bodies)
-        world = JudgedWorld(scenario, clearing, options)
+        if first_seed is not None:
+            options += ["--first-seed", str(first_seed)]
+        world = JudgedWorld(scenario, clearing, options, first_seed)
     tally = judge_policy(
         policy,
         out,
@@ -223,9 +223,13 @@ def judge_command(
 
 def _refuse(options: Mapping[str, object], policy_or_trials: str, kind: str) -> None:
     """Raise a StudyError if an option is given that is not for what is judged."""
-    for option, value in options.items():
-        if value:
-            raise StudyError(f"{option} is not for {kind}, and {policy_or_trials!r} is one")
+    for option in _options_in_use(options):
+        raise StudyError(f"{option} is not for {kind}, and {policy_or_trials!r} is one")
+
+
+def _options_in_use(options: Mapping[str, object]) -> list[str]:
+    """Return the options that were typed: 0 is a value of an option, False is none."""
+    return [name for name, value in options.items() if value or (value == 0 and value is not False)]
 
 
 class JudgedWorld(NamedTuple):
@@ -234,12 +238,14 @@ class JudgedWorld(NamedTuple):
     Attributes:
         scenario: the world, in which nothing fails yet.
         clearing: whether P is the rate at which its items are cleared.
-        options: what was typed to choose the scenario, e.g. ["--preset", "realistic"].
+        options: what was typed to choose scenario and seeds, e.g. ["--preset", "realistic"].
+        first_seed: the smallest seed; None: that of the study.
     """
 
     scenario: Scenario
     clearing: bool
     options: list[str]
+    first_seed: int | None = None
 
     @property
     def words(self) -> list[str]:
@@ -280,7 +286,15 @@ def judge_policy(
         parts = [slug(policy.title), *world.words]
         directory = out or Path("results", "judged", "-".join(parts))
         looks = until_clear and most_seeds > FIRST_LOOK
-        study = study_of(STUDY, directory, most_seeds, [policy], policy.trusted, until_clear=looks)
+        study = study_of(
+            STUDY,
+            directory,
+            most_seeds,
+            [policy],
+            policy.trusted,
+            until_clear=looks,
+            first_seed=world.first_seed,
+        )
         ask_in_world(study, world.scenario)
         if world.clearing:
             switch_to_clearing(study)
@@ -324,14 +338,10 @@ def names_policy(policy_or_trials: str) -> bool:
     return ":" in policy_or_trials or not suffix
 
 
-# Scores of the shipped policies in the benchmark; `docs/play_tables.py` writes it.
-ENTRIES = Path(__file__).parents[1] / "report" / "benchmark_entries.json"
-
-
 def _show_benchmark(results: StudyResults, out: Path) -> None:
     """Print the table of a policy in the benchmark and its place, and write the report."""
-    show(benchmark.table(results))
-    entries = {name: np.array(scores) for name, scores in json.loads(ENTRIES.read_text()).items()}
-    entries[results.policies[0]] = benchmark.score(results)
-    show(benchmark.leaderboard(entries))
+    entries = benchmark.Entries.read()
+    show(benchmark.table(results, entries.references))
+    score = benchmark.score(results, entries.references)
+    show(benchmark.leaderboard({**entries.scores, results.policies[0]: score}))
     echo(f"Report: {write_report(results, out, document(results))[0]}")

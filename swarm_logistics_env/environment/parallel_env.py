@@ -246,6 +246,15 @@ class SwarmLogisticsEnv(DictView):
             self.agents = agent_names(np.flatnonzero(is_left).tolist())
         return observations, rewards, terminations, truncations
 
+    def change_rewards(self, rewards: Mapping[str, float]) -> None:
+        """Pay by other weights of the terms from the next step on, e.g. as a training goes on.
+
+        Raises:
+            SetupError: a term is unknown, or a weight is no finite number.
+        """
+        RewardTerms(rewards)  # which checks them
+        self._rewards.reweigh(rewards)
+
     @property
     def episode_info(self) -> dict[str, float]:
         """The entries of every agent's infos that are about the episode; keys never change.

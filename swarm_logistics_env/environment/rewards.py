@@ -171,7 +171,8 @@ def stocking(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """Metres that the item a robot carries, requested or not, came nearer to the delivery area.
 
     The way counts from where the item lay, so no circle earns: carrying it back costs as much.
-    What lies nearer is delivered sooner once it is requested. Privileged: as `approach`.
+    What lies nearer is delivered sooner once it is requested; nearer than `STOCK_DISTANCE` it
+    would be in the way. Privileged: as `approach`.
     """
     state, floor = world.state, world.floor
     # The step in which a robot lets go still moves the item; one that was delivered lies elsewhere.
@@ -184,8 +185,9 @@ def stocking(world: Warehouse, before: Moment, after: Moment) -> Earned:
         return None
     names_docks = (state.requested_docks != NOBODY).any()
     docks = state.item_docks[items] if names_docks else NO_DOCK
-    metres = np.minimum(floor.along(after.item_position[items], docks), floor.edge)
-    metres -= np.minimum(floor.along(before.item_position[items], docks), floor.edge)
+    nearest = floor.edge - STOCK_DISTANCE
+    metres = np.minimum(floor.along(after.item_position[items], docks), nearest)
+    metres -= np.minimum(floor.along(before.item_position[items], docks), nearest)
     # Who lets go of one may lift another at once: both count.
     return np.asarray(np.bincount(carriers[items], metres, state.n_robots), np.float64)
 
@@ -193,6 +195,11 @@ def stocking(world: Warehouse, before: Moment, after: Moment) -> Earned:
 def contact(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """Seconds that the robot touched a robot, a wall or an obstacle; weigh it negatively."""
     return world.state.robot_contact.astype(np.float64) * world.scenario.control_period
+
+
+def collision(world: Warehouse, before: Moment, after: Moment) -> Earned:
+    """Speed [m/s] at which the robot ran into others in this step, summed; weigh it negatively."""
+    return world.state.contacts.closing
 
 
 def blocked_request(world: Warehouse, before: Moment, after: Moment) -> Earned:
@@ -215,6 +222,7 @@ def blocked_request(world: Warehouse, before: Moment, after: Moment) -> Earned:
 
 
 SECONDS_A_METRE = 2.0
+STOCK_DISTANCE = 1.5  # [m] from the delivery area
 
 Term = Callable[[Warehouse, Moment, Moment], Earned]
 REWARD_TERMS: dict[str, Term] = {
@@ -224,6 +232,7 @@ REWARD_TERMS: dict[str, Term] = {
     "approach": approach,
     "stocking": stocking,
     "contact": contact,
+    "collision": collision,
     "blocked_request": blocked_request,
 }
 _AT_DELIVERIES = {"delivery", "own_delivery"}

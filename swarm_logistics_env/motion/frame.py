@@ -45,7 +45,7 @@ class MotionView:
         """Begin an episode of as many rows as there are keys, which are those of their streams.
 
         Args:
-            bodies: (N, 3) of robots that are not all as the scenario has them (`memory.body_of`).
+            bodies: (N, 4) of robots that are not all as the scenario has them (`memory.body_of`).
         """
         n = len(keys)
         self.keys, self.counts = np.empty(n, np.uint64), np.empty(n, np.int64)
@@ -77,6 +77,18 @@ class MotionView:
         self.rows = observations
         return inputs
 
+    def hold(self, observations: NDArray[np.float32]) -> None:
+        """Let memories and time go on between two decisions; outputs keep their direction.
+
+        Raises:
+            PolicyError: there are more or fewer rows than keys at `begin`.
+        """
+        self.check(observations)
+        column.remember_observation(observations, self._period, self.memory)
+        self.turned -= self._period * observations[:, row.TURN_RATE]
+        self.counts += 1
+        self.rows = observations
+
     def check(self, observations: NDArray[np.float32]) -> None:
         """Raise PolicyError if there are more or fewer rows than keys at `begin`."""
         if len(observations) != len(self.keys):
@@ -107,13 +119,11 @@ class MotionView:
     def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
 
-        A robot that is caged by items clears its way instead, and one that handles an item stands.
+        A robot that is caged by items clears its way instead.
         A differential robot turns its body to where it wants to drive.
         """
         commands = np.zeros((len(outputs), 4))
-        command_rows(
-            outputs.astype(np.float64), self.turned, self.rows, self._period, self.memory, commands
-        )
+        command_rows(outputs.astype(np.float64), self.turned, self.rows, self.memory, commands)
         return commands
 
 
@@ -126,7 +136,6 @@ def command_rows(
     outputs: NDArray[np.float64],
     turned: NDArray[np.float64],
     rows: NDArray[np.float32],
-    period: float,
     memories: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
@@ -134,7 +143,7 @@ def command_rows(
     for robot in range(outputs.shape[0]):
         along, aside, gripper = outputs[robot]
         turn_outputs(along, aside, gripper, turned[robot], commands[robot])
-        finish_command(rows[robot], period, memories[robot], commands[robot])
+        finish_command(rows[robot], memories[robot], commands[robot])
 
 
 @kernel
@@ -142,7 +151,6 @@ def command_own_frames(
     commands: NDArray[np.float64],
     turned: NDArray[np.float64],
     rows: NDArray[np.float32],
-    period: float,
     memories: NDArray[np.float64],
 ) -> None:
     """Do as `command_rows` with commands (N, 4) in the robots' own frames; turns are left out."""
@@ -152,19 +160,17 @@ def command_own_frames(
         # There and back: outputs are clipped in the frame of motion.
         along, aside = to_frame((_COSINES[beams], _SINES[beams]), x, y)
         turn_outputs(along, aside, gripper, turned[robot], commands[robot])
-        finish_command(rows[robot], period, memories[robot], commands[robot])
+        finish_command(rows[robot], memories[robot], commands[robot])
 
 
 @inlined_kernel
 def finish_command(
     sensed: NDArray[np.float32],
-    period: float,
     memory: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> None:
-    """Change a command (4,) where the robot is caged or handles an item, and take note of it."""
+    """Change a command (4,) where the robot is caged, and take note of it."""
     column.clear_the_way(sensed, memory, command)
-    column.stand_to_handle(sensed, period, memory, command)
     column.note_command(sensed, command, memory)
     column.steer(memory, command)
 

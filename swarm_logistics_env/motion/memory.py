@@ -7,10 +7,12 @@ Three neighbouring beams that meet one wall tell how the robot stands to it, up 
 That tells how fast the gyro drifts, so that a direction is remembered for minutes. It holds in
 rooms with walls at right angles; where a robot sees no wall it reckons on with the drift it found.
 
-And what commands make of it: how a differential robot drives where it wants to, as its body turns
-and its memory with it; and the way out for a robot that is caged by items with gaps narrower than
-it is. That one lets the requested item go, lifts one of those that stand around it, and carries it
-away. Then the way is open for whoever lifts the requested item next.
+Its gyro tells how its body turned, so that its memory turns with it.
+
+And what commands make of it: how a differential robot drives where it wants to; and the way out for
+a robot that is caged by items with gaps narrower than it is. That one lets the requested item go,
+lifts one of those that stand around it, and carries it away. Then the way is open for whoever lifts
+the requested item next.
 """
 
 from __future__ import annotations
@@ -70,12 +72,10 @@ def wall_angle(sensed: NDArray[np.float32]) -> float:
     CANNOT_LIFT,  # 1: it takes its gripper for broken; falls to 0 in RETRY_TIME
     IN_VAIN,  # [s] that it held on to items in vain; fades in FADING_TIME, a lift clears it
     DELIVERING,  # [s] that it held the requested item inside the area; fades as IN_VAIN
-    CARRIED,  # whether it carried anything
-    HANDLES,  # [s] for which it goes on to stand, to lift, put down or deliver
     # What its maker knows of its body, see `body_of`; they stay for the whole episode.
-    TOP_SPEED, HANDLING_TIME, WIDEST_TURN,
+    TOP_SPEED, HANDLING_TIME, WIDEST_TURN, ACCELERATION,
     N_COLUMNS,
-) = range(28)  # fmt: skip
+) = range(27)  # fmt: skip
 BODY = slice(TOP_SPEED, N_COLUMNS)
 
 FAILURE_TIME = 60.0  # [s]
@@ -93,13 +93,14 @@ MOVES = 0.1  # [m/s] and more: its velocity has a direction
 
 
 def body_of(scenario: Scenario) -> NDArray[np.float64]:
-    """Return a robot's top speed [m/s], handling time [s] and widest turn in a period [rad], (3,).
+    """Return what its maker knows of a robot (4,).
 
-    The widest turn is 0 of a robot that drives in every direction and never has to turn.
+    Top speed [m/s], handling time [s], widest turn in a period [rad], and acceleration [m/s2]. The
+    widest turn is 0 of a robot that drives in every direction and never has to turn.
     """
     turns = scenario.drive == "differential"
     widest = scenario.max_turn_rate * scenario.control_period if turns else 0.0
-    return np.array([scenario.max_speed, scenario.handling_time, widest])
+    return np.array([scenario.max_speed, scenario.handling_time, widest, scenario.max_acceleration])
 
 
 @kernel
@@ -123,6 +124,7 @@ def remember_observation(
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
         delivers = sensed[row.CARRYING_REQUESTED] > 0.5
 
+        turn_back(sensed[row.TURN_RATE] * period, memory)
         diagnose(sensed, period, memory)
 
         memory[STUCK] = max(0.0, memory[STUCK] - period / STUCK_TIME)
@@ -182,9 +184,6 @@ def diagnose(sensed: NDArray[np.float32], period: float, memory: NDArray[np.floa
     # What it brought inside and did not let go of was delivered.
     if is_inside and not carries and memory[HELD] > 1.5:
         memory[DELIVERING], memory[CANNOT_DELIVER], memory[FAILED] = 0.0, 0.0, 0.0
-    if carries != (memory[CARRIED] > 0.5):
-        memory[HANDLES] = 0.0
-    memory[CARRIED] = 1.0 if carries else 0.0
     surely = memory[HANDLING_TIME] + SURELY_IN_VAIN - 0.5 * period
     if carries:
         memory[IN_VAIN], memory[CANNOT_LIFT] = 0.0, 0.0
@@ -264,39 +263,12 @@ def note_command(
 
 
 @kernel
-def stand_to_handle(
-    sensed: NDArray[np.float32],
-    period: float,
-    memory: NDArray[np.float64],
-    command: NDArray[np.float64],
-) -> None:
-    """Let a robot stand in its command (4,) while it lifts, puts down or delivers.
-
-    The world makes it stand anyway; so its memory knows that its body does not turn.
-    """
-    if memory[HANDLING_TIME] <= 0.0:
-        return
-    memory[HANDLES] = max(0.0, memory[HANDLES] - period)
-    carries, grips = sensed[row.CARRYING] > 0.5, command[3]
-    begins = carries and grips < -0.5
-    begins |= not carries and grips > 0.5 and memory[CANNOT_LIFT] <= 0.0 and item_in_reach(sensed)
-    is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
-    delivers = sensed[row.CARRYING_REQUESTED] > 0.5 and memory[CANNOT_DELIVER] <= 0.0
-    begins |= is_inside and delivers
-    if begins and memory[HANDLES] <= 0.0:
-        memory[HANDLES] = memory[HANDLING_TIME] + period
-    if memory[HANDLES] > 0.0:
-        command[:3] = 0.0
-
-
-@kernel
 def steer(memory: NDArray[np.float64], command: NDArray[np.float64]) -> None:
     """Turn a command (4,) to drive in a direction into a turn and motion ahead or back.
 
     Of a robot that drives in every direction it stays as it is.
 
     Args:
-        memory: the robot's memory; its directions are turned back by the robot's own turn.
         command: forward and left as if the drive were holonomic; left becomes 0.
     """
     widest, speed = memory[WIDEST_TURN], length_of(command[0], command[1])
@@ -312,12 +284,13 @@ def steer(memory: NDArray[np.float64], command: NDArray[np.float64]) -> None:
     # It drives along its mean direction in the period, and slower the more that is off.
     command[0] = forwards * speed * max(0.0, math.cos(angle - 0.5 * turn))
     command[1], command[2] = 0.0, turn / widest
-    turn_back(turn, memory)
 
 
 @kernel
 def turn_back(turn: float, memory: NDArray[np.float64]) -> None:
-    """Turn the directions in one memory by -turn [rad], as the body turns by `turn`."""
+    """Turn the directions in one memory by -turn [rad], as the body turned by `turn`."""
+    if turn == 0.0:
+        return
     frame = math.cos(turn), math.sin(turn)
     for column in (HEADING_X, HOME_X):
         memory[column], memory[column + 1] = to_frame(frame, memory[column], memory[column + 1])

@@ -39,7 +39,7 @@ INPUTS: tuple[str, ...] = (
     "whim_along", "whim_aside",
     "kept_home_along", "kept_home_aside", "kept_home_distance",
     "cannot_deliver", "cannot_lift", "delivering_in_vain", "items_in_view",
-    "top_speed", "handling_time", "turns_to_drive",
+    "top_speed", "handling_time", "turns_to_drive", "time_to_top_speed",
 )  # fmt: skip
 _Columns = namedtuple("_Columns", INPUTS)  # type: ignore[misc]  # by their names, as above
 INPUT: Any = _Columns(*range(len(INPUTS)))  # the column of each input
@@ -205,6 +205,7 @@ def read_robot(
     read[INPUT.top_speed] = memory[column.TOP_SPEED] / 2.0
     read[INPUT.handling_time] = memory[column.HANDLING_TIME] / 2.0
     read[INPUT.turns_to_drive] = 1.0 if memory[column.WIDEST_TURN] > 0.0 else 0.0
+    read[INPUT.time_to_top_speed] = memory[column.TOP_SPEED] / memory[column.ACCELERATION]
 
 
 @kernel

@@ -30,7 +30,7 @@ from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
 
 REPLAN = 0.3  # [s]
 NEAR = 0.3  # [m] from here on the worker drives straight to its item
-PATIENCE = 2.0  # [s] without getting nearer, until another robot is sent
+PATIENCE = 2.0  # [s] without getting nearer, beside its handling time, until another one is sent
 STUCK = 0.6  # [s] without getting nearer, until a laden worker steps over an item
 STEP = 0.2  # [s] without its item
 DISTRUST = 30.0  # [s]
@@ -55,6 +55,7 @@ class Central(Described):
     def configure(self, scenario: Scenario) -> None:
         """Take the sizes of the warehouse and of the robots, and the floor plan."""
         self._scenario = scenario
+        self._stride = scenario.max_speed * scenario.control_period  # [m] in a control step
         self._ground = ground_of(scenario)
 
     def reset(self, n_robots: int, seed: int) -> None:
@@ -127,14 +128,12 @@ class Central(Described):
         Args:
             is_idle: which robots have no request to work on (N,).
         """
-        waits = is_idle & (self.laden_wait | (state.robot_item == NOBODY))
-        is_free = state.item_status == STORED
-        if state.requested != NOBODY:
-            is_free[state.requested] = False
+        waits = is_idle if self.laden_wait else is_idle & (state.robot_item == NOBODY)
         goals = self._resting_places.copy()
         share_items(
-            state.robot_position, state.item_position, is_free, waits, self._waits_under, goals
-        )
+            state.robot_position, state.item_position, state.item_status, state.requested, waits,
+            self._waits_under, goals,
+        )  # fmt: skip
         return goals
 
     # -- who -----------------------------------------------------------------------------------
@@ -176,7 +175,7 @@ class Central(Described):
         if distance < self._least_distance - 0.05:
             self._least_distance = distance
             self._least_distance_at = state.time
-        elif state.time > self._least_distance_at + PATIENCE:
+        elif state.time > self._least_distance_at + PATIENCE + self._scenario.handling_time:
             self._trusted_from[self._worker] = state.time + DISTRUST
 
     def _distance_to_goal(self, state: WarehouseState) -> float:
@@ -200,7 +199,7 @@ class Central(Described):
 
     def _worker_velocity(
         self, state: WarehouseState, worker: int, is_idle: NDArray[np.bool_]
-    ) -> NDArray[np.float64]:
+    ) -> NDArray[np.float64] | tuple[float, float]:
         item, carries = self._task
         x, y = state.robot_position[worker].tolist()
         dock = int(state.requested_docks[0])
@@ -208,7 +207,7 @@ class Central(Described):
         if inwards is not None:
             return inwards
         if not carries and self._way_to_item(state) < NEAR:
-            return self._towards(state.robot_position[worker], state.item_position[item])
+            return self._towards(x, y, state.item_position[item].tolist())
         if state.time >= self._planned_at + REPLAN - 1e-6:
             self._cost = self._costs_among(state, is_idle, carries)
             goal = self._ground.dock_cells(dock)
@@ -218,8 +217,7 @@ class Central(Described):
             self._cost_to_go = cost_to_go(self._cost, goal)
             self._planned_at = state.time
         find_point = self._ground.point_home if carries else lookahead
-        waypoint = find_point(self._cost, self._cost_to_go, x, y)
-        return self._towards(state.robot_position[worker], np.array(waypoint))
+        return self._towards(x, y, find_point(self._cost, self._cost_to_go, x, y))
 
     def _costs_among(
         self, state: WarehouseState, robots: NDArray[np.bool_], carries: bool
@@ -266,21 +264,14 @@ class Central(Described):
         worker: int,
     ) -> NDArray[np.float64]:
         """Return velocities (N, 2), in top speeds, of robots on their way to where they wait."""
-        stride = self._scenario.max_speed * self._scenario.control_period
-        velocity = np.empty((state.n_robots, 2))
-        drift(
-            state.robot_position, state.robot_present, goals, self._waits_under, worker, stride,
-            velocity,
+        return drift(
+            state.robot_position, state.robot_present, goals, self._waits_under, worker,
+            self._stride,
         )  # fmt: skip
-        return velocity
 
-    def _towards(
-        self, position: NDArray[np.float64], goal: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _towards(self, x: float, y: float, goal: tuple[float, float]) -> tuple[float, float]:
         """Return the velocity, in top speeds, to be at the goal in one control step if it can."""
-        stride = self._scenario.max_speed * self._scenario.control_period
-        x, y = ((goal - position) / stride).tolist()
-        return np.array(at_most_1(x, y))
+        return at_most_1((goal[0] - x) / self._stride, (goal[1] - y) / self._stride)
 
     def _steer(
         self,

@@ -34,6 +34,7 @@ ARRIVAL_RADIUS = 0.1
 HOLDING_DEPTH = 0.4  # of robots that hold items, in the area
 
 Numbers = NDArray[np.float64]
+Slots = NDArray[np.int64]
 
 
 class CentralStock(Central):
@@ -52,6 +53,8 @@ class CentralStock(Central):
         super().configure(scenario)
         self._floor = floor_map(scenario)
         self._slots = self._ground.slots(ROWS, SLOT_PITCH)
+        # Items up to here, as the floor measures ways, are far from a dock [m].
+        self._far_from = self._floor.edge - ROWS[-1] - SLOT_PITCH
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode without stock; nothing here is random."""
@@ -68,22 +71,17 @@ class CentralStock(Central):
     ) -> None:
         """Let waiting robots lift items, and laden ones take theirs to a slot or hold it inside."""
         position = state.robot_position
-        # Who carries the requested item without being trusted to deliver it lets it go.
-        laden = is_idle & (state.robot_item != NOBODY) & (state.robot_item != state.requested)
-        self._slot[~laden] = NOBODY
+        laden, n_laden, n_held = find_laden(is_idle, state.robot_item, state.requested, self._slot)
         slots = self._slots
-        is_free = free_slots(slots, state.item_position, state.item_status == STORED, self._slot)
+        is_free, n_free = free_slots(slots, state.item_position, state.item_status, self._slot)
         most_held = int(HELD_SHARE * state.n_robots)
-        n_held = int((laden & (self._slot == NOBODY)).sum())
 
-        along = self._floor.along(state.item_position)
-        is_far = along < self._floor.edge - ROWS[-1] - SLOT_PITCH
-        room = int(is_free.sum()) + most_held - n_held
         lift_far_items(
-            position, state.item_position, is_far, self._waits_under, is_idle, room, gripper
-        )
+            position, state.item_position, self._floor.along(state.item_position), self._far_from,
+            self._waits_under, is_idle, n_free + most_held - n_held, gripper,
+        )  # fmt: skip
 
-        if not laden.any():
+        if n_laden == 0:
             return
         if state.time >= self._home_planned_at + REPLAN - 1e-6:
             unladen = state.robot_present & ~laden
@@ -103,20 +101,51 @@ class CentralStock(Central):
 
 
 @kernel
+def find_laden(
+    is_idle: NDArray[np.bool_], robot_item: NDArray[np.int64], requested: int, slot: Slots
+) -> tuple[NDArray[np.bool_], int, int]:
+    """Return which idle robots carry a stored item (N,), how many, and how many without a slot.
+
+    Who carries the requested item without being trusted to deliver it lets it go.
+
+    Args:
+        slot: of each robot (N,), or `NOBODY`; those of the others are given back.
+    """
+    is_laden = np.empty(len(is_idle), np.bool_)
+    n_laden, n_held = 0, 0
+    for robot in range(len(is_idle)):
+        item = robot_item[robot]
+        is_laden[robot] = is_idle[robot] and item != NOBODY and item != requested
+        if not is_laden[robot]:
+            slot[robot] = NOBODY
+            continue
+        n_laden += 1
+        n_held += int(slot[robot] == NOBODY)
+    return is_laden, n_laden, n_held
+
+
+@kernel
 def lift_far_items(
     position: Numbers,
     item_position: Numbers,
-    is_far: NDArray[np.bool_],
+    along: Numbers,
+    far_from: float,
     waits_under: NDArray[np.int64],
     is_idle: NDArray[np.bool_],
     most: int,
     gripper: Numbers,
 ) -> None:
-    """Close the grippers (N,) of at most so many idle robots under items far from a dock."""
+    """Close the grippers (N,) of at most so many idle robots under items far from a dock.
+
+    Args:
+        along: where each item is, as the floor measures ways (M,) [m]; far ones below `far_from`.
+    """
     n_lifting = 0
     for robot in range(len(position)):
         item = waits_under[robot]
-        if n_lifting >= most or not is_idle[robot] or item == NOBODY or not is_far[item]:
+        if n_lifting >= most or not is_idle[robot] or item == NOBODY:
+            continue
+        if along[item] >= far_from:
             continue
         x, y = item_position[item]
         if distance_to(x, y, position[robot]) < ARRIVAL_RADIUS:
@@ -131,7 +160,7 @@ def send_to_slots(
     slots: Numbers,
     most: int,
     is_free: NDArray[np.bool_],
-    slot: NDArray[np.int64],
+    slot: Slots,
 ) -> None:
     """Send at most so many laden robots without a slot to the nearest free slots (S, 2) [m].
 
@@ -158,7 +187,7 @@ def send_to_slots(
 
 
 @kernel
-def ways_to_slots(position: Numbers, slots: Numbers, slot: NDArray[np.int64]) -> Numbers:
+def ways_to_slots(position: Numbers, slots: Numbers, slot: Slots) -> Numbers:
     """Return how far each robot is from its slot (N,) [m]; infinite if it has none."""
     away = np.full(len(position), np.inf)
     for robot in range(len(position)):
@@ -170,21 +199,21 @@ def ways_to_slots(position: Numbers, slots: Numbers, slot: NDArray[np.int64]) ->
 
 @kernel
 def free_slots(
-    slots: Numbers, item_position: Numbers, is_stored: NDArray[np.bool_], slot: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    """Return which slots (S, 2) [m] have no item in them and no robot on its way with one (S,).
+    slots: Numbers, item_position: Numbers, item_status: NDArray[np.int64], slot: Slots
+) -> tuple[NDArray[np.bool_], int]:
+    """Return which slots (S, 2) [m] have neither an item nor a robot on its way (S,), and how many.
 
     Args:
-        item_position, is_stored: of each item (M, 2) [m], (M,).
+        item_position, item_status: of each item (M, 2) [m], (M,).
         slot: to which each robot is on its way (N,), or `NOBODY`.
     """
     is_free = np.ones(len(slots), np.bool_)
     for number in range(len(slots)):
         for item in range(len(item_position)):
             away = distance_to(slots[number, 0], slots[number, 1], item_position[item])
-            if is_stored[item] and away <= SLOT_RADIUS:
+            if item_status[item] == STORED and away <= SLOT_RADIUS:
                 is_free[number] = False
     for robot in range(len(slot)):
         if slot[robot] != NOBODY:
             is_free[slot[robot]] = False
-    return is_free
+    return is_free, is_free.sum()

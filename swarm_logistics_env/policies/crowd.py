@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.warehouse.state import NOBODY
+from swarm_logistics_env.warehouse.state import NOBODY, STORED
 
 Numbers = NDArray[np.float64]
 
@@ -24,9 +24,8 @@ def drift(
     waits_under: NDArray[np.int64],
     worker: int,
     stride: float,
-    velocity: Numbers,
-) -> None:
-    """Fill velocities (N, 2), in top speeds, of robots on their way to where they wait.
+) -> Numbers:
+    """Return velocities (N, 2), in top speeds, of robots on their way to where they wait.
 
     Args:
         position, goals: (N, 2) [m].
@@ -36,6 +35,7 @@ def drift(
         stride: how far a robot drives in a control period [m].
     """
     n_robots = len(position)
+    velocity = np.empty((n_robots, 2))
     for robot in range(n_robots):
         x, y = position[robot]
         shove_x, shove_y = 0.0, 0.0
@@ -59,6 +59,7 @@ def drift(
         velocity_x += shove_x + 0.5 * shove_y
         velocity_y += shove_y + 0.5 * -shove_x
         velocity[robot, 0], velocity[robot, 1] = at_most_1(velocity_x, velocity_y)
+    return velocity
 
 
 @kernel
@@ -99,7 +100,8 @@ def at_most_1(x: float, y: float) -> tuple[float, float]:
 def share_items(
     position: Numbers,
     item_position: Numbers,
-    is_free: NDArray[np.bool_],
+    item_status: NDArray[np.int64],
+    requested: int,
     waits: NDArray[np.bool_],
     waits_under: NDArray[np.int64],
     goals: Numbers,
@@ -110,11 +112,15 @@ def share_items(
 
     Args:
         position: of robots (N, 2) [m]; item_position: (M, 2) [m].
-        is_free: whether an item lies there and nobody asks for it (M,).
+        item_status: of each item (M,); they wait under `STORED` ones.
+        requested: the item that is asked for, under which nobody waits; `NOBODY`: none.
         waits: which robots wait (N,).
         waits_under: the item of each robot so far (N,), or `NOBODY`; changed.
         goals: (N, 2) [m]; of who has an item, filled with where it lies.
     """
+    is_free = item_status == STORED
+    if requested != NOBODY:
+        is_free[requested] = False
     is_taken = np.zeros(len(is_free), np.bool_)
     for robot in range(len(position)):
         item = waits_under[robot]

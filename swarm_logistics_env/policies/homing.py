@@ -58,7 +58,7 @@ def act_homing(
     turn_frames(rows, period, memories, turned)
     counts += 1
     decide_homing(rows, memories, keys, counts, period, commands)
-    command_own_frames(commands, turned, rows, period, memories)
+    command_own_frames(commands, turned, rows, memories)
 
 
 @kernel

@@ -50,6 +50,8 @@ class Network(_Part):
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         hidden: widths of the hidden layers.
         activation: the activation function between layers.
+        decides_every: control steps from one decision to the next; in between outputs keep their
+            direction.
         exploration: the training's noise, times this factor, is added to the outputs, from each
             robot's own stream; 0 means none.
 
@@ -62,6 +64,7 @@ class Network(_Part):
     listens: bool = True
     hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
     activation: Literal["tanh"] = "tanh"
+    decides_every: PositiveInt = 1
     exploration: NonNegativeFloat = 0.0
 
     @field_validator("inputs", "outputs")
@@ -182,6 +185,7 @@ class LearnedPolicy(Described):
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode."""
         self._frame.begin(row_keys(seed, STREAM, n_robots))
+        self._n_steps = 0
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D).
@@ -189,10 +193,15 @@ class LearnedPolicy(Described):
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
-        outputs = self.outputs_of(self._frame.read(observations))
-        if self.card.network.exploration:
-            explore(self._frame.keys, self._frame.counts, self._deviations, outputs)
-        return self._frame.command(outputs)
+        frame, network = self._frame, self.card.network
+        if self._n_steps % network.decides_every:
+            frame.hold(observations)
+        else:
+            self._outputs = self.outputs_of(frame.read(observations))
+            if network.exploration:
+                explore(frame.keys, frame.counts, self._deviations, self._outputs)
+        self._n_steps += 1
+        return frame.command(self._outputs)
 
     def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the network's outputs (N, k) for rows of its inputs, without noise."""

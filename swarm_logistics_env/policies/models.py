@@ -52,7 +52,7 @@ def of(
     Example:
         >>> policy = of(lambda rows: np.tanh(rows[:, :3]), frame=True)
         >>> policy.reset(n_robots=2, seed=0)
-        >>> policy.act(np.zeros((2, 140), np.float32)).shape
+        >>> policy.act(np.zeros((2, 141), np.float32)).shape
         (2, 4)
     """
     decide, content = decider_of(network)

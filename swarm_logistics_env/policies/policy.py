@@ -146,9 +146,9 @@ def mask_unreachable_commands(commands: NDArray[Any], state: WarehouseState) -> 
     reality. The controller sees from above and reaches every robot that hears, wherever it is:
     it makes no difference whether a robot sends, nor do radio range, loss and sensor noise.
     """
-    deaf = state.robot_present & ~state.hears
-    if not deaf.any():
+    if state.hears.all():  # nearly always
         return commands
+    deaf = state.robot_present & ~state.hears
     try:
         masked = np.array(commands, dtype=np.float64)
     except (TypeError, ValueError):

@@ -91,7 +91,8 @@ def costmap(
 def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the cost of the cheapest way from each cell to a `goal` cell, in cells.
 
-    It sweeps over the grid in four orders until no cell gets cheaper; in the open few are enough.
+    It sweeps over the grid in four orders until no cell gets cheaper; in the open few are enough,
+    if the first ones lead away from the goal.
     """
     rows, columns = cost.shape
     # A border that no way leads through spares the sweeps a check of every neighbour.
@@ -99,13 +100,17 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
     # Rows that may get cheaper: a visit that changed nothing need not be repeated until a
     # neighbouring row has changed.
     may_change = np.zeros(rows + 2, np.bool_)
+    right_of_middle = 0  # columns from the middle to the goal's cells, summed and doubled
     for row in range(rows):
         n_goals = 0
         for column in range(columns):
-            n_goals += int(goal[row, column])
-            far[row + 1, column + 1] = 0.0 if goal[row, column] else np.inf
+            if goal[row, column]:
+                n_goals += 1
+                right_of_middle += 2 * column - columns + 1
+                far[row + 1, column + 1] = 0.0
         if n_goals > 0:
             may_change[row : row + 3] = True
+    goal_is_left = right_of_middle < 0
     limits, costs = np.empty(columns), np.empty(columns)
     while may_change[1:-1].any():
         for order in range(4):
@@ -113,7 +118,8 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
                 row = i + 1 if order % 2 == 0 else rows - i
                 if may_change[row]:
                     may_change[row] = False
-                    if cheapen_row(far, cost[row - 1], row, order < 2, limits, costs):
+                    is_forwards = (order < 2) == goal_is_left
+                    if cheapen_row(far, cost[row - 1], row, is_forwards, limits, costs):
                         may_change[row - 1 : row + 2] = True
     return far[1:-1, 1:-1].copy()
 

@@ -20,7 +20,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import POWER, UNAFFECTED, UNDEFINED, Verdict, level_of
 
 from . import section, templates
-from .answer_notes import notes
+from .answer_notes import notes, reason_to_be_open
 from .section import Section
 from .templates import Slots, fill
 
@@ -115,6 +115,8 @@ class Line(NamedTuple):
             return "untestable", {"words": words, "threshold": estimate.threshold}
         if "unbounded" in first.flags and first.on_property.adjusted in section.DECIDED:
             return "unbounded", {"words": words}
+        if self.reason:
+            return "open_for_a_reason", {"words": words, "reason": self.reason}
         if first.conclusion == "open":
             # An effect on the side of the value, which 80 % power finds.
             effect = estimate.threshold + math.copysign(
@@ -125,6 +127,11 @@ class Line(NamedTuple):
                 n_more, threshold = n_needed - estimate.n_seeds, estimate.threshold
                 return "more_runs", {"n_more": n_more, "effect": effect, "threshold": threshold}
         return "words", {"words": words}
+
+    @property
+    def reason(self) -> str:
+        """Why its one verdict is open though its interval lies on one side; empty: no reason."""
+        return reason_to_be_open(self.verdicts[0]) if len(self.verdicts) == 1 else ""
 
     @property
     def needs_runs(self) -> bool:
@@ -205,7 +212,8 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     policies = results.policies
     indicators = list(DEFINITIONS)
     lines.sort(key=lambda line: (policies.index(line.policy), indicators.index(line.indicator)))
-    notes_text = notes(results, needs_runs=any(line.needs_runs for line in lines))
+    needs_runs = any(line.needs_runs for line in lines)
+    notes_text = notes(results, needs_runs, {line.reason for line in lines})
     return Answer(_scope(results), performance_of(results), tuple(lines), notes_text)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.tasks.task import DEFAULT
 from swarm_logistics_env.verdicts.collapses import collapses
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
@@ -13,19 +14,24 @@ from . import section, templates
 from .collapse_tables import collapsed_in_words
 from .templates import Slots, fill
 
+_FEW_ITEMS = 1.0  # in a run, of which shares say little
 
-def notes(results: StudyResults, needs_runs: bool) -> str:
+
+def notes(results: StudyResults, needs_runs: bool, reasons: Collection[str]) -> str:
     """Return the notes on the answer of a study, in one line.
 
     Args:
         needs_runs: whether a line of it says how many more runs it takes.
+        reasons: why verdicts are open, names in `REASONS_TO_BE_OPEN` that its lines say.
     """
-    slots_by_case = dict(_notes_that_apply(results, needs_runs))
+    slots_by_case = dict(_notes_that_apply(results, needs_runs, reasons))
     line = "; ".join(fill(templates.NOTES, slots_by_case))
     return f"{line[0].upper()}{line[1:]}."
 
 
-def _notes_that_apply(results: StudyResults, needs_runs: bool) -> Iterator[tuple[str, Slots]]:
+def _notes_that_apply(
+    results: StudyResults, needs_runs: bool, reasons: Collection[str]
+) -> Iterator[tuple[str, Slots]]:
     """Yield the notes on an answer that apply, each with its slots; `NOTES` has their order."""
     verdicts = results.verdicts
     is_paired = results.plan.paired
@@ -44,6 +50,8 @@ def _notes_that_apply(results: StudyResults, needs_runs: bool) -> Iterator[tuple
     for flag in ("cannot_fail", "too_few_seeds"):
         if flag in flags:
             yield flag, {}
+    if _delivers_little(results):
+        yield "few_items", {}
     if results.damage:
         yield "damage", {"damage": results.damage}
     if results.exploratory:
@@ -58,14 +66,13 @@ def _notes_that_apply(results: StudyResults, needs_runs: bool) -> Iterator[tuple
     if named := collapses(results.cells):
         words = collapsed_in_words(named, names_policies=len(results.policies) > 1)
         yield "collapsed_runs", {"conditions": words}
-    open_verdicts = [verdict for verdict in verdicts if verdict.conclusion == "open"]
     if needs_runs:
         yield "more_runs", {"runs": "seeds" if is_paired else "trials a condition"}
-    elif open_verdicts:
+    elif any(verdict.conclusion == "open" for verdict in verdicts):
         yield "open", {"runs": "seeds" if is_paired else "trials"}
-    reasons = list(_reasons_to_be_open(open_verdicts))
-    if reasons:
-        yield "open_at_an_interval_on_one_side", {"reasons": " or ".join(reasons)}
+    for reason, words in templates.REASONS_TO_BE_OPEN.items():
+        if reason in reasons:
+            yield f"open_{reason}", {"reason": reason, "words": words}
     claims_of_text = results.reference.claims if results.reference else {}
     claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
     in_text = [verdict for verdict in claims if verdict.compared.question in claims_of_text]
@@ -77,13 +84,27 @@ def _notes_that_apply(results: StudyResults, needs_runs: bool) -> Iterator[tuple
         yield case, _claims(not_in_text)
 
 
-def _reasons_to_be_open(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """Yield why verdicts are open though their intervals lie on one side of the threshold."""
-    one_sided = [verdict for verdict in verdicts if verdict.lies_above is not None]
-    if any("hidden_stalls" in verdict.flags for verdict in one_sided):
-        yield templates.REASONS_TO_BE_OPEN["hidden_stalls"]
-    if any(verdict.on_threshold.plain in section.DECIDED for verdict in one_sided):
-        yield templates.REASONS_TO_BE_OPEN["holm"]
+def _delivers_little(results: StudyResults) -> bool:
+    """Return whether swarms in a warehouse that are as they should be deliver hardly anything."""
+    originals = [results.cells_of(v.compared)[v.compared.original] for v in results.verdicts]
+    return any(
+        cell.n_seeds and cell.arm.case.task.name == DEFAULT and cell.mean.value < _FEW_ITEMS
+        for cell in originals
+    )
+
+
+def reason_to_be_open(verdict: Verdict) -> str:
+    """Return why a verdict is open although its interval lies on one side of the threshold.
+
+    Returns:
+        A name in `REASONS_TO_BE_OPEN`; empty: it is not open, or its interval holds the threshold.
+    """
+    if verdict.conclusion != "open" or verdict.lies_above is None:
+        return ""
+    for flag, reason in templates.REASON_OF_FLAG.items():
+        if flag in verdict.flags:
+            return reason
+    return "Holm" if verdict.on_threshold.plain in section.DECIDED else ""
 
 
 def _claims(verdicts: Sequence[Verdict]) -> Slots:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from more_itertools import map_reduce
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm
+from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm, Comparison
 from swarm_logistics_env.spi.estimate import LEAST_TRAININGS
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.verdicts.cell import Cell
@@ -29,11 +32,40 @@ from .section import (
 from .tables import CONTACTS_HEADING, contacts_text
 
 STUDY = "benchmark"
+# P of the local scripts in each world, and scores of policies; `docs/play_tables.py` writes it.
+ENTRIES = Path(__file__).parent / "benchmark_entries.json"
 HELD_OUT = "Held out"  # how the titles of its tables begin that give the score
 RESAMPLES = 2_000
 
 
-def table(results: StudyResults) -> Section:
+@dataclass(frozen=True)
+class Entries:
+    """What a policy is set beside.
+
+    Attributes:
+        references: world -> P of the local script that delivers the most in it, without a fault
+            [items].
+        scores: policy -> its `score`, (K, n) or (n,).
+    """
+
+    references: Mapping[str, float]
+    scores: Mapping[str, Numbers]
+
+    @classmethod
+    def read(cls) -> Entries:
+        """Return the entries that the package has."""
+        recorded = json.loads(ENTRIES.read_text(encoding="utf-8"))
+        scores = {name: np.array(score) for name, score in recorded["scores"].items()}
+        return cls(recorded["references"], scores)
+
+    def write(self) -> None:
+        """Make them the entries that the package has."""
+        scores = {name: np.asarray(score).tolist() for name, score in self.scores.items()}
+        text = json.dumps({"references": dict(self.references), "scores": scores})
+        ENTRIES.write_text(text + "\n", encoding="utf-8")
+
+
+def table(results: StudyResults, references: Mapping[str, float]) -> Section:
     """Return P, contacts, S, R or A, and FT of every condition, those of a title together."""
     level = results.level
     rows: list[Texts] = []
@@ -67,11 +99,11 @@ def table(results: StudyResults) -> Section:
             f"FT [{percent(level)}]",
         ),
         tuple(rows),
-        tuple(_notes(results)),
+        tuple(_notes(results, references)),
     )
 
 
-def _notes(results: StudyResults) -> Iterator[str]:
+def _notes(results: StudyResults, references: Mapping[str, float]) -> Iterator[str]:
     verdict, share = worst(results)
     cells = results.cells_of(verdict.compared)
     changed = cells[verdict.compared.changed]
@@ -80,10 +112,10 @@ def _notes(results: StudyResults) -> Iterator[str]:
         f"Worst cell: {verdict.compared.table}, {changed.words}: P {mean_p(changed)}, {share:.0%} "
         f"of {mean_p(original)}."
     )
-    held_out = bracketed(spi.mean_interval(score(results), CONFIDENCE), 1)
+    held_out = bracketed(spi.mean_interval(score(results, references), CONFIDENCE), 2)
     yield (
-        f"Score: mean P of the {len(_held_out(results))} held-out cells {held_out}, {P_LEVEL} "
-        "interval."
+        f"Score {held_out}, {P_LEVEL} interval: the mean share of the best local script's P, over "
+        f"the {len(_held_out(results))} held-out cells."
     )
 
 
@@ -107,17 +139,51 @@ def worst(results: StudyResults) -> tuple[Verdict, float]:
     return min(shares, key=lambda verdict_and_share: verdict_and_share[1])
 
 
-def score(results: StudyResults) -> Numbers:
-    """Return mean P over the held-out conditions, of every training and seed, (K, n) or (n,).
+def score(results: StudyResults, references: Mapping[str, float]) -> Numbers:
+    """Return the mean share of the best local script's P over the held-out conditions.
+
+    Args:
+        references: of `Entries`.
+
+    Returns:
+        The score of every training and seed, (K, n) or (n,).
 
     Raises:
         StudyError: runs are missing, or failed.
     """
-    cells = _held_out(results)
-    for arm, cell in cells.items():
+    shares = []
+    for comparison, cell in _held_out(results).items():
         if cell.problem:
-            raise StudyError(f"{arm.setting}: {cell.problem}, so there is no score")
-    return np.asarray(np.mean([cell.by_seed for cell in cells.values()], axis=0))
+            raise StudyError(f"{comparison.label}: {cell.problem}, so there is no score")
+        shares.append(cell.by_seed / references[_world_of(comparison)])
+    return np.asarray(np.mean(shares, axis=0))
+
+
+def best_scripts(studies: Sequence[StudyResults]) -> dict[str, tuple[str, Cell]]:
+    """Return by world which script delivers the most in it without a fault, and its runs.
+
+    Args:
+        studies: the benchmark's study of each local script.
+    """
+    best: dict[str, tuple[str, Cell]] = {}
+    for results in studies:
+        for comparison in _held_out(results):
+            world, cells = _world_of(comparison), results.cells_of(comparison)
+            cell = cells[_sound_arm(comparison)]
+            if world not in best or cell.mean.value > best[world][1].mean.value:
+                best[world] = results.policies[0], cell
+    return best
+
+
+def _sound_arm(comparison: Comparison) -> Arm:
+    """Return the arm without a fault in the world of the changed condition."""
+    is_fault = comparison.changed.setting.kind == "fault"
+    return comparison.original if is_fault else comparison.changed
+
+
+def _world_of(comparison: Comparison) -> str:
+    """Return the name of the world that a condition is played in."""
+    return f"{comparison.table}, {_sound_arm(comparison).setting}"
 
 
 def contacts(results: StudyResults) -> str:
@@ -126,12 +192,14 @@ def contacts(results: StudyResults) -> str:
     return NOTHING if np.isnan(mean) else f"{mean:.1f}"
 
 
-def _held_out(results: StudyResults) -> dict[Arm, Cell]:
-    return {
-        verdict.compared.changed: results.cells_of(verdict.compared)[verdict.compared.changed]
+def _held_out(results: StudyResults) -> dict[Comparison, Cell]:
+    """Return the cell of every held-out condition, by one of its comparisons."""
+    comparisons = {
+        verdict.compared.changed: verdict.compared
         for verdict in results.verdicts
         if verdict.compared.table.startswith(HELD_OUT)
     }
+    return {c: results.cells_of(c)[changed] for changed, c in comparisons.items()}
 
 
 def leaderboard(entries: Mapping[str, Numbers]) -> Section:
@@ -152,7 +220,7 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
     rows = tuple(
         (
             name,
-            bracketed(spi.mean_interval(entries[name], CONFIDENCE), 1),
+            bracketed(spi.mean_interval(entries[name], CONFIDENCE), 2),
             *of_name.get(name, ("open", NOTHING)),
         )
         for name in names
@@ -162,7 +230,10 @@ def leaderboard(entries: Mapping[str, Numbers]) -> Section:
         ("policy", f"score [{P_LEVEL}]", f"rank [{P_LEVEL}]", "same rank"),
         rows,
         (
-            "Score: mean P of the held-out cells, over trainings and seeds.",
+            (
+                "Score: P as a share of the best local script's in the same world without a fault, "
+                "the mean of the held-out cells."
+            ),
             f"Limits of a rank, and how often it is the same: of {RESAMPLES} resamples of both.",
             f"Open: of fewer than {LEAST_TRAININGS} trainings, too few for a rank.",
         ),

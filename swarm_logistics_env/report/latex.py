@@ -16,7 +16,8 @@ from .for_a_paper import world_in_words
 from .section import SATURATED, Section, Texts, conclusion_text, join_names, slug
 from .tables import tables
 
-_HOLM = "Verdicts are adjusted by Holm's method over all comparisons of an indicator."
+_HOLM = "Verdicts are adjusted by Holm's method over all questions on an indicator."
+_LETTERS_OF_A_COLUMN = 65  # in a column of 3.5 inch, with room between the table's columns
 _NUMBER = re.compile(r"(?<![\w.-])-?(?:\d+(?:\.\d+)?|∞)(?![\w.]| (?!to )[a-z])")
 _ROOM = r"(?:\\phantom\{[^}]*\})+"
 _ESCAPES = {
@@ -106,8 +107,9 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     caption = [f"{section.title}.", about, intervals, *(section.lines or [_HOLM]), capped]
     columns = [_aligned(column) for column in zip(*section.rows)]
     columns[0] = [_escape(row[0]) for row in section.rows]
-    # Over both columns of a page that has two.
-    environment = "table*" if len(columns) > 4 else "table"
+    n_letters = sum(max(map(len, column)) for column in zip(section.columns, *section.rows))
+    # Over both columns of a page that has two, if it needs them.
+    environment = "table*" if n_letters > _LETTERS_OF_A_COLUMN else "table"
     yield rf"\begin{{{environment}}}"
     yield r"\centering"
     yield rf"\caption{{{_escape(' '.join(filter(None, caption)))}}}"

@@ -68,6 +68,7 @@ LINE = {
     "unaffected": "{words}, exact",
     "untestable": "{words}: it cannot be below {threshold:g}",
     "unbounded": "{words} by its test; P_o is too near 0 for an interval",
+    "open_for_a_reason": "{words} ({reason})",
     "more_runs": "open; {n_more} more to tell {effect:g} from {threshold:g}",
 }
 
@@ -80,6 +81,7 @@ NOTES = {
     "few_seeds": "provisional (below ten seeds)",
     "cannot_fail": "untestable where it cannot lie below the threshold, as P cannot below 0",
     "too_few_seeds": "two seeds give no verdict",
+    "few_items": "P is small: a longer duration tells more",
     "damage": "{damage}",
     "exploratory": "exploratory: other seeds than were declared, whose report this replaces",
     "late_margin": "equivalence is exploratory: another margin was declared",
@@ -88,14 +90,23 @@ NOTES = {
     "collapsed_runs": "runs collapse {conditions}",
     "open": "open: undecided by these {runs}",
     "more_runs": "open: undecided; so many more {runs} would tell in 4 of 5 studies",
-    "open_at_an_interval_on_one_side": "open beside an interval on one side of it: {reasons}",
+    "open_stalls": "({reason}): {words}",
+    "open_trainings": "({reason}): {words}",
+    "open_Holm": "({reason}): {words}",
     "claims_of_the_text": "of {claims} in the paper's text {counts}",
     "claims_beside_the_text": "of {claims} beside it {counts}",
     "claims_without_text": "of {claims} {counts}",
 }
+# Why a verdict is open although its interval lies on one side, and the flags that say so.
 REASONS_TO_BE_OPEN = {
-    "hidden_stalls": "so few seeds may hide stalls",
-    "holm": "Holm counts all questions",
+    "stalls": "so few seeds may hide stalled runs",
+    "trainings": "so few trainings may hide collapses",
+    "Holm": "decided alone, not among all questions on the indicator",
+}
+REASON_OF_FLAG = {
+    "hidden_stalls": "stalls",
+    "hidden_collapses": "trainings",
+    "few_trainings": "trainings",
 }
 
 # The sentence that a paper can quote: the cases that apply, one after the other.

@@ -222,7 +222,11 @@ class Definition:
         if self.compares == "size":
             return None
         _, changed, *_ = self.performances.values()
-        return f"{changed} within {100 * margin:.3g} % of {' from '.join(self.references)}"
+        share = f"{100 * margin:.3g} %"
+        reference, *compared = self.references
+        if compared:
+            return f"{changed} and {compared[0]} differ by less than {share} of {reference}"
+        return f"{changed} within {share} of {reference}"
 
 
 DEFINITIONS: dict[str, Definition] = {

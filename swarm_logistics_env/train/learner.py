@@ -12,6 +12,7 @@ import inspect
 import io
 import math
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +125,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         self._privileged = np.zeros((worlds.num_envs, len(PRIVILEGED)), np.float32)
         self._n_episodes = 0
         self._seed = 0
+        self._n_held = training.network.decides_every - 1
         super().__init__(
             worlds,
             Box(-np.inf, np.inf, (len(INPUTS) + len(PRIVILEGED),), np.float32),
@@ -155,11 +157,17 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
+        self._outputs = actions
         self.venv.step_async(self.frame.command(actions))
 
     def step_wait(self) -> Any:
-        """Step every world."""
+        """Step every world until the next decision."""
         observations, rewards, dones, infos = self.venv.step_wait()
+        for _ in range(self._n_held):
+            self.frame.hold(observations)
+            self.venv.step_async(self.frame.command(self._outputs))
+            observations, more, dones, infos = self.venv.step_wait()
+            rewards = rewards + more
         ended = np.flatnonzero(dones)
         if ended.size:
             last = np.stack([infos[row]["terminal_observation"] for row in ended.tolist()])
@@ -170,9 +178,14 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             self.frame.begin_rows(ended, self._keys()[ended], self._bodies()[ended])
         return self._read(observations), rewards, dones, infos
 
+    def change_rewards(self, rewards: Mapping[str, float]) -> None:
+        """Pay by other weights from the next step on, in every world."""
+        for world in self.venv.worlds:
+            world.unwrapped.change_rewards(rewards)
+
     def _bodies(self) -> NDArray[np.float64]:
         # Every episode may have robots of another kind.
-        bodies = np.empty((self.num_envs, 3))
+        bodies = np.empty((self.num_envs, 4))
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
             bodies[rows] = body_of(world.warehouse.scenario)
         return bodies
@@ -205,12 +218,10 @@ FIRST_OUTPUTS = (0.8, 0.0, 0.0)
 def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
     """Return PPO as the training asks for it; seeds the worlds and global generators."""
     ppo, network = training.ppo, training.network
-    first, last = ppo.learning_rate, ppo.final_learning_rate
     learner = PPO(
         AsymmetricPolicy,
         view,
-        # The last rollout may pass the end of a training, where the rate would go on to fall.
-        learning_rate=lambda left: max(0.0, last + left * (first - last)),
+        learning_rate=lambda left: ppo.rate(1.0 - left),
         n_steps=ppo.n_steps,
         batch_size=training.rows * ppo.n_steps // ppo.n_minibatches,
         n_epochs=ppo.epochs,

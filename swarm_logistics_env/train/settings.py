@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -80,7 +81,8 @@ class WorldKind(Part):
     Args:
         count: how many.
         n_robots: the swarm size.
-        scenario: fields in which they differ from the training's scenario.
+        scenario: fields in which they differ from the training's scenario; with "preset", from
+            that preset.
         conditions: kinds of episodes that are mixed in these worlds; none: the training's.
     """
 
@@ -123,7 +125,9 @@ class PPOSettings(Part):
         n_minibatches: the number of parts that a batch is divided into.
         epochs: the number of passes over a batch.
         learning_rate: the rate at the start; it falls linearly to `final_learning_rate`.
-        final_learning_rate: the rate at the end.
+        final_learning_rate: the rate at the end, and before it begins anew.
+        restarts: pairs (share of the training, rate) at which the rate begins anew, and with it
+            Adam's averages (warm restarts, Loshchilov and Hutter 2017) and the episodes.
         gamma: the discount of a control step.
         gae_lambda: lambda of generalised advantage estimation (Schulman et al. 2016).
         clip: the largest distance from 1 at which the ratio of an action's probabilities pays.
@@ -146,6 +150,7 @@ class PPOSettings(Part):
     epochs: PositiveInt = 4
     learning_rate: PositiveFloat = 3e-4
     final_learning_rate: NonNegativeFloat = 0.0
+    restarts: tuple[tuple[Fraction, PositiveFloat], ...] = ()
     gamma: Fraction = 0.995
     gae_lambda: Fraction = 0.95
     clip: PositiveFloat = 0.2
@@ -157,6 +162,29 @@ class PPOSettings(Part):
     least_deviation: tuple[PositiveFloat, PositiveFloat] = (0.001, 0.001)
     least_until: Fraction = 1.0
     value_hidden: tuple[PositiveInt, ...] = (128, 128)
+
+    @field_validator("restarts")
+    @classmethod
+    def _check_restarts(
+        cls, restarts: tuple[tuple[float, float], ...]
+    ) -> tuple[tuple[float, float], ...]:
+        ends = [*(share for share, _ in restarts), 1.0]
+        if any(before >= after for before, after in pairwise(ends)):
+            raise ValueError("should be one after another, all before the end, 1.0")
+        return restarts
+
+    def rate(self, done: float) -> float:
+        """Return the learning rate once a share `done` of the training is over."""
+        n_restarts = self.restarts_before(done)
+        begin, first = ((0.0, self.learning_rate), *self.restarts)[n_restarts]
+        end = (*(share for share, _ in self.restarts), 1.0)[n_restarts]
+        # The last rollout may pass the end of a training, where the rate would go on to fall.
+        progress = min(1.0, (done - begin) / (end - begin))
+        return first + progress * (self.final_learning_rate - first)
+
+    def restarts_before(self, done: float) -> int:
+        """Return how often the rate began anew before a share `done` of the training was over."""
+        return sum(share <= done for share, _ in self.restarts)
 
     def floor(self, done: float) -> float:
         """Return the least deviation once a share `done` of the training is over."""

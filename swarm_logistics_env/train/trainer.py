@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
@@ -256,7 +257,10 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
     def _on_rollout_start(self) -> None:
         self._log.cpu_seconds += time.process_time() - self._cpu
-        floor = self._training.ppo.floor(self.num_timesteps / self._training.agent_steps)
+        progress = self.num_timesteps / self._training.agent_steps
+        if self._training.final_rewards:
+            self.model.env.change_rewards(self._training.rewards_at(progress))
+        floor = self._training.ppo.floor(progress)
         with torch.no_grad():
             self.model.policy.log_std.clamp_(min=math.log(floor))
         curve = self._log.curve
@@ -268,6 +272,16 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         if time.monotonic() - self._saved_at >= CHECKPOINT_EVERY:
             self._save()
         self._cpu = time.process_time()
+
+    def _on_rollout_end(self) -> None:
+        training, ppo = self._training, self._training.ppo
+        done = self.num_timesteps / training.agent_steps
+        before = done - training.rows * ppo.n_steps / training.agent_steps
+        if ppo.restarts_before(before) < ppo.restarts_before(done):
+            # From here on it is as a training that begins with these weights.
+            self.model.policy.optimizer.state.clear()
+            self.model._last_obs = self.model.env.reset()
+            self.model._last_episode_starts = np.ones(training.rows, np.bool_)
 
     def _on_training_end(self) -> None:
         self._log.cpu_seconds += time.process_time() - self._cpu

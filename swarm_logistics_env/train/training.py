@@ -17,9 +17,11 @@ from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.records import FileName, each_of, one_of, read_table
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import generator
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
+    Fraction,
     Indicators,
     Part,
     PPOSettings,
@@ -38,13 +40,18 @@ PRESETS_FOLDER = Path(__file__).parent / "presets"
 Seed = Annotated[int, Field(ge=0, lt=2**32)]
 
 
+def _scenario_of(fields: object) -> object:
+    return WAREHOUSE.vary(Scenario(), fields) if isinstance(fields, dict) else fields
+
+
 class Training(Part):
     """Everything that decides the result of a training.
 
     Args:
         name: the policy's name.
         about: a sentence about the policy, for its card.
-        scenario: the conditions; a table of fields makes one.
+        scenario: the conditions; a table of fields makes one, in which "preset" names the scenario
+            to start from.
         worlds: kinds of worlds that run side by side. A training begins to learn in easy ones,
             which therefore stand beside the hard ones.
         threads: how many threads step the worlds, and how many processes measure the scores; no
@@ -52,6 +59,9 @@ class Training(Part):
         seed: the number that decides everything random.
         agent_steps: decisions of single robots to learn from, over all worlds.
         rewards: task reward: term -> weight, see `rewards.REWARD_TERMS`.
+        final_rewards: later weights of those terms whose weight changes, linearly until
+            `final_rewards_from`.
+        final_rewards_from: the share of the training after which weights change no more.
         indicators: the indicators that are paid beside the task reward; none: the task reward.
         conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
@@ -65,7 +75,7 @@ class Training(Part):
 
     name: FileName = "policy"
     about: str = ""
-    scenario: Annotated[Scenario, BeforeValidator(one_of(Scenario))] = Scenario(restock=True)
+    scenario: Annotated[Scenario, BeforeValidator(_scenario_of)] = Scenario(restock=True)
     worlds: Annotated[
         tuple[WorldKind, ...], Field(min_length=1), BeforeValidator(each_of(WorldKind))
     ] = (WorldKind(count=6),)
@@ -73,6 +83,8 @@ class Training(Part):
     seed: Seed = 0
     agent_steps: PositiveInt = 2_000_000
     rewards: dict[str, float] = Field(default_factory=lambda: {"delivery": 1.0})
+    final_rewards: dict[str, float] = Field(default_factory=dict)
+    final_rewards_from: Fraction = 1.0
     indicators: Annotated[Indicators | None, BeforeValidator(one_of(Indicators))] = None
     conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
     network: Annotated[Network, BeforeValidator(one_of(Network))] = Network()
@@ -90,6 +102,11 @@ class Training(Part):
     def _check_consistency(self) -> Self:
         if any(scenario.message_size for _, scenario in self.each_world):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
+        self._check_decisions()
+        RewardTerms(self.final_rewards)
+        for term in self.final_rewards:
+            if term not in self.rewards:
+                raise ValueError(f"final_rewards: {term!r} should be among the rewards, too")
         sizes = {self.evaluation.n_robots, *(self.scores.sizes if self.scores.seeds else ())}
         for size in sorted(sizes):
             self.scenario.replace(n_robots=size)
@@ -109,11 +126,33 @@ class Training(Part):
             )
         return self
 
+    def _check_decisions(self) -> None:
+        """Raise a ValueError if an episode could end between two decisions."""
+        every = self.network.decides_every
+        mixed = [*self.conditions, *(kind for world in self.worlds for kind in world.conditions)]
+        changed = {name for kind in mixed for name in kind.scenario}
+        ends_between = changed & {"duration", "control_period", "restock"} or any(
+            scenario.n_steps % every or not scenario.restock for _, scenario in self.each_world
+        )
+        if every > 1 and ends_between:
+            raise ValueError(
+                f"network.decides_every = {every}: should divide the control steps of each episode,"
+                " and delivered items should come back, or episodes end between two decisions"
+            )
+
+    def rewards_at(self, progress: float) -> dict[str, float]:
+        """Return the weights of the reward's terms at a time of the training, from 0 to 1."""
+        ends = {**self.rewards, **self.final_rewards}
+        change = min(progress / self.final_rewards_from, 1.0)
+        return {
+            term: weight + change * (ends[term] - weight) for term, weight in self.rewards.items()
+        }
+
     @property
     def each_world(self) -> tuple[tuple[WorldKind, Scenario], ...]:
         """The kind and the scenario of every world."""
         return tuple(
-            (kind, self.scenario.replace(n_robots=kind.n_robots, **kind.scenario))
+            (kind, WAREHOUSE.vary(self.scenario, {"n_robots": kind.n_robots, **kind.scenario}))
             for kind in self.worlds
             for _ in range(kind.count)
         )

@@ -68,8 +68,8 @@ def may_drive(world: World, robot: int) -> bool:
 
 
 @inlined_kernel
-def wanted_motion(world: World, robot: int) -> tuple[float, float, float, float]:
-    """Return what a robot is commanded: forward and left, the speed [m/s] they scale, turn [rad/s].
+def wanted_motion(world: World, robot: int) -> tuple[float, float, float, float, float]:
+    """Return what a robot wants: forward, left, the speed [m/s] they scale, turn and drift [rad/s].
 
     Commands beyond [-1, 1] are cut, and the speed to the top speed whatever the direction. A robot
     turns as commanded and by its heading drift, unless its motor is dead; one that is not holonomic
@@ -83,7 +83,7 @@ def wanted_motion(world: World, robot: int) -> tuple[float, float, float, float]
     turn = min(max(command[TURN], -1.0), 1.0)
     max_turn_rate = able.max_turn_rate[robot]
     drift = world.robots.heading_drift[robot] if max_turn_rate > 0.0 else 0.0
-    return forward, left, speed, turn * max_turn_rate + drift
+    return forward, left, speed, turn * max_turn_rate, drift
 
 
 @kernel
@@ -92,9 +92,9 @@ def list_motions(world: World, motions: Numbers) -> None:
     motions[:] = 0.0
     for robot in range(len(motions)):
         if may_drive(world, robot):
-            forward, left, speed, turn_rate = wanted_motion(world, robot)
+            forward, left, speed, turn_rate, drift = wanted_motion(world, robot)
             motions[robot, 0], motions[robot, 1] = speed * forward, speed * left
-            motions[robot, 2] = turn_rate
+            motions[robot, 2] = turn_rate + drift
 
 
 @kernel
@@ -108,9 +108,11 @@ def drive(world: World) -> None:
         wanted_velocity[robot, 0] = 0.0
         wanted_velocity[robot, 1] = 0.0
         if not may_drive(world, robot):
+            robots.turn_rate[robot] = -robots.heading_drift[robot]
             continue
-        forward, left, speed, turn_rate = wanted_motion(world, robot)
-        angle = turn_rate * world.parameters.control_period
+        forward, left, speed, turn_rate, drift = wanted_motion(world, robot)
+        robots.turn_rate[robot] = turn_rate + drift - robots.heading_drift[robot]
+        angle = (turn_rate + drift) * world.parameters.control_period
         heading = robots.heading[robot]
         cosine, sine = math.cos(heading + 0.5 * angle), math.sin(heading + 0.5 * angle)
         wanted_velocity[robot, 0] = speed * (forward * cosine - left * sine)

@@ -82,6 +82,7 @@ def count_motion(world: World) -> None:
     counts, robots, bodies = world.contacts, world.robots, world.engine.bodies.numbers
     period, total = world.parameters.control_period, counts.acceleration_sum[0]
     for robot in range(len(robots.item)):
+        counts.closing[robot] = 0.0
         for axis in range(2):
             counts.position_before[robot, axis] = robots.position[robot, axis]
             counts.velocity_before[robot, axis] = robots.velocity[robot, axis]
@@ -112,8 +113,12 @@ def count_overlap(me: int, other: int, square: float, world: World) -> None:
     rate_x = velocity[other, 0] - velocity[me, 0]
     rate_y = velocity[other, 1] - velocity[me, 1]
     counts.n_contacts[0] += 1
-    if -(x * rate_x + y * rate_y) > FAST * math.sqrt(square_before):
+    closing = -(x * rate_x + y * rate_y)
+    if closing > FAST * math.sqrt(square_before):
         counts.n_fast[0] += 1
+    if closing > 0.0:
+        counts.closing[me] += closing / math.sqrt(square_before)
+        counts.closing[other] += closing / math.sqrt(square_before)
 
 
 @kernel

@@ -211,6 +211,7 @@ def take_out(world: World, robot: int) -> None:
     robots.position[robot, :] = 0.0
     robots.velocity[robot, :] = 0.0
     robots.heading[robot] = 0.0
+    robots.turn_rate[robot] = 0.0
 
 
 @inlined_kernel

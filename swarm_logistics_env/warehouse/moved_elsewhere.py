@@ -13,7 +13,7 @@ from swarm_logistics_env.scenario import Scenario
 from . import stepping
 from .physics import N_CORNERS
 from .state import WarehouseState
-from .structs import NOBODY, Sensed, World
+from .structs import NOBODY, Numbers, Sensed, World
 
 
 class MovedElsewhere:
@@ -40,6 +40,7 @@ class MovedElsewhere:
         )
         self._bodies = bodies
         self._size = np.array([scenario.warehouse_width, scenario.warehouse_height])
+        self._period = scenario.control_period
         self._motions = np.zeros((scenario.n_robots, 3))
 
     def step(self, address: int, world: World, state: WarehouseState, rows: Sensed) -> bool:
@@ -63,6 +64,14 @@ class MovedElsewhere:
         # Walls are the world's: nobody is outside, whatever a camera says.
         moved[is_seen, :2] = np.clip(poses.position[is_seen], 0.0, self._size)
         moved[is_seen, 2:] = poses.velocity[is_seen]
-        turned = np.remainder(poses.heading[is_seen] + math.pi, 2.0 * math.pi) - math.pi
-        state.robot_heading[is_seen] = turned
+        heading = within_half_a_turn(poses.heading[is_seen])
+        turned = within_half_a_turn(heading - state.robot_heading[is_seen])
+        drift = state.robot_heading_drift[is_seen]
+        state.robot_turn_rate[is_seen] = turned / self._period - drift
+        state.robot_heading[is_seen] = heading
         return stepping.follow_bodies(address, rows)
+
+
+def within_half_a_turn(angle: Numbers) -> Numbers:
+    """Return angles [rad] less whole turns, within +-pi."""
+    return np.remainder(angle + math.pi, 2.0 * math.pi) - math.pi

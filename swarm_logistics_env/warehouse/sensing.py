@@ -109,7 +109,7 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
 
 @inlined_kernel
 def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
-    """Fill the end of a row: load, delivery area, timer, velocity and contact."""
+    """Fill the end of a row: load, delivery area, timer, velocity, contact and turn rate."""
     robots, parameters = world.robots, world.parameters
     velocity_x, velocity_y = robots.velocity[me, 0], robots.velocity[me, 1]
     forward = velocity_x * pose.cosine + velocity_y * pose.sine
@@ -127,3 +127,5 @@ def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     out[row.VELOCITY] = min(max(forward, -limit), limit)
     out[row.VELOCITY + 1] = min(max(left, -limit), limit)
     out[row.CONTACT] = 1.0 if robots.contact[me] else 0.0
+    limit = parameters.max_turn_rate
+    out[row.TURN_RATE] = min(max(robots.turn_rate[me], -limit), limit)

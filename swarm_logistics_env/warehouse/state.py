@@ -40,6 +40,7 @@ class WarehouseState:
     robot_velocity: Numbers
     robot_heading: Numbers
     robot_heading_drift: Numbers
+    robot_turn_rate: Numbers
     robot_present: Flags
     robot_in_delivery: Flags
     robot_contact: Flags

@@ -41,6 +41,7 @@ class Parameters(NamedTuple):
     item_radius: float
     obstacle_radius: float
     max_speed: float
+    max_turn_rate: float
     max_acceleration: float
     ranger_range: float
     view_range: float
@@ -71,6 +72,7 @@ class Robots(NamedTuple):
     velocity: Annotated[Numbers, "N", 2]  # [m/s]
     heading: Annotated[Numbers, "N"]  # [rad] from +x to the left, within +-pi
     heading_drift: Annotated[Numbers, "N"]  # [rad/s] at which its body turns unasked
+    turn_rate: Annotated[Numbers, "N"]  # [rad/s] as its gyro tells, which misses the drift
     present: Annotated[Flags, "N"]  # False once it was removed
     failed: Annotated[Flags, "N"]  # any failure mode holds
     in_delivery: Annotated[Flags, "N"]  # its centre is in a dock that takes what it carries
@@ -146,6 +148,7 @@ class ContactCounts(NamedTuple):
 
     position_before: Annotated[Numbers, "N", 2]  # [m] of the robots
     velocity_before: Annotated[Numbers, "N", 2]  # [m/s]
+    closing: Annotated[Numbers, "N"]  # [m/s] of its contacts that began in this step, summed
     n_contacts: Annotated[Integers, 1]  # pairs that began to overlap
     n_fast: Annotated[Integers, 1]  # those of them that closed fast
     is_deep: Annotated[Flags, 1]  # a pair overlaps deeply in this step

@@ -29,7 +29,7 @@ from .wrapper import Wrapper
 class MotionFrame(Wrapper):
     """Gives each robot a memory of its own, and turns what it reads and commands into its motion.
 
-    Observations become rows of `motion.INPUTS` (94 numbers, most within -1 and 1): walls,
+    Observations become rows of `motion.INPUTS` (95 numbers, most within -1 and 1): walls,
     neighbours, items and the lowest timer, relative to the direction in which the robot drives,
     and what it remembers, such as the way to the delivery area. Actions become rows of
     `motion.OUTPUTS`: along and aside, fractions of the top speed, and the gripper, all within -1
@@ -50,7 +50,7 @@ class MotionFrame(Wrapper):
         >>> env = MotionFrame(swarm_logistics_v0.parallel_env(n_robots=3))
         >>> observations, infos = env.reset(seed=0)
         >>> observations["robot_0"].shape, env.action_space("robot_0").shape
-        ((94,), (3,))
+        ((95,), (3,))
     """
 
     def __init__(self, env: SwarmLogisticsEnv | Wrapper, listens: bool = True) -> None:
@@ -69,7 +69,7 @@ class MotionFrame(Wrapper):
         self._spaces_of: dict[frozenset[Scenario], Box] = {}
 
     def observation_space(self, agent: str) -> Box:
-        """Return the space of a row of inputs (94,), the same for every agent."""
+        """Return the space of a row of inputs (95,), the same for every agent."""
         scenarios = self.unwrapped.declared_scenarios
         if scenarios not in self._spaces_of:
             self._spaces_of[scenarios] = _input_space(scenarios)
@@ -82,11 +82,11 @@ class MotionFrame(Wrapper):
     def reset_arrays(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> NDArray[np.float32]:
-        """Begin an episode and return the first inputs (N, 94).
+        """Begin an episode and return the first inputs (N, 95).
 
         Raises:
-            SetupError: as `SwarmLogisticsEnv.reset_arrays`, or the robots are slower to lift, or
-                faster, than the space holds.
+            SetupError: as `SwarmLogisticsEnv.reset_arrays`, or the robots are slower to lift or to
+                gather speed than the space holds.
         """
         seed = self.env.next_seed if seed is None else seed
         scenario = self.scenario_of(seed, checked_options(options))
@@ -94,8 +94,8 @@ class MotionFrame(Wrapper):
         is_declared = scenario in self.unwrapped.declared_scenarios
         if not is_declared and (_input_space([scenario]).high[_OF_BODIES] > most).any():
             raise SetupError(
-                f"handling_time = {scenario.handling_time}, max_speed = {scenario.max_speed}: "
-                "inputs could leave their space; "
+                f"handling_time = {scenario.handling_time}, max_speed = {scenario.max_speed}, "
+                f"max_acceleration = {scenario.max_acceleration}: inputs could leave their space; "
                 "should be declared by env.declare_spaces(scenario)"
             )
         return self._read(super().reset_arrays(seed, options))
@@ -128,14 +128,14 @@ class MotionFrame(Wrapper):
         return inputs
 
 
-_OF_BODIES = [INPUT.top_speed, INPUT.handling_time]
+_OF_BODIES = [INPUT.top_speed, INPUT.handling_time, INPUT.time_to_top_speed]
 _NEVER_NEGATIVE = [
     *(f"wall_{beam}" for beam in range(N_BEAMS)),
     "requested_present", "requested_distance", "requested_nearness", "requested_recently_held",
     "lead_present", "lead_distance", "lead_timer",
     "carrying", "carrying_requested", "in_delivery_area", "timer_runs", "timer", "contact",
     "home_certainty", "failed", "stuck", "cannot_deliver", "cannot_lift", "delivering_in_vain",
-    "items_in_view", "top_speed", "handling_time", "turns_to_drive",
+    "items_in_view", "top_speed", "handling_time", "turns_to_drive", "time_to_top_speed",
 ]  # fmt: skip
 
 
@@ -156,6 +156,7 @@ def _input_space(scenarios: Iterable[Scenario]) -> Box:
             "velocity_aside": speed / 2.0,
             "top_speed": scenario.max_speed / 2.0,
             "handling_time": scenario.handling_time / 2.0,
+            "time_to_top_speed": scenario.max_speed / scenario.max_acceleration,
         }
         for obstacle, part in product(range(N_OBSTACLES), ("along", "aside")):
             most[f"obstacle_{obstacle}_{part}"] = view

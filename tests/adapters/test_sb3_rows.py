@@ -12,6 +12,7 @@ import pytest
 
 from swarm_logistics_env import Fault
 from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.streams import key
 from swarm_logistics_env.wrappers import (
     DiscreteActions,
@@ -70,7 +71,7 @@ def test_rows_are_the_worlds_own_over_several_episodes_and_padding_is_zeros() ->
                 done = is_over or (is_robot and bool(ended[robot]))
                 assert dones[place][robot] == done
                 if done:
-                    last = rows[robot] if is_robot else np.zeros(140)
+                    last = rows[robot] if is_robot else np.zeros(N_COLUMNS)
                     np.testing.assert_array_equal(info.pop("terminal_observation"), last)
                     assert ("episode" in info) == bool(there[place][robot])
                     info.pop("episode", None)

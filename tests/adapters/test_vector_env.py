@@ -34,7 +34,7 @@ def test_gymnasium_makes_it_by_its_name() -> None:
     )
     assert (env.num_envs, env.observation_space.shape, env.action_space.shape) == (
         5,
-        (5, 140),
+        (5, 141),
         (5, 4),
     )
     assert env.spec is not None
@@ -169,7 +169,7 @@ def test_gymnasiums_wrappers_go_around_it() -> None:
     for _ in range(N_STEPS):
         env.action_space.seed(0)
         observations, _, _, truncations, infos = env.step(env.action_space.sample())
-    assert observations.shape == (5, 94)
+    assert observations.shape == (5, 95)
     assert truncations.all()
     assert infos["episode"]["l"].tolist() == [N_STEPS] * 5
 

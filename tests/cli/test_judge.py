@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from swarm_logistics_env.cli import judge_trials
 from swarm_logistics_env.questions.presets import PRESETS
+from swarm_logistics_env.report import benchmark
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.studies import Study
 from tests.cli.conftest import Command
@@ -34,7 +36,9 @@ class Short(Mine):
 
 
 @pytest.fixture(autouse=True)
-def material(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def material(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     """Trials and a policy in the current folder; a policy is judged in a small warehouse."""
     Path("lab.csv").write_text(LAB)
     Path("judged_policy.py").write_text(OWN)
@@ -48,6 +52,8 @@ def material(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     held_out = {"title": "Held out: x", "modes": ["FM1+FM4"], "robots": [1]}
     monkeypatch.setitem(PRESETS, "scorecard", small)
     monkeypatch.setitem(PRESETS, "benchmark", small.replace(seeds=3, faults=[held_out], sizes=[]))
+    monkeypatch.setattr(benchmark, "ENTRIES", tmp_path_factory.mktemp("entries") / "entries")
+    benchmark.Entries({"Held out: x, no fault": 2.0}, {"swarm-dt": np.full(3, 0.5)}).write()
 
 
 TRIALS = "judge lab.csv --column performance=boxes"
@@ -109,6 +115,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
         ("homing --column N=robots", "--column is not for a policy, and 'homing' is one"),
         ("homing --seeds 2", "--seeds"),
         ("homing --benchmark --seeds 5", "same conditions for everybody"),
+        ("homing --benchmark --first-seed 0", "--first-seed: the benchmark has the same"),
     ],
 )
 def test_what_cannot_be_judged_ends_in_one_sentence_before_anything_is_written(
@@ -140,6 +147,12 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     last = printed.splitlines()[-1]
     assert last.startswith(f"{5 * len(study.plan().cases) - 1} runs played in ")
     assert "1 were kept" in last
+
+
+def test_other_seeds_are_judged_in_a_directory_of_their_own(command: Command) -> None:
+    printed = command("judge homing --processes 1 --seeds 3 --first-seed 500")
+    assert Study.stored("results/judged/homing-first-seed-500").plan().seeds == range(500, 503)
+    assert " --first-seed 500 --seeds " in printed
 
 
 def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:

@@ -77,7 +77,7 @@ def test_commands_are_outputs_in_the_robots_own_frames_within_their_limits() -> 
     assert (commands[:, 2] == 0.0).all()
     # In the robots' own frames they ask for the same.
     again = commands.copy()
-    command_own_frames(again, frame.turned, frame.rows, 0.1, frame.memory)
+    command_own_frames(again, frame.turned, frame.rows, frame.memory)
     np.testing.assert_allclose(again, commands, atol=1e-12)
     turned = np.exp(-1j * frame.turned) * (commands[:, 0] + 1j * commands[:, 1])
     np.testing.assert_allclose(turned, outputs[:, 0] + 1j * outputs[:, 1], atol=1e-12)
@@ -182,7 +182,9 @@ def test_a_robot_knows_its_own_body_whatever_its_neighbours_have() -> None:
     frame, rows = MotionView(Scenario()), np.tile(amid(), (2, 1))
     bodies = np.stack([column.body_of(Scenario()), column.body_of(scenario)])
     frame.begin(row_keys(0, "test", 2), bodies)
-    assert frame.read(rows)[:, -3:].tolist() == [[1.0, 0.0, 0.0], [0.5, 0.25, 1.0]]
+    # Its top speed, handling time, whether it turns to drive, and the time to its top speed.
+    body_inputs = frame.read(rows)[:, -4:]
+    np.testing.assert_allclose(body_inputs, [[1.0, 0.0, 0.0, 0.1], [0.5, 0.25, 1.0, 0.05]])
     commands = frame.command(np.array([[0.3, 0.9, 0.0]] * 2))
     assert commands[0, 2] == commands[1, 1] == 0.0
     assert commands[0, 1] != 0.0 != commands[1, 2], "one drives aside, the other one turns"
@@ -195,3 +197,17 @@ def test_of_several_requests_the_nearest_is_read_and_who_carries_sees_obstacles(
     assert told(read, "items_in_view") == 3 / 8
     assert [told(read, f"obstacle_{n}_present") for n in range(4)] == [1.0, 1.0, 1.0, 0.0]
     assert not told(frame_of().read(amid(*items)), "obstacle_0_present")
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.35, -2.0])
+def test_between_decisions_outputs_keep_their_direction_in_the_room(turn: float) -> None:
+    frame = frame_of()
+    rows = np.zeros((1, row.N_COLUMNS), np.float32)
+    frame.read(rows)
+    outputs = np.array([[0.6, 0.3, 0.0]])
+    decided = complex(*frame.command(outputs)[0, :2])
+    rows[0, row.TURN_RATE] = 10.0 * turn  # its body turned in this step
+    frame.hold(rows)
+    held = complex(*frame.command(outputs)[0, :2])
+    assert held == pytest.approx(decided * np.exp(-1j * turn))
+    assert frame.counts.tolist() == [2]

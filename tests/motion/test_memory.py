@@ -94,22 +94,17 @@ def test_a_lift_or_a_delivery_shows_that_the_robot_can(memory: Memory) -> None:
     assert memory[0, column.CANNOT_DELIVER] == memory[0, column.DELIVERING] == 0.0
 
 
-@pytest.mark.parametrize("turn_rate", [0.0, 6.0])
-def test_a_robot_that_lifts_stands_so_that_its_memory_does_not_turn(
-    memory: Memory, turn_rate: float
-) -> None:
-    memory[0, column.HANDLING_TIME], memory[0, column.WIDEST_TURN] = 0.5, 0.1 * turn_rate
-    memory[0, column.HOME_X] = 1.0
-    rows = sensed(item_at=0.1)
-    for _ in range(7):  # the step in which it closes, those of the handling time, and one more
-        command = np.array([0.0, 1.0, 0.0, 1.0])
-        column.stand_to_handle(rows[0], 0.1, memory[0], command)
-        column.steer(memory[0], command)
-        assert command.tolist() == [0.0, 0.0, 0.0, 1.0]
-    assert memory[0, column.HOME_X] == 1.0
-    command = np.array([0.0, 1.0, 0.0, -1.0])
-    column.stand_to_handle(rows[0], 0.1, memory[0], command)
-    assert command[1] == 1.0, "it stood in vain, and drives on"
+def test_its_memory_turns_as_its_gyro_tells_whatever_was_commanded(memory: Memory) -> None:
+    memory[0, column.HOME_X], memory[0, column.HEADING_Y] = 1.0, 1.0
+    rows = sensed()
+    rows[0, row.TURN_RATE] = 2.0  # rad/s to the left, for half a second
+    for _ in range(5):
+        column.remember_observation(rows, 0.1, memory)
+    home = math.atan2(memory[0, column.HOME_Y], memory[0, column.HOME_X])
+    heading = math.atan2(memory[0, column.HEADING_Y], memory[0, column.HEADING_X])
+    assert home == pytest.approx(-1.0, abs=1e-6)
+    assert heading == pytest.approx(0.5 * math.pi - 1.0, abs=1e-6)
+    assert memory[0, column.WALL] == pytest.approx(-1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -9,19 +9,17 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env.policies.crowd import drift, share_items
-from swarm_logistics_env.warehouse.state import NOBODY
+from swarm_logistics_env.warehouse.state import CARRIED, NOBODY, STORED
 
 
 def velocities(position: Any, goals: Any, worker: int = NOBODY, **changed: Any) -> Any:
-    """Return what `drift` fills, of robots that wait under no item and drive 0.2 m a period."""
+    """Return what `drift` does, of robots that wait under no item and drive 0.2 m a period."""
     position, goals = np.array(position, float), np.array(goals, float)
     fields = {
         "present": np.ones(len(position), np.bool_),
         "waits_under": np.full(len(position), NOBODY),
     } | changed
-    velocity = np.full((len(position), 2), np.nan)
-    drift(position, fields["present"], goals, fields["waits_under"], worker, 0.2, velocity)
-    return velocity
+    return drift(position, fields["present"], goals, fields["waits_under"], worker, 0.2)
 
 
 def test_a_robot_alone_drives_to_its_goal_and_is_there_in_one_period_if_it_can() -> None:
@@ -58,8 +56,8 @@ def shared(
     """Return the items of robots at (0, 1), and their goals."""
     position, goals = np.tile([0.0, 1.0], (n_robots, 1)), np.full((n_robots, 2), -1.0)
     items = np.array(waits_under)
-    free = np.array(is_free or [True] * len(ITEMS))
-    share_items(position, ITEMS, free, np.full(n_robots, waits), items, goals)
+    status = np.where(is_free or [True] * len(ITEMS), STORED, CARRIED)
+    share_items(position, ITEMS, status, NOBODY, np.full(n_robots, waits), items, goals)
     return items.tolist(), goals
 
 
@@ -67,6 +65,12 @@ def test_the_first_waits_under_the_nearest_item_and_the_next_far_from_it() -> No
     items, goals = shared(2, [NOBODY, NOBODY])
     assert items == [0, 2]  # 8 m from the first item, less half of 9 m, is more than 1 less 1
     np.testing.assert_array_equal(goals, ITEMS[items])
+
+
+def test_nobody_waits_under_the_requested_item() -> None:
+    items, goals = np.array([0]), np.zeros((1, 2))
+    share_items(ITEMS[:1], ITEMS, np.full(3, STORED), 0, np.array([True]), items, goals)
+    assert items.tolist() == [1]
 
 
 def test_an_item_is_kept_while_it_is_free_and_nobody_waits_under_one_that_is_not() -> None:

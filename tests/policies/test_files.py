@@ -117,7 +117,7 @@ def test_a_card_that_is_none_or_of_another_version_is_refused(
         refused(file, "cannot be used: PolicyCard")
     for old, new, sentence in (
         ('"format":1', '"format":2', "PolicyCard.format = 2"),
-        ("wall_3", "wall_33", "inputs = .* should be the 94 names that this version knows"),
+        ("wall_3", "wall_33", "inputs = .* should be the 95 names that this version knows"),
     ):
         save_file(tensors, file, {CARD: card.to_json().replace(old, new)})
         refused(file, sentence)

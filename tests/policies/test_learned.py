@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env.motion import INPUTS
-from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.observations import N_COLUMNS, TURN_RATE
 from swarm_logistics_env.policies import PolicyCard, identity
 from swarm_logistics_env.policies.layers import hyperbolic_tangent
 from swarm_logistics_env.policies.learned import LearnedPolicy, explore
@@ -25,6 +25,21 @@ def test_an_episode_follows_from_its_seed(card: PolicyCard, tensors: Tensors) ->
     first = played(0)
     assert played(1) != first
     assert played(0) == first
+
+
+def test_it_decides_every_so_many_steps_and_goes_on_as_decided_in_between(
+    card: PolicyCard, tensors: Tensors
+) -> None:
+    slow = card.replace(network=card.network.replace(decides_every=3, exploration=0.0))
+    policy, rng = LearnedPolicy(slow, tensors), np.random.default_rng(0)
+    policy.reset(5, 0)
+    rows = rng.uniform(0, 1, (7, 5, N_COLUMNS)).astype(np.float32)
+    rows[..., TURN_RATE] = 0.0
+    grips = [policy.act(observations)[:, 3] for observations in rows]
+    for step in (1, 2, 4, 5):
+        np.testing.assert_array_equal(grips[step], grips[step - 1])
+    assert (grips[3] != grips[2]).any()
+    assert (grips[6] != grips[5]).any()
 
 
 def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:

@@ -24,7 +24,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.wrappers import FaultInjection, SwarmSize, Wrapper
 
 BRIEF = Scenario(n_robots=3, n_items=10, duration=2.0)
-WEIGHTS = np.random.default_rng(0).normal(0.0, 0.3, (94, 3)).astype(np.float32)
+WEIGHTS = np.random.default_rng(0).normal(0.0, 0.3, (95, 3)).astype(np.float32)
 
 
 def linear(rows: Any) -> Any:
@@ -32,9 +32,11 @@ def linear(rows: Any) -> Any:
 
 
 def test_a_trained_network_plays_as_its_policy_file_does() -> None:
-    """Without noise both are the same network in the same frame."""
+    """Without noise, and deciding each step, both are the same network in the same frame."""
     learned: Any = policies.load("ppo-delivery")
-    card = learned.card.replace(network=learned.card.network.replace(exploration=0.0))
+    card = learned.card.replace(
+        network=learned.card.network.replace(exploration=0.0, decides_every=1)
+    )
     same: Any = type(learned)(card, learned.tensors)
     policy = policies.of(same.outputs_of, frame=True)
     rows = np.random.default_rng(0).normal(size=(40, 5, N_COLUMNS)).astype(np.float32)
@@ -47,7 +49,7 @@ def test_a_trained_network_plays_as_its_policy_file_does() -> None:
 
 def test_torch_onnx_and_a_function_of_one_network_give_the_same_commands() -> None:
     torch = pytest.importorskip("torch")
-    layer = torch.nn.Linear(94, 3, bias=False)
+    layer = torch.nn.Linear(95, 3, bias=False)
     layer.weight.data = torch.from_numpy(WEIGHTS.T.copy())
     module = torch.nn.Sequential(layer, torch.nn.Tanh())
 
@@ -101,7 +103,7 @@ def test_rows_are_normalized_as_they_were_in_training() -> None:
 
 def test_a_model_is_known_by_its_numbers_and_its_form_and_each_run_has_a_memory() -> None:
     torch = pytest.importorskip("torch")
-    module = torch.nn.Linear(94, 3)
+    module = torch.nn.Linear(95, 3)
     policy: Any = policies.of(module, frame=True)
     identity = policies.identity(policy)
     assert policies.identity(policies.of(copy.deepcopy(module), frame=True)) == identity

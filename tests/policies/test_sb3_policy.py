@@ -15,6 +15,7 @@ from swarm_logistics_env.cli.study_choice import study_of
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import PolicyError, StudyError
 from swarm_logistics_env.motion import INPUTS
+from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.policies import Policy, PolicySpec
 from swarm_logistics_env.questions.specification import read_study_file
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame
@@ -43,7 +44,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_trusted_model_plays_and_is_known_by_its_content(model: Path, tmp_path: Path) -> None:
     policy: Any = policies.load(str(model), trust_code=True)
     assert run_episode(Scenario(n_robots=3, duration=1.0), policy, seed=0).ended_at == 1.0
-    rows = np.random.default_rng(0).normal(size=(4, 140)).astype(np.float32)
+    rows = np.random.default_rng(0).normal(size=(4, N_COLUMNS)).astype(np.float32)
     from stable_baselines3 import PPO
 
     told, _ = PPO.load(model, device="cpu").predict(rows, deterministic=True)

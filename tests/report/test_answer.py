@@ -88,6 +88,17 @@ def test_claims_are_counted_and_what_contradicts_the_paper_is_marked(few: StudyR
     assert "† P is capped" in last
 
 
+def test_a_row_that_is_open_beside_its_interval_says_why() -> None:
+    of_twelve = answer(paper(seeds=12), most=None)
+    reasons = {line.reason for line in of_twelve.lines} - {""}
+    assert reasons == {"stalls", "Holm"}
+    for line in of_twelve.lines:
+        if line.reason:
+            assert line.verdict_text == f"open ({line.reason})"
+            assert line.verdicts[0].lies_above is not None
+    assert set(re.findall(r"\((\w+)\): ", of_twelve.notes)) == reasons
+
+
 def test_words_for_what_is_no_plain_verdict() -> None:
     nothing = answer(paper(lambda *_: 0.0, seeds=1), most=None)
     undefined = {line.verdict_text for line in nothing.lines if line.indicator == "S"}

@@ -65,7 +65,7 @@ def test_each_table_has_a_label_of_its_own_and_a_caption_that_can_stay(latex: st
         world = "a warehouse of 8 m x 10 m with 60 items that come back, robots of 2 m/s"
         assert f"World: {world}, 500 s; ${{N = 25}}$ unless said oth" in caption
         assert "12 paired seeds (0 to 11). 95\\,\\% intervals in brackets." in caption
-        assert caption.endswith("by Holm's method over all comparisons of an indicator.")
+        assert caption.endswith("by Holm's method over all questions on an indicator.")
     assert "continued" not in latex
     assert latex.startswith("% In the preamble: \\usepackage{booktabs}\n")
 

@@ -79,6 +79,34 @@ def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None
     assert n_steps > 5
 
 
+def test_between_decisions_worlds_go_on_and_their_rewards_are_summed(small: Any) -> None:
+    network = {"hidden": (8,), "decides_every": 3}
+    rewards = {"contact": -1.0, "delivery": 1.0}
+    often, seldom = (
+        NetworkView(small(rewards=rewards)),
+        NetworkView(small(rewards=rewards, network=network)),
+    )
+    outputs = np.tile(
+        np.array([1.0, 0.0, 1.0], np.float32), (8, 1)
+    )  # ahead, until they run into something
+    for view in (often, seldom):
+        view.seed(0)
+        view.reset()
+    for _ in range(20):
+        total = np.zeros(8)
+        for _ in range(3):
+            often.step_async(outputs)
+            _, earned, dones, _ = often.step_wait()
+            total += earned
+        seldom.step_async(outputs)
+        _, earned, seldom_dones, _ = seldom.step_wait()
+        # Holonomic robots that drive ahead in the frame of their motion never turn it.
+        np.testing.assert_allclose(earned, total, atol=1e-6)
+        assert seldom.frame.counts.tolist() == often.frame.counts.tolist()
+    assert dones.all()
+    assert seldom_dones.all()
+
+
 def test_the_actor_sees_nothing_of_it(small: Any) -> None:
     policy = make_learner(small(), NetworkView(small()), "cpu").policy
     columns = torch.randn(50, len(INPUTS) + len(PRIVILEGED))

@@ -272,6 +272,27 @@ def test_deviations_keep_above_their_floor(small: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(ended["deviations"], [0.5, 0.4, 0.4], rtol=1e-5)
 
 
+def test_where_the_rate_begins_anew_adam_does_too_also_in_a_training_that_goes_on(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = small(ppo=small().ppo.replace(restarts=((0.5, 2e-3),)))
+
+    def interrupt(inside: dict[str, Any], _: object) -> bool:
+        if inside["self"].num_timesteps > 320:
+            raise KeyboardInterrupt
+        return True
+
+    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    with pytest.raises(KeyboardInterrupt):
+        train(training, tmp_path / "cut", callbacks=[ConvertCallback(interrupt)])
+    uncut = weights(train(training, tmp_path / "uncut"))
+    assert weights(train(training, tmp_path / "cut")) == uncut
+    saved = read_checkpoint(tmp_path / "uncut")
+    assert saved is not None
+    steps = {state["step"].item() for state in saved["optimizer"]["state"].values()}
+    assert steps == {12.0}  # 3 batches of 2 epochs in 2 parts, of the 4 batches in all
+
+
 def test_torch_has_as_many_threads_after_a_training_as_before(small: Any, tmp_path: Path) -> None:
     before = torch.get_num_threads()
 

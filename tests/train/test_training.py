@@ -9,7 +9,7 @@ import pytest
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import Conditions
+from swarm_logistics_env.train.settings import Conditions, PPOSettings
 from swarm_logistics_env.train.training import EpisodeMix, make_worlds
 from swarm_logistics_env.warehouse import Fault
 
@@ -20,6 +20,19 @@ def test_every_preset_can_be(name: str) -> None:
     assert training.name == f"ppo-{name}"
     assert Training.from_json(training.to_json()) == training
     assert training.about
+
+
+def test_rates_begin_anew_and_rewards_change_until_their_share_of_the_training() -> None:
+    ppo = PPOSettings(
+        learning_rate=0.5, final_learning_rate=0.1, restarts=((0.5, 0.3), (0.75, 0.2))
+    )
+    rates = [ppo.rate(done) for done in (0.0, 0.25, 0.5, 0.625, 0.75, 1.0, 1.01)]
+    assert rates == pytest.approx([0.5, 0.3, 0.3, 0.2, 0.2, 0.1, 0.1])
+    rewards = {"delivery": 1.0, "contact": -0.1}
+    training = Training(rewards=rewards, final_rewards={"contact": -0.5}, final_rewards_from=0.5)
+    weights = [training.rewards_at(done)["contact"] for done in (0.0, 0.25, 0.5, 1.0)]
+    assert weights == pytest.approx([-0.1, -0.3, -0.5, -0.5])
+    assert training.rewards_at(0.25)["delivery"] == 1.0
 
 
 def test_worlds_of_several_kinds_stand_side_by_side() -> None:
@@ -35,7 +48,10 @@ def test_worlds_of_several_kinds_stand_side_by_side() -> None:
         ("agent_step = 5", "Training has no field 'agent_step'; did you mean 'agent_steps'"),
         ("seed =", "is not TOML"),
         ("name = '../x'", r"should match pattern '\^\[A-Za-z0-9_-\]"),
+        ("network.decides_every = 3", "should divide the control steps of each episode"),
         ("ppo.n_minibatches = 7", "should divide the batch of 150 robots x 128 steps"),
+        ("ppo.restarts = [[0.5, 1e-3], [0.5, 1e-4]]", "should be one after another, all before"),
+        ("final_rewards.contact = -1.0", "'contact' should be among the rewards, too"),
         ("rewards.deliver = 1.0", "no reward term 'deliver'; did you mean 'delivery'"),
         ("scenario.n_itens = 5", "Scenario has no field 'n_itens'"),
         ("scenario.message_size = 2", "the network sends no messages"),

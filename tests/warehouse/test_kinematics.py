@@ -10,6 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.observations import TURN_RATE
 from swarm_logistics_env.warehouse.commands import drive
 
 
@@ -67,3 +68,25 @@ def test_headings_drift_at_constant_rates_of_robots_that_can_move(drive_kind: An
     wanted = 5.0 * world.state.robot_heading_drift * [0, 0, 0, 1, 1, 1]
     np.testing.assert_allclose(turned, wanted, atol=1e-9)
     assert turned.any()
+
+
+@pytest.mark.parametrize("bodies", ["chipmunk", "tests.bodies.test_bodies:Exact"])
+def test_a_gyro_tells_turns_without_the_drift_so_robots_that_stand_feel_their_drift(
+    bodies: str,
+) -> None:
+    world = Warehouse(Scenario(n_robots=4, heading_drift=0.2, bodies=bodies))
+    world.reset(0, [Fault("dead", (0,)), Fault("motor_slow", (1,)), Fault("removed", (2,))])
+    drift = world.state.robot_heading_drift.copy()
+    slow = 0.5 * world.state.max_turn_rate[1]
+    for _ in range(30):  # more than half a turn
+        rows = world.step(np.tile([0.0, 0.0, 0.5, 0.0], (4, 1)))
+        expected = [-drift[0], slow, 0.0, 3.0]
+        np.testing.assert_allclose(rows[:, TURN_RATE], expected, atol=1e-5)
+
+
+def test_the_gyro_of_a_robot_that_drifts_alone_tells_exactly_nothing() -> None:
+    world = Warehouse(Scenario(heading_drift=0.3))
+    world.reset(0)
+    for _ in range(20):
+        rows = world.step(np.tile([1.0, 0.5, 0.0, 0.0], (25, 1)))
+        assert not rows[:, TURN_RATE].any()

@@ -54,17 +54,19 @@ def test_rows_agree_with_a_plain_computation(name: str) -> None:
         if step > 24:
             heading = world.state.robot_heading
             commands[:, 0], commands[:, 1] = np.cos(heading), -np.sin(heading)
+        heading_before = world.state.robot_heading.copy()
         rows = world.step(commands)
         if step % 12 == 11:
             for me in range(scenario.n_robots):
-                plain = Plain(world, me).row()
+                plain = Plain(world, me, heading_before[me]).row()
                 np.testing.assert_allclose(rows[me], plain, atol=TOLERANCE, err_msg=str(me))
 
 
 class Plain:
     """What a robot senses, with places in its own frame as complex numbers: forward + 1j left."""
 
-    def __init__(self, world: Warehouse, me: int) -> None:
+    def __init__(self, world: Warehouse, me: int, heading_before: float) -> None:
+        self.heading_before = heading_before
         self.state, self.scenario, self.me = world.state, world.scenario, me
         self.modes = [set(modes) for modes in world.state.failure_modes]
         is_other = world.state.robot_present.copy()
@@ -153,9 +155,12 @@ class Plain:
         runs, gap = not math.isnan(timer), self.gap()
         touches = state.robot_contact[me] if 0.001 < gap < 0.02 else gap < 0.01
         assert state.robot_contact[me] == touches
+        turned = math.remainder(state.robot_heading[me] - self.heading_before, math.tau)
+        turn_rate = turned / s.control_period - state.robot_heading_drift[me]
         return [
             item != NOBODY, item != NOBODY and item == state.requested, x >= s.storage_width, runs,
             timer if runs else s.timer_limit, *limited, touches,
+            np.clip(turn_rate, -s.max_turn_rate, s.max_turn_rate),
         ]  # fmt: skip
 
     def gap(self) -> float:
