@@ -27,14 +27,22 @@ from swarm_logistics_env.policies.learned import LearnedPolicy, Network, PolicyC
 from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.report.section import bracketed
 from swarm_logistics_env.train.evaluation import performances, versions
-from swarm_logistics_env.train.training import load_training
 from swarm_logistics_env.wrappers import MotionFrame
 
 RESULTS = Path(__file__).parents[1] / "results" / "interop"
 
-_PRESET = load_training("delivery")  # of whose worlds all but these two are left out
-WORLDS = {"small": _PRESET.each_world[0][1], "paper": _PRESET.scenario}
-REWARDS = _PRESET.rewards
+# As `interop/swarm_logistics/*.yaml` has them for BenchMARL: the paper's robots, items come back.
+WORLDS = {
+    "small": Scenario(
+        n_robots=10, warehouse_width=6.0, warehouse_height=5.0, delivery_width=1.5, n_items=8,
+        duration=200.0, restock=True,
+    ),
+    "paper": Scenario(restock=True),
+}  # fmt: skip
+REWARDS = {
+    "own_delivery": 0.5, "delivery": 0.5, "lift_requested": 0.3, "approach": 0.1, "stocking": 0.15,
+    "contact": -0.05,
+}  # fmt: skip
 AGENT_STEPS = {"small": 2_000_000, "paper": 4_000_000}
 N_WORLDS = {"small": 12, "paper": 5}
 

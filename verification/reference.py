@@ -208,6 +208,7 @@ def rewards(
     """Return what a step pays each robot that was there as it began."""
     period, edge, total = scenario.control_period, scenario.storage_width, []
     new = now.delivered_by[len(before.delivered_by) :]
+    nearest = edge - 1.5  # what is stocked nearer would be in the way
     asked = _asked(before) & _asked(now)  # what a step takes up, brings nearer or lets go of
     for robot in range(now.n_robots):
         x, x_before = (moment.robot_position[robot, 0] for moment in (now, before))
@@ -223,8 +224,8 @@ def rewards(
             who = before.item_carrier[item] if after == NOBODY else after
             is_delivered = before.item_carrier[item] != NOBODY and before.item_carrier[item] in new
             if who == robot and not is_delivered:
-                way += min(now.item_position[item, 0], edge)
-                way -= min(before.item_position[item, 0], edge)
+                way += min(now.item_position[item, 0], nearest)
+                way -= min(before.item_position[item, 0], nearest)
         delivers = now.delivers[robot]
         deeper = 2.0 * (max(x, edge) - max(x_before, edge)) if carries_on else 0.0
         nearer = min(x, edge) - min(x_before, edge) if carries_on else 0.0
@@ -235,10 +236,27 @@ def rewards(
             "approach": nearer,
             "stocking": way,
             "contact": period * now.robot_contact[robot],
+            "collision": _closing(scenario, before, now, robot),
             "blocked_request": (period + deeper) * (is_ in _asked(now) and not delivers),
         }
         paid = sum(weights.get(name, 0.0) * value for name, value in terms.items())
         total.append(paid if before.robot_present[robot] else 0.0)
+    return total
+
+
+def _closing(scenario: Scenario, before: State, now: State, robot: int) -> float:
+    """Return how fast [m/s] a robot ran into others that it touches now and did not before."""
+    diameter, total = 2.0 * scenario.robot_radius, 0.0
+    for other in range(now.n_robots):
+        if other == robot or not (now.robot_present[robot] and now.robot_present[other]):
+            continue
+        gap, gap_before = (
+            moment.robot_position[other] - moment.robot_position[robot] for moment in (now, before)
+        )
+        distance, distance_before = math.hypot(*gap), math.hypot(*gap_before)
+        if distance < diameter <= distance_before:
+            rate = before.robot_velocity[other] - before.robot_velocity[robot]
+            total += max(0.0, -float(gap_before @ rate) / distance_before)
     return total
 
 
