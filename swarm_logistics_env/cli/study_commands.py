@@ -40,7 +40,7 @@ StudyArgument = Annotated[
     Argument(
         metavar="FILE|PRESET",
         # Literal, as to import the presets would slow every command.
-        help="TOML file of a study, or a preset: benchmark-2, benchmark, paper-fit, paper, quick, "
+        help="TOML file of a study, or a preset: benchmark, paper-fit, paper, quick, "
         "resilience, scorecard.",
     ),
 ]

@@ -70,9 +70,13 @@ def _notes_that_apply(
         yield "more_runs", {"runs": "seeds" if is_paired else "trials a condition"}
     elif any(verdict.conclusion == "open" for verdict in verdicts):
         yield "open", {"runs": "seeds" if is_paired else "trials"}
-    for reason, words in templates.REASONS_TO_BE_OPEN.items():
-        if reason in reasons:
-            yield f"open_{reason}", {"reason": reason, "words": words}
+    explained = [
+        f"({reason}): {words}"
+        for reason, words in templates.REASONS_TO_BE_OPEN.items()
+        if reason in reasons
+    ]
+    if explained:
+        yield "open_for_a_reason", {"reasons": "; ".join(explained)}
     claims_of_text = results.reference.claims if results.reference else {}
     claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
     in_text = [verdict for verdict in claims if verdict.compared.question in claims_of_text]

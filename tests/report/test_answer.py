@@ -103,10 +103,12 @@ def test_words_for_what_is_no_plain_verdict() -> None:
     nothing = answer(paper(lambda *_: 0.0, seeds=1), most=None)
     undefined = {line.verdict_text for line in nothing.lines if line.indicator == "S"}
     assert undefined == {"undefined: it delivers nothing"}
+    assert "P is small: a longer duration tells more" in nothing.notes
     same = answer(paper(same=frozenset({"FM2"})), most=None)
     exact = {line.verdict_text for line in same.lines if line.question.startswith("R FM2")}
     assert exact == {"unaffected, exact"}
     assert "provisional" not in same.notes
+    assert "P is small" not in same.notes
 
 
 def test_policies_stand_one_below_the_other_each_with_its_p(compared: StudyResults) -> None:

@@ -66,6 +66,16 @@ def test_the_table_names_the_worst_cell_and_the_score() -> None:
     assert len(outcome.failed_robots) == 3
 
 
+def test_the_entries_of_the_package_are_of_its_benchmark() -> None:
+    entries = benchmark.Entries.read()
+    plan = make_plan(PRESETS["benchmark"])
+    assert min(entries.references.values()) > 0.0
+    assert {"swarm-dt", "homing", "central-stock"} <= entries.scores.keys()
+    for scores in entries.scores.values():
+        assert scores.shape[-1] == len(plan.seeds)
+        assert 0.0 < scores.mean() < 10.0  # a share, no number of items
+
+
 @pytest.mark.parametrize("kind", [int, float])  # of ranks, before SciPy 1.18 and since
 def test_ranks_are_as_stable_as_the_scores_allow(
     kind: type, monkeypatch: pytest.MonkeyPatch

@@ -11,74 +11,31 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, spi
-from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.wrappers import (
     Condition,
     FaultInjection,
-    IndicatorReward,
     ParameterChange,
     RunningMeans,
     SwarmSize,
 )
 from swarm_logistics_env.wrappers.indicator_payments import comparison
-from tests.wrappers.conftest import eastward
-
-N = 4
-OWN = Condition(N)
-FAULTY = Condition(N, ("motor_slow",), n_failed=2)
-REMOVED = Condition(N, n_removed=2)
-LARGER = Condition(N + 3)
-NARROW = Condition(N, changes=(("delivery_width", 1.5),))
-OPTIONS: dict[Condition, Any] = {
-    OWN: {},
-    FAULTY: {"faults": [Fault("motor_slow", 2)]},
-    REMOVED: {"faults": [Fault("removed", 2)]},
-    LARGER: {"scenario": {"n_robots": N + 3}},
-    NARROW: {"scenario": {"delivery_width": 1.5}},
-}
-CLOSE: Any = {"abs": 1e-9, "rel": 0}
-
-
-def busy(**arguments: Any) -> SwarmLogisticsEnv:
-    """A warehouse whose robots reach every item, so that even a blind policy delivers."""
-    fields: dict[str, Any] = {
-        "n_robots": N, "n_items": 12, "warehouse_width": 6.0, "warehouse_height": 5.0,
-        "pickup_range": 9.0, "duration": 12.0, "restock": True,
-    }  # fmt: skip
-    return SwarmLogisticsEnv(**{**fields, **arguments})
-
-
-def rewarded(weights: Any, references: Any, env: Any = None, **arguments: Any) -> IndicatorReward:
-    return IndicatorReward(env or busy(), weights, references=references, **arguments)
-
-
-def play(env: Any, seed: int | None, options: Any = None) -> tuple[np.ndarray, Any]:
-    """Play an episode to its end; returns the rewards (steps, N) and the last infos."""
-    env.reset(seed=seed, options=options)
-    n_robots = env.unwrapped.warehouse.state.n_robots
-    rng, rewards, infos = np.random.default_rng(seed), [], {}
-    while env.agents:
-        east = eastward(env)
-        east[:, 3] = np.where(rng.uniform(size=n_robots) < 0.3, -1.0, 1.0)
-        _, earned, _, _, infos = env.step({name: east[int(name[6:])] for name in env.agents})
-        rewards.append([earned.get(f"robot_{row}", 0.0) for row in range(n_robots)])
-    return np.array(rewards), infos
-
-
-def delivered(env: Any) -> int:
-    return int(env.unwrapped.warehouse.state.delivered)
-
-
-Performances = dict[Condition, float]
-# Of each indicator: the condition that it tests, and its value.
-TESTED: dict[str, tuple[Condition, Callable[[Performances], spi.Estimate]]] = {
-    "R": (FAULTY, lambda p: spi.robustness([p[OWN]], [p[FAULTY]], n=N, m=2)),
-    "FT": (FAULTY, lambda p: spi.fault_tolerance([p[OWN]], [p[FAULTY]], [p[REMOVED]])),
-    "S": (LARGER, lambda p: spi.scalability([p[OWN]], [p[LARGER]], n=N, m=3)),
-    "A": (NARROW, lambda p: spi.adaptability([p[OWN]], [p[NARROW]], x_o=2.0, x_new=1.5)),
-}
-each_indicator = pytest.mark.parametrize("name", TESTED)
+from tests.wrappers.conftest import (
+    CLOSE,
+    FAULTY,
+    NARROW,
+    OPTIONS,
+    OWN,
+    REMOVED,
+    TESTED,
+    N,
+    busy,
+    delivered,
+    each_indicator,
+    eastward,
+    play,
+    rewarded,
+)
 
 
 @each_indicator
@@ -194,17 +151,6 @@ def test_a_fault_by_role_that_strikes_in_mid_run_makes_the_return_the_robustness
     assert counted == {2, 3}
 
 
-def test_means_at_the_start_hold_for_the_whole_episode() -> None:
-    means = filled({OWN: 33, FAULTY: 20})
-    env = rewarded("R", means)
-    env.reset_arrays(0, OPTIONS[FAULTY])
-    payments = env.payments
-    for _ in range(40):
-        env.step_arrays(eastward(env))
-        means.add(OWN, 5)  # as another environment does that shares them
-        assert env.payments == payments
-
-
 # Of a swarm in which a robot is missing anyway: what is tested, and the indicator of it.
 WITHOUT_ONE: dict[str, tuple[Condition, Any, Callable[[int], float]]] = {
     "R": (
@@ -254,68 +200,6 @@ def test_the_same_robots_are_removed_in_the_references(name: str, credit: Any) -
     for reference in references:
         env.condition = reference
         assert env.payments_of(reference)[name].share == 0.0
-
-
-def test_running_means_are_those_of_the_episodes_that_ended() -> None:
-    means = RunningMeans(window=2)
-    env = rewarded({"R": 1.0, "FT": 1.0}, means)
-    plays: dict[Condition, list[int]] = {OWN: [], FAULTY: [], REMOVED: []}
-    for seed in range(4):
-        for condition in plays:
-            env.reset(seed=99, options=OPTIONS[FAULTY])  # is cut short, so counts for nothing
-            env.step_arrays(np.zeros((N, 4)))
-            play(env, seed, OPTIONS[condition])
-            assert env.condition == condition
-            plays[condition].append(delivered(env))
-    env.reset(seed=0)
-    assert {c: means.count(c) for c in means.conditions} == dict.fromkeys(plays, 4)
-    assert {c: means.mean(c) for c in means.conditions} == pytest.approx(
-        {condition: np.mean(counts[-2:]) for condition, counts in plays.items()}
-    )
-
-
-def filled(performances: dict[Condition, int]) -> RunningMeans:
-    means = RunningMeans()
-    for condition, items in performances.items():
-        means.add(condition, items)
-    return means
-
-
-@each_indicator
-def test_reference_episodes_are_paid_the_derivative(name: str) -> None:
-    tested, estimate = TESTED[name]
-    played = {OWN: 30, REMOVED: 25, tested: 20}
-    env = rewarded(name, filled(played))
-    h = 1e-4
-    for condition, value in played.items():
-        up, down = (float(estimate({**played, condition: value + e}).value) for e in (h, -h))
-        paid = env.payments_of(condition)[name]
-        assert paid.share == pytest.approx((up - down) / (2 * h), rel=1e-6)
-        own = float(estimate({**played}).value) if condition == tested else 0.0
-        assert paid.share * value + paid.constant == pytest.approx(own, **CLOSE)
-
-
-def test_a_reference_episode_stands_for_as_many_as_it_serves() -> None:
-    means = filled({OWN: 30, FAULTY: 20, REMOVED: 25})
-    env = rewarded({"R": 1.0, "FT": 1.0}, means)
-    means.add(FAULTY, 20)
-    assert env.payments_of(OWN)["R"].share == pytest.approx(-2 * 20 / 30**2)
-    means.add(OWN, 30)
-    means.add(Condition(N, ("FM1",), n_failed=1), 10)
-    assert env.payments_of(OWN)["R"].share == pytest.approx(-(2 * 20 + 10) / 2 / 30**2)
-    # An environment of another size does not take part in what this one's S is about.
-    env = rewarded("S", filled({OWN: 30, LARGER: 40, Condition(2): 11}))
-    assert env.payments_of(OWN)["S"].share == pytest.approx(-(N / 3) * 40 / 30**2)
-
-
-def test_means_that_are_not_there_yet_or_too_small() -> None:
-    env = rewarded({"R": 1.0, "FT": 1.0}, RunningMeans(least=8.0))
-    assert env.payments_of(FAULTY)["R"].share == 1 / 8
-    assert env.payments_of(FAULTY)["FT"].constant == 0
-    assert env.payments_of(OWN)["R"].share == 0
-    env = rewarded({"R": 1.0, "FT": 1.0}, filled({OWN: 0, FAULTY: 3}))
-    assert env.payments_of(FAULTY)["R"].share == 1
-    assert env.payments_of(OWN)["R"].share == 0  # a mean below `least` moves nothing
 
 
 def test_where_the_deliverer_is_paid_all_returns_sum_up_to_the_indicator() -> None:
