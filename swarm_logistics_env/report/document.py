@@ -196,12 +196,12 @@ def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:
     shared = "Paired by the seeds that it names" if origin.paired else "Unpaired: it names no seeds"
     text = (
         f"Study {plan.specification.name!r}: {len(plan.cases)} conditions, imported from "
-        f"{origin.file}. {shared}. Of their conditions what varies is known, and what is "
-        "stated below."
+        f"{origin.file}. {shared}. Their conditions are known as far as the file tells them "
+        "and they are stated below."
     )
     unstated = () if origin.setup else ("Nothing is stated of the set-up (--setup NAME=VALUE).",)
     return (
-        Section("Study", lines=(text,)),
+        Section("Study", lines=(text, *origin.notes)),
         Section("Set-up as stated", ("condition", "value"), origin.setup, unstated),
     )
 
