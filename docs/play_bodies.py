@@ -11,7 +11,7 @@ difference over seeds lie on different sides of 0.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -67,10 +67,12 @@ class World(NamedTuple):
 _WORLD = Scenario(restock=True, duration=200.0)
 # MuJoCo's motors give 5 m/s2 at most, so the package's own engine gets no more either.
 _WHEELS = _WORLD.replace(drive="differential", max_acceleration=5.0)
+_SLOW = _WORLD.replace(drive="differential", max_speed=1.0, max_acceleration=2.0)
 _REALISTIC = Scenario.preset("realistic").replace(restock=True)
-WORLDS = (
-    World("realistic", _REALISTIC, "mujoco", 5, (), ("homing", STOCK, "ppo-robust@all")),
-    World("wheels", _WHEELS, "mujoco", 10, faults=()),
+REALISTIC = World("realistic", _REALISTIC, "mujoco", 5, (), ("homing", STOCK, "ppo-robust@all"))
+OTHERS = (
+    World("wheels", _WHEELS, "mujoco", 10),
+    World("slow wheels", _SLOW, "mujoco", 10, faults=()),
     World("pushed disc", _WORLD, "mujoco", 10, faults=()),
     World("dotbots", Scenario.preset("dotbots"), "dotbots", 5),
 )
@@ -166,30 +168,36 @@ def share_rows(results: Results) -> Iterator[tuple[str, ...]]:
         yield f"`{policy}` / `{script}`", *texts
 
 
-def main() -> None:
-    """Play what is missing, then write the tables of docs/bodies.md."""
-    results = [played(world) for world in WORLDS]
-    realistic, *others = results
-    seeds = "; ".join(f"{result.world.name}: {result.world.n_seeds}" for result in results)
+def write(
+    worlds: Sequence[Results],
+    **tables: tuple[Sequence[str], Callable[[Results], Iterable[Sequence[str]]]],
+) -> None:
+    """Write tables of some worlds into the page: of each, its columns and the rows of a world."""
+    seeds = "; ".join(f"{results.world.name}: {results.world.n_seeds}" for results in worlds)
     line = f"Seeds from 560,000 on, the same for both engines ({seeds}); intervals of 95 %."
+    blocks = {
+        f"bodies {name}": table(head, [row for results in worlds for row in rows(results)], line)
+        for name, (head, rows) in tables.items()
+    }
+    rewrite(PAGE, blocks)
+
+
+def main() -> None:
+    """Play what is missing, then write the tables of docs/bodies.md, those of `REALISTIC` first."""
     engines = "P, `chipmunk`", "P, the other engine"
     contacts = "contacts a robot-minute, `chipmunk`", "the other engine"
-    blocks = {
-        "bodies p": (
-            ("world", "policy", "condition", *engines, "change of P", *contacts),
-            (row for result in results for row in p_rows(result)),
-        ),
-        "bodies share": (("P of two policies", "`chipmunk`", "MuJoCo"), share_rows(realistic)),
-        "bodies order": (
-            ("world", "difference", *engines, "order"),
-            (row for result in others for row in order_rows(result)),
-        ),
-        "bodies r": (
-            ("world", "policy", "fault", "R, `chipmunk`", "R, the other engine"),
-            (row for result in results for row in r_rows(result)),
-        ),
-    }
-    rewrite(PAGE, {name: table(head, rows, line) for name, (head, rows) in blocks.items()})
+    columns = "world", "policy", "condition", *engines, "change of P", *contacts
+    write(
+        [played(REALISTIC)],
+        realistic=(columns, p_rows),
+        share=(("P of two policies", "`chipmunk`", "the other engine"), share_rows),
+    )
+    write(
+        [played(world) for world in OTHERS],
+        p=(columns, p_rows),
+        order=(("world", "difference", *engines, "order"), order_rows),
+        r=(("world", "policy", "fault", "R, `chipmunk`", "R, the other engine"), r_rows),
+    )
 
 
 if __name__ == "__main__":
