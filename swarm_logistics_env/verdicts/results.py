@@ -117,13 +117,13 @@ class StudyResults:
             fewest = min(cell.n_seeds for cell in self.cells)
             count = f"{fewest} to {len(seeds)}" if fewest < len(seeds) else f"{fewest}"
             return f"{count} unpaired {'run' if count == '1' else 'runs'} a condition"
-        if self.looks:
-            seeds = range(seeds[0], seeds[0] + max(cell.n_seeds for cell in self.cells))
-        count = f"{len(seeds)} paired seeds"
-        if len(self.plan.seeds) < len(seeds):
-            count = f"{len(self.plan.seeds)} to {count}"
-        if len(seeds) == 1:
-            count = "one seed"
+        fewest = len(seeds)
+        if self.looks:  # conditions have as many as were needed
+            most = max([fewest, *(cell.n_seeds for cell in self.cells)])
+            seeds = range(seeds[0], seeds[0] + most)
+        count = "one seed" if len(seeds) == 1 else f"{len(seeds)} paired seeds"
+        if fewest < len(seeds):
+            count = f"{fewest} to {count}"
         return f"{count} ({seeds_in_words(seeds)})"
 
 
