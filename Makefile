@@ -53,7 +53,7 @@ help:
 	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; six learners with P before and after; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make dotbots         bodies in the DotBots' simulator: the tests, and 20 DotBots for 20 s (half a minute, once pydotbot is installed)"
-	@echo "make bodies          how far results carry to MuJoCo and to the DotBots' simulator: the tables of docs/bodies.md (a core-hour)"
+	@echo "make bodies          how far results carry to MuJoCo and to the DotBots' simulator: the tables of docs/bodies.md (two core-hours)"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make docs-check      every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"

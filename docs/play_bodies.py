@@ -1,8 +1,8 @@
-"""How far results carry from one engine to another: `make bodies` (a core-hour).
+"""How far results carry from one engine to another: `make bodies` (two core-hours).
 
-Plays three policies in the package's own engine, on MuJoCo's robots and in the DotBots' simulator,
-on the same seeds, and writes the tables of docs/bodies.md. What is played stays in results/bodies,
-and the same command goes on after an interruption.
+Plays policies in the package's own engine, on MuJoCo's robots and in the DotBots' simulator, on the
+same seeds, and writes the tables of docs/bodies.md. What is played stays in results/bodies, and the
+same command goes on after an interruption.
 
 Declared before the first run: an order of two policies turns if the 95 % intervals of their
 difference over seeds lie on different sides of 0.
@@ -11,13 +11,16 @@ difference over seeds lie on different sides of 0.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
+from play_benchmark import STOCK
+from play_tables import shares_of_script
 from tables import ROOT, rewrite, table
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.questions.comparison import NO_FAULT
 from swarm_logistics_env.report import section
 from swarm_logistics_env.report.tables import contacts_text
@@ -29,7 +32,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
 
 PAGE = ROOT / "docs" / "bodies.md"
-POLICIES = ("swarm-dt", "homing", "ppo-robust")
+POLICIES: tuple[str, ...] = ("swarm-dt", "homing", "ppo-robust")
 FAULTS = ({"modes": ["FM1", "FM4_jam"], "robots": [2]},)
 
 
@@ -41,18 +44,22 @@ class World(NamedTuple):
     engine: str
     n_seeds: int
     faults: Sequence[Mapping[str, object]] = FAULTS
+    policies: Sequence[str | PolicySpec] = POLICIES
 
     def study(self, bodies: str) -> Study:
         """Return the study of one of the two engines."""
         return Study(
             name=section.slug(self.name, bodies),
-            policies=list(POLICIES),
+            policies=list(self.policies),
             seeds=self.n_seeds,
             first_seed=560_000,
             scenario=self.scenario.replace(bodies=bodies),
             indicators=["R", "change"],
             faults=list(self.faults),
-            ablations=[] if self.faults else [{"title": "policies", "policy": POLICIES[0]}],
+            ablations=[
+                {"title": "policies", "policy": policy}
+                for policy in (() if self.faults else self.policies[:-1])
+            ],
             out=ROOT / "results" / "bodies" / section.slug(self.name, bodies),
         )
 
@@ -61,7 +68,9 @@ _WORLD = Scenario(restock=True, duration=200.0)
 # MuJoCo's motors give 5 m/s2 at most, so the package's own engine gets no more either.
 _WHEELS = _WORLD.replace(drive="differential", max_acceleration=5.0)
 _SLOW = _WORLD.replace(drive="differential", max_speed=1.0, max_acceleration=2.0)
-WORLDS = (
+_REALISTIC = Scenario.preset("realistic").replace(restock=True)
+REALISTIC = World("realistic", _REALISTIC, "mujoco", 5, (), ("homing", STOCK, "ppo-robust@all"))
+OTHERS = (
     World("wheels", _WHEELS, "mujoco", 10),
     World("slow wheels", _SLOW, "mujoco", 10, faults=()),
     World("pushed disc", _WORLD, "mujoco", 10, faults=()),
@@ -113,7 +122,8 @@ def cells_of(results: StudyResults) -> dict[tuple[str, str], Cell]:
         is_policy = setting.kind == "policy"
         key = (setting.name, str(NO_FAULT)) if is_policy else (cell.policy, str(setting))
         cells[key] = cell
-    return {key: cells[key] for key in sorted(cells, key=lambda key: POLICIES.index(key[0]))}
+    rank = {policy: rank for rank, policy in enumerate(results.policies)}
+    return {key: cells[key] for key in sorted(cells, key=lambda key: rank[key[0]])}
 
 
 def r_rows(results: Results) -> Iterator[tuple[str, ...]]:
@@ -136,7 +146,7 @@ def verdicts_of(results: StudyResults) -> dict[tuple[str, str], Verdict]:
 def order_rows(results: Results) -> Iterator[tuple[str, ...]]:
     """Yield the difference of each two policies' P without a fault in both engines."""
     in_chipmunk, in_other = (cells_of(study) for study in (results.chipmunk, results.other))
-    for first, second in combinations(POLICIES, 2):
+    for first, second in combinations(results.chipmunk.policies, 2):
         texts, sides = [], []
         for cells in (in_chipmunk, in_other):
             p, of_second = (cells[policy, str(NO_FAULT)].by_seed for policy in (first, second))
@@ -149,27 +159,44 @@ def order_rows(results: Results) -> Iterator[tuple[str, ...]]:
         yield results.world.name, f"`{first}` less `{second}`", *texts, words[sides[0] * sides[1]]
 
 
-def main() -> None:
-    """Play what is missing, then write the tables of docs/bodies.md."""
-    results = [played(world) for world in WORLDS]
-    seeds = "; ".join(f"{result.world.name}: {result.world.n_seeds}" for result in results)
+def share_rows(results: Results) -> Iterator[tuple[str, ...]]:
+    """Yield P of each policy as a multiple of that of each one before it, in both engines."""
+    studies = (results.chipmunk, results.other)
+    for script, policy in combinations(results.chipmunk.policies, 2):
+        shares = (shares_of_script(study, script)[policy] for study in studies)
+        texts = (section.bracketed(share, 2, [1.0]) for share in shares)
+        yield f"`{policy}` / `{script}`", *texts
+
+
+def write(
+    worlds: Sequence[Results],
+    **tables: tuple[Sequence[str], Callable[[Results], Iterable[Sequence[str]]]],
+) -> None:
+    """Write tables of some worlds into the page: of each, its columns and the rows of a world."""
+    seeds = "; ".join(f"{results.world.name}: {results.world.n_seeds}" for results in worlds)
     line = f"Seeds from 560,000 on, the same for both engines ({seeds}); intervals of 95 %."
+    blocks = {
+        f"bodies {name}": table(head, [row for results in worlds for row in rows(results)], line)
+        for name, (head, rows) in tables.items()
+    }
+    rewrite(PAGE, blocks)
+
+
+def main() -> None:
+    """Play what is missing, then write the tables of docs/bodies.md, those of `REALISTIC` first."""
     engines = "P, `chipmunk`", "P, the other engine"
     contacts = "contacts a robot-minute, `chipmunk`", "the other engine"
-    blocks = {
-        "bodies p": (
-            ("world", "policy", "condition", *engines, "change of P", *contacts),
-            p_rows,
-        ),
-        "bodies order": (("world", "difference", *engines, "order"), order_rows),
-        "bodies r": (("world", "policy", "fault", "R, `chipmunk`", "R, the other engine"), r_rows),
-    }
-    rewrite(
-        PAGE,
-        {
-            name: table(head, [row for result in results for row in rows(result)], line)
-            for name, (head, rows) in blocks.items()
-        },
+    columns = "world", "policy", "condition", *engines, "change of P", *contacts
+    write(
+        [played(REALISTIC)],
+        realistic=(columns, p_rows),
+        share=(("P of two policies", "`chipmunk`", "the other engine"), share_rows),
+    )
+    write(
+        [played(world) for world in OTHERS],
+        p=(columns, p_rows),
+        order=(("world", "difference", *engines, "order"), order_rows),
+        r=(("world", "policy", "fault", "R, `chipmunk`", "R, the other engine"), r_rows),
     )
 
 

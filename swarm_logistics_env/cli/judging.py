@@ -204,8 +204,6 @@ def judge_command(
         if "restock" not in changed_fields(changes, bodies):
             scenario = scenario.replace(restock=True)
         options = options_of_world(preset, scenario_file, changes, bodies)
-        if first_seed is not None:
-            options += ["--first-seed", str(first_seed)]
         world = JudgedWorld(scenario, clearing, options, first_seed)
     tally = judge_policy(
         policy,
@@ -238,7 +236,7 @@ class JudgedWorld(NamedTuple):
     Attributes:
         scenario: the world, in which nothing fails yet.
         clearing: whether P is the rate at which its items are cleared.
-        options: what was typed to choose scenario and seeds, e.g. ["--preset", "realistic"].
+        options: what was typed to choose the scenario, e.g. ["--preset", "realistic"].
         first_seed: the smallest seed; None: that of the study.
     """
 
@@ -254,6 +252,8 @@ class JudgedWorld(NamedTuple):
             value if option == "--set" else f"{option[2:]} {value}"
             for option, value in zip(self.options[::2], self.options[1::2])
         ]
+        if self.first_seed is not None:
+            words.append(f"first-seed {self.first_seed}")
         return ["clearing"] * self.clearing + [slug(word)[:40] for word in words]
 
 
@@ -314,6 +314,7 @@ def judge_policy(
     # Several trainings and untrusted code need options that the suggested command does not have.
     elif world and is_open and not (tally.left or policy.trainings or policy.trusted):
         options = [policy.name, *["--clearing"] * world.clearing, *world.options]
+        options += ["--first-seed", str(study.plan().seeds[0] + most_seeds)]
         _suggest_more_seeds(options, directory, max(JUDGE_SEEDS, 2 * most_seeds))
     say_what_was_played(tally)
     return tally
@@ -322,7 +323,7 @@ def judge_policy(
 def _suggest_more_seeds(options: Sequence[str], directory: Path, seeds: int) -> None:
     options = [*options, "--seeds", str(seeds), "--out", f"{directory}-{seeds}"]
     command = f"swarm-logistics judge {join(options)}"
-    say("What is open needs more seeds, from the start:", command)
+    say("What is open needs more seeds, which nobody has looked at:", command)
 
 
 def names_policy(policy_or_trials: str) -> bool:

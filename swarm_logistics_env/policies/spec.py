@@ -95,6 +95,8 @@ def load(
         )
     make = NAMES.get(name) or _entry_point_maker(name) or maker_of_file(name, trust_code)
     make = make or _import_maker(name)
+    if make is None and name.endswith(".py"):
+        raise PolicyError(f"policy {name!r}: should name its class, as '{name}:Class'")
     if make is None:
         names = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         hint = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, names)

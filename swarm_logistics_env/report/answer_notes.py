@@ -70,13 +70,8 @@ def _notes_that_apply(
         yield "more_runs", {"runs": "seeds" if is_paired else "trials a condition"}
     elif any(verdict.conclusion == "open" for verdict in verdicts):
         yield "open", {"runs": "seeds" if is_paired else "trials"}
-    explained = [
-        f"({reason}): {words}"
-        for reason, words in templates.REASONS_TO_BE_OPEN.items()
-        if reason in reasons
-    ]
-    if explained:
-        yield "open_for_a_reason", {"reasons": "; ".join(explained)}
+    if explained := reasons_in_words(reasons):
+        yield "open_for_a_reason", {"reasons": explained}
     claims_of_text = results.reference.claims if results.reference else {}
     claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
     in_text = [verdict for verdict in claims if verdict.compared.question in claims_of_text]
@@ -86,6 +81,15 @@ def _notes_that_apply(
     if not_in_text:
         case = "claims_beside_the_text" if claims_of_text else "claims_without_text"
         yield case, _claims(not_in_text)
+
+
+def reasons_in_words(reasons: Collection[str]) -> str:
+    """Return what the reasons of open verdicts mean, e.g. "(stalls): so few seeds may hide .."."""
+    return "; ".join(
+        f"({reason}): {words}"
+        for reason, words in templates.REASONS_TO_BE_OPEN.items()
+        if reason in reasons
+    )
 
 
 def _delivers_little(results: StudyResults) -> bool:

@@ -196,12 +196,12 @@ def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:
     shared = "Paired by the seeds that it names" if origin.paired else "Unpaired: it names no seeds"
     text = (
         f"Study {plan.specification.name!r}: {len(plan.cases)} conditions, imported from "
-        f"{origin.file}. {shared}. Of their conditions what varies is known, and what is "
-        "stated below."
+        f"{origin.file}. {shared}. Their conditions are known as far as the file tells them "
+        "and they are stated below."
     )
     unstated = () if origin.setup else ("Nothing is stated of the set-up (--setup NAME=VALUE).",)
     return (
-        Section("Study", lines=(text,)),
+        Section("Study", lines=(text, *origin.notes)),
         Section("Set-up as stated", ("condition", "value"), origin.setup, unstated),
     )
 
@@ -219,10 +219,10 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
         runs = "trials" if plan.origin else "simulated runs"
         count = f"at least {n}" if looks else f"{n}"
         trials = f"{count} {runs} of each of {len(plan.cases)} conditions, paired by seed"
-        test = "the paired t-test of a logarithm, which allows for hidden stalls"
+        test = "the paired t-test of a logarithm"
     else:
         trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
-        test = "Welch's t-test of a logarithm, which allows for hidden stalls"
+        test = "Welch's t-test of a logarithm"
     level = percent(CONFIDENCE)
     side = f"{50 * (1 - CONFIDENCE):.3g} %"
     interval = f"the {level} interval"
@@ -240,8 +240,9 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
         f"We measured performance P in {trials}. We report {join_names(names)}, each a ratio of "
         f"mean performances, with {interval} that inverts {test}.{stops} An indicator is called "
         "above its threshold (supported) or below it (refuted) where this test rejects at "
-        f"{side} on that side, else open; it is untestable where it cannot lie below. Beside it "
-        "stands whether two one-sided tests find that P changes by less than "
+        f"{side} on that side, also if runs that stall were hidden, else open; it is "
+        "untestable where it cannot lie below. Beside it stands whether two one-sided tests find "
+        "that P changes by less than "
         f"{100 * plan.specification.margin:.3g} % of P_o; p is adjusted by Holm's method over all "
         f"comparisons of one indicator for one policy. Computed with {_version()}."
     )

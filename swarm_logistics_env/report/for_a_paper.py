@@ -10,6 +10,7 @@ from swarm_logistics_env.verdicts.verdict import Verdict, level_of
 
 from . import section, templates
 from .answer import Line, answer, line_of, performance_of
+from .answer_notes import reason_to_be_open
 from .templates import Slots, fill
 
 
@@ -23,6 +24,7 @@ def in_a_sentence(results: StudyResults) -> str:
     line = line_of([(0, lowest)])
     words = section.conclusion_text(*verdicts)
     lowest_text = _question_with_value(line, level_of([lowest]))
+    reason = templates.REASONS_TO_BE_OPEN.get(reason_to_be_open(lowest), "")
     world = world_in_words(results)
     slots: dict[str, Slots] = {
         "performance": {
@@ -35,6 +37,7 @@ def in_a_sentence(results: StudyResults) -> str:
     method = templates.METHOD.format(error=section.percent(1.0 - CONFIDENCE))
     verdict_slots = {"words": words, "method": method}
     if len(verdicts) == 1:
+        verdict_slots["method"] = f"{reason}; {method}" if reason else method
         name = f"{line.indicator} > {lowest.compared.threshold:.3g}"
         slots["one_question"] = {"lowest": lowest_text, "property": name, **verdict_slots}
     else:
@@ -44,7 +47,13 @@ def in_a_sentence(results: StudyResults) -> str:
         if any(verdict.conclusion == "open" for verdict in verdicts):
             slots["not_decided"] = {"questions": _undecided(results)}
         if candidates:
-            slots["lowest"] = {"lowest": lowest_text, "word": lowest.on_property.adjusted}
+            word = lowest.on_property.adjusted
+            slots["lowest"] = {
+                "lowest": lowest_text,
+                "word": f"{word}: {reason}" if reason else word,
+            }
+    if results.exploratory:
+        slots["exploratory"] = {}
     return "".join(fill(templates.FOR_A_PAPER, {**slots, "end": {}}))
 
 

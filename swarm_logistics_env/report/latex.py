@@ -10,15 +10,21 @@ from swarm_logistics_env.records import plain
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.verdicts.results import StudyResults
 
+from .answer_notes import reasons_in_words
 from .document import Document, what_p_is
 from .figures import CAPPED, parameter_label
 from .for_a_paper import world_in_words
 from .section import SATURATED, Section, Texts, conclusion_text, join_names, slug
 from .tables import tables
 
-_HOLM = "Verdicts are adjusted by Holm's method over all questions on an indicator."
-_LETTERS_OF_A_COLUMN = 65  # in a column of 3.5 inch, with room between the table's columns
+_HOLM = "Verdicts are adjusted by Holm's method over all questions on an indicator of one policy."
+_LETTERS_OF_A_COLUMN = 58  # in a column of 3.5 inch
+_LETTERS_OF_A_PAGE = 75  # across a page of one column; with more they are smaller
+_LONG = 30  # letters of a column, of which more are broken into lines
+_LETTERS_BETWEEN = 1.5  # as wide is the room between two columns of a table
 _NUMBER = re.compile(r"(?<![\w.-])-?(?:\d+(?:\.\d+)?|∞)(?![\w.]| (?!to )[a-z])")
+_LEVEL = r"(?:> |[\d.]+ to )?[\d.]+ %"
+_LEVELS_BEHIND = re.compile(r"(?<=\]) ([\d.]+) %(?: to ([\d.]+) %)?$")
 _ROOM = r"(?:\\phantom\{[^}]*\})+"
 _ESCAPES = {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
@@ -34,6 +40,8 @@ _SPECIAL = re.compile(rf"({_SIGNS})|((?<![\w.-])-\d+(?:\.\d+)?|\b[Nm] = \d+)|([^
 def latex_tables(results: StudyResults, report: Document) -> str:
     """Return the tables of a study, each a table environment with caption and label."""
     about = f"P is {what_p_is(results.plan)}. {_world(results)}; {results.seeds_text}."
+    if results.exploratory:
+        about += " Exploratory: over other seeds than were declared before the first run."
     labels = {
         verdict.after.name: parameter_label(verdict)
         for verdict in results.verdicts
@@ -59,7 +67,7 @@ def _answer(results: StudyResults, report: Document) -> Section:
             question,
             line.value,
             line.interval(answer.level).removeprefix("in "),
-            conclusion_text(*line.verdicts),
+            conclusion_text(*line.verdicts) + f" ({line.reason})" * bool(line.reason),
         )
         for question, line in zip(answer.questions, answer.lines)
     )
@@ -68,8 +76,9 @@ def _answer(results: StudyResults, report: Document) -> Section:
     symbols = dict.fromkeys(line.indicator for line in answer.lines)
     names = [definition.heading for symbol, definition in DEFINITIONS.items() if symbol in symbols]
     text = ", ".join(names)
-    meaning = f"{text[:1].upper()}{text[1:]}: supported above 0, refuted below."
-    lines = (answer.performance, meaning, hull, _HOLM)
+    meaning = f"{text[:1].upper()}{text[1:]}: supported above 0, refuted below, open: undecided."
+    reasons = reasons_in_words({line.reason for line in answer.lines})
+    lines = (answer.performance, meaning, hull, reasons and f"Open {reasons}.", _HOLM)
     return Section(f"{join_names(results.policies)}: indicators", columns, rows, lines)
 
 
@@ -94,12 +103,29 @@ def _readable(section: Section, labels: Mapping[str, str]) -> Section:
             text = re.sub(rf"\b{re.escape(name)}{values}", with_unit, text).replace(name, words)
         return re.sub(r"(?<=\d)(→| -> )(?=\d)", " to ", text)
 
-    rows = tuple(tuple(map(readable, row)) for row in section.rows)
-    return section._replace(title=readable(section.title), rows=rows)
+    columns = [_levels_in_heading(column) for column in zip(section.columns, *section.rows)]
+    headings, *rows = zip(*columns)
+    readable_rows = tuple(tuple(map(readable, row)) for row in rows)
+    return section._replace(title=readable(section.title), columns=headings, rows=readable_rows)
+
+
+def _levels_in_heading(column: Texts) -> Texts:
+    """Return a column in whose heading alone stand the levels of its intervals."""
+    heading, *cells = column
+    behind = {
+        level
+        for cell in cells
+        for match in _LEVELS_BEHIND.finditer(cell)
+        for level in match.groups()
+    }
+    levels = sorted({*filter(None, behind), *re.findall(r"([\d.]+) %", heading)}, key=float)
+    if behind:
+        heading = re.sub(r"[\d.]+ %", f"{levels[0]} to {levels[-1]} %", heading)
+    return heading, *(_LEVELS_BEHIND.sub("", cell) for cell in cells)
 
 
 def _table(section: Section, about: str, label: str) -> Iterator[str]:
-    levels = [*dict.fromkeys(re.findall(r"(?:> )?[\d.]+ %", " ".join(section.columns)))]
+    levels = [*dict.fromkeys(re.findall(_LEVEL, " ".join(section.columns)))]
     intervals = f"{levels[0]} intervals in brackets." if levels else ""
     if len(levels) > 1:
         intervals = "Intervals in brackets, at the levels in the headings."
@@ -107,7 +133,10 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     caption = [f"{section.title}.", about, intervals, *(section.lines or [_HOLM]), capped]
     columns = [_aligned(column) for column in zip(*section.rows)]
     columns[0] = [_escape(row[0]) for row in section.rows]
-    n_letters = sum(max(map(len, column)) for column in zip(section.columns, *section.rows))
+    widths = [max(map(len, column)) for column in zip(section.columns, *section.rows)]
+    first, *others = widths  # names of policies cannot be broken
+    layout = "l" + "".join("l" if width <= _LONG else r"p{0.16\linewidth}" for width in others)
+    n_letters = first + sum(min(width, _LONG) + _LETTERS_BETWEEN for width in others)
     # Over both columns of a page that has two, if it needs them.
     environment = "table*" if n_letters > _LETTERS_OF_A_COLUMN else "table"
     yield rf"\begin{{{environment}}}"
@@ -115,10 +144,8 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     yield rf"\caption{{{_escape(' '.join(filter(None, caption)))}}}"
     yield rf"\label{{{label}}}"
     yield r"\smallskip"
-    yield r"\footnotesize"
+    yield r"\scriptsize" if n_letters > _LETTERS_OF_A_PAGE else r"\footnotesize"
     yield r"\setlength{\tabcolsep}{3pt}"
-    long = [max(map(len, column)) > 40 for column in zip(*section.rows)]
-    layout = "".join(r"p{0.3\linewidth}" if is_long else "l" for is_long in long)
     yield rf"\begin{{tabular}}{{@{{}}{layout}@{{}}}}"
     yield from (r"\toprule", _row(map(_escape, section.columns)), r"\midrule")
     yield from map(_row, zip(*columns))

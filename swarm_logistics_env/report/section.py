@@ -347,7 +347,8 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots
     if verdict.flags:
         yield "flags", {"flags": " ".join(templates.FLAGS[flag] for flag in verdict.flags)}
     if "hidden_stalls" in verdict.flags:
-        yield "hidden_stalls", {"n_seeds": spi.seeds_against_stalls(estimate)}
+        runs = "seeds" if results.plan.paired else "trials a condition"
+        yield "hidden_stalls", {"n_runs": spi.seeds_against_stalls(estimate), "runs": runs}
     if estimate.collapsed is not None:
         yield "collapsed", {"collapsed": estimate.collapsed}
     if "hidden_collapses" in verdict.flags:

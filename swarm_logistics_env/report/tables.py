@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from operator import attrgetter
 
 import numpy as np
 from more_itertools import map_reduce
@@ -26,6 +25,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict, level_of
 
 from . import section
+from .answer_notes import reason_to_be_open
 from .collapse_tables import collapsed_in_words, edge_sections
 from .figures import rate_figures
 from .section import NOTHING, Section, Sentence, Texts
@@ -53,7 +53,7 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
     """Yield the tables of a study's results, policy by policy; then how near each comes.
 
     Args:
-        for_paper: whether all indicators stand in one table beside P alone, Holm's verdicts alone.
+        for_paper: whether P alone stands beside each indicator, and Holm's verdicts alone.
     """
     verdicts_of: dict[tuple[str, str], list[Verdict]] = map_reduce(
         results.verdicts, lambda verdict: (verdict.compared.policy, verdict.compared.table)
@@ -62,10 +62,15 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
         cells = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
         has_published = any(cell.published is not None for cell in cells)
         has_contacts = any(cell.contacts.value >= 0.0 for cell in cells)  # NaN: not counted
+        has_looks = bool(results.looks)
         verdicts = verdicts_of.get((policy, table), [])
-        layouts = _layouts(verdicts, published=has_published, contacts=has_contacts)
-        if for_paper and verdicts:
-            layouts = _paper_layout(verdicts, published=has_published)
+        columns = [_SETTING, *_performance_columns(published=has_published, looks=has_looks)]
+        if not for_paper:
+            columns.append((f"one run [{section.P_LEVEL}]", _one_run))
+            columns += [(CONTACTS_HEADING, contacts_text)] * has_contacts
+        decision = _holm if for_paper else section.decision_text
+        answers = partial(_answers, decision, published=has_published, looks=has_looks)
+        layouts = _layouts(verdicts, columns, answers, repeats_p=for_paper)
         for title, columns, arms in layouts:
             rows = tuple(
                 tuple(text(cell) for _, text in columns)
@@ -80,48 +85,50 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
     yield from edge_sections(results.cells)
 
 
-def _paper_layout(verdicts: Sequence[Verdict], *, published: bool) -> Iterator[Layout]:
-    *performance, _ = _performance_columns(published=published, contacts=False)
-    columns: list[CellColumn] = [("", lambda cell: cell.words), *performance]
-    by_indicator: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.indicator)
-    holm: Callable[[Verdict], str] = attrgetter("on_property.adjusted")
-    for indicator, of_indicator in by_indicator.items():
-        columns += _answers(indicator, of_indicator, holm, published=published)
-    yield "", columns, None
+def _holm(verdict: Verdict) -> str:
+    """Return Holm's verdict, and why it is open beside an interval on one side."""
+    reason = reason_to_be_open(verdict)
+    return f"{verdict.on_property.adjusted} ({reason})" if reason else verdict.on_property.adjusted
 
 
-def _layouts(verdicts: Sequence[Verdict], *, published: bool, contacts: bool) -> Iterator[Layout]:
+def _layouts(
+    verdicts: Sequence[Verdict],
+    columns: Sequence[CellColumn],
+    answers: Callable[[str, Sequence[Verdict]], Iterable[CellColumn]],
+    *,
+    repeats_p: bool,
+) -> Iterator[Layout]:
     """Yield the tables of one policy and one heading of the plan, without their cells.
 
-    The first has P and the first indicator; each further one has an indicator, without P again,
-    and the cells alone for which it was asked.
+    The first has P and the first indicator; each further one has an indicator. If P is not
+    repeated, it has the cells alone for which its indicator was asked.
 
     Yields:
         What stands behind the title, the columns, and the arms of the rows; None: all.
     """
-    setting: CellColumn = ("", lambda cell: cell.words)
-    title = ""
-    columns = [setting, *_performance_columns(published=published, contacts=contacts)]
-    arms: set[Arm] | None = None
     by_indicator: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.compared.indicator)
-    for indicator, same_indicator in by_indicator.items():
-        if title:
+    for number, (indicator, same_indicator) in enumerate(by_indicator.items()):
+        of_indicator = answers(indicator, same_indicator)
+        if repeats_p:
+            title = f", {indicator}" if len(by_indicator) > 1 else ""
+            yield title, [*columns, *of_indicator], None
+        elif number:
             arms = {verdict.compared.changed for verdict in same_indicator}
-        yield title, [*columns, *_answers(indicator, same_indicator, published=published)], arms
-        title = ", continued"
-        columns = [setting]
+            yield ", continued", [_SETTING, *of_indicator], arms
+        else:
+            yield "", [*columns, *of_indicator], None
 
 
-def _performance_columns(*, published: bool, contacts: bool) -> Iterator[CellColumn]:
+def _performance_columns(*, published: bool, looks: bool) -> Iterator[CellColumn]:
     if published:
         yield "P paper", _published_text
     heading = "P ours" if published else "P"
     yield f"{heading} [{section.P_LEVEL}]", section.mean_p
-    yield f"one run [{section.P_LEVEL}]", _one_run
-    if contacts:
-        yield CONTACTS_HEADING, contacts_text
+    if looks:  # conditions have seeds as many as were needed
+        yield "seeds", lambda cell: str(cell.n_seeds)
 
 
+_SETTING: CellColumn = ("", lambda cell: cell.words)
 CONTACTS_HEADING = f"contacts a robot-minute [{section.P_LEVEL}]"
 
 
@@ -139,11 +146,12 @@ def _one_run(cell: Cell) -> str:
 
 
 def _answers(
+    decision_text: Callable[[Verdict], str],
     indicator: str,
     verdicts: Sequence[Verdict],
-    decision_text: Callable[[Verdict], str] = section.decision_text,
     *,
     published: bool,
+    looks: bool,
 ) -> Iterator[CellColumn]:
     """Yield the columns of one indicator in a table of cells.
 
@@ -153,6 +161,8 @@ def _answers(
     level = level_of(verdicts)
     ratio = partial(section.ratio, level=level)
     yield _column(f"{indicator} [{section.percent(level)}]", verdicts, ratio)
+    if looks:
+        yield _column("seeds", verdicts, _number_of_seeds)
     if published:
         yield _column(f"{indicator} paper", verdicts, lambda v: section.number(v.published))
     by_property: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.property_name)
@@ -167,6 +177,10 @@ def _column(
 ) -> CellColumn:
     verdict_of = {verdict.compared.changed: verdict for verdict in verdicts}
     return heading, lambda cell: text(verdict_of[cell.arm]) if cell.arm in verdict_of else NOTHING
+
+
+def _number_of_seeds(verdict: Verdict) -> str:
+    return str(verdict.estimate.n_seeds) if verdict.estimate else NOTHING
 
 
 def _claim_text(verdict: Verdict) -> str:

@@ -97,7 +97,7 @@ NOTES = {
 }
 # Why a verdict is open although its interval lies on one side, and the flags that say so.
 REASONS_TO_BE_OPEN = {
-    "stalls": "so few seeds may hide stalled runs",
+    "stalls": "so few runs may hide stalled ones",
     "trainings": "so few trainings may hide collapses",
     "Holm": "decided alone, not among all questions on the indicator",
 }
@@ -114,6 +114,7 @@ FOR_A_PAPER = {
     "several_questions": "; of {n_questions} questions {words} ({method})",
     "not_decided": "; not decided: {questions}",
     "lowest": "; the lowest is {lowest} ({word})",
+    "exploratory": "; exploratory: over other seeds than were declared before the first run",
     "end": ".",
 }
 METHOD = "Holm's method, {error} error"
@@ -140,7 +141,7 @@ VERDICT = {
     "equivalence": "{question}? Change {change}: {words}.",
     "flags": "{flags}",
     "collapsed": "Trainings: {collapsed}.",
-    "hidden_stalls": "It needs at least {n_seeds} seeds.",
+    "hidden_stalls": "It needs at least {n_runs} {runs}.",
     "hidden_collapses": "It needs at least {n_trainings} trainings.",
     "open_after_all_looks": "Open after {n_seeds} of at most {most} seeds.",
     "clear_at_a_look": "Clear at {n_seeds} of at most {most} seeds.",
@@ -155,7 +156,7 @@ FLAGS = {
     "cannot_fail": "As no P is below 0, it cannot lie below the threshold, so it is not tested and "
     "has no verdict.",
     "capped": "P is capped on the side that the verdict leans to, so the verdict is open.",
-    "hidden_stalls": "These seeds are too few to exclude stalled runs that would turn the verdict, "
+    "hidden_stalls": "These runs are too few to exclude stalled ones that would turn the verdict, "
     "so it is open.",
     "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
     "the verdict comes from the test.",

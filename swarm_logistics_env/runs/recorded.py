@@ -246,7 +246,7 @@ def _refuse_unused(origin: Origin, plan: Plan) -> None:
                 raise StudyError(
                     f"line {row.line}: the number of robots and {name!r} change together, so what "
                     "comes of either cannot be told: should have trials in which one of them alone "
-                    "differs"
+                    f"differs; --ignore {name} counts what comes of both as the robots'"
                 )
             varied = ", ".join(repr(name) for name, _ in row.parameters)
             hint = f"; columns taken for parameters: {varied}" if varied else ""

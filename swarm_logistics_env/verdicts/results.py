@@ -117,7 +117,13 @@ class StudyResults:
             fewest = min(cell.n_seeds for cell in self.cells)
             count = f"{fewest} to {len(seeds)}" if fewest < len(seeds) else f"{fewest}"
             return f"{count} unpaired {'run' if count == '1' else 'runs'} a condition"
+        fewest = len(seeds)
+        if self.looks:  # conditions have as many as were needed
+            most = max([fewest, *(cell.n_seeds for cell in self.cells)])
+            seeds = range(seeds[0], seeds[0] + most)
         count = "one seed" if len(seeds) == 1 else f"{len(seeds)} paired seeds"
+        if fewest < len(seeds):
+            count = f"{fewest} to {count}"
         return f"{count} ({seeds_in_words(seeds)})"
 
 
@@ -134,17 +140,18 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
     declared = declared or Declaration.model_validate(specification)
     is_exploratory = not declared.covers(plan)
     verdicts: Iterable[Verdict] = ()
+    all_seeds, seeds_of = plan.seeds, dict[str, int]()
     if specification.until_clear:
         look = latest_look(plan, outcomes)
+        seeds_of |= look.seeds_of
         plan = replace(plan, specification=specification.replace(seeds=look.shared_seeds))
         verdicts = look.verdicts
     # Recorded conditions need not have the same seeds.
     is_even = plan.paired and plan.origin is None
     cells: dict[CellKey, Cell] = {}
     for policy, table, arm in plan.cells:
-        runs = [
-            outcomes.get((case.key, seed)) for case in arm.case.trainings for seed in plan.seeds
-        ]
+        seeds = all_seeds[: seeds_of.get(arm.case.key, len(all_seeds))]
+        runs = [outcomes.get((case.key, seed)) for case in arm.case.trainings for seed in seeds]
         cells[policy, table, arm] = Cell.of(
             policy, table, arm, runs, paired=is_even, reference=reference
         )

@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -49,13 +49,18 @@ class LatestLook(NamedTuple):
             are played.
         shared_runs: those of them that the first look needs of the condition that most comparisons
             of a policy share.
-        shared_seeds: number of seeds that every condition has, counted at the looks.
+        seeds_of: number of seeds that a condition has, counted at the looks, by its key.
     """
 
     verdicts: tuple[Verdict, ...]
     next_runs: tuple[Run, ...]
     shared_runs: tuple[Run, ...]
-    shared_seeds: int
+    seeds_of: Mapping[str, int]
+
+    @property
+    def shared_seeds(self) -> int:
+        """Number of seeds that every condition has."""
+        return min(self.seeds_of.values())
 
 
 def latest_look(plan: Plan, outcomes: Outcomes) -> LatestLook:
@@ -71,13 +76,12 @@ def latest_look(plan: Plan, outcomes: Outcomes) -> LatestLook:
         family = _Family(comparisons, looks)
         next_runs |= family.next_runs
         verdicts |= family.verdicts()
-    complete = [n_seeds for n_seeds in looks.seeds if not looks.missing(plan.cases, n_seeds)]
     return LatestLook(
         tuple(verdicts[comparison] for comparison in plan.comparisons),
         # Seed by seed, so that a study that is stopped early has something of every question.
         tuple(sorted(next_runs.values(), key=lambda run: run.seed)),
         tuple(shared_runs.values()),
-        max(complete, default=looks.seeds[0]),
+        {case.key: looks.seeds_of(case) for case in plan.cases},
     )
 
 
@@ -108,6 +112,11 @@ class _Looks:
         seeds = self._plan.seeds[:n_seeds]
         runs = (Run(case, self._plan.code, seed) for case in cases for seed in seeds)
         return {run.key: run for run in runs if (run.case.key, run.seed) not in self._outcomes}
+
+    def seeds_of(self, case: Case) -> int:
+        """Return the number of seeds of the latest look that a condition is complete for."""
+        complete = [n_seeds for n_seeds in self.seeds if not self.missing([case], n_seeds)]
+        return max(complete, default=self.seeds[0])
 
     def judge(self, comparisons: Iterable[Comparison], n_seeds: int) -> dict[Comparison, Verdict]:
         """Judge comparisons at a look, as far as it is played."""

@@ -143,7 +143,9 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     world = "in a warehouse of 3 m x 3 m with 6 items that come back, robots of 2 m/s"
     performance = f"P [95 %], items in 20 s, at N = 4, no fault: {p:.1f} ["
     assert f"For a paper: homing {world}: {performance}" in printed
-    assert "from the start: swarm-logistics judge homing --seeds" in printed
+    new_seeds = study.plan().seeds[-1] + 1
+    command_for_more = f"swarm-logistics judge homing --first-seed {new_seeds} --seeds"
+    assert f"more seeds, which nobody has looked at: {command_for_more}" in printed
     last = printed.splitlines()[-1]
     assert last.startswith(f"{5 * len(study.plan().cases) - 1} runs played in ")
     assert "1 were kept" in last
@@ -152,7 +154,7 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
 def test_other_seeds_are_judged_in_a_directory_of_their_own(command: Command) -> None:
     printed = command("judge homing --processes 1 --seeds 3 --first-seed 500")
     assert Study.stored("results/judged/homing-first-seed-500").plan().seeds == range(500, 503)
-    assert " --first-seed 500 --seeds " in printed
+    assert " --first-seed 503 --seeds " in printed
 
 
 def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
@@ -194,7 +196,8 @@ def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(command: Command
 def test_a_policy_is_judged_on_other_bodies_and_floors(command: Command) -> None:
     printed = command("judge homing --bodies mujoco --seeds 3 --processes 1")
     folder = "results/judged/homing-bodies-mujoco"
-    assert f"homing --bodies mujoco --seeds 60 --out {folder}-60" in printed
+    more = f"homing --bodies mujoco --first-seed 30003 --seeds 60 --out {folder}-60"
+    assert more in printed
     report = Path(folder, "report.md").read_text()
     assert "| bodies | mujoco (default chipmunk) |" in report
     refused = command("judge homing --benchmark --bodies mujoco", code=2)

@@ -29,6 +29,7 @@ def test_a_class_is_loaded_by_module_or_the_file_of_this_folder_and_name(own_mod
 @pytest.mark.parametrize(
     ("name", "parameters", "complaint"),
     [
+        ("mine.py", {}, r"policy 'mine.py': should name its class, as 'mine.py:Class'$"),
         ("swarm-td", {}, r"no policy 'swarm-td' \(.* file\); did you mean 'swarm-dt'\?$"),
         ("no_such_module:Class", {}, "ModuleNotFoundError: No module named 'no_such_mod"),
         ("own_policies:Stil", {}, r"own_policies has no Stil; did you mean 'Still'\?"),

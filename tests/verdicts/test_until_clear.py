@@ -159,6 +159,9 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
     seeds = {mode: modes.count(mode) for mode in MEANS}
     assert seeds == {mode: found[mode][1] for mode in MEANS}
     assert len(engine.played) == sum(seeds.values()) + max(seeds.values())
+    cells, most = study.findings().cells, max(seeds.values())
+    assert {cell.n_seeds for cell in cells} == {*seeds.values()}  # the sound swarm has the most
+    assert study.findings().seeds_text == f"10 to {most} paired seeds (0 to {most - 1})"
     # Each is judged by its own seeds and its repeated interval.
     looks = looks_up_to(60)
     for test in study.findings().verdicts:

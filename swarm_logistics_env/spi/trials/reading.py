@@ -103,6 +103,8 @@ def read_trials(
     if "time_to_finish" not in table_columns.names:  # a rate compares trials of any length
         _check_durations(table, trials)
     notes += _notes_on_conditions(trials, table_columns, varying, covariates)
+    conditions = [trial.condition for trial, _ in pairs]
+    notes += _notes_on_left_out({name: table.column(name) for name in ignore}, conditions)
     notes += notes_on_pairs(trials, block)
     return Trials(
         Path(table.source).name or table.source,
@@ -130,6 +132,19 @@ def _notes_on_conditions(
             f"{' and '.join(varying)}, some of a single trial: leave out what was only noted, as "
             f"by --ignore {varying[0]!r}."
         )
+
+
+def _notes_on_left_out(
+    columns: Mapping[str, Sequence[str]], conditions: Sequence[object]
+) -> Iterator[str]:
+    """Yield which columns are left out though they differ from condition to condition alone."""
+    n_conditions = len({*conditions})
+    for name, cells in columns.items():
+        if len({*cells}) > 1 and len({*zip(conditions, cells)}) == n_conditions:
+            yield (
+                f"{name!r} is left out, though it differs between conditions: what comes of it "
+                "counts as theirs."
+            )
 
 
 def _parameters(table: Table, columns: Columns) -> tuple[list[str], list[str]]:

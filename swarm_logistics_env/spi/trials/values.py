@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
+from shlex import quote
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
@@ -167,6 +170,7 @@ class FaultNames:
                 self.notes.append(
                     f"The faults {spelled[name.casefold()]} and {name} are taken for one."
                 )
+        self.notes += _notes_on_misspelled(Counter(self[row.text("fault")] for row in rows))
 
     def __getitem__(self, name: str) -> str:
         """Return what a fault is called, by its cell."""
@@ -176,6 +180,18 @@ class FaultNames:
     def any_fails(self) -> bool:
         """Whether robots fail in some trial."""
         return any(name not in (NO_FAULT_WORD, REPEATED) for name in self._names.values())
+
+
+def _notes_on_misspelled(counts: Counter[str]) -> Iterator[str]:
+    """Yield the faults of one row whose names are nearly those of faults of several rows."""
+    frequent = [name for name, count in counts.items() if count > 1]
+    for name, count in counts.items():
+        similar = get_close_matches(name, frequent, n=1, cutoff=0.8)
+        if count == 1 and similar:
+            yield (
+                f"The fault {name!r} stands in one row alone: if {similar[0]!r} is meant, "
+                f"--value {quote(f'fault:{name}={similar[0]}')} says so."
+            )
 
 
 def _without_faulty_robots(rows: Sequence[Row]) -> set[str]:

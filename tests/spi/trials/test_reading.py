@@ -175,6 +175,22 @@ def test_a_number_that_splits_the_trials_is_named(tmp_path: Path) -> None:
     assert read(tmp_path, text, ignore=["temperature"]).notes == ()
 
 
+def test_a_fault_that_is_nearly_another_is_named(tmp_path: Path) -> None:
+    text = "robots,fault,faulty,p\n6,none,0,9\n6,R motor,1,7\n6,R motor,1,6\n6,R motr,1,6\n"
+    (note,) = read(tmp_path, text).notes
+    correction = note.partition("--value '")[2].partition("'")[0]
+    assert correction == "fault:R motr=R motor"
+    assert read(tmp_path, text, values=[correction]).notes == ()
+
+
+def test_a_column_that_is_left_out_is_named_if_it_differs_between_conditions(
+    tmp_path: Path,
+) -> None:
+    text = "robots,tags,p\n4,32,1\n4,32,2\n8,64,2\n8,64,3\n"
+    (note,) = read(tmp_path, text, ignore=["tags"]).notes
+    assert note.startswith("'tags' is left out, though it differs between conditions")
+
+
 def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
     for asked, words in (
         ({"columns": {"performanse": "delivered"}}, "did you mean 'performance'?"),
