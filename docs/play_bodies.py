@@ -68,8 +68,14 @@ _WORLD = Scenario(restock=True, duration=200.0)
 # MuJoCo's motors give 5 m/s2 at most, so the package's own engine gets no more either.
 _WHEELS = _WORLD.replace(drive="differential", max_acceleration=5.0)
 _SLOW = _WORLD.replace(drive="differential", max_speed=1.0, max_acceleration=2.0)
-_REALISTIC = Scenario.preset("realistic").replace(restock=True)
-REALISTIC = World("realistic", _REALISTIC, "mujoco", 5, (), ("homing", STOCK, "ppo-robust@all"))
+REALISTIC = World(
+    "realistic",
+    Scenario.preset("realistic").replace(restock=True),
+    "mujoco",
+    n_seeds=5,
+    faults=(),
+    policies=("homing", STOCK, "ppo-robust@all"),
+)
 OTHERS = (
     World("wheels", _WHEELS, "mujoco", 10),
     World("slow wheels", _SLOW, "mujoco", 10, faults=()),

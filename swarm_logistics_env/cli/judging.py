@@ -314,7 +314,7 @@ def judge_policy(
     # Several trainings and untrusted code need options that the suggested command does not have.
     elif world and is_open and not (tally.left or policy.trainings or policy.trusted):
         options = [policy.name, *["--clearing"] * world.clearing, *world.options]
-        options += ["--first-seed", str(study.plan().seeds[0] + most_seeds)]
+        options += ["--first-seed", str(study.plan().seeds[-1] + 1)]
         _suggest_more_seeds(options, directory, max(JUDGE_SEEDS, 2 * most_seeds))
     say_what_was_played(tally)
     return tally

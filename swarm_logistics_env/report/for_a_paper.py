@@ -53,7 +53,7 @@ def in_a_sentence(results: StudyResults) -> str:
                 "word": f"{word}: {reason}" if reason else word,
             }
     if results.exploratory:
-        slots["exploratory"] = {}
+        slots["exploratory"] = {"exploratory": templates.EXPLORATORY}
     return "".join(fill(templates.FOR_A_PAPER, {**slots, "end": {}}))
 
 

@@ -16,6 +16,7 @@ from .figures import CAPPED, parameter_label
 from .for_a_paper import world_in_words
 from .section import SATURATED, Section, Texts, conclusion_text, join_names, slug
 from .tables import tables
+from .templates import EXPLORATORY
 
 _HOLM = "Verdicts are adjusted by Holm's method over all questions on an indicator of one policy."
 _LETTERS_OF_A_COLUMN = 58  # in a column of 3.5 inch
@@ -41,7 +42,7 @@ def latex_tables(results: StudyResults, report: Document) -> str:
     """Return the tables of a study, each a table environment with caption and label."""
     about = f"P is {what_p_is(results.plan)}. {_world(results)}; {results.seeds_text}."
     if results.exploratory:
-        about += " Exploratory: over other seeds than were declared before the first run."
+        about += f" {EXPLORATORY.capitalize()}."
     labels = {
         verdict.after.name: parameter_label(verdict)
         for verdict in results.verdicts

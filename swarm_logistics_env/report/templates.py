@@ -107,6 +107,8 @@ REASON_OF_FLAG = {
     "few_trainings": "trainings",
 }
 
+EXPLORATORY = "exploratory: over other seeds than were declared before the first run"
+
 # The sentence that a paper can quote: the cases that apply, one after the other.
 FOR_A_PAPER = {
     "performance": "{policies}{world}: {performance} over {seeds}",
@@ -114,7 +116,7 @@ FOR_A_PAPER = {
     "several_questions": "; of {n_questions} questions {words} ({method})",
     "not_decided": "; not decided: {questions}",
     "lowest": "; the lowest is {lowest} ({word})",
-    "exploratory": "; exploratory: over other seeds than were declared before the first run",
+    "exploratory": "; {exploratory}",
     "end": ".",
 }
 METHOD = "Holm's method, {error} error"

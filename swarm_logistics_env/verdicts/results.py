@@ -32,7 +32,8 @@ class StudyResults:
         plan: of the study; of one that runs until it is clear, over the seeds that all conditions
             share.
         reference: what the study is compared with; None: nothing.
-        cells: P of every policy and condition, in the order of the report.
+        cells: P of every policy and condition, over all seeds that it has, in the order of the
+            report.
         verdicts: on every comparison, in the order of the plan.
         exploratory: whether the seeds are not those that were declared at the study's start, or the
             look is none of them, so that the verdicts' error level is not the nominal one.

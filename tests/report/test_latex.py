@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,11 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     assert row.endswith("open (stalls) \\\\")
     assert f"open: undecided. Open (stalls): {reason}. Verdicts are" in latex
     assert in_a_sentence(few).endswith(f"open ({reason}; Holm's method, 5 % error).")
+    assert "xploratory" not in latex + in_a_sentence(few)
+    undeclared = replace(few, exploratory=True)
+    words = "xploratory: over other seeds than were declared before the first run."
+    assert latex_tables(undeclared, document(undeclared)).count(f" E{words} ") == 2
+    assert in_a_sentence(undeclared).endswith(f"; e{words}")
 
 
 @pytest.mark.parametrize("page", ["article", "[twocolumn]{article}"])

@@ -143,6 +143,10 @@ HEAD = "robots,fault,faulty,width,delivered\n"
         (HEAD + "5,,,0,9\n5,,,2,9\n", "line 2: width = 0 is x_o"),
         (
             "robots,tags,delivered\n4,8,9\n4,8,8\n8,16,20\n",
+            "line 2: the number of robots and 'tags' change together",
+        ),
+        (
+            "robots,tags,delivered\n4,8,9\n4,8,8\n8,16,20\n",
             "should have trials in which one of them alone differs; --ignore tags counts what",
         ),
         ("robots,weight,slope,delivered\n4,1,0,9\n4,2,3,9\n", "parameters: 'weight', 'slope'"),
