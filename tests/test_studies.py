@@ -254,3 +254,19 @@ def test_another_specification_makes_another_plan(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="asks what its trials vary"):
         imported.specification = study.specification
     assert imported.plan().origin is not None
+
+
+def test_the_same_outcomes_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    study, looks_at = until_clear(30), list[int]()
+
+    def counted(plan: Plan, outcomes: Outcomes) -> LatestLook:
+        looks_at.append(len(outcomes))
+        return latest_look(plan, outcomes)
+
+    monkeypatch.setattr(studies, "latest_look", counted)
+    study.run(Engine(), after_look=lambda _: None)
+    results = study.findings()
+    assert looks_at == sorted(set(looks_at))
+    assert looks_at[-1] == len(results.outcomes)
+    study.specification = study.specification.replace(margin=0.2)
+    assert study.findings().verdicts != results.verdicts  # another plan's looks
