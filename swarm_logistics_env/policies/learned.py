@@ -38,7 +38,7 @@ from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-from .layers import in_blocks, padded, run_network
+from .layers import Layers, in_blocks, padded, run_network
 
 Width = Annotated[int, Field(ge=1, le=4096)]
 
@@ -165,10 +165,12 @@ class LearnedPolicy(Described):
         self.card = card
         self.tensors = dict(tensors)
         network = card.network
-        layers = range(len(network.hidden) + 1)
-        self._weights = np.concatenate([in_blocks(tensors[f"layers.{n}.weight"].T) for n in layers])
-        self._biases = np.concatenate([padded(tensors[f"layers.{n}.bias"]) for n in layers])
-        self._widths = np.array(network.widths)
+        numbers = range(len(network.hidden) + 1)
+        self._layers = Layers(
+            np.concatenate([in_blocks(tensors[f"layers.{n}.weight"].T) for n in numbers]),
+            np.concatenate([padded(tensors[f"layers.{n}.bias"]) for n in numbers]),
+            np.array(network.widths),
+        )
         self._decides_every, self._listens = network.decides_every, network.listens
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = {
@@ -192,7 +194,7 @@ class LearnedPolicy(Described):
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode."""
         self._frame.begin(row_keys(seed, STREAM, n_robots))
-        self._outputs = np.empty((n_robots, self._widths[-1]), np.float32)
+        self._outputs = np.empty((n_robots, len(OUTPUTS)), np.float32)
         self._n_steps = 0
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -210,17 +212,15 @@ class LearnedPolicy(Described):
         else:
             act_network(
                 observations, period, memory, counts, turned, frame.keys, self._listens,
-                self._weights, self._biases, self._widths, self._deviations, outputs, commands,
+                self._layers, self._deviations, outputs, commands,
             )  # fmt: skip
         self._n_steps += 1
         return commands
 
     def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the network's outputs (N, k) for rows of its inputs, without noise."""
-        outputs = np.empty((len(inputs), self._widths[-1]), np.float32)
-        run_network(
-            np.ascontiguousarray(inputs), self._weights, self._biases, self._widths, outputs
-        )
+        outputs = np.empty((len(inputs), len(OUTPUTS)), np.float32)
+        run_network(np.ascontiguousarray(inputs), self._layers, outputs)
         return outputs
 
 
@@ -233,9 +233,7 @@ def act_network(
     turned: NDArray[np.float64],
     keys: NDArray[np.uint64],
     listens: bool,
-    weights: NDArray[np.float32],
-    biases: NDArray[np.float32],
-    widths: NDArray[np.int64],
+    layers: Layers,
     deviations: NDArray[np.float32],
     outputs: NDArray[np.float32],
     commands: NDArray[np.float64],
@@ -244,10 +242,10 @@ def act_network(
 
     One kernel a step, because each call of a kernel costs more than a microsecond.
     """
-    inputs = np.empty((rows.shape[0], widths[0]), np.float32)
+    inputs = np.empty((rows.shape[0], layers.widths[0]), np.float32)
     read_observations(rows, period, memories, keys, counts, listens, inputs, turned)
     counts += 1
-    run_network(inputs, weights, biases, widths, outputs)
+    run_network(inputs, layers, outputs)
     if deviations.any():
         explore(keys, counts, deviations, outputs)
     command_rows(outputs, turned, rows, memories, commands)
