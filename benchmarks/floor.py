@@ -44,14 +44,14 @@ def record(scenario: Scenario, n_steps: int, name: str = "swarm-dt") -> Recordin
 class ForceFloor:
     """Bodies that replay the wanted velocities of a recording, driven by forces.
 
-    `state` is (N + 1, 4): x, y [m] and velocity [m/s] of every body.
+    `state` is (N, 4): x, y [m] and velocity [m/s] of every robot.
     """
 
     def __init__(self, recording: Recording) -> None:
         self._wanted = recording.wanted_velocity
         self._world = Warehouse(recording.scenario)
         self._world.reset(seed=0)
-        self.state = self._world._world.engine.bodies.numbers
+        self.state = self._world._world.engine.bodies
 
     def step(self, index: int) -> None:
         """Take control step `index` of the recording."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import CommandError, PolicyError
-from swarm_logistics_env.policies.policy import Policy, decide, one_thread, start
+from swarm_logistics_env.policies.policy import Policy, decide_in_one_thread, one_thread, start
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.contacts import NO_MEASURES, ContactMeasures
@@ -100,12 +100,13 @@ class Play:
         if not self.is_over:
             if self._env is None:
                 self._rows = self.world.observe()  # others, if the caller changed the world
-            self.advance()
+            with one_thread():
+                self.advance()
 
     def advance(self) -> None:
-        """Do as `step` where nobody changed the world and the episode is not over."""
+        """Do as `step` in `one_thread`, where nobody changed the world and it is not over."""
         world = self.world
-        commands = decide(self._policy, self._rows, world.state)
+        commands = decide_in_one_thread(self._policy, self._rows, world.state)
         try:
             if self._env is None:
                 self._rows = world.step(commands)
@@ -168,9 +169,10 @@ def run_episode(
     with one_thread():  # once for all steps, as each change takes a while
         play = Play(scenario, policy, seed, faults, policy_seed)
         world, is_over = play.world, play.is_over
+        positions = world.state.robot_position.data  # the same memory during the whole episode
         while not is_over:
             play.advance()
-            digest.update(world.state.robot_position.data)
+            digest.update(positions)
             # No end without an event, but for wrappers that end it sooner.
             is_over = (world.is_eventful or play._env is not None) and play.is_over
     state = world.state

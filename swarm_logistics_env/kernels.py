@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from swarm_logistics_env.numba_fence import IS_PLAIN
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+# The array at a pointer (`addresses.pointer_at`), of a shape and a type.
+carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:

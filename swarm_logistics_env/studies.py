@@ -22,9 +22,9 @@ from swarm_logistics_env.runs.engines import Engine, Shard, Tally, engine_named,
 from swarm_logistics_env.runs.notes import StoredStudy, note
 from swarm_logistics_env.runs.recorded import imported_plan
 from swarm_logistics_env.runs.store import FILE_NAME, Runs
-from swarm_logistics_env.tasks.task import Run, Task, refuse_untrusted
+from swarm_logistics_env.tasks.task import Outcomes, Run, Task, refuse_untrusted
 from swarm_logistics_env.verdicts.results import StudyResults, judge
-from swarm_logistics_env.verdicts.until_clear import latest_look
+from swarm_logistics_env.verdicts.until_clear import LatestLook, latest_look
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,6 +62,7 @@ class Study:
         self._specification = Specification(**fields)
         self.out = None if out is None else Path(out)
         self._plan: Plan | None = None
+        self._look: tuple[dict[tuple[str, int], str | None], LatestLook] | None = None
         self._memory: Runs | None = None
 
     @classmethod
@@ -135,7 +136,7 @@ class Study:
     def specification(self, changed: Specification) -> None:
         if self._plan is not None and self._plan.origin is not None:
             raise StudyError("specification: a study that was imported asks what its trials vary")
-        self._specification, self._plan = changed, None
+        self._specification, self._plan, self._look = changed, None, None
 
     def plan(self) -> Plan:
         """Return the conditions and comparisons, shared conditions once; nothing is run."""
@@ -194,7 +195,7 @@ class Study:
                 missing = self._missing(all_runs, store, tried, in_stages=True)
                 tried.update(run.key for run in missing)
                 if after_look:
-                    after_look(judge(plan, store.outcomes(plan.runs), self._declared(store)))
+                    after_look(self._results(store))
                 return missing
 
             if missing := self._missing(all_runs, store, tried, in_stages=True):
@@ -252,8 +253,22 @@ class Study:
         if not self.specification.until_clear:
             return [run for run in runs if run.key not in done]
         outcomes = store.outcomes(run for run in runs if run.key in done)
-        look = latest_look(self.plan(), outcomes)
+        look = self._latest_look(outcomes)
         return list((in_stages and look.shared_runs) or look.next_runs)
+
+    def _latest_look(self, outcomes: Outcomes) -> LatestLook:
+        """Return the latest look at these outcomes; the one before, if nothing was played since."""
+        errors = {key: outcome.error for key, outcome in outcomes.items()}
+        if self._look is None or self._look[0] != errors:
+            self._look = errors, latest_look(self.plan(), outcomes)
+        return self._look[1]
+
+    def _results(self, store: Runs) -> StudyResults:
+        """Return what the stored runs say."""
+        plan = self.plan()
+        outcomes = store.outcomes(plan.runs)
+        look = self._latest_look(outcomes) if self.specification.until_clear else None
+        return judge(plan, outcomes, self._declared(store), look)
 
     def finished(self, shard: Shard | None = None) -> tuple[int, int]:
         """Return how many runs have succeeded, and of how many.
@@ -301,11 +316,8 @@ class Study:
         """
         from swarm_logistics_env.report.findings import Findings
 
-        plan = self.plan()
         with self._store(existing=True) as store:
-            declared = self._declared(store)
-            results = judge(plan, store.outcomes(plan.runs), declared)
-            return replace(Findings.of(results), damage=store.damage())
+            return replace(Findings.of(self._results(store)), damage=store.damage())
 
     def results(self) -> pd.DataFrame:
         """Return one row per finished run: condition, seed, P, delivery times [s], error.

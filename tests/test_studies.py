@@ -17,9 +17,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from swarm_logistics_env import studies
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.questions.declaration import Declaration
+from swarm_logistics_env.questions.plan import Plan
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.runs.notes import note
@@ -27,8 +29,11 @@ from swarm_logistics_env.runs.recorded import import_results
 from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.tasks.task import Outcomes
+from swarm_logistics_env.verdicts.until_clear import LatestLook, latest_look
 from tests.conftest import SMALL
 from tests.made_up import alter, digest
+from tests.verdicts.test_until_clear import Engine, until_clear
 
 DYING = """
 import os, pathlib, signal
@@ -254,3 +259,19 @@ def test_another_specification_makes_another_plan(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="asks what its trials vary"):
         imported.specification = study.specification
     assert imported.plan().origin is not None
+
+
+def test_the_same_outcomes_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    study, looks_at = until_clear(30), list[int]()
+
+    def counted(plan: Plan, outcomes: Outcomes) -> LatestLook:
+        looks_at.append(len(outcomes))
+        return latest_look(plan, outcomes)
+
+    monkeypatch.setattr(studies, "latest_look", counted)
+    study.run(Engine(), after_look=lambda _: None)
+    results = study.findings()
+    assert looks_at == sorted(set(looks_at))
+    assert looks_at[-1] == len(results.outcomes)
+    study.specification = study.specification.replace(margin=0.2)
+    assert study.findings().verdicts != results.verdicts  # another plan's looks

@@ -17,6 +17,7 @@ from swarm_logistics_env.scenario import Scenario
 from .network_inputs import INPUTS, read_observations
 
 OUTPUTS = ("along", "aside", "gripper")
+N_COMMANDS = 4  # of a robot: forward, left, turn, gripper
 
 
 class MotionView:
@@ -31,12 +32,13 @@ class MotionView:
     Attributes:
         keys: of each row's stream (N,).
         counts: the decisions of each row in its episode so far (N,).
+        period: the scenario's control period [s].
         rows: the observations last read (N, D).
         turned: how far each row's frame is turned from its robot's body (N,) [rad].
     """
 
     def __init__(self, scenario: Scenario, listens: bool = True) -> None:
-        self._period = scenario.control_period
+        self.period = scenario.control_period
         self._body = column.body_of(scenario)
         self._listens = listens
         self.begin(np.empty(0, np.uint64))
@@ -84,9 +86,7 @@ class MotionView:
             PolicyError: there are more or fewer rows than keys at `begin`.
         """
         self.check(observations)
-        column.remember_observation(observations, self._period, self.memory)
-        self.turned -= self._period * observations[:, row.TURN_RATE]
-        self.counts += 1
+        hold_rows(observations, self.period, self.memory, self.counts, self.turned)
         self.rows = observations
 
     def check(self, observations: NDArray[np.float32]) -> None:
@@ -112,7 +112,7 @@ class MotionView:
         turned: NDArray[np.float64],
     ) -> NDArray[np.float32]:
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
-        period, listens = self._period, self._listens
+        period, listens = self.period, self._listens
         read_observations(observations, period, memory, keys, counts, listens, inputs, turned)
         return inputs
 
@@ -122,8 +122,8 @@ class MotionView:
         A robot that is caged by items clears its way instead.
         A differential robot turns its body to where it wants to drive.
         """
-        commands = np.zeros((len(outputs), 4))
-        command_rows(outputs.astype(np.float64), self.turned, self.rows, self.memory, commands)
+        commands = np.empty((len(outputs), N_COMMANDS))
+        command_rows(outputs, self.turned, self.rows, self.memory, commands)
         return commands
 
 
@@ -132,8 +132,23 @@ _COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
 
 
 @kernel
+def hold_rows(
+    rows: NDArray[np.float32],
+    period: float,
+    memories: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    turned: NDArray[np.float64],
+) -> None:
+    """Take what rows (N, D) tell into the memories, and let frames (N,) stay while bodies turn."""
+    column.remember_observation(rows, period, memories)
+    for robot in range(rows.shape[0]):
+        turned[robot] -= np.float32(period) * rows[robot, row.TURN_RATE]
+        counts[robot] += 1
+
+
+@kernel
 def command_rows(
-    outputs: NDArray[np.float64],
+    outputs: NDArray[np.floating],
     turned: NDArray[np.float64],
     rows: NDArray[np.float32],
     memories: NDArray[np.float64],
@@ -142,7 +157,7 @@ def command_rows(
     """Fill the commands (N, 4) of outputs (N, 3) upon rows; memories take note of them."""
     for robot in range(outputs.shape[0]):
         along, aside, gripper = outputs[robot]
-        turn_outputs(along, aside, gripper, turned[robot], commands[robot])
+        turn_outputs(float(along), float(aside), float(gripper), turned[robot], commands[robot])
         finish_command(rows[robot], memories[robot], commands[robot])
 
 

@@ -8,6 +8,7 @@ are summed at once, as many as the registers of a processor hold; `register_bloc
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,14 @@ from swarm_logistics_env.kernels import kernel
 from .register_blocks import NARROW, ROWS, WIDE, sum_narrow_block, sum_wide_block
 
 Floats = NDArray[np.float32]
+
+
+class Layers(NamedTuple):
+    """The layers of a network as `run_network` reads them; layer l has widths[l] inputs."""
+
+    weights: Floats  # of all layers, `in_blocks`
+    biases: Floats  # `padded`
+    widths: NDArray[np.int64]
 
 
 def in_blocks(weights: Floats) -> Floats:
@@ -62,13 +71,9 @@ def hyperbolic_tangent(x: np.float32) -> np.float32:
 
 
 @kernel
-def run_network(
-    inputs: Floats, weights: Floats, biases: Floats, widths: NDArray[np.int64], outputs: Floats
-) -> None:
-    """Fill `outputs` (N, widths[-1]) from `inputs` (N, widths[0]); layer l has widths[l] inputs.
-
-    `weights` are those `in_blocks` of all layers, `biases` the `padded` ones.
-    """
+def run_network(inputs: Floats, layers: Layers, outputs: Floats) -> None:
+    """Fill `outputs` (N, widths[-1]) from `inputs` (N, widths[0])."""
+    weights, biases, widths = layers
     n_rows, n_layers = inputs.shape[0], len(widths) - 1
     most = n_rows * -(-widths.max() // NARROW) * NARROW
     sums, hidden = np.empty(most, np.float32), np.empty(most, np.float32)

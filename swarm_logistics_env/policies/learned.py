@@ -25,14 +25,20 @@ from pydantic import (
 
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.motion.network_inputs import INPUTS
+from swarm_logistics_env.motion.frame import (
+    N_COMMANDS,
+    OUTPUTS,
+    MotionView,
+    command_rows,
+    hold_rows,
+)
+from swarm_logistics_env.motion.network_inputs import INPUTS, read_observations
 from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-from .layers import in_blocks, padded, run_network
+from .layers import Layers, in_blocks, padded, run_network
 
 Width = Annotated[int, Field(ge=1, le=4096)]
 
@@ -159,10 +165,13 @@ class LearnedPolicy(Described):
         self.card = card
         self.tensors = dict(tensors)
         network = card.network
-        layers = range(len(network.hidden) + 1)
-        self._weights = np.concatenate([in_blocks(tensors[f"layers.{n}.weight"].T) for n in layers])
-        self._biases = np.concatenate([padded(tensors[f"layers.{n}.bias"]) for n in layers])
-        self._widths = np.array(network.widths)
+        numbers = range(len(network.hidden) + 1)
+        self._layers = Layers(
+            np.concatenate([in_blocks(tensors[f"layers.{n}.weight"].T) for n in numbers]),
+            np.concatenate([padded(tensors[f"layers.{n}.bias"]) for n in numbers]),
+            np.array(network.widths),
+        )
+        self._decides_every, self._listens = network.decides_every, network.listens
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = {
             "network": network.model_dump(mode="json"),
@@ -185,6 +194,7 @@ class LearnedPolicy(Described):
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode."""
         self._frame.begin(row_keys(seed, STREAM, n_robots))
+        self._outputs = np.empty((n_robots, len(OUTPUTS)), np.float32)
         self._n_steps = 0
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -193,23 +203,67 @@ class LearnedPolicy(Described):
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
-        frame, network = self._frame, self.card.network
-        if self._n_steps % network.decides_every:
-            frame.hold(observations)
+        frame, outputs = self._frame, self._outputs
+        frame.check(observations)
+        commands = np.empty((len(outputs), N_COMMANDS))
+        period, memory, counts, turned = frame.period, frame.memory, frame.counts, frame.turned
+        if self._n_steps % self._decides_every:
+            hold_outputs(observations, period, memory, counts, turned, outputs, commands)
         else:
-            self._outputs = self.outputs_of(frame.read(observations))
-            if network.exploration:
-                explore(frame.keys, frame.counts, self._deviations, self._outputs)
+            act_network(
+                observations, period, memory, counts, turned, frame.keys, self._listens,
+                self._layers, self._deviations, outputs, commands,
+            )  # fmt: skip
         self._n_steps += 1
-        return frame.command(self._outputs)
+        return commands
 
     def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the network's outputs (N, k) for rows of its inputs, without noise."""
-        outputs = np.empty((len(inputs), self._widths[-1]), np.float32)
-        run_network(
-            np.ascontiguousarray(inputs), self._weights, self._biases, self._widths, outputs
-        )
+        outputs = np.empty((len(inputs), len(OUTPUTS)), np.float32)
+        run_network(np.ascontiguousarray(inputs), self._layers, outputs)
         return outputs
+
+
+@kernel
+def act_network(
+    rows: NDArray[np.float32],
+    period: float,
+    memories: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    turned: NDArray[np.float64],
+    keys: NDArray[np.uint64],
+    listens: bool,
+    layers: Layers,
+    deviations: NDArray[np.float32],
+    outputs: NDArray[np.float32],
+    commands: NDArray[np.float64],
+) -> None:
+    """Fill outputs (N, k) and commands (N, 4) of a decision upon rows (N, D); memories go on.
+
+    One kernel a step, because each call of a kernel costs more than a microsecond.
+    """
+    inputs = np.empty((rows.shape[0], layers.widths[0]), np.float32)
+    read_observations(rows, period, memories, keys, counts, listens, inputs, turned)
+    counts += 1
+    run_network(inputs, layers, outputs)
+    if deviations.any():
+        explore(keys, counts, deviations, outputs)
+    command_rows(outputs, turned, rows, memories, commands)
+
+
+@kernel
+def hold_outputs(
+    rows: NDArray[np.float32],
+    period: float,
+    memories: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    turned: NDArray[np.float64],
+    outputs: NDArray[np.float32],
+    commands: NDArray[np.float64],
+) -> None:
+    """Fill the commands (N, 4) of a step between two decisions, whose outputs (N, k) hold on."""
+    hold_rows(rows, period, memories, counts, turned)
+    command_rows(outputs, turned, rows, memories, commands)
 
 
 @kernel

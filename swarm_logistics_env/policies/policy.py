@@ -118,14 +118,15 @@ def decide(
     They are checked where they are used, by `Warehouse.step`.
     """
     if _has_one_thread():  # nearly always, and decisions are many
-        return _commands(policy, observations, state)
+        return decide_in_one_thread(policy, observations, state)
     with one_thread():
-        return _commands(policy, observations, state)
+        return decide_in_one_thread(policy, observations, state)
 
 
-def _commands(
+def decide_in_one_thread(
     policy: Policy, observations: NDArray[np.float32], state: WarehouseState
 ) -> NDArray[np.float64]:
+    """Do as `decide` where torch has one thread already."""
     if getattr(policy, "needs_state", False):
         # The protocol knows the one argument that all policies take.
         return mask_unreachable_commands(policy.act(observations, state), state)  # type: ignore[call-arg]

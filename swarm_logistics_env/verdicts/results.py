@@ -17,7 +17,7 @@ from .agreement import Agreement, agreements
 from .cell import Cell
 from .columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from .reference import PAPER, Reference
-from .until_clear import latest_look
+from .until_clear import LatestLook, latest_look
 from .verdict import Verdict, adjust_families, judge_comparison, level_of
 
 if TYPE_CHECKING:
@@ -128,13 +128,19 @@ class StudyResults:
         return f"{count} ({seeds_in_words(seeds)})"
 
 
-def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -> StudyResults:
+def judge(
+    plan: Plan,
+    outcomes: Outcomes,
+    declared: Declaration | None = None,
+    look: LatestLook | None = None,
+) -> StudyResults:
     """Judge a plan by the outcomes of its runs.
 
     Args:
         plan: of the study.
         outcomes: of its runs, by the key of the case and the seed.
         declared: what was declared before the first run; None: what the plan says.
+        look: the latest look at these outcomes, which takes a second; None: it is made.
     """
     specification = plan.specification
     reference = PAPER if specification.reference else None
@@ -143,7 +149,7 @@ def judge(plan: Plan, outcomes: Outcomes, declared: Declaration | None = None) -
     verdicts: Iterable[Verdict] = ()
     all_seeds, seeds_of = plan.seeds, dict[str, int]()
     if specification.until_clear:
-        look = latest_look(plan, outcomes)
+        look = look or latest_look(plan, outcomes)
         seeds_of |= look.seeds_of
         plan = replace(plan, specification=specification.replace(seeds=look.shared_seeds))
         verdicts = look.verdicts

@@ -7,7 +7,7 @@ Statistics in Medicine 32). The interval is the repeated one of Jennison and Tur
 all looks together it holds the true value with 95 %, whatever made the comparison stop.
 
 A comparison is also played no further once its verdict can hardly change any more: the predictive
-power, the chance that the last look decides it given the runs so far, is below 5 % (Spiegelhalter,
+power, the chance that the last look decides it given the runs so far, is below 10 % (Spiegelhalter,
 Freedman and Blackburn 1986, Controlled Clinical Trials 7). Nor is one played further whose change
 is shown to be within the margin: which sign so small a change has is not worth the runs. Both stay
 open, and in their family, so this costs no error.
@@ -37,7 +37,7 @@ from .verdict import Decision, Verdict, judge_comparison
 
 MOST_SEEDS_UNTIL_CLEAR = 200
 SPENDING: spi.Spending = "linear"
-HARDLY = 0.05  # chance of a verdict below which no further seed is played
+HARDLY = 0.1  # chance of a verdict below which no further seed is played
 
 
 class LatestLook(NamedTuple):

@@ -11,7 +11,7 @@ from .floor_cells import is_in_sight
 from .logistics import is_known_request, is_remembered
 from .pose import Pose, in_frame
 from .sensor_errors import ROBOT_SEEN, is_missed
-from .structs import Grid, Nearby, Sensed, World
+from .structs import RANKED_AT_ONCE, Grid, Nearby, Sensed, World
 
 
 @inlined_kernel
@@ -31,7 +31,7 @@ def choose(me: int, pose: Pose, world: World, grid: Grid, n_found: int, purpose:
         if world.floor.n_columns > 0 and is_seen:
             slot = nearby.slot[index]
             is_seen = is_in_sight(
-                world, pose.x, pose.y, grid.position[slot, 0], grid.position[slot, 1]
+                world, pose.x, pose.y, grid.position[0, slot], grid.position[1, slot]
             )
         if dropout > 0.0 and is_seen:
             is_seen = not is_missed(world.robots.sensor_key[me], other, step, purpose, dropout)
@@ -50,14 +50,15 @@ def rank_nearest(nearby: Nearby, count: int, n_wanted: int) -> int:
     Returns how many there are, at most `n_wanted`.
     """
     squares = nearby.chosen_square
+    # Filled up with some that are far, so that all are counted in whole vectors.
+    n_counted = (count + RANKED_AT_ONCE - 1) & -RANKED_AT_ONCE
+    squares[count:n_counted] = math.inf
     for index in range(count):
-        # Counted without a branch: a few vector instructions for all the others.
         square = squares[index]
         n_nearer = 0
-        for other in range(index):
-            n_nearer += squares[other] <= square
-        for other in range(index + 1, count):
-            n_nearer += squares[other] < square
+        for other in range(n_counted):
+            is_nearer = squares[other] < square
+            n_nearer += is_nearer | ((squares[other] == square) & (other < index))
         if n_nearer < n_wanted:
             nearby.nearest[n_nearer] = index
     return min(count, n_wanted)

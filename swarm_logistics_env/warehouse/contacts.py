@@ -79,7 +79,7 @@ def count_motion(world: World) -> None:
 
     Notes where the robots were and how fast, for `count_overlap`.
     """
-    counts, robots, bodies = world.contacts, world.robots, world.engine.bodies.numbers
+    counts, robots, bodies = world.contacts, world.robots, world.engine.bodies
     period, total = world.parameters.control_period, counts.acceleration_sum[0]
     for robot in range(len(robots.item)):
         counts.closing[robot] = 0.0

@@ -26,7 +26,7 @@ def blank_grid(width: float, height: float, cell: float, n_points: int) -> Grid:
         n_rows=n_rows,
         start=np.zeros(n_columns * n_rows + 1, np.int64),
         members=np.zeros(n_points, np.int64),
-        position=np.zeros((n_points, 2)),
+        position=np.zeros((2, n_points)),
     )
 
 
@@ -72,7 +72,7 @@ def look_through(
     Returns how many are listed then.
     """
     for slot in range(run[0], run[1]):
-        dx, dy = grid.position[slot, 0] - centre[0], grid.position[slot, 1] - centre[1]
+        dx, dy = grid.position[0, slot] - centre[0], grid.position[1, slot] - centre[1]
         square = dx * dx + dy * dy
         # Written always and counted only if near: no branch to mispredict.
         nearby.slot[n_found] = slot
@@ -107,5 +107,5 @@ def fill(grid: Grid, position: Numbers, included: Flags) -> None:
             cell = cell_of(grid, x, y)
             start[cell] -= 1
             grid.members[start[cell]] = point
-            grid.position[start[cell], 0] = x
-            grid.position[start[cell], 1] = y
+            grid.position[0, start[cell]] = x
+            grid.position[1, start[cell]] = y

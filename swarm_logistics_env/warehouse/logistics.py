@@ -131,7 +131,7 @@ def unmask_left(world: World) -> None:
         item = grid.members[slot]
         if world.items.covered[item] == 0:
             continue
-        x, y = grid.position[slot, 0], grid.position[slot, 1]
+        x, y = grid.position[0, slot], grid.position[1, slot]
         n_found = look_around(world.robot_grid, x, y, reach_of(world), NOBODY, nearby)
         is_below_laden = False
         for index in range(n_found):

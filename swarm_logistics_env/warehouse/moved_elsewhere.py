@@ -60,7 +60,7 @@ class MovedElsewhere:
         for robot in np.flatnonzero(poses.lost & state.robot_present).tolist():
             stepping.remove(address, robot)
         is_seen = state.robot_present
-        moved = world.engine.bodies.numbers[: len(is_seen)]
+        moved = world.engine.bodies
         # Walls are the world's: nobody is outside, whatever a camera says.
         moved[is_seen, :2] = np.clip(poses.position[is_seen], 0.0, self._size)
         moved[is_seen, 2:] = poses.velocity[is_seen]

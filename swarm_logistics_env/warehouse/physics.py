@@ -16,17 +16,17 @@ from weakref import finalize
 import numpy as np
 from numpy.typing import NDArray
 from pymunk._chipmunk_cffi import ffi, lib  # its functions' addresses have no public name
-from pymunk.batch import BodyFields
 
-from swarm_logistics_env.kernels import engine_kernel
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.kernels import carray, engine_kernel
 from swarm_logistics_env.scenario import Scenario
 
-from .addresses import call_at, made_at, unpacked_at
+from .addresses import call_at, made_at, pointer_at, unpacked_at
 from .packing import packed
 from .structs import (
     NOBODY,
     STORED,
-    Batch,
+    BodyWords,
     EngineArrays,
     Functions,
     Numbers,
@@ -64,10 +64,9 @@ def advance(world: World) -> None:
     period = parameters.physics_period
     greatest = parameters.max_acceleration * period
     for _ in range(parameters.n_substeps):
-        read(engine, engine.velocities)
         push(engine, greatest, parameters.robot_mass / period)
         call_at(engine.functions.cpSpaceStep, (engine.space[0], period))
-    read(engine, engine.bodies)
+    read(engine)
 
 
 @engine_kernel
@@ -76,30 +75,32 @@ def push(engine: EngineArrays, greatest: float, mass_per_period: float) -> None:
 
     `mass_per_period` [kg/s] makes a force of a change of velocity.
     """
-    velocities, forces = engine.velocities.numbers, engine.forces.numbers
+    at = engine.body_words
     for robot in range(len(engine.wanted_velocity)):
-        change_x = engine.wanted_velocity[robot, 0] - velocities[robot, 0]
-        change_y = engine.wanted_velocity[robot, 1] - velocities[robot, 1]
+        body = words_of(engine, robot)
+        change_x = engine.wanted_velocity[robot, 0] - body[at.velocity]
+        change_y = engine.wanted_velocity[robot, 1] - body[at.velocity + 1]
         change = math.sqrt(change_x * change_x + change_y * change_y)
         share = mass_per_period * (1.0 if change <= greatest else greatest / change)
-        forces[robot, 0], forces[robot, 1] = share * change_x, share * change_y
-    call = engine.functions
-    engine.forces.filled[0] = 0
-    call_at(
-        call.cpSpaceEachBody,
-        (engine.space[0], call.pmSpaceBodySetIteratorFuncBatched, engine.forces.address),
-    )
+        body[at.force], body[at.force + 1] = share * change_x, share * change_y
 
 
 @engine_kernel
-def read(engine: EngineArrays, batch: Batch) -> None:
-    """Fill a batch with what it holds of the bodies."""
-    batch.filled[0] = 0
-    call = engine.functions
-    call_at(
-        call.cpSpaceEachBody,
-        (engine.space[0], call.pmSpaceBodyGetIteratorFuncBatched, batch.address),
-    )
+def read(engine: EngineArrays) -> None:
+    """Note where the bodies are and how fast."""
+    at, bodies = engine.body_words, engine.bodies
+    for robot in range(len(bodies)):
+        body = words_of(engine, robot)
+        for axis in range(2):
+            bodies[robot, axis] = body[at.position + axis]
+            bodies[robot, 2 + axis] = body[at.velocity + axis]
+
+
+@engine_kernel
+def words_of(engine: EngineArrays, robot: int) -> Numbers:
+    """Return the numbers (N_WORDS,) of a robot's body, where the engine has them."""
+    words: Numbers = carray(pointer_at(engine.robot_bodies[robot]), N_WORDS, np.float64)
+    return words
 
 
 @engine_kernel
@@ -118,6 +119,7 @@ def collide_with(engine: EngineArrays, shape: int, categories: int) -> None:
     call_at(engine.functions.cpShapeSetFilter, (shape, (0, categories)))
 
 
+N_WORDS = 16  # of a body that are looked at: all of these are before the engine's own lists
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
 _BIAS = 1e-4  # share of an overlap that is left after a second; the engine's default: 0.0018
 _WALL = 0.5  # [m], half the thickness of a wall
@@ -137,7 +139,7 @@ def build(address: int) -> None:
     build_solids(world, static)
     build_robots(world)
     build_items(world, static)
-    read(engine, engine.bodies)
+    read(engine)
 
 
 @engine_kernel
@@ -176,7 +178,6 @@ def build_robots(world: World) -> None:
     """Make the robots' bodies, which no contact turns, and their shapes."""
     engine, parameters, robots = world.engine, world.parameters, world.robots
     call, space = engine.functions, engine.space[0]
-    # A batch reads and writes bodies in the order in which they were added.
     for robot in range(len(robots.item)):
         body = made_at(call.cpBodyNew, (parameters.robot_mass, math.inf))
         position = (engine.robot_places[robot, 0], engine.robot_places[robot, 1])
@@ -239,13 +240,6 @@ class Physics:
 
     def __init__(self, scenario: Scenario, robot_places: Numbers, n_boxes: int) -> None:
         n = scenario.n_robots
-        # A batch call reads and writes every body: of N robots, and the static one.
-        self._batches = [
-            _batch(n + 1, 4, BodyFields.POSITION | BodyFields.VELOCITY),
-            _batch(n + 1, 2, BodyFields.VELOCITY),
-            _batch(n + 1, 2, BodyFields.FORCE),
-        ]
-        bodies, velocities, forces = (batch for batch, _ in self._batches)
         self.engine = EngineArrays(
             functions=_FUNCTION_ADDRESSES,
             space=np.zeros(1, np.int64),
@@ -254,9 +248,8 @@ class Physics:
             robot_shapes=np.zeros(n, np.int64),
             item_shapes=np.zeros(scenario.n_items, np.int64),
             solid_shapes=np.zeros(N_WALLS + scenario.n_obstacles + n_boxes, np.int64),
-            bodies=bodies,
-            velocities=velocities,
-            forces=forces,
+            body_words=_BODY_WORDS,
+            bodies=np.zeros((n, 4)),
             wanted_velocity=np.zeros((n, 2)),
         )
 
@@ -264,25 +257,33 @@ class Physics:
         """Make the bodies of the world at `address` as its arrays have them now."""
         build(address)
         # This is left out at the end of the process, which frees everything anyway.
-        finalize(self, _free, packed(self.engine), self.engine, self._batches).atexit = False
+        finalize(self, _free, packed(self.engine), self.engine).atexit = False
 
 
-def _free(engine: NDArray[np.int64], *batches: object) -> None:
+def _free(engine: NDArray[np.int64], _: EngineArrays) -> None:
     free(engine.ctypes.data)
 
 
-def _batch(rows: int, columns: int, fields: BodyFields) -> tuple[Batch, object]:
-    """Return a batch of (rows, columns), and what has to be kept as long as it is used."""
-    # The engine trusts the memory it is given. One number to spare: it replaces, with memory of
-    # its own, a buffer that what it reads would fill.
-    memory = np.zeros(rows * columns + 1)
-    # What a structure of cffi points to lives no longer for it.
-    numbers = ffi.from_buffer("double[]", memory)
-    buffer = ffi.new("pmFloatArray *", {"arr": numbers, "max": len(memory)})
-    data = ffi.new("pmBatchedData *", {"floatArray": buffer, "fields": fields.value})
-    filled = np.frombuffer(ffi.buffer(ffi.addressof(buffer, "num")), np.int32)
-    batch = Batch(_address(data), filled, memory[:-1].reshape(rows, columns))
-    return batch, (numbers, buffer, data)
+def _body_words() -> BodyWords:
+    """Return where a body of this engine has its numbers, which no function tells at once.
+
+    Calling the engine for each of them takes longer than a fifth of its step.
+
+    Raises:
+        SetupError: its bodies have them elsewhere.
+    """
+    body = lib.cpBodyNew(1.0, 1.0)
+    numbers = np.frombuffer(ffi.buffer(body, 8 * N_WORDS))
+    places: list[int] = []
+    for put in (lib.cpBodySetPosition, lib.cpBodySetVelocity, lib.cpBodySetForce):
+        mark = (1.0 + len(places), -0.5)
+        put(body, {"x": mark[0], "y": mark[1]})
+        at = np.flatnonzero((numbers[:-1] == mark[0]) & (numbers[1:] == mark[1]))
+        if len(at) != 1:
+            raise SetupError("pymunk's bodies are not as expected: should be pymunk 7")
+        places.append(at.item())
+    lib.cpBodyFree(body)
+    return BodyWords(*places)
 
 
 def _address(thing: Any) -> int:
@@ -291,3 +292,4 @@ def _address(thing: Any) -> int:
 
 # A pymunk that lacks one raises an AttributeError that names it.
 _FUNCTION_ADDRESSES = Functions(*(_address(ffi.addressof(lib, name)) for name in Functions._fields))
+_BODY_WORDS = _body_words()

@@ -130,7 +130,7 @@ def scan_discs(
         index = nearby.scanned[number]
         slot = nearby.slot[index]
         nearby.forward[number], nearby.left[number] = in_frame(
-            pose, grid.position[slot, 0], grid.position[slot, 1]
+            pose, grid.position[0, slot], grid.position[1, slot]
         )
         nearby.scanned_square[number] = nearby.square[index]
     meet_middle_beams(nearby, n_scanned, radius)

@@ -143,7 +143,7 @@ def log_command(commands: Commands) -> None:
 def take_motion(world: World) -> None:
     """Take over where the bodies are after their motion, and how fast; absent robots are at 0."""
     count_motion(world)
-    robots, bodies = world.robots, world.engine.bodies.numbers
+    robots, bodies = world.robots, world.engine.bodies
     for robot in range(len(robots.item)):
         is_there = 1.0 if robots.present[robot] else 0.0
         for axis in range(2):

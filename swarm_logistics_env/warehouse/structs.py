@@ -165,7 +165,7 @@ class Grid(NamedTuple):
     n_rows: int  # cells along y
     start: Annotated[Integers, "cells + 1"]  # where each cell's points begin in `members`
     members: Annotated[Integers, "points"]  # point numbers, cell by cell, row by row of cells
-    position: Annotated[Numbers, "points", 2]  # [m], in the same order
+    position: Annotated[Numbers, 2, "points"]  # x and y [m], in the same order
 
 
 class Floor(NamedTuple):
@@ -187,6 +187,9 @@ class Floor(NamedTuple):
     n_block_rows: int  # blocks along y
     first_near: Annotated[Integers, "blocks + 1"]  # where each block's boxes begin in `near`
     near: Annotated[Integers, "boxes near blocks"]  # boxes that beams from a block may meet
+
+
+RANKED_AT_ONCE = 8  # numbers of one vector instruction; a power of 2
 
 
 class Nearby(NamedTuple):
@@ -224,9 +227,6 @@ class Functions(NamedTuple):
 
     cpSpaceStep: int
     cpSpaceSetIterations: int
-    cpSpaceEachBody: int
-    pmSpaceBodyGetIteratorFuncBatched: int
-    pmSpaceBodySetIteratorFuncBatched: int
     cpShapeSetFilter: int
     cpCircleShapeSetOffset: int
     cpSpaceReindexShape: int
@@ -247,12 +247,12 @@ class Functions(NamedTuple):
     cpShapeFree: int
 
 
-class Batch(NamedTuple):
-    """Numbers of all bodies, the static one last, that one call of the engine reads or writes."""
+class BodyWords(NamedTuple):
+    """Which words of a body in the engine's memory hold x; y stands in the next one."""
 
-    address: int  # of the engine's structure
-    filled: Annotated[NDArray[np.int32], 1]  # numbers that it has read or written
-    numbers: Annotated[Numbers, "bodies", "columns"]
+    position: int  # [m]
+    velocity: int  # [m/s]
+    force: int  # [N], which the engine uses up within a substep
 
 
 class EngineArrays(NamedTuple):
@@ -265,9 +265,8 @@ class EngineArrays(NamedTuple):
     robot_shapes: Annotated[Integers, "N"]
     item_shapes: Annotated[Integers, "I"]
     solid_shapes: Annotated[Integers, "solids"]  # walls, obstacles, then racks
-    bodies: Batch  # (N + 1, 4) x, y [m] and velocity [m/s]
-    velocities: Batch  # (N + 1, 2) [m/s]
-    forces: Batch  # (N + 1, 2) [N], written to the bodies for one substep
+    body_words: BodyWords
+    bodies: Annotated[Numbers, "N", 4]  # x, y [m] and velocity [m/s] after a control step
     wanted_velocity: Annotated[Numbers, "N", 2]  # [m/s] what the drives aim at
 
 
@@ -320,7 +319,7 @@ def lengths_of(scenario: Scenario) -> dict[str, int]:
         "K": n_kept,
         "K N": n_kept * n,
         "beams": 3 * N_BEAMS,
-        "nearby": max(n, n_items) + 1,
+        "nearby": max(n, n_items) + RANKED_AT_ONCE,
         "n_requests": scenario.n_requests,
         "memory_size": scenario.memory_size,
         "message_size": scenario.message_size,

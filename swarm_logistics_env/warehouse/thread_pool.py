@@ -16,14 +16,12 @@ import time
 import weakref
 from collections.abc import Callable, Sequence
 from queue import SimpleQueue
-from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import ScenarioError
-from swarm_logistics_env.kernels import engine_kernel, inlined_kernel
+from swarm_logistics_env.kernels import carray, engine_kernel, inlined_kernel
 from swarm_logistics_env.numba_fence import IS_PLAIN
 from swarm_logistics_env.scenario import CHIPMUNK
 
@@ -33,8 +31,6 @@ from .commands import not_finite, refused_command
 from .one_thread import holding
 from .structs import NOBODY, Numbers, Sensed, World
 from .warehouse import Warehouse
-
-carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
 
 # Words of the queue. Jobs are taken and given in turn, counted without end, so that a helper who
 # comes late finds nothing to take rather than something that is not ready.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.policies import register_blocks
 from swarm_logistics_env.policies.layers import (
+    Layers,
     hyperbolic_tangent,
     in_blocks,
     padded,
@@ -49,10 +50,11 @@ def test_outputs_have_the_bits_of_products_added_one_after_the_other(
     weights = [drawn(n_in, n_out) for n_in, n_out in pairwise(widths)]
     biases = [drawn(n_out) for n_out in widths[1:]]
     inputs, outputs = drawn(n_rows, widths[0]), np.empty((n_rows, widths[-1]), np.float32)
-    blocks = np.concatenate(list(map(in_blocks, weights)))
-    run_network(
-        inputs, blocks, np.concatenate(list(map(padded, biases))), np.array(widths), outputs
+    blocks, padded_biases = map(in_blocks, weights), map(padded, biases)
+    layers = Layers(
+        np.concatenate(list(blocks)), np.concatenate(list(padded_biases)), np.array(widths)
     )
+    run_network(inputs, layers, outputs)
     expected = one_after_the_other(inputs, weights, biases)
     np.testing.assert_array_equal(outputs.view(np.uint32), expected.view(np.uint32))
 

@@ -29,7 +29,7 @@ def test_every_included_point_stands_once_in_the_cell_that_holds_it(
     fill(grid, position, included)
     listed = grid.members[: grid.start[-1]]
     assert sorted(listed) == np.flatnonzero(included).tolist()
-    np.testing.assert_array_equal(grid.position[: len(listed)], position[listed])
+    np.testing.assert_array_equal(grid.position[:, : len(listed)], position[listed].T)
     for index, (first, last) in enumerate(zip(grid.start[:-1], grid.start[1:])):
         members = grid.members[first:last]
         assert (np.diff(members) > 0).all()  # so that ties never depend on memory

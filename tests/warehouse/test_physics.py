@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pymunk._chipmunk_cffi import ffi, lib
 
 from swarm_logistics_env import Fault, Warehouse
+from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.warehouse import physics
 from swarm_logistics_env.warehouse.packing import blank, packed
 from swarm_logistics_env.warehouse.structs import Items
 from tests.warehouse.conftest import EAST, FAR, HOLD, OPEN, STAY, WEST, Build, steps
@@ -119,3 +122,20 @@ def test_an_array_that_is_not_as_declared_is_refused_before_a_kernel_reads_it() 
     for position in others:
         with pytest.raises(TypeError, match=r"Items\.position: should be"):
             packed(items._replace(position=position))
+
+
+def test_bodies_are_read_and_pushed_where_the_engine_has_them(build: Build) -> None:
+    world = build([(2.0, 5.0), (3.0, 6.0)], [FAR])
+    engine = world._world.engine
+    steps(world, EAST, (0.3, 0.4, 0.0, 0.0))
+    for address, (x, y, velocity_x, velocity_y) in zip(engine.robot_bodies, engine.bodies):
+        body = ffi.cast("cpBody *", int(address))
+        position, velocity = lib.cpBodyGetPosition(body), lib.cpBodyGetVelocity(body)
+        assert (position.x, position.y) == (x, y)
+        assert (velocity.x, velocity.y) == (velocity_x, velocity_y) != (0.0, 0.0)
+
+
+def test_an_engine_whose_bodies_are_otherwise_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(physics, "N_WORDS", 8)
+    with pytest.raises(SetupError, match="should be pymunk 7"):
+        physics._body_words()
