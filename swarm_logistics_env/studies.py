@@ -62,6 +62,7 @@ class Study:
         self._specification = Specification(**fields)
         self.out = None if out is None else Path(out)
         self._plan: Plan | None = None
+        # By case and seed, what each outcome raised when it was last looked at, and that look.
         self._look: tuple[dict[tuple[str, int], str | None], LatestLook] | None = None
         self._memory: Runs | None = None
 
@@ -257,7 +258,7 @@ class Study:
         return list((in_stages and look.shared_runs) or look.next_runs)
 
     def _latest_look(self, outcomes: Outcomes) -> LatestLook:
-        """Return the latest look at these outcomes; the one before, if nothing was played since."""
+        """Return the latest look at these outcomes; computed anew if runs were played since."""
         errors = {key: outcome.error for key, outcome in outcomes.items()}
         if self._look is None or self._look[0] != errors:
             self._look = errors, latest_look(self.plan(), outcomes)

@@ -17,7 +17,6 @@ from swarm_logistics_env.scenario import Scenario
 from .network_inputs import INPUTS, read_observations
 
 OUTPUTS = ("along", "aside", "gripper")
-N_COMMANDS = 4  # of a robot: forward, left, turn, gripper
 
 
 class MotionView:
@@ -122,7 +121,7 @@ class MotionView:
         A robot that is caged by items clears its way instead.
         A differential robot turns its body to where it wants to drive.
         """
-        commands = np.empty((len(outputs), N_COMMANDS))
+        commands = np.empty((len(outputs), 4))
         command_rows(outputs, self.turned, self.rows, self.memory, commands)
         return commands
 
@@ -139,7 +138,7 @@ def hold_rows(
     counts: NDArray[np.int64],
     turned: NDArray[np.float64],
 ) -> None:
-    """Take what rows (N, D) tell into the memories, and let frames (N,) stay while bodies turn."""
+    """Take what rows (N, D) tell into the memories; count, and let frames stay as bodies turn."""
     column.remember_observation(rows, period, memories)
     for robot in range(rows.shape[0]):
         turned[robot] -= np.float32(period) * rows[robot, row.TURN_RATE]

@@ -96,14 +96,14 @@ def read_observations(
         read_items(sensed, frame, read)
         # The robot that tells the lowest timer may lie: it counts less the more this robot knows.
         certainty = length_of(memory[column.HOME_X], memory[column.HOME_Y])
-        knows = math.tanh(certainty)
-        read_lead(sensed, frame, 1.0 - knows, read)
+        confidence = math.tanh(certainty)
+        read_lead(sensed, frame, 1.0 - confidence, read)
         if not listens:
             read[INPUT.lead_present : INPUT.lead_timer + 1] = 0.0
         read_robot(sensed, memory, frame, read)
         angle = random_heading(keys[robot], counts[robot], period) - turned[robot]
         read[INPUT.whim_along], read[INPUT.whim_aside] = math.cos(angle), math.sin(angle)
-        read_memory(memory, certainty, knows, frame, read)
+        read_memory(memory, certainty, confidence, frame, read)
 
 
 @inlined_kernel
@@ -213,16 +213,16 @@ def read_robot(
 def read_memory(
     memory: NDArray[np.float64],
     certainty: float,
-    knows: float,
+    confidence: float,
     frame: tuple[float, float],
     read: NDArray[np.float32],
 ) -> None:
     """Fill the inputs of what a robot remembers: the way home, and failures of its own.
 
     Args:
-        certainty: length of the sum of its directions home; `knows` is its tanh.
+        certainty: length of the sum of its directions home; `confidence` is its tanh.
     """
-    unit = knows / certainty if certainty > 0.0 else 0.0
+    unit = confidence / certainty if certainty > 0.0 else 0.0
     put(read, INPUT.home_along, unit, frame, memory[column.HOME_X], memory[column.HOME_Y])
     read[INPUT.home_certainty] = math.tanh(certainty / 3.0)
     read[INPUT.failed], read[INPUT.stuck] = memory[column.FAILED], memory[column.STUCK]

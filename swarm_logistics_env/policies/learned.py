@@ -25,13 +25,7 @@ from pydantic import (
 
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import (
-    N_COMMANDS,
-    OUTPUTS,
-    MotionView,
-    command_rows,
-    hold_rows,
-)
+from swarm_logistics_env.motion.frame import OUTPUTS, MotionView, command_rows, hold_rows
 from swarm_logistics_env.motion.network_inputs import INPUTS, read_observations
 from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.records import Record
@@ -205,7 +199,7 @@ class LearnedPolicy(Described):
         """
         frame, outputs = self._frame, self._outputs
         frame.check(observations)
-        commands = np.empty((len(outputs), N_COMMANDS))
+        commands = np.empty((len(outputs), 4))
         period, memory, counts, turned = frame.period, frame.memory, frame.counts, frame.turned
         if self._n_steps % self._decides_every:
             hold_outputs(observations, period, memory, counts, turned, outputs, commands)

@@ -140,7 +140,7 @@ def judge(
         plan: of the study.
         outcomes: of its runs, by the key of the case and the seed.
         declared: what was declared before the first run; None: what the plan says.
-        look: the latest look at these outcomes, which takes a second; None: it is made.
+        look: the latest look at these outcomes, of a study until it is clear; None: it is computed.
     """
     specification = plan.specification
     reference = PAPER if specification.reference else None

@@ -119,7 +119,7 @@ def collide_with(engine: EngineArrays, shape: int, categories: int) -> None:
     call_at(engine.functions.cpShapeSetFilter, (shape, (0, categories)))
 
 
-N_WORDS = 16  # of a body that are looked at: all of these are before the engine's own lists
+N_WORDS = 16  # of a body that are looked at: up to its force, which pointers follow
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
 _BIAS = 1e-4  # share of an overlap that is left after a second; the engine's default: 0.0018
 _WALL = 0.5  # [m], half the thickness of a wall
@@ -265,25 +265,25 @@ def _free(engine: NDArray[np.int64], _: EngineArrays) -> None:
 
 
 def _body_words() -> BodyWords:
-    """Return where a body of this engine has its numbers, which no function tells at once.
+    """Return which words of a body hold its numbers: it sets marks with the engine and looks.
 
-    Calling the engine for each of them takes longer than a fifth of its step.
+    Reading and writing them there costs less than the engine's calls.
 
     Raises:
-        SetupError: its bodies have them elsewhere.
+        SetupError: the marks are not among the first words of a body.
     """
     body = lib.cpBodyNew(1.0, 1.0)
     numbers = np.frombuffer(ffi.buffer(body, 8 * N_WORDS))
-    places: list[int] = []
+    words: list[int] = []
     for put in (lib.cpBodySetPosition, lib.cpBodySetVelocity, lib.cpBodySetForce):
-        mark = (1.0 + len(places), -0.5)
+        mark = (1.0 + len(words), -0.5)
         put(body, {"x": mark[0], "y": mark[1]})
         at = np.flatnonzero((numbers[:-1] == mark[0]) & (numbers[1:] == mark[1]))
         if len(at) != 1:
-            raise SetupError("pymunk's bodies are not as expected: should be pymunk 7")
-        places.append(at.item())
+            raise SetupError("pymunk keeps numbers of bodies elsewhere: should be pymunk 7")
+        words.append(at.item())
     lib.cpBodyFree(body)
-    return BodyWords(*places)
+    return BodyWords(*words)
 
 
 def _address(thing: Any) -> int:

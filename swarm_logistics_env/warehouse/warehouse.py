@@ -125,8 +125,7 @@ class Warehouse:
         if not lock.acquire(False):  # as `in_one_thread`, within a tenth of a microsecond
             raise used_elsewhere()
         try:
-            if self._seed is None:
-                self._seed_of_episode("step")
+            self._seed_of_episode("step")
             self._world.commands.now[...] = as_array(commands, self._command_shape)
             rows = np.empty_like(self._rows)  # what was handed out stays as it was
             if self._elsewhere is None:
