@@ -10,7 +10,7 @@ import html
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +24,15 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.kernels import gaussian, kernel, pair_key
+from swarm_logistics_env.kernels import engine_kernel, gaussian, kernel, pair_key
 from swarm_logistics_env.motion.frame import OUTPUTS, MotionView, command_rows, hold_rows
 from swarm_logistics_env.motion.network_inputs import INPUTS, read_observations
 from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.warehouse.addresses import unpacked_at
+from swarm_logistics_env.warehouse.packing import packed
 
 from .layers import Layers, in_blocks, padded, run_network
 
@@ -190,6 +192,25 @@ class LearnedPolicy(Described):
         self._frame.begin(row_keys(seed, STREAM, n_robots))
         self._outputs = np.empty((n_robots, len(OUTPUTS)), np.float32)
         self._n_steps = 0
+        self._tell_compiled_code()
+
+    def _tell_compiled_code(self) -> None:
+        """Note where the arrays of a step are; they live as long as the address."""
+        frame = self._frame
+        self._arrays = StepArrays(
+            frame.period, self._listens, frame.memory, frame.keys, frame.counts, frame.turned,
+            self._outputs, self._deviations, self._layers,
+        )  # fmt: skip
+        self._words = packed(self._arrays)
+        self._address: int = self._words.ctypes.data
+
+    def __getstate__(self) -> dict[str, Any]:
+        addresses = ("_arrays", "_words", "_address")
+        return {name: value for name, value in vars(self).items() if name not in addresses}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._tell_compiled_code()  # a copy has arrays of its own
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D).
@@ -197,17 +218,10 @@ class LearnedPolicy(Described):
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
-        frame, outputs = self._frame, self._outputs
-        frame.check(observations)
-        commands = np.empty((len(outputs), 4))
-        period, memory, counts, turned = frame.period, frame.memory, frame.counts, frame.turned
-        if self._n_steps % self._decides_every:
-            hold_outputs(observations, period, memory, counts, turned, outputs, commands)
-        else:
-            act_network(
-                observations, period, memory, counts, turned, frame.keys, self._listens,
-                self._layers, self._deviations, outputs, commands,
-            )  # fmt: skip
+        self._frame.check(observations)
+        commands = np.empty((len(observations), 4))
+        decides = self._n_steps % self._decides_every == 0
+        act_at(self._address, decides, observations, commands)
         self._n_steps += 1
         return commands
 
@@ -218,8 +232,46 @@ class LearnedPolicy(Described):
         return outputs
 
 
+class StepArrays(NamedTuple):
+    """What a step reads and writes beside observations and commands.
+
+    Kernels find it at an address, as each array handed to one costs a tenth of a microsecond.
+    """
+
+    period: float  # [s]
+    listens: bool
+    memories: Annotated[NDArray[np.float64], "n_robots", "n_columns"]
+    keys: Annotated[NDArray[np.uint64], "n_robots"]
+    counts: Annotated[NDArray[np.int64], "n_robots"]
+    turned: Annotated[NDArray[np.float64], "n_robots"]
+    outputs: Annotated[NDArray[np.float32], "n_robots", "n_outputs"]
+    deviations: Annotated[NDArray[np.float32], "n_outputs"]
+    layers: Layers
+
+
+@engine_kernel
+def act_at(
+    address: int, decides: bool, rows: NDArray[np.float32], commands: NDArray[np.float64]
+) -> None:
+    """Fill the commands (N, 4) of a step upon rows (N, D); the arrays at `address` go on.
+
+    Args:
+        decides: whether the network decides; if not, its last outputs keep their direction.
+    """
+    here = unpacked_at(StepArrays, address)
+    if decides:
+        layers = Layers(here.layers.weights, here.layers.biases, here.layers.widths)
+        decide(
+            rows, here.period, here.memories, here.counts, here.turned, here.keys, here.listens,
+            layers, here.deviations, here.outputs,
+        )  # fmt: skip
+    else:
+        hold_rows(rows, here.period, here.memories, here.counts, here.turned)
+    command_rows(here.outputs, here.turned, rows, here.memories, commands)
+
+
 @kernel
-def act_network(
+def decide(
     rows: NDArray[np.float32],
     period: float,
     memories: NDArray[np.float64],
@@ -230,34 +282,14 @@ def act_network(
     layers: Layers,
     deviations: NDArray[np.float32],
     outputs: NDArray[np.float32],
-    commands: NDArray[np.float64],
 ) -> None:
-    """Fill outputs (N, k) and commands (N, 4) of a decision upon rows (N, D); memories go on.
-
-    One kernel a step, because each call of a kernel costs more than a microsecond.
-    """
+    """Fill the network's outputs (N, k), with its noise, upon rows (N, D); memories go on."""
     inputs = np.empty((rows.shape[0], layers.widths[0]), np.float32)
     read_observations(rows, period, memories, keys, counts, listens, inputs, turned)
     counts += 1
     run_network(inputs, layers, outputs)
     if deviations.any():
         explore(keys, counts, deviations, outputs)
-    command_rows(outputs, turned, rows, memories, commands)
-
-
-@kernel
-def hold_outputs(
-    rows: NDArray[np.float32],
-    period: float,
-    memories: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    turned: NDArray[np.float64],
-    outputs: NDArray[np.float32],
-    commands: NDArray[np.float64],
-) -> None:
-    """Fill the commands (N, 4) of a step between two decisions, whose outputs (N, k) hold on."""
-    hold_rows(rows, period, memories, counts, turned)
-    command_rows(outputs, turned, rows, memories, commands)
 
 
 @kernel

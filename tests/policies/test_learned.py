@@ -1,6 +1,11 @@
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
+
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
@@ -25,6 +30,26 @@ def test_an_episode_follows_from_its_seed(card: PolicyCard, tensors: Tensors) ->
     first = played(0)
     assert played(1) != first
     assert played(0) == first
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
+)
+def test_a_copy_goes_on_from_where_it_was_made(
+    card: PolicyCard, tensors: Tensors, copied: Callable[[LearnedPolicy], LearnedPolicy]
+) -> None:
+    policy, rng = LearnedPolicy(card, tensors), np.random.default_rng(0)
+    rows = rng.uniform(0, 1, (9, 5, N_COLUMNS)).astype(np.float32)
+    policy.reset(5, 0)
+    for observations in rows[:4]:
+        policy.act(observations)
+    other = copied(policy)
+    if copied is copy.copy:  # it shares the memories, so the first one begins another episode
+        policy.reset(5, 1)
+    commands = [other.act(observations).tobytes() for observations in rows[4:]]
+    again = LearnedPolicy(card, tensors)
+    again.reset(5, 0)
+    assert commands == [again.act(observations).tobytes() for observations in rows][4:]
 
 
 def test_it_decides_every_so_many_steps_and_goes_on_as_decided_in_between(
