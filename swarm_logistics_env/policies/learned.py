@@ -10,7 +10,7 @@ import html
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,17 +24,16 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.kernels import engine_kernel, gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import OUTPUTS, MotionView, command_rows, hold_rows
-from swarm_logistics_env.motion.network_inputs import INPUTS, read_observations
+from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
+from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
-from swarm_logistics_env.warehouse.addresses import unpacked_at
 from swarm_logistics_env.warehouse.packing import packed
 
 from .layers import Layers, in_blocks, padded, run_network
+from .network_steps import StepArrays, act_at, play_at
 
 Width = Annotated[int, Field(ge=1, le=4096)]
 
@@ -225,89 +224,34 @@ class LearnedPolicy(Described):
         self._n_steps += 1
         return commands
 
+    def play_steps(
+        self,
+        world_address: int,
+        observations: NDArray[np.float32],
+        positions: NDArray[np.float64],
+    ) -> tuple[int, bool]:
+        """Act in a world, step by step as `act` and `Warehouse.step` do, within one call.
+
+        Args:
+            world_address: `Warehouse.address`; the caller has to `take` the last step.
+            observations: (N, D) of the world now; it is filled with those after the last step.
+            positions: (K, N, 2) to be filled with the robots' positions after each step [m].
+
+        Returns:
+            The number of steps, K or fewer, and whether the last one has more to tell.
+        """
+        n_steps, is_eventful = play_at(
+            self._address, world_address, self._n_steps, self._decides_every, observations,
+            positions,
+        )  # fmt: skip
+        self._n_steps += n_steps
+        return n_steps, is_eventful
+
     def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the network's outputs (N, k) for rows of its inputs, without noise."""
         outputs = np.empty((len(inputs), len(OUTPUTS)), np.float32)
         run_network(np.ascontiguousarray(inputs), self._layers, outputs)
         return outputs
-
-
-class StepArrays(NamedTuple):
-    """What a step reads and writes beside observations and commands.
-
-    Kernels find it at an address, as each array handed to one costs a tenth of a microsecond.
-    """
-
-    period: float  # [s]
-    listens: bool
-    memories: Annotated[NDArray[np.float64], "n_robots", "n_columns"]
-    keys: Annotated[NDArray[np.uint64], "n_robots"]
-    counts: Annotated[NDArray[np.int64], "n_robots"]
-    turned: Annotated[NDArray[np.float64], "n_robots"]
-    outputs: Annotated[NDArray[np.float32], "n_robots", "n_outputs"]
-    deviations: Annotated[NDArray[np.float32], "n_outputs"]
-    layers: Layers
-
-
-@engine_kernel
-def act_at(
-    address: int, decides: bool, rows: NDArray[np.float32], commands: NDArray[np.float64]
-) -> None:
-    """Fill the commands (N, 4) of a step upon rows (N, D); the arrays at `address` go on.
-
-    Args:
-        decides: whether the network decides; if not, its last outputs keep their direction.
-    """
-    here = unpacked_at(StepArrays, address)
-    if decides:
-        layers = Layers(here.layers.weights, here.layers.biases, here.layers.widths)
-        decide(
-            rows, here.period, here.memories, here.counts, here.turned, here.keys, here.listens,
-            layers, here.deviations, here.outputs,
-        )  # fmt: skip
-    else:
-        hold_rows(rows, here.period, here.memories, here.counts, here.turned)
-    command_rows(here.outputs, here.turned, rows, here.memories, commands)
-
-
-@kernel
-def decide(
-    rows: NDArray[np.float32],
-    period: float,
-    memories: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    turned: NDArray[np.float64],
-    keys: NDArray[np.uint64],
-    listens: bool,
-    layers: Layers,
-    deviations: NDArray[np.float32],
-    outputs: NDArray[np.float32],
-) -> None:
-    """Fill the network's outputs (N, k), with its noise, upon rows (N, D); memories go on."""
-    inputs = np.empty((rows.shape[0], layers.widths[0]), np.float32)
-    read_observations(rows, period, memories, keys, counts, listens, inputs, turned)
-    counts += 1
-    run_network(inputs, layers, outputs)
-    if deviations.any():
-        explore(keys, counts, deviations, outputs)
-
-
-@kernel
-def explore(
-    keys: NDArray[np.uint64],
-    counts: NDArray[np.int64],
-    deviations: NDArray[np.float32],
-    outputs: NDArray[np.float32],
-) -> None:
-    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, k).
-
-    Args:
-        counts: the number of decisions of each robot (N,), this one among them.
-    """
-    for robot in range(outputs.shape[0]):
-        for output in range(outputs.shape[1]):
-            noise = gaussian(pair_key(keys[robot], output), counts[robot] - 1)
-            outputs[robot, output] += np.float32(deviations[output] * noise)
 
 
 def tensor_shapes(network: Network) -> dict[str, tuple[int, ...]]:
