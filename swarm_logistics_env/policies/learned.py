@@ -239,7 +239,11 @@ class LearnedPolicy(Described):
 
         Returns:
             The number of steps, K or fewer, and whether the last one has more to tell.
+
+        Raises:
+            PolicyError: there are more or fewer rows than robots at `reset`.
         """
+        self._frame.check(observations)
         n_steps, is_eventful = play_at(
             self._address, world_address, self._n_steps, self._decides_every, observations,
             positions,

@@ -45,16 +45,16 @@ def act_at(
     Args:
         decides: whether the network decides; if not, its last outputs keep their direction.
     """
-    here = unpacked_at(StepArrays, address)
+    own = unpacked_at(StepArrays, address)
     if decides:
-        layers = Layers(here.layers.weights, here.layers.biases, here.layers.widths)
+        layers = Layers(own.layers.weights, own.layers.biases, own.layers.widths)
         decide(
-            rows, here.period, here.memories, here.counts, here.turned, here.keys, here.listens,
-            layers, here.deviations, here.outputs,
+            rows, own.period, own.memories, own.counts, own.turned, own.keys, own.listens,
+            layers, own.deviations, own.outputs,
         )  # fmt: skip
     else:
-        hold_rows(rows, here.period, here.memories, here.counts, here.turned)
-    command_rows(here.outputs, here.turned, rows, here.memories, commands)
+        hold_rows(rows, own.period, own.memories, own.counts, own.turned)
+    command_rows(own.outputs, own.turned, rows, own.memories, commands)
 
 
 @engine_kernel
@@ -71,9 +71,9 @@ def play_at(
     Args:
         n_before: steps since the reset of the policy.
     """
-    world, commands = unpacked_at(World, world_address), np.empty((rows.shape[0], MESSAGE))
-    now = world.commands.now
-    now[:, MESSAGE:] = 0.0
+    world = unpacked_at(World, world_address)
+    commands, now = np.empty((rows.shape[0], MESSAGE)), world.commands.now
+    now[:, MESSAGE:] = 0.0  # it broadcasts no messages
     for number in range(positions.shape[0]):
         act_at(address, (n_before + number) % decides_every == 0, rows, commands)
         now[:, :MESSAGE] = commands

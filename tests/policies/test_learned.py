@@ -3,6 +3,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,6 +67,37 @@ def test_it_decides_every_so_many_steps_and_goes_on_as_decided_in_between(
         np.testing.assert_array_equal(grips[step], grips[step - 1])
     assert (grips[3] != grips[2]).any()
     assert (grips[6] != grips[5]).any()
+
+
+@pytest.mark.parametrize(
+    ("faults", "fields"),
+    [
+        ((), {"restock": True, "duration": 70.0}),  # longer than the log of commands
+        (("dead:2@3.05", "FM3:1@7"), {"message_size": 2, "drive": "differential"}),
+        (("removed:2@4",), {"n_items": 1, "handling_time": 0.5}),
+    ],
+)
+def test_steps_played_in_one_call_are_those_of_a_call_each(
+    card: PolicyCard, tensors: Tensors, faults: tuple[str, ...], fields: dict[str, Any]
+) -> None:
+    class Own(LearnedPolicy):
+        """What somebody derives is asked for each command, as it may act in its own way."""
+
+    scenario = Scenario(**{"n_robots": 6, "n_items": 8, "duration": 20.0, **fields})
+    slow = card.replace(network=card.network.replace(decides_every=3))
+    together, alone = (
+        run_episode(scenario, kind(slow, tensors), seed=2, faults=faults)
+        for kind in (LearnedPolicy, Own)
+    )
+    assert together.digest == alone.digest
+    assert (together.contacts, together.ended_at) == (alone.contacts, alone.ended_at)
+
+
+def test_an_act_of_somebody_else_is_asked(card: PolicyCard, tensors: Tensors) -> None:
+    policy: Any = LearnedPolicy(card, tensors)
+    policy.act = lambda rows: np.zeros((len(rows), 4))
+    scenario = Scenario(n_robots=2, n_items=3, duration=2.0)
+    assert run_episode(scenario, policy, seed=0).contacts.mean_acceleration == 0.0
 
 
 def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:
