@@ -5,17 +5,20 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import CommandError, PolicyError
+from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.policy import Policy, decide_in_one_thread, one_thread, start
-from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.scenario import CHIPMUNK, Scenario
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.contacts import NO_MEASURES, ContactMeasures
 from swarm_logistics_env.warehouse.faults import FaultLike
+
+_MOST_STEPS = 100  # in one call: the interpreter answers a Ctrl-C between calls
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,10 @@ class Play:
             self._env, self._rows = _begun(wrap, scenario, seed, faults)
             self.world = self._env.warehouse
         start(policy, scenario, seed if policy_seed is None else policy_seed)
+        # Not if somebody's own `act` replaces that of the class.
+        is_learned = type(policy) is LearnedPolicy and "act" not in vars(policy)
+        plays_steps = is_learned and self._env is None and scenario.bodies == CHIPMUNK
+        self._learned = cast("LearnedPolicy", policy) if plays_steps else None
 
     @property
     def is_over(self) -> bool:
@@ -113,9 +120,34 @@ class Play:
             else:
                 self._rows = self._env.step_arrays(commands)[0]
         except CommandError as error:
-            raise PolicyError(
-                f"{type(self._policy).__name__} at {world.state.time:g} s: {error}"
-            ) from error
+            raise self._error_about(error) from error
+
+    def advance_to_event(self, positions: NDArray[np.float64]) -> int:
+        """Do as `advance` until something happens, in one call where the policy plays steps.
+
+        Args:
+            positions: (K, N, 2), filled with the robots' positions after each step [m].
+
+        Returns:
+            The number of steps, K or fewer.
+        """
+        if self._learned is None:
+            self.advance()
+            n_steps = 1
+        else:
+            world, rows = self.world, self._rows
+            n_steps, is_eventful = self._learned.play_steps(world.address, rows, positions)
+            try:
+                world.take(rows, is_eventful)
+            except CommandError as error:
+                raise self._error_about(error) from error
+        # Who is taken out as a fault begins has no position any more.
+        positions[n_steps - 1] = self.world.state.robot_position
+        return n_steps
+
+    def _error_about(self, error: CommandError) -> PolicyError:
+        when = f"at {self.world.state.time:g} s"
+        return PolicyError(f"{type(self._policy).__name__} {when}: {error}")
 
 
 def _begun(
@@ -169,10 +201,10 @@ def run_episode(
     with one_thread():  # once for all steps, as each change takes a while
         play = Play(scenario, policy, seed, faults, policy_seed)
         world, is_over = play.world, play.is_over
-        positions = world.state.robot_position.data  # the same memory during the whole episode
+        positions = np.empty((_MOST_STEPS, *world.state.robot_position.shape))
         while not is_over:
-            play.advance()
-            digest.update(positions)
+            n_steps = play.advance_to_event(positions)
+            digest.update(positions[:n_steps].data)
             # No end without an event, but for wrappers that end it sooner.
             is_over = (world.is_eventful or play._env is not None) and play.is_over
     state = world.state

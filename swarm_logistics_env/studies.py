@@ -24,7 +24,7 @@ from swarm_logistics_env.runs.recorded import imported_plan
 from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.tasks.task import Outcomes, Run, Task, refuse_untrusted
 from swarm_logistics_env.verdicts.results import StudyResults, judge
-from swarm_logistics_env.verdicts.until_clear import LatestLook, latest_look
+from swarm_logistics_env.verdicts.until_clear import Judged, LatestLook, latest_look
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,6 +64,7 @@ class Study:
         self._plan: Plan | None = None
         # By case and seed, what each outcome raised when it was last looked at, and that look.
         self._look: tuple[dict[tuple[str, int], str | None], LatestLook] | None = None
+        self._judged: Judged = {}
         self._memory: Runs | None = None
 
     @classmethod
@@ -137,7 +138,7 @@ class Study:
     def specification(self, changed: Specification) -> None:
         if self._plan is not None and self._plan.origin is not None:
             raise StudyError("specification: a study that was imported asks what its trials vary")
-        self._specification, self._plan, self._look = changed, None, None
+        self._specification, self._plan, self._look, self._judged = changed, None, None, {}
 
     def plan(self) -> Plan:
         """Return the conditions and comparisons, shared conditions once; nothing is run."""
@@ -261,7 +262,7 @@ class Study:
         """Return the latest look at these outcomes; computed anew if runs were played since."""
         errors = {key: outcome.error for key, outcome in outcomes.items()}
         if self._look is None or self._look[0] != errors:
-            self._look = errors, latest_look(self.plan(), outcomes)
+            self._look = errors, latest_look(self.plan(), outcomes, self._judged)
         return self._look[1]
 
     def _results(self, store: Runs) -> StudyResults:

@@ -30,7 +30,7 @@ from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcomes
-from swarm_logistics_env.verdicts.until_clear import LatestLook, latest_look
+from swarm_logistics_env.verdicts.until_clear import Judged, LatestLook, latest_look
 from tests.conftest import SMALL
 from tests.made_up import alter, digest
 from tests.verdicts.test_until_clear import Engine, until_clear
@@ -264,14 +264,18 @@ def test_another_specification_makes_another_plan(tmp_path: Path) -> None:
 def test_the_same_outcomes_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     study, looks_at = until_clear(30), list[int]()
 
-    def counted(plan: Plan, outcomes: Outcomes) -> LatestLook:
+    def counted(plan: Plan, outcomes: Outcomes, judged: Judged) -> LatestLook:
         looks_at.append(len(outcomes))
-        return latest_look(plan, outcomes)
+        look = latest_look(plan, outcomes, judged)
+        anew = latest_look(plan, outcomes)
+        assert repr(look.verdicts) == repr(anew.verdicts)  # a nan is not equal to itself
+        return look
 
     monkeypatch.setattr(studies, "latest_look", counted)
     study.run(Engine(), after_look=lambda _: None)
     results = study.findings()
     assert looks_at == sorted(set(looks_at))
     assert looks_at[-1] == len(results.outcomes)
+    assert study._judged
     study.specification = study.specification.replace(margin=0.2)
     assert study.findings().verdicts != results.verdicts  # another plan's looks

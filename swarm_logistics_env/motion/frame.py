@@ -14,7 +14,7 @@ from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.memory import length_of, to_frame
 from swarm_logistics_env.scenario import Scenario
 
-from .network_inputs import INPUTS, read_observations
+from .network_inputs import COSINES, INPUTS, SINES, TURNS, read_observations
 
 OUTPUTS = ("along", "aside", "gripper")
 
@@ -126,10 +126,6 @@ class MotionView:
         return commands
 
 
-_TURNS = 2.0 * math.pi * np.arange(row.N_BEAMS) / row.N_BEAMS  # of frames, by whole beams [rad]
-_COSINES, _SINES = np.cos(_TURNS), np.sin(_TURNS)
-
-
 @kernel
 def hold_rows(
     rows: NDArray[np.float32],
@@ -172,7 +168,7 @@ def command_own_frames(
         beams = round(turned[robot] / (2.0 * math.pi / row.N_BEAMS))
         x, y, gripper = commands[robot, 0], commands[robot, 1], commands[robot, 3]
         # There and back: outputs are clipped in the frame of motion.
-        along, aside = to_frame((_COSINES[beams], _SINES[beams]), x, y)
+        along, aside = to_frame((COSINES[beams], SINES[beams]), x, y)
         turn_outputs(along, aside, gripper, turned[robot], commands[robot])
         finish_command(rows[robot], memories[robot], commands[robot])
 
@@ -196,6 +192,16 @@ def turn_outputs(
     """Fill the command (4,) of outputs; clipped, no turn."""
     along, aside = min(max(along, -1.0), 1.0), min(max(aside, -1.0), 1.0)
     longer = max(length_of(along, aside), 1.0)
-    x, y = to_frame((math.cos(turned), -math.sin(turned)), along, aside)
+    cosine, sine = cosine_and_sine(turned)
+    x, y = to_frame((cosine, -sine), along, aside)
     command[0], command[1], command[2] = x / longer, y / longer, 0.0
     command[3] = min(max(gripper, -1.0), 1.0)
+
+
+@inlined_kernel
+def cosine_and_sine(turned: float) -> tuple[float, float]:
+    """Return those of a frame's turn [rad], out of a table if it is turned by whole beams."""
+    beams = round(turned / (2.0 * math.pi / row.N_BEAMS))
+    if 0 <= beams < row.N_BEAMS and turned == TURNS[beams]:
+        return COSINES[beams], SINES[beams]
+    return math.cos(turned), math.sin(turned)

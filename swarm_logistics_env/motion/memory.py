@@ -33,6 +33,15 @@ LEAST_GAIN = 0.15  # the share of a deviation that is corrected after the first 
 SETTLING_TIME = 1.0  # [s], so that the drift is not judged by the noise of the first sightings
 
 
+def _directions(aside: float) -> NDArray[np.float64]:
+    """Return cosine and sine of each beam's angle plus `aside` [rad], (N_BEAMS, 2)."""
+    angles = [BEAM_ANGLE * beam + aside for beam in range(row.N_BEAMS)]
+    return np.array([(math.cos(angle), math.sin(angle)) for angle in angles])
+
+
+_BEFORE, _ALONG, _AFTER = map(_directions, (-BEAM_ANGLE, 0.0, BEAM_ANGLE))
+
+
 @kernel
 def wall_angle(sensed: NDArray[np.float32]) -> float:
     """Return the direction of the nearest wall in the robot's frame, 0 to pi/2 [rad]; -1: none."""
@@ -42,10 +51,9 @@ def wall_angle(sensed: NDArray[np.float32]) -> float:
     # In a room every robot has a beam that meets nothing, or too long a one to be used.
     if max(a, c) >= walls.max():
         return -1.0
-    angle = BEAM_ANGLE * nearest
-    ax, ay = a * math.cos(angle - BEAM_ANGLE), a * math.sin(angle - BEAM_ANGLE)
-    bx, by = b * math.cos(angle), b * math.sin(angle)
-    cx, cy = c * math.cos(angle + BEAM_ANGLE), c * math.sin(angle + BEAM_ANGLE)
+    ax, ay = a * _BEFORE[nearest, 0], a * _BEFORE[nearest, 1]
+    bx, by = b * _ALONG[nearest, 0], b * _ALONG[nearest, 1]
+    cx, cy = c * _AFTER[nearest, 0], c * _AFTER[nearest, 1]
     x, y = cx - ax, cy - ay
     length = max(length_of(x, y), 1e-6)
     if abs((bx - ax) * y - (by - ay) * x) / length > STRAIGHT:
@@ -116,42 +124,59 @@ def remember_observation(
     rows: NDArray[np.float32], period: float, memories: NDArray[np.float64]
 ) -> None:
     """Take what the rows (N, D) tell into the memories, once a control period [s]."""
-    home_fades, kept_fades = math.exp(-period / HOME_TIME), math.exp(-period / KEPT_TIME)
+    fades = fading(period)
     for robot in range(rows.shape[0]):
-        sensed, memory = rows[robot], memories[robot]
-        x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
-        speed = length_of(x, y)
-        is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
-        delivers = sensed[row.CARRYING_REQUESTED] > 0.5
+        remember_row(rows[robot], period, fades, memories[robot])
 
-        turn_back(sensed[row.TURN_RATE] * period, memory)
-        diagnose(sensed, period, memory)
 
-        memory[STUCK] = max(0.0, memory[STUCK] - period / STUCK_TIME)
-        stands = delivers and memory[HELD] > 1.5 and speed < STANDS
-        if stands:
-            memory[STUCK] = 1.0
-        memory[STANDING] = max(0.0, memory[STANDING] + (period if stands else -period))
-        memory[CLEARING] = max(0.0, memory[CLEARING] - period)
-        if memory[STANDING] > CAGED_TIME and not is_inside:
-            memory[STANDING], memory[CLEARING] = 0.0, CLEARING_TIME
+@inlined_kernel
+def fading(period: float) -> tuple[float, float]:
+    """Return the shares of HOME and of KEPT that a control period [s] leaves."""
+    return math.exp(-period / HOME_TIME), math.exp(-period / KEPT_TIME)
 
-        watch_walls(sensed, period, memory)
-        for column, fades in ((HOME_X, home_fades), (KEPT_X, kept_fades)):
-            memory[column] *= fades
-            memory[column + 1] *= fades
-        if is_inside != (memory[WAS_INSIDE] > 0.5) and speed > MOVES:
-            inwards = 1.0 if is_inside else -1.0
-            memory[HOME_X] += inwards * x / speed
-            memory[HOME_Y] += inwards * y / speed
-            along, aside = to_frame((math.cos(memory[WALL]), math.sin(memory[WALL])), x, y)
-            memory[KEPT_X] += inwards / speed * along
-            memory[KEPT_Y] += inwards / speed * aside
-            memory[AWAY] = 0.0
-        home_x, home_y, sure = kept_home(memory)
-        if sure > 0.0:
-            memory[AWAY] -= period * (home_x * x + home_y * y)
-        memory[WAS_INSIDE] = 1.0 if is_inside else 0.0
+
+@kernel
+def remember_row(
+    sensed: NDArray[np.float32],
+    period: float,
+    fades: tuple[float, float],
+    memory: NDArray[np.float64],
+) -> tuple[float, float, float]:
+    """Take what one row (D,) tells into a memory, and return its `kept_home`."""
+    x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
+    speed = length_of(x, y)
+    is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
+    delivers = sensed[row.CARRYING_REQUESTED] > 0.5
+
+    turn_back(sensed[row.TURN_RATE] * period, memory)
+    diagnose(sensed, period, memory)
+
+    memory[STUCK] = max(0.0, memory[STUCK] - period / STUCK_TIME)
+    stands = delivers and memory[HELD] > 1.5 and speed < STANDS
+    if stands:
+        memory[STUCK] = 1.0
+    memory[STANDING] = max(0.0, memory[STANDING] + (period if stands else -period))
+    memory[CLEARING] = max(0.0, memory[CLEARING] - period)
+    if memory[STANDING] > CAGED_TIME and not is_inside:
+        memory[STANDING], memory[CLEARING] = 0.0, CLEARING_TIME
+
+    watch_walls(sensed, period, memory)
+    for column, share in ((HOME_X, fades[0]), (KEPT_X, fades[1])):
+        memory[column] *= share
+        memory[column + 1] *= share
+    if is_inside != (memory[WAS_INSIDE] > 0.5) and speed > MOVES:
+        inwards = 1.0 if is_inside else -1.0
+        memory[HOME_X] += inwards * x / speed
+        memory[HOME_Y] += inwards * y / speed
+        along, aside = to_frame((math.cos(memory[WALL]), math.sin(memory[WALL])), x, y)
+        memory[KEPT_X] += inwards / speed * along
+        memory[KEPT_Y] += inwards / speed * aside
+        memory[AWAY] = 0.0
+    home_x, home_y, sure = kept_home(memory)
+    if sure > 0.0:
+        memory[AWAY] -= period * (home_x * x + home_y * y)
+    memory[WAS_INSIDE] = 1.0 if is_inside else 0.0
+    return home_x, home_y, sure
 
 
 @inlined_kernel

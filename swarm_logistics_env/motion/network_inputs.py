@@ -23,6 +23,10 @@ WALL_REACH, FAR, NEAR = 0.7, 2.0, 0.5  # [m], where nearness 1 .. 0 ends
 RANDOM_HEADING_TIME = 0.8  # [s] that a random direction lasts
 FARTHEST = 8.0  # [m] from the delivery area, as far as a network is told
 FIRST_RANDOM_HEADING = 1_000_003  # number in the robot's stream
+# Of frames that are turned by 0, 1, .. beams [rad]; the cosines and sines are those of `math`.
+TURNS = 2.0 * math.pi * np.arange(row.N_BEAMS) / row.N_BEAMS
+COSINES = np.array([math.cos(turn) for turn in TURNS])
+SINES = np.array([math.sin(turn) for turn in TURNS])
 
 _VECTOR = ("along", "aside")
 INPUTS: tuple[str, ...] = (
@@ -63,7 +67,7 @@ def turn_frames(
     """Take what rows tell into the memories; fill how far each frame is turned (N,) [rad]."""
     column.remember_observation(rows, period, memories)
     for robot in range(rows.shape[0]):
-        turned[robot] = 2.0 * math.pi * beams_turned(memories[robot]) / row.N_BEAMS
+        turned[robot] = TURNS[beams_turned(memories[robot])]
 
 
 @kernel
@@ -83,12 +87,13 @@ def read_observations(
         counts: the decisions of each row before this one (N,).
         listens: whether the lowest timer heard is read; zeros if not.
     """
-    column.remember_observation(rows, period, memories)
+    fades = column.fading(period)
     for robot in range(rows.shape[0]):
         sensed, memory, read = rows[robot], memories[robot], inputs[robot]
+        kept_home = column.remember_row(sensed, period, fades, memory)
         beams = beams_turned(memory)
-        turned[robot] = 2.0 * math.pi * beams / row.N_BEAMS
-        frame = math.cos(turned[robot]), math.sin(turned[robot])
+        turned[robot] = TURNS[beams]
+        frame = COSINES[beams], SINES[beams]
         for beam in range(row.N_BEAMS):
             distance = sensed[row.RANGE_WALLS + (beam + beams) % row.N_BEAMS]
             read[INPUT.wall_0 + beam] = max(0.0, 1.0 - distance / WALL_REACH)
@@ -103,7 +108,7 @@ def read_observations(
         read_robot(sensed, memory, frame, read)
         angle = random_heading(keys[robot], counts[robot], period) - turned[robot]
         read[INPUT.whim_along], read[INPUT.whim_aside] = math.cos(angle), math.sin(angle)
-        read_memory(memory, certainty, confidence, frame, read)
+        read_memory(memory, certainty, confidence, kept_home, frame, read)
 
 
 @inlined_kernel
@@ -214,6 +219,7 @@ def read_memory(
     memory: NDArray[np.float64],
     certainty: float,
     confidence: float,
+    kept_home: tuple[float, float, float],
     frame: tuple[float, float],
     read: NDArray[np.float32],
 ) -> None:
@@ -221,13 +227,14 @@ def read_memory(
 
     Args:
         certainty: length of the sum of its directions home; `confidence` is its tanh.
+        kept_home: see `memory.kept_home`.
     """
     unit = confidence / certainty if certainty > 0.0 else 0.0
     put(read, INPUT.home_along, unit, frame, memory[column.HOME_X], memory[column.HOME_Y])
     read[INPUT.home_certainty] = math.tanh(certainty / 3.0)
     read[INPUT.failed], read[INPUT.stuck] = memory[column.FAILED], memory[column.STUCK]
-    home_x, home_y, kept_certainty = column.kept_home(memory)
-    kept_certainty = math.tanh(kept_certainty)
+    home_x, home_y, sure = kept_home
+    kept_certainty = math.tanh(sure)
     put(read, INPUT.kept_home_along, kept_certainty, frame, home_x, home_y)
     distance = min(max(memory[column.AWAY], -FARTHEST), FARTHEST)
     read[INPUT.kept_home_distance] = kept_certainty * distance / FARTHEST

@@ -8,7 +8,7 @@ are summed at once, as many as the registers of a processor hold; `register_bloc
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,9 @@ Floats = NDArray[np.float32]
 class Layers(NamedTuple):
     """The layers of a network as `run_network` reads them; layer l has widths[l] inputs."""
 
-    weights: Floats  # of all layers, `in_blocks`
-    biases: Floats  # `padded`
-    widths: NDArray[np.int64]
+    weights: Annotated[Floats, "n_weights"]  # of all layers, `in_blocks`
+    biases: Annotated[Floats, "n_biases"]  # `padded`
+    widths: Annotated[NDArray[np.int64], "n_layers + 1"]
 
 
 def in_blocks(weights: Floats) -> Floats:

@@ -24,15 +24,16 @@ from pydantic import (
 )
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.kernels import gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import OUTPUTS, MotionView, command_rows, hold_rows
-from swarm_logistics_env.motion.network_inputs import INPUTS, read_observations
+from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
+from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.warehouse.packing import packed
 
 from .layers import Layers, in_blocks, padded, run_network
+from .network_steps import StepArrays, act_at, play_at
 
 Width = Annotated[int, Field(ge=1, le=4096)]
 
@@ -190,6 +191,25 @@ class LearnedPolicy(Described):
         self._frame.begin(row_keys(seed, STREAM, n_robots))
         self._outputs = np.empty((n_robots, len(OUTPUTS)), np.float32)
         self._n_steps = 0
+        self._tell_compiled_code()
+
+    def _tell_compiled_code(self) -> None:
+        """Note where the arrays of a step are; they live as long as the address."""
+        frame = self._frame
+        self._arrays = StepArrays(
+            frame.period, self._listens, frame.memory, frame.keys, frame.counts, frame.turned,
+            self._outputs, self._deviations, self._layers,
+        )  # fmt: skip
+        self._words = packed(self._arrays)
+        self._address: int = self._words.ctypes.data
+
+    def __getstate__(self) -> dict[str, Any]:
+        addresses = ("_arrays", "_words", "_address")
+        return {name: value for name, value in vars(self).items() if name not in addresses}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._tell_compiled_code()  # a copy has arrays of its own
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D).
@@ -197,85 +217,45 @@ class LearnedPolicy(Described):
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
         """
-        frame, outputs = self._frame, self._outputs
-        frame.check(observations)
-        commands = np.empty((len(outputs), 4))
-        period, memory, counts, turned = frame.period, frame.memory, frame.counts, frame.turned
-        if self._n_steps % self._decides_every:
-            hold_outputs(observations, period, memory, counts, turned, outputs, commands)
-        else:
-            act_network(
-                observations, period, memory, counts, turned, frame.keys, self._listens,
-                self._layers, self._deviations, outputs, commands,
-            )  # fmt: skip
+        self._frame.check(observations)
+        commands = np.empty((len(observations), 4))
+        decides = self._n_steps % self._decides_every == 0
+        act_at(self._address, decides, observations, commands)
         self._n_steps += 1
         return commands
+
+    def play_steps(
+        self,
+        world_address: int,
+        observations: NDArray[np.float32],
+        positions: NDArray[np.float64],
+    ) -> tuple[int, bool]:
+        """Act in a world, step by step as `act` and `Warehouse.step` do, within one call.
+
+        Args:
+            world_address: `Warehouse.address`; the caller has to `take` the last step.
+            observations: (N, D) of the world now; it is filled with those after the last step.
+            positions: (K, N, 2) to be filled with the robots' positions after each step [m].
+
+        Returns:
+            The number of steps, K or fewer, and whether the last one has more to tell.
+
+        Raises:
+            PolicyError: there are more or fewer rows than robots at `reset`.
+        """
+        self._frame.check(observations)
+        n_steps, is_eventful = play_at(
+            self._address, world_address, self._n_steps, self._decides_every, observations,
+            positions,
+        )  # fmt: skip
+        self._n_steps += n_steps
+        return n_steps, is_eventful
 
     def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the network's outputs (N, k) for rows of its inputs, without noise."""
         outputs = np.empty((len(inputs), len(OUTPUTS)), np.float32)
         run_network(np.ascontiguousarray(inputs), self._layers, outputs)
         return outputs
-
-
-@kernel
-def act_network(
-    rows: NDArray[np.float32],
-    period: float,
-    memories: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    turned: NDArray[np.float64],
-    keys: NDArray[np.uint64],
-    listens: bool,
-    layers: Layers,
-    deviations: NDArray[np.float32],
-    outputs: NDArray[np.float32],
-    commands: NDArray[np.float64],
-) -> None:
-    """Fill outputs (N, k) and commands (N, 4) of a decision upon rows (N, D); memories go on.
-
-    One kernel a step, because each call of a kernel costs more than a microsecond.
-    """
-    inputs = np.empty((rows.shape[0], layers.widths[0]), np.float32)
-    read_observations(rows, period, memories, keys, counts, listens, inputs, turned)
-    counts += 1
-    run_network(inputs, layers, outputs)
-    if deviations.any():
-        explore(keys, counts, deviations, outputs)
-    command_rows(outputs, turned, rows, memories, commands)
-
-
-@kernel
-def hold_outputs(
-    rows: NDArray[np.float32],
-    period: float,
-    memories: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    turned: NDArray[np.float64],
-    outputs: NDArray[np.float32],
-    commands: NDArray[np.float64],
-) -> None:
-    """Fill the commands (N, 4) of a step between two decisions, whose outputs (N, k) hold on."""
-    hold_rows(rows, period, memories, counts, turned)
-    command_rows(outputs, turned, rows, memories, commands)
-
-
-@kernel
-def explore(
-    keys: NDArray[np.uint64],
-    counts: NDArray[np.int64],
-    deviations: NDArray[np.float32],
-    outputs: NDArray[np.float32],
-) -> None:
-    """Add Gaussian noise, from each robot's own stream, to `outputs` (N, k).
-
-    Args:
-        counts: the number of decisions of each robot (N,), this one among them.
-    """
-    for robot in range(outputs.shape[0]):
-        for output in range(outputs.shape[1]):
-            noise = gaussian(pair_key(keys[robot], output), counts[robot] - 1)
-            outputs[robot, output] += np.float32(deviations[output] * noise)
 
 
 def tensor_shapes(network: Network) -> dict[str, tuple[int, ...]]:

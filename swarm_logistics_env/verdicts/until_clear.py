@@ -22,7 +22,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from more_itertools import map_reduce
 
@@ -63,9 +63,17 @@ class LatestLook(NamedTuple):
         return min(self.seeds_of.values())
 
 
-def latest_look(plan: Plan, outcomes: Outcomes) -> LatestLook:
-    """Return the state of a plan's comparisons after these outcomes."""
-    looks = _Looks(plan, outcomes)
+Judged: TypeAlias = dict[tuple[Comparison, int], Verdict]  # by the comparison and its seeds
+
+
+def latest_look(plan: Plan, outcomes: Outcomes, judged: Judged | None = None) -> LatestLook:
+    """Return the state of a plan's comparisons after these outcomes.
+
+    Args:
+        judged: verdicts of looks whose runs are all there, of this plan: they are not computed
+            again, and new ones are added.
+    """
+    looks = _Looks(plan, outcomes, {} if judged is None else judged)
     next_runs = looks.missing(plan.cases, looks.seeds[0])
     shared_runs = looks.missing(_shared_cases(plan), looks.seeds[0])
     verdicts = dict[Comparison, Verdict]()
@@ -102,10 +110,11 @@ class _Looks:
         seeds: the numbers of seeds at which comparisons may stop.
     """
 
-    def __init__(self, plan: Plan, outcomes: Outcomes) -> None:
+    def __init__(self, plan: Plan, outcomes: Outcomes, judged: Judged) -> None:
         self.seeds = plan.specification.looks
         self._plan = plan
         self._outcomes = outcomes
+        self._judged = judged
 
     def missing(self, cases: Iterable[Case], n_seeds: int) -> dict[str, Run]:
         """Return the runs of cases that are not played yet, by their keys."""
@@ -120,21 +129,25 @@ class _Looks:
 
     def judge(self, comparisons: Iterable[Comparison], n_seeds: int) -> dict[Comparison, Verdict]:
         """Judge comparisons at a look, as far as it is played."""
+        return {comparison: self._verdict(comparison, n_seeds) for comparison in comparisons}
+
+    def _verdict(self, comparison: Comparison, n_seeds: int) -> Verdict:
+        if (comparison, n_seeds) in self._judged:
+            return self._judged[comparison, n_seeds]
+        cells = self._cells(comparison, n_seeds)
         # Each test spends its own error: 5 % on both sides of a threshold, and as much on each
         # side of the margin.
-        confidence = 1 - self.alpha(n_seeds, 1 - CONFIDENCE)
-        alpha = self.alpha(n_seeds, 2 * ALPHA) / 2
-        return {
-            comparison: judge_comparison(
-                comparison,
-                self._cells(comparison, n_seeds),
-                paired=True,
-                margin=self._plan.specification.margin,
-                confidence=confidence,
-                alpha=alpha,
-            )
-            for comparison in comparisons
-        }
+        verdict = judge_comparison(
+            comparison,
+            cells,
+            paired=True,
+            margin=self._plan.specification.margin,
+            confidence=1 - self.alpha(n_seeds, 1 - CONFIDENCE),
+            alpha=self.alpha(n_seeds, 2 * ALPHA) / 2,
+        )
+        if all(cell.n_seeds == n_seeds for cell in cells.values()):  # without one that failed
+            self._judged[comparison, n_seeds] = verdict
+        return verdict
 
     def _cells(self, comparison: Comparison, n_seeds: int) -> dict[Arm, Cell]:
         seeds = self._plan.seeds[:n_seeds]

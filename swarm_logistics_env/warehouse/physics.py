@@ -235,7 +235,9 @@ class Physics:
         n_boxes: rectangles of solid cells that the floor has.
 
     Attributes:
+        n_boxes: as given.
         engine: what compiled code knows of it.
+        words: the engine, `packed`.
     """
 
     def __init__(self, scenario: Scenario, robot_places: Numbers, n_boxes: int) -> None:
@@ -252,12 +254,13 @@ class Physics:
             bodies=np.zeros((n, 4)),
             wanted_velocity=np.zeros((n, 2)),
         )
+        self.n_boxes, self.words = n_boxes, packed(self.engine)
 
     def begin(self, address: int) -> None:
         """Make the bodies of the world at `address` as its arrays have them now."""
         build(address)
         # This is left out at the end of the process, which frees everything anyway.
-        finalize(self, _free, packed(self.engine), self.engine).atexit = False
+        finalize(self, _free, self.words, self.engine).atexit = False
 
 
 def _free(engine: NDArray[np.int64], _: EngineArrays) -> None:

@@ -189,7 +189,9 @@ class Warehouse:
             )
         self.scenario = self.scenario.replace(**fields)
         self._apply_faults()
-        self._remember()
+        self._robot_places = self.state.robot_position.copy()
+        self._build()
+        self._save()
 
     @in_one_thread
     def set_faults(self, faults: Sequence[FaultLike]) -> None:
@@ -287,6 +289,40 @@ class Warehouse:
         most_steps = _LOGGED_NUMBERS // math.prod(self._command_shape)
         self._longest_log = max(min(most_steps, _LONGEST_LOG), _SHORTEST_LOG)
 
+    def _build(self) -> None:
+        """Make the bodies, and tell compiled code where everything is."""
+        scenario, state = self.scenario, self.state
+        n, n_columns = self._command_shape
+        state.progress.last_step[0] = scenario.n_steps
+        lengths = lengths_of(scenario)
+        floor = floor_of(scenario)
+        self._physics = Physics(scenario, self._robot_places, len(floor.corners) // N_CORNERS)
+        self._world = World(
+            parameters=Parameters(*(getattr(scenario, name) for name in Parameters._fields)),
+            commands=Commands(
+                now=np.zeros(self._command_shape),
+                log=np.empty((self._longest_log * n, n_columns)),
+                n_logged=np.zeros(1, np.int64),
+            ),
+            robots=state.robots,
+            able=state.able,
+            items=state.items,
+            obstacles=state.obstacle_position,
+            floor=floor,
+            progress=state.progress,
+            contacts=state.contacts,
+            outcome=blank(StepResult, lengths),
+            robot_grid=self._robot_grid,
+            item_grid=self._item_grid,
+            nearby=blank(Nearby, lengths),
+            claims=blank(Claims, lengths),
+            engine=self._physics.engine,
+        )
+        self._world.claims.robot[:] = NOBODY
+        self._words = packed(self._world)
+        self._address: int = self._words.ctypes.data
+        self._physics.begin(self._address)
+
     def _remember(self) -> None:
         """Note everything a pickle needs, and rebuild the bodies from it as unpickling will.
 
@@ -294,8 +330,16 @@ class Warehouse:
         last such moment and the commands since, which unpickling replays.
         """
         self._robot_places = self.state.robot_position.copy()
-        self._build()
+        self._rebuild_bodies()
+        self._world.commands.n_logged[0] = 0
         self._save()
+
+    def _rebuild_bodies(self) -> None:
+        self._physics = Physics(self.scenario, self._robot_places, self._physics.n_boxes)
+        self._world = self._world._replace(engine=self._physics.engine)
+        words = self._physics.words
+        self._words[-len(words) :] = words  # the engine is the last field of a world
+        self._physics.begin(self._address)
 
     def _logged(self) -> NDArray[np.float64]:
         """Return the commands since the last such moment, (steps, N, C)."""
@@ -342,40 +386,6 @@ class Warehouse:
         is_removed = apply_faults(state, self.scenario, self._occurrences)
         for robot in np.flatnonzero(is_removed & state.robot_present).tolist():
             stepping.remove(self._address, robot)
-
-    def _build(self) -> None:
-        """Make the bodies, and tell compiled code where everything is."""
-        scenario, state = self.scenario, self.state
-        n, n_columns = self._command_shape
-        state.progress.last_step[0] = scenario.n_steps
-        lengths = lengths_of(scenario)
-        floor = floor_of(scenario)
-        self._physics = Physics(scenario, self._robot_places, len(floor.corners) // N_CORNERS)
-        self._world = World(
-            parameters=Parameters(*(getattr(scenario, name) for name in Parameters._fields)),
-            commands=Commands(
-                now=np.zeros(self._command_shape),
-                log=np.empty((self._longest_log * n, n_columns)),
-                n_logged=np.zeros(1, np.int64),
-            ),
-            robots=state.robots,
-            able=state.able,
-            items=state.items,
-            obstacles=state.obstacle_position,
-            floor=floor,
-            progress=state.progress,
-            contacts=state.contacts,
-            outcome=blank(StepResult, lengths),
-            robot_grid=self._robot_grid,
-            item_grid=self._item_grid,
-            nearby=blank(Nearby, lengths),
-            claims=blank(Claims, lengths),
-            engine=self._physics.engine,
-        )
-        self._world.claims.robot[:] = NOBODY
-        self._words = packed(self._world)
-        self._address: int = self._words.ctypes.data
-        self._physics.begin(self._address)
 
 
 def _occurrences(faults: Sequence[FaultLike], seed: int, n_robots: int) -> list[Occurrence]:

@@ -1,6 +1,12 @@
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
@@ -8,7 +14,8 @@ from swarm_logistics_env.motion import INPUTS
 from swarm_logistics_env.observations import N_COLUMNS, TURN_RATE
 from swarm_logistics_env.policies import PolicyCard, identity
 from swarm_logistics_env.policies.layers import hyperbolic_tangent
-from swarm_logistics_env.policies.learned import LearnedPolicy, explore
+from swarm_logistics_env.policies.learned import LearnedPolicy
+from swarm_logistics_env.policies.network_steps import explore
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.streams import row_keys
 
@@ -27,6 +34,26 @@ def test_an_episode_follows_from_its_seed(card: PolicyCard, tensors: Tensors) ->
     assert played(0) == first
 
 
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
+)
+def test_a_copy_goes_on_from_where_it_was_made(
+    card: PolicyCard, tensors: Tensors, copied: Callable[[LearnedPolicy], LearnedPolicy]
+) -> None:
+    policy, rng = LearnedPolicy(card, tensors), np.random.default_rng(0)
+    rows = rng.uniform(0, 1, (9, 5, N_COLUMNS)).astype(np.float32)
+    policy.reset(5, 0)
+    for observations in rows[:4]:
+        policy.act(observations)
+    other = copied(policy)
+    if copied is copy.copy:  # it shares the memories, so the first one begins another episode
+        policy.reset(5, 1)
+    commands = [other.act(observations).tobytes() for observations in rows[4:]]
+    again = LearnedPolicy(card, tensors)
+    again.reset(5, 0)
+    assert commands == [again.act(observations).tobytes() for observations in rows][4:]
+
+
 def test_it_decides_every_so_many_steps_and_goes_on_as_decided_in_between(
     card: PolicyCard, tensors: Tensors
 ) -> None:
@@ -40,6 +67,37 @@ def test_it_decides_every_so_many_steps_and_goes_on_as_decided_in_between(
         np.testing.assert_array_equal(grips[step], grips[step - 1])
     assert (grips[3] != grips[2]).any()
     assert (grips[6] != grips[5]).any()
+
+
+@pytest.mark.parametrize(
+    ("faults", "fields"),
+    [
+        ((), {"restock": True, "duration": 70.0}),  # longer than the log of commands
+        (("dead:2@3.05", "FM3:1@7"), {"message_size": 2, "drive": "differential"}),
+        (("removed:2@4",), {"n_items": 1, "handling_time": 0.5}),
+    ],
+)
+def test_steps_played_in_one_call_are_those_of_a_call_each(
+    card: PolicyCard, tensors: Tensors, faults: tuple[str, ...], fields: dict[str, Any]
+) -> None:
+    class Own(LearnedPolicy):
+        """What somebody derives is asked for each command, as it may act in its own way."""
+
+    scenario = Scenario(**{"n_robots": 6, "n_items": 8, "duration": 20.0, **fields})
+    slow = card.replace(network=card.network.replace(decides_every=3))
+    together, alone = (
+        run_episode(scenario, kind(slow, tensors), seed=2, faults=faults)
+        for kind in (LearnedPolicy, Own)
+    )
+    assert together.digest == alone.digest
+    assert (together.contacts, together.ended_at) == (alone.contacts, alone.ended_at)
+
+
+def test_an_act_of_somebody_else_is_asked(card: PolicyCard, tensors: Tensors) -> None:
+    policy: Any = LearnedPolicy(card, tensors)
+    policy.act = lambda rows: np.zeros((len(rows), 4))
+    scenario = Scenario(n_robots=2, n_items=3, duration=2.0)
+    assert run_episode(scenario, policy, seed=0).contacts.mean_acceleration == 0.0
 
 
 def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:
