@@ -71,10 +71,16 @@ paper-fit: $(FIT)/installed
 tables: $(STUDY)/installed
 	$(STUDY)/bin/python docs/play_tables.py
 
-test: check
+# Kernels are compiled beside mypy: two workers that begin with tests would compile each of them twice.
+test: $(DEV)/installed
+	$(DEV)/bin/ruff check .
+	$(DEV)/bin/ruff format --check .
+	$(DEV)/bin/mypy & types=$$!; \
+	$(DEV)/bin/python -m verification.trajectories && \
+	$(DEV)/bin/swarm-logistics run --policy ppo-robust --set duration=5 && wait $$types
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
-	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -p verification.interpreted --cov --cov-append --cov-report= \
-		$(KERNELS) -m "not compiled"
+	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest --numprocesses=2 -p verification.interpreted \
+		--cov --cov-append --cov-report= $(KERNELS) -m "not compiled"
 	$(DEV)/bin/python -m coverage report --fail-under=94
 
 # For every commit, within a minute: mypy runs beside the fastest tests, which interpret the kernels.
@@ -236,8 +242,10 @@ $(CANARY)/installed: EXTRAS := study,train
 $(CANARY)/installed: OTHERS := hypothesis pytest
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
+# pip compiles on one core, half of its time. Files that no Python can compile are templates.
 .venvs/%/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venvs/$*
-	.venvs/$*/bin/python -m pip install --constraint constraints.txt --editable ".$(EXTRAS:%=[%])" $(OTHERS)
-	$(if $(BARE),.venvs/$*/bin/python -m pip install --no-deps $(BARE))
+	.venvs/$*/bin/python -m pip install --no-compile --constraint constraints.txt --editable ".$(EXTRAS:%=[%])" $(OTHERS)
+	$(if $(BARE),.venvs/$*/bin/python -m pip install --no-compile --no-deps $(BARE))
+	.venvs/$*/bin/python -m compileall -qq --workers 0 .venvs/$*/lib || true
 	@touch $@
