@@ -40,6 +40,7 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
     if session.config.getoption("--cov", None):
         for module in pkgutil.walk_packages(swarm_logistics_env.__path__, "swarm_logistics_env."):
             importlib.import_module(module.name)
+        _draw_uncovered()
     with _uncovered():
         return (yield)
 
@@ -67,6 +68,19 @@ def _uncovered() -> Iterator[None]:
     finally:
         sys.settrace(trace)
         threading.settrace(trace_of_threads)
+
+
+def _draw_uncovered() -> None:
+    """Measure no coverage while figures are written: no line of the package runs then."""
+    from matplotlib.figure import Figure
+
+    write = Figure.savefig
+
+    def write_uncovered(figure: Figure, *args: Any, **options: Any) -> None:
+        with _uncovered():
+            write(figure, *args, **options)
+
+    Figure.savefig = write_uncovered  # type: ignore[assignment]
 
 
 def mirrors(test: Path) -> bool:

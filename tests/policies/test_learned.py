@@ -72,7 +72,8 @@ def test_it_decides_every_so_many_steps_and_goes_on_as_decided_in_between(
 @pytest.mark.parametrize(
     ("faults", "fields"),
     [
-        ((), {"restock": True, "duration": 70.0}),  # longer than the log of commands
+        # Longer than the log of commands.
+        pytest.param((), {"restock": True, "duration": 70.0}, marks=pytest.mark.compiled),
         (("dead:2@3.05", "FM3:1@7"), {"message_size": 2, "drive": "differential"}),
         (("removed:2@4",), {"n_items": 1, "handling_time": 0.5}),
     ],

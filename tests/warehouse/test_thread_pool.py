@@ -72,7 +72,7 @@ def step_beside(
             np.testing.assert_array_equal(rows[own], world.step(given[own]))
 
 
-@pytest.mark.parametrize("n_helpers", [0, 3])
+@pytest.mark.parametrize("n_helpers", [0, pytest.param(3, marks=pytest.mark.compiled)])
 def test_a_pool_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
     together, apart = worlds(), worlds()
     pool = WorldThreadPool(together, FIRSTS, n_helpers)
@@ -197,6 +197,7 @@ def test_a_program_ends_while_its_pool_is_at_work() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
 
 
+@pytest.mark.compiled
 def test_a_refused_command_counts_no_delivery_of_the_step_before_again() -> None:
     made = worlds()
     pool = WorldThreadPool(made, FIRSTS, 1)
