@@ -33,7 +33,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help paper paper-fit tables test quick check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
+.PHONY: help paper paper-fit tables test quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
@@ -71,10 +71,8 @@ paper-fit: $(FIT)/installed
 tables: $(STUDY)/installed
 	$(STUDY)/bin/python docs/play_tables.py
 
-# Kernels are compiled beside mypy: two workers that begin with tests would compile each of them twice.
-test: $(DEV)/installed
-	$(DEV)/bin/ruff check .
-	$(DEV)/bin/ruff format --check .
+# Kernels of steps and of networks are compiled beside mypy: two workers that begin with tests would compile each of them twice.
+test: lint
 	$(DEV)/bin/mypy & types=$$!; \
 	$(DEV)/bin/python -m verification.trajectories && \
 	$(DEV)/bin/swarm-logistics run --policy ppo-robust --set duration=5 && wait $$types
@@ -84,9 +82,7 @@ test: $(DEV)/installed
 	$(DEV)/bin/python -m coverage report --fail-under=94
 
 # For every commit, within a minute: mypy runs beside the fastest tests, which interpret the kernels.
-quick: $(DEV)/installed
-	$(DEV)/bin/ruff check .
-	$(DEV)/bin/ruff format --check .
+quick: lint
 	$(DEV)/bin/mypy & types=$$!; \
 	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -q -p verification.interpreted $(QUICK) && wait $$types
 
@@ -98,9 +94,11 @@ QUICK := tests/warehouse/test_kinematics.py tests/questions/test_plan.py tests/v
 KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py sensor_errors.py radio.py kinematics.py layout.py grid.py) \
 	$(addprefix tests/policies/test_,swarm_dt.py routes.py homing.py crowd.py layers.py learned.py) tests/motion
 
-check: $(DEV)/installed
+lint: $(DEV)/installed
 	$(DEV)/bin/ruff check .
 	$(DEV)/bin/ruff format --check .
+
+check: lint
 	$(DEV)/bin/mypy
 
 soak: $(DEV)/installed
@@ -242,7 +240,7 @@ $(CANARY)/installed: EXTRAS := study,train
 $(CANARY)/installed: OTHERS := hypothesis pytest
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
-# pip compiles on one core, half of its time. Files that no Python can compile are templates.
+# pip would compile what it installs on one core, which is half of its time. `|| true`: some packages hold templates that are no Python.
 .venvs/%/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venvs/$*
 	.venvs/$*/bin/python -m pip install --no-compile --constraint constraints.txt --editable ".$(EXTRAS:%=[%])" $(OTHERS)
