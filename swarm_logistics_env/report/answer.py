@@ -17,10 +17,17 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.task import DEFAULT
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import POWER, UNAFFECTED, UNDEFINED, Verdict, level_of
+from swarm_logistics_env.verdicts.verdict import (
+    POWER,
+    UNAFFECTED,
+    UNDEFINED,
+    UNTESTABLE,
+    Verdict,
+    level_of,
+)
 
 from . import section, templates
-from .answer_notes import notes, reason_to_be_open
+from .answer_notes import notes, reason_of
 from .section import Section
 from .templates import Slots, fill
 
@@ -106,17 +113,18 @@ class Line(NamedTuple):
         if all(v.estimate and v.conclusion == UNDEFINED for v in self.verdicts):
             return "family_lacks_runs", {"indicator": self.indicator}
         if len(self.verdicts) > 1:
-            return "words", {"words": words}
+            case = "with_reason" if self.reason else "words"
+            return case, {"words": words, "reason": self.reason}
         estimate = first.estimate
         assert estimate is not None
         if first.conclusion == UNAFFECTED:
             return "unaffected", {"words": words}
         if estimate.untestable:
-            return "untestable", {"words": words, "threshold": estimate.threshold}
+            return "untestable", {"words": words, "reason": self.reason}
         if "unbounded" in first.flags and first.on_property.adjusted in section.DECIDED:
             return "unbounded", {"words": words}
         if self.reason:
-            return "open_for_a_reason", {"words": words, "reason": self.reason}
+            return "with_reason", {"words": words, "reason": self.reason}
         if first.conclusion == "open":
             # An effect on the side of the value, which 80 % power finds.
             effect = estimate.threshold + math.copysign(
@@ -130,8 +138,11 @@ class Line(NamedTuple):
 
     @property
     def reason(self) -> str:
-        """Why its one verdict is open though its interval lies on one side; empty: no reason."""
-        return reason_to_be_open(self.verdicts[0]) if len(self.verdicts) == 1 else ""
+        """Why what is untestable is so, or its one verdict open; empty: there is no reason."""
+        if len(self.verdicts) == 1:
+            return reason_of(self.verdicts[0])
+        untestable = [verdict for verdict in self.verdicts if verdict.conclusion == UNTESTABLE]
+        return ", ".join(dict.fromkeys(map(reason_of, untestable)))
 
     @property
     def needs_runs(self) -> bool:

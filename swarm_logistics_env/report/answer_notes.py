@@ -8,7 +8,7 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.task import DEFAULT
 from swarm_logistics_env.verdicts.collapses import collapses
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.verdicts.verdict import UNTESTABLE, Verdict
 
 from . import section, templates
 from .collapse_tables import collapsed_in_words
@@ -101,12 +101,14 @@ def _delivers_little(results: StudyResults) -> bool:
     )
 
 
-def reason_to_be_open(verdict: Verdict) -> str:
-    """Return why a verdict is open although its interval lies on one side of the threshold.
+def reason_of(verdict: Verdict) -> str:
+    """Return why a verdict is untestable, or open with its interval on one side of the threshold.
 
     Returns:
-        A name in `REASONS_TO_BE_OPEN`; empty: it is not open, or its interval holds the threshold.
+        The reason in words, or a name in `REASONS_TO_BE_OPEN`; empty: there is none.
     """
+    if verdict.conclusion == UNTESTABLE:
+        return templates.UNTESTABLE[verdict.flags[0]].format(threshold=verdict.compared.threshold)
     if verdict.conclusion != "open" or verdict.lies_above is None:
         return ""
     for flag, reason in templates.REASON_OF_FLAG.items():

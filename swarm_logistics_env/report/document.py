@@ -232,7 +232,9 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
         side = f"its share of {side}"
         stops = (
             f" The study was looked at after {join_names([*map(str, looks)])} seeds, and each "
-            "comparison stopped where it was clear. Its error was spent over these looks in "
+            "comparison stopped where it was clear, where its verdict could hardly change any more "
+            "or where P was shown to change within the margin; the latter two stayed open. Its "
+            "error was spent over these looks in "
             "proportion to the seeds, so that an interval has the level of its look, which stands "
             f"with it, and those of all looks together hold the true value with {level}."
         )
@@ -241,8 +243,9 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
         f"mean performances, with {interval} that inverts {test}.{stops} An indicator is called "
         "above its threshold (supported) or below it (refuted) where this test rejects at "
         f"{side} on that side, also if runs that stall were hidden, else open; it is "
-        "untestable where it cannot lie below. Beside it stands whether two one-sided tests find "
-        "that P changes by less than "
+        "untestable where it cannot lie below, where P_o is not told from 0 or where P is the "
+        "same in nearly all pairs of runs. Beside it stands whether two one-sided tests find that "
+        "P changes by less than "
         f"{100 * plan.specification.margin:.3g} % of P_o; p is adjusted by Holm's method over all "
         f"comparisons of one indicator for one policy. Computed with {_version()}."
     )

@@ -6,25 +6,27 @@ from typing import Any
 
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict, level_of
+from swarm_logistics_env.verdicts.verdict import UNTESTABLE, Verdict, level_of
 
 from . import section, templates
 from .answer import Line, answer, line_of, performance_of
-from .answer_notes import reason_to_be_open
+from .answer_notes import reason_of
 from .templates import Slots, fill
 
 
 def in_a_sentence(results: StudyResults) -> str:
     """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
     verdicts = results.verdicts
-    with_interval = [v for v in verdicts if v.interval and v.interval.low is not None]
+    tested = [v for v in verdicts if v.conclusion != UNTESTABLE]
+    with_interval = [v for v in tested if v.interval and v.interval.low is not None]
     # A change of P has another scale than the indicators.
     candidates = [v for v in with_interval if v.compared.indicator != "change"] or with_interval
     lowest = min(candidates or verdicts, key=lambda verdict: verdict.value or 0.0)
     line = line_of([(0, lowest)])
     words = section.conclusion_text(*verdicts)
     lowest_text = _question_with_value(line, level_of([lowest]))
-    reason = templates.REASONS_TO_BE_OPEN.get(reason_to_be_open(lowest), "")
+    reason = reason_of(lowest)
+    reason = templates.REASONS_TO_BE_OPEN.get(reason, reason)
     world = world_in_words(results)
     slots: dict[str, Slots] = {
         "performance": {

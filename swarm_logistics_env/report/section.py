@@ -323,7 +323,7 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots
             "decision",
             {
                 "plain": plain,
-                "p": _p(estimate.p_value),
+                "p": _p(estimate.p_seen),
                 "adjusted": adjusted,
                 # One seed gives no p, and Holm's placeholder of 1 says nothing.
                 "adjusted_p": _p(None if estimate.p_value is None else verdict.p_adjusted),
@@ -348,12 +348,14 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots
         yield "flags", {"flags": " ".join(templates.FLAGS[flag] for flag in verdict.flags)}
     if "hidden_stalls" in verdict.flags:
         runs = "seeds" if results.plan.paired else "trials a condition"
-        yield "hidden_stalls", {"n_runs": spi.seeds_against_stalls(estimate), "runs": runs}
+        n_runs = spi.seeds_against_stalls(estimate)
+        yield "hidden_stalls", {"p": estimate.p_value, "n_runs": n_runs, "runs": runs}
     if estimate.collapsed is not None:
         yield "collapsed", {"collapsed": estimate.collapsed}
     if "hidden_collapses" in verdict.flags:
-        yield "hidden_collapses", {"n_trainings": spi.trainings_against_collapses(estimate)}
-    if results.plan.specification.until_clear:
+        n_trainings = spi.trainings_against_collapses(estimate)
+        yield "hidden_collapses", {"p": estimate.p_value, "n_trainings": n_trainings}
+    if results.plan.specification.until_clear and not estimate.untestable:
         case = "open_after_all_looks" if verdict.stopped_at is None else "clear_at_a_look"
         yield case, {"n_seeds": estimate.n_seeds, "most": results.looks[-1]}
     if results.exploratory:

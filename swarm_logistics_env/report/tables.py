@@ -25,7 +25,7 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict, level_of
 
 from . import section
-from .answer_notes import reason_to_be_open
+from .answer_notes import reason_of
 from .collapse_tables import collapsed_in_words, edge_sections
 from .figures import rate_figures
 from .section import NOTHING, Section, Sentence, Texts
@@ -86,8 +86,8 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
 
 
 def _holm(verdict: Verdict) -> str:
-    """Return Holm's verdict, and why it is open beside an interval on one side."""
-    reason = reason_to_be_open(verdict)
+    """Return Holm's verdict, and why it is untestable, or open beside an interval on one side."""
+    reason = reason_of(verdict)
     return f"{verdict.on_property.adjusted} ({reason})" if reason else verdict.on_property.adjusted
 
 

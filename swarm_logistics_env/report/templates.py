@@ -66,10 +66,17 @@ LINE = {
     "family_lacks_runs": "no verdict: {indicator} lacks runs",
     "words": "{words}",
     "unaffected": "{words}, exact",
-    "untestable": "{words}: it cannot be below {threshold:g}",
+    "untestable": "{words}: {reason}",
     "unbounded": "{words} by its test; P_o is too near 0 for an interval",
-    "open_for_a_reason": "{words} ({reason})",
+    "with_reason": "{words} ({reason})",
     "more_runs": "open; {n_more} more to tell {effect:g} from {threshold:g}",
+}
+
+# Why there is nothing to test, by the flag of the estimate.
+UNTESTABLE = {
+    "cannot_fail": "it cannot be below {threshold:g}",
+    "few_pairs_differ": "equal P",
+    "reference_near_0": "P_o near 0",
 }
 
 # How to read the answer, and what limits it: the cases that apply, with "; " between them.
@@ -143,8 +150,10 @@ VERDICT = {
     "equivalence": "{question}? Change {change}: {words}.",
     "flags": "{flags}",
     "collapsed": "Trainings: {collapsed}.",
-    "hidden_stalls": "It needs at least {n_runs} {runs}.",
-    "hidden_collapses": "It needs at least {n_trainings} trainings.",
+    "hidden_stalls": "With stalls that may be hidden p is {p:.2g}: it needs at least {n_runs} "
+    "{runs}.",
+    "hidden_collapses": "With collapses that may be hidden p is {p:.2g}: it needs at least "
+    "{n_trainings} trainings.",
     "open_after_all_looks": "Open after {n_seeds} of at most {most} seeds.",
     "clear_at_a_look": "Clear at {n_seeds} of at most {most} seeds.",
     "exploratory": "Exploratory.",
@@ -157,6 +166,10 @@ FLAGS = {
     "degenerate": "The seeds show no spread, so there is no interval and no verdict.",
     "cannot_fail": "As no P is below 0, it cannot lie below the threshold, so it is not tested and "
     "has no verdict.",
+    "few_pairs_differ": "Nearly all pairs of runs have equal P, so that a handful of deliveries "
+    "would decide: it is not tested and has no verdict.",
+    "reference_near_0": "The interval of P_o reaches 0, so that a change relative to it says "
+    "nothing: it is not tested and has no verdict.",
     "capped": "P is capped on the side that the verdict leans to, so the verdict is open.",
     "hidden_stalls": "These runs are too few to exclude stalled ones that would turn the verdict, "
     "so it is open.",

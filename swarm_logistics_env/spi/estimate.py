@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, TypedDict
 
@@ -20,18 +20,11 @@ from .inputs import (
     same_seeds,
 )
 from .ratio import Design, RatioTest, Term, hidden_of_side, ratio_test
-from .summaries import pairing_correlation
+from .summaries import mean_interval, pairing_correlation
 
 # Performances by name, with their weights in the numerator; the last is the denominator.
 Weighted: TypeAlias = Mapping[str, tuple[ArrayLike, float]]
 DecisionWord = Literal["supported", "refuted", "equivalent", "open"]
-# Words of version 0.3, which stored files may hold.
-_FORMER_WORDS = {"inconclusive": "open", "blocked": "undefined"}
-
-
-def current_word(word: str) -> str:
-    """Return the word of this version for a decision that an older one wrote."""
-    return _FORMER_WORDS.get(word, word)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,13 +33,14 @@ class Estimate:
 
     Everything but `value` and the description of the input is None at n = 1; where the runs
     compared are the same runs, `low` and `high` are `value`, and there is no p. Nor is there one
-    where the indicator cannot lie below the threshold.
+    where the indicator is `untestable`.
 
     Attributes:
         indicator: Which indicator this is.
         value: The ratio of means plus offset, dimensionless.
-        low: Lower limit of the interval; -inf where the interval is unbounded. None at n = 1 and
-            where the differences show no spread; `value` where the value is exact.
+        low: Lower limit of the interval; -inf where the interval is unbounded. None at n = 1,
+            where the differences show no spread and where no pair differs; `value` where the
+            value is exact.
         high: Upper limit of the interval; inf where the interval is unbounded; None as `low`.
         probability: Confidence that theta > threshold, in [0, 1], not a posterior frequency:
             1 - p/2 where mean(D) > 0, else p/2, D = num - (threshold - offset) den.
@@ -57,6 +51,8 @@ class Estimate:
             and nothing is said of another training of it.
         p_value: Two-sided p of mean(D) = 0, in [0, 1]: what Holm acts on. It holds for stalls and
             collapses that may be hidden.
+        p_seen: The same of the runs seen alone, by the rule of the interval, which excludes the
+            threshold exactly where p_seen < 1 - confidence; None as `p_value`.
         paired: Whether the samples share their seeds, row by row.
         pairing_correlation: Pearson correlation of the two performances compared (P_F and P_S for
             FT); None where unpaired, below three seeds, or where one of them is constant.
@@ -73,10 +69,14 @@ class Estimate:
         flags: Some of "single_seed", "too_few_seeds" (two: counts agree by chance, so p = 1),
             "degenerate" (se(D) = 0: no limits, p = 1), "identical" (the runs compared are the same
             runs: the value is exact, and no evidence), "cannot_fail" (as no P is below 0, theta
-            cannot lie below the threshold: there is no p, and no verdict), "capped" (a capped P
-            blocks the verdict on the side that it leans to: p = 1), "hidden_stalls" (stalled runs
-            that these seeds did not show could turn the verdict: it needs `seeds_against_stalls`),
-            "hidden_collapses" (so could trainings that collapse: `trainings_against_collapses`),
+            cannot lie below the threshold: there is no p, and no verdict), "few_pairs_differ" (the
+            performances compared are equal at most seeds, and the threshold is a few items from
+            that, so that a handful of deliveries would decide: there is no p),
+            "reference_near_0" (the interval of the mean reference reaches 0, so that a change
+            relative to it says nothing: there is no p), "capped" (a capped P blocks the verdict on
+            the side that it leans to: p = 1), "hidden_stalls" (stalled runs that these seeds did
+            not show could turn the verdict: it needs `seeds_against_stalls`), "hidden_collapses"
+            (so could trainings that collapse: `trainings_against_collapses`),
             "unbounded" (the mean denominator is not distinguishable from 0), "assumes_normal"
             (below ten seeds: provisional, as few show how they scatter), "few_trainings" (fewer
             than five: p = 1).
@@ -92,6 +92,7 @@ class Estimate:
     n_seeds: int
     n_trainings: int | None = None
     p_value: float | None = None
+    p_seen: float | None = None
     paired: bool
     pairing_correlation: float | None = None
     log_sd: float | None = None
@@ -109,8 +110,13 @@ class Estimate:
 
     @property
     def untestable(self) -> bool:
-        """Whether it cannot lie below the threshold, so that there is nothing to test."""
-        return "cannot_fail" in self.flags
+        """Whether there is nothing to test: a flag, one of `UNTESTABLE`, says why."""
+        return any(flag in self.flags for flag in UNTESTABLE)
+
+    @property
+    def withheld(self) -> bool:
+        """Whether stalls or collapses that may be hidden keep a verdict from what was seen."""
+        return "hidden_stalls" in self.flags or "hidden_collapses" in self.flags
 
     @property
     def verdict(self) -> DecisionWord:
@@ -145,7 +151,9 @@ class Estimate:
         n = f"{self.n_seeds} {unit}{'' if self.n_seeds == 1 else 's'}"
         n += "" if self.paired else " a condition"
         n = n if self.n_trainings is None else f"{self.n_trainings} trainings x {n}"
-        p = "" if self.p_value is None else f", p = {self.p_value:.3g}"
+        p = "" if self.p_seen is None else f", p = {self.p_seen:.3g}"
+        if self.withheld and self.p_value is not None:
+            p += f", {self.p_value:.3g} with what these runs may hide"
         p += "" if self.collapsed is None else f"; {self.collapsed}"
         return (
             f"{self.indicator} = {self.value:.3f}{limits}; above {self.threshold:g}: "
@@ -163,6 +171,13 @@ LEAST_TRAININGS = 5
 SEEDS_OF_HEADLINE = 10
 # The flags that concern the interval; all others are about a test.
 _OF_INTERVAL = ("single_seed", "degenerate", "unbounded")
+# Flags of what is not tested. The first follows from the question, the others from the runs.
+UNTESTABLE = ("cannot_fail", "few_pairs_differ", "reference_near_0")
+# Where fewer pairs differ, and most are equal, the threshold has to lie as many items from equal
+# sums: it is the least number of events of which a sign test can tell anything at 5 %.
+LEAST_EVENTS = 6
+# Of the interval by which the reference is told from 0: that which reports print beside P.
+_CONFIDENCE_OF_P = 0.95
 
 
 class Options(TypedDict, total=False):
@@ -245,13 +260,41 @@ def estimate_ratio(
         estimate = _tested(
             untested, weighted, offset, saturated, two_recipes=two_recipes, limits=limits
         )
+    terms_in_order = list(weighted.values())
+    reason = _why_untestable(terms_in_order, threshold - offset, paired=paired)
+    if reason is None:
+        return estimate
+    if paired and np.array_equal(terms_in_order[0].sample, terms_in_order[1].sample):
+        estimate = replace(estimate, low=None, high=None)  # they show no spread
+    of_interval = [flag for flag in estimate.flags if flag in _OF_INTERVAL]
+    return replace(
+        estimate, p_value=None, p_seen=None, probability=None, flags=(reason, *of_interval)
+    )
+
+
+def _why_untestable(terms: Sequence[Term], null: float, *, paired: bool) -> str | None:
+    """Return the flag that says why there is nothing to test at a ratio `null`; None: there is."""
+    reference = terms[-1].sample
     # D is a sum of weighted P, and no P is below 0.
-    if min(term.weight(threshold - offset) for term in weighted.values()) >= 0.0:
-        of_interval = [flag for flag in estimate.flags if flag in _OF_INTERVAL]
-        return replace(
-            estimate, p_value=None, probability=None, flags=("cannot_fail", *of_interval)
-        )
-    return estimate
+    if min(term.weight(null) for term in terms) >= 0.0:
+        return "cannot_fail"
+    if reference.shape[-1] < LEAST_SEEDS:
+        return None
+    if paired and _few_pairs_differ(terms[0], terms[1], null):
+        return "few_pairs_differ"
+    if mean_interval(reference, _CONFIDENCE_OF_P).low == 0.0:
+        return "reference_near_0"
+    return None
+
+
+def _few_pairs_differ(changed: Term, original: Term, null: float) -> bool:
+    """Return whether most pairs are equal, and the threshold lies only a few items from that."""
+    differs = changed.sample != original.sample
+    values = np.unique([changed.sample, original.sample])
+    item = np.diff(values).min(initial=values[-1])  # the smallest step between two values
+    lost = abs(1.0 + original.weight(null) / changed.weight(null)) * original.sample.sum()
+    few = LEAST_EVENTS
+    return bool(differs.sum() < few and differs.mean() < 0.5 and lost < few * item)
 
 
 def _tested(
@@ -310,6 +353,7 @@ def _tested(
         high=None if degenerate else test.high,
         probability=1.0 - p_value / 2 if test.mean_difference > 0.0 else p_value / 2,
         p_value=p_value,
+        p_seen=1.0 if blocked else test.p_seen,
         pairing_correlation=correlation,
         log_sd=None if over_trainings else test.log_sd,
         base=test.base,

@@ -41,7 +41,8 @@ def adjust(estimates: Sequence[Estimate | Equivalence]) -> tuple[DecisionWord, .
     In the order given. An estimate without a p (one seed) counts in the family and stays
     open. One of identical runs is no evidence and outside the family: it stays open
     on a threshold, and is equivalent. One that cannot fail is outside the family, too, and
-    open. The family-wise error is 1 - confidence, of equivalences their alpha.
+    open; one that its runs make untestable counts in the family, as they might have told. The
+    family-wise error is 1 - confidence, of equivalences their alpha.
 
     Raises:
         IndicatorError: The estimates' confidences differ.

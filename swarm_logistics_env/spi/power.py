@@ -175,8 +175,10 @@ def no_plan_because(estimate: Estimate, effect: float) -> str | None:
     finite("effect", effect)
     if estimate.identical:
         return "the runs compared are the same runs: the value is exact"
-    if estimate.untestable:
+    if "cannot_fail" in estimate.flags:
         return f"it cannot lie below {estimate.threshold:g}: there is nothing to find"
+    if estimate.untestable:
+        return "these runs deliver too little, or all the same, to plan others by"
     if estimate.n_trainings is not None:
         return "of several trainings no number of seeds is planned: more trainings tell more"
     if estimate.log_sd is None:

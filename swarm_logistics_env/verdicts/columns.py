@@ -166,7 +166,16 @@ VERDICT_COLUMNS: Columns[Verdict] = {
         _of_estimate(lambda estimate: estimate.probability),
         "confidence that it is above the threshold",
     ),
-    "p_value": (float, _of_estimate(lambda estimate: estimate.p_value), "two-sided p, unadjusted"),
+    "p_value": (
+        float,
+        _of_estimate(lambda estimate: estimate.p_value),
+        "two-sided p, unadjusted, which holds for stalls and collapses that may be hidden",
+    ),
+    "p_seen": (
+        float,
+        _of_estimate(lambda estimate: estimate.p_seen),
+        "the same of the runs seen alone, by the rule of the interval",
+    ),
     "p_holm": (
         float,
         lambda verdict: verdict.p_adjusted,
@@ -175,7 +184,7 @@ VERDICT_COLUMNS: Columns[Verdict] = {
     "verdict": (
         str,
         lambda verdict: verdict.on_threshold.plain,
-        "decision on the threshold; unaffected: the same runs; untestable: it cannot lie below",
+        "decision on the threshold; unaffected: the same runs; untestable: `flags` says why",
     ),
     "verdict_holm": (str, lambda verdict: verdict.on_threshold.adjusted, "the same after Holm"),
     "n_seeds": (

@@ -208,7 +208,7 @@ class _Family:
             estimate = self._verdicts[comparison].estimate
             if estimate is None:
                 continue
-            if estimate.identical or estimate.untestable:
+            if estimate.identical or "cannot_fail" in estimate.flags:
                 self._stop(comparison, n_seeds)  # nothing to test, at any number of seeds
             elif estimate.p_value is not None:
                 p_values[comparison] = estimate.p_value
@@ -231,7 +231,7 @@ class _Family:
         verdict = self._verdicts[comparison]
         if verdict.estimate is None:
             return True
-        if self._is_equivalent(verdict, n_seeds):
+        if verdict.estimate.untestable or self._is_equivalent(verdict, n_seeds):
             return False
         most = self._looks.seeds[-1]
         p = verdict.estimate.p_value

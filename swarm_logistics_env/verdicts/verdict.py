@@ -31,8 +31,8 @@ class Decision(NamedTuple):
     Attributes:
         plain: the word at the question's own level: supported, refuted, equivalent or open;
             unaffected: both conditions gave the same runs, which is no evidence; untestable: the
-            indicator cannot lie below the threshold; undefined: a run that it needs failed or is
-            missing.
+            indicator cannot lie below the threshold, or the runs deliver too little, or all the
+            same, to tell; undefined: a run that it needs failed or is missing.
         adjusted: the word after Holm's adjustment over the family; undefined, too, where another
             comparison of the family is, but for what needs no test (unaffected, untestable) and in
             a study that runs until it is clear, whose family keeps it as one that is open.
@@ -288,5 +288,5 @@ def adjust_families(verdicts: Sequence[Verdict]) -> Iterator[Verdict]:
 
 
 def _adjust(decision: Decision, p: float | None, word: spi.DecisionWord) -> Decision:
-    """Put the adjusted word into a decision; without a p it was decided without a test."""
-    return decision if p is None else Decision(decision.plain, word)
+    """Put the adjusted word into a decision; what was not tested keeps its own."""
+    return decision if p is None or decision.plain == UNTESTABLE else Decision(decision.plain, word)
