@@ -33,9 +33,10 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help paper paper-fit tables test quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
+.PHONY: help first-look paper paper-fit tables test quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
 
 help:
+	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
 	@echo "make paper-fit MINUTES=40  fit the constants of swarm-dt to the paper's tables, then confirm them for as long: results/paper_fit"
 	@echo "make tables          play the studies behind docs/results.md (26,000 runs, two to four hours of two cores; with the learners of make interop, if there), write its tables, the README's numbers and the scores of judge --benchmark"
@@ -59,6 +60,11 @@ help:
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
+
+first-look: SEEDS = 10
+first-look: OUT = results/first-look
+first-look: $(STUDY)/installed
+	$(STUDY)/bin/swarm-logistics judge homing --seeds $(SEEDS) --out $(OUT)
 
 paper: $(STUDY)/installed
 	$(STUDY)/bin/swarm-logistics study run paper --seeds $(SEEDS) --out $(OUT)

@@ -7,6 +7,7 @@ from collections.abc import Container, Iterable, Iterator
 from typing import Any, get_args, get_origin
 
 import numpy as np
+import pandas as pd
 from pydantic_core import PydanticUndefined
 from python_reference import python_names
 from tables import ROOT, table, with_blocks
@@ -118,6 +119,44 @@ def about(study: Specification) -> str:
     return f"{study.seeds} seeds, {world}; tables: {tables}"
 
 
+def indicators() -> dict[str, str]:
+    """Return the blocks of the page about indicators, from what the simulations of errors wrote."""
+    errors = pd.read_csv(ROOT / "docs" / "results" / "verdict_errors.csv")
+    largest = errors[["supported", "refuted"]].rename(columns=str).max(axis=1)
+    errors["largest"] = largest.where(errors["half"].notna())
+    errors["column"] = "until clear, at most 60"
+    errors.loc[errors["seeds"] < 10, "column"] = "seeds 5, 6"
+    errors.loc[errors["seeds"] >= 10, "column"] = "seeds 10 to 60"
+    errors = errors[errors["half"].notna() & (errors["most"] != 200)]
+    wide = errors.pivot_table("largest", ["half", "runs"], "column", aggfunc="max", sort=False)
+    held_out, chosen_on = wide.loc["held out"], wide.loc["chosen on"]
+    largest = held_out.max(axis=1)
+    above = largest[largest > _PROMISED].sort_values(ascending=False)
+    exceptions = "; ".join(f"{runs}: {in_percent(share)}" for runs, share in above.items())
+    return {
+        "errors": f"Of {len(held_out)} kinds of runs that chose no constant, "
+        f"{len(held_out) - len(above)} keep each side at {in_percent(_PROMISED)} or less, at any "
+        f"number of seeds and until clear. The others err more on one side: {exceptions}.",
+        "errors, held out": error_table(held_out),
+        "errors, chosen on": error_table(chosen_on),
+    }
+
+
+# The error on a side that the page says to hold, where 2.5 % are declared.
+_PROMISED = 0.035
+
+
+def in_percent(share: float) -> str:
+    """Return a share in percent, e.g. "3.5 %"."""
+    return f"{100 * share:.1f} %"
+
+
+def error_table(wide: pd.DataFrame) -> str:
+    """Return a table of shares of wrong verdicts."""
+    rows = [(runs, *map(in_percent, shares)) for runs, shares in zip(wide.index, wide.to_numpy())]
+    return table(("runs", *wide.columns), rows)
+
+
 def columns_of(columns: Columns[Judged]) -> str:
     """Return the columns of a table of results with what they mean."""
     rows = [(f"`{name}`", text) for name, (*_, text) in columns.items()]
@@ -183,7 +222,12 @@ def python() -> dict[str, str]:
     return {"python": python_names()}
 
 
-PAGES = {"environment": environment, "reference": reference, "python": python}
+PAGES = {
+    "environment": environment,
+    "indicators": indicators,
+    "reference": reference,
+    "python": python,
+}
 
 
 def page_text(page: str) -> str:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import spi
-from verification.verdict_errors import MODELS, share_equivalent
+from verification.generators import MODELS
+from verification.verdict_errors import share_equivalent
 
 
 def poisson(seed: int, change: float, n: int = 80) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,8 @@ from scipy.stats import chi2, nct, t
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.ratio import RAISED, log_ratio, statistic
-from verification.verdict_errors import MODELS, STALLS, judged
+from verification.generators import MODELS, STALLS
+from verification.verdict_errors import judged
 
 rng = np.random.default_rng(11)
 P_O = rng.poisson(39, 10)

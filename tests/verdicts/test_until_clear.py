@@ -28,7 +28,8 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.until_clear import SPENDING, predictive_power
 from swarm_logistics_env.verdicts.verdict import Verdict
 from tests.made_up import decided, delivered
-from verification.verdict_errors import MODELS, wrong_verdicts
+from verification.generators import MODELS
+from verification.verdict_errors import wrong_verdicts
 
 MEANS = {"FM2": 38.5, "FM3": 34.0, "FM4": 15.0}  # of 40 items; R is 0.0025, -0.11 and -0.585
 
