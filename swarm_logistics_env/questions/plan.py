@@ -31,9 +31,10 @@ class Origin(Record):
         paired: whether its rows name their seeds.
         seeds: those that they name, ascending; empty: none.
         setup: what the user states about the trials, name and value.
-        trials: the first of every condition, in the file's order.
+        trials: one of every condition, in the order of their policies and conditions.
         notes: sentences on how the file was read.
         performance: what the file calls P, with its unit where it names one.
+        references: table, parameter and its value that A is relative to, where it is settled.
     """
 
     error_type = StudyError
@@ -46,6 +47,7 @@ class Origin(Record):
     trials: tuple[Trial, ...] = ()
     notes: tuple[str, ...] = ()
     performance: str = "P"
+    references: tuple[tuple[str, str, float], ...] = ()
 
 
 @dataclass(frozen=True)
