@@ -35,6 +35,7 @@ class Origin(Record):
         notes: sentences on how the file was read.
         performance: what the file calls P, with its unit where it names one.
         references: table, parameter and its value that A is relative to, where it is settled.
+        blocks: the names of the blocks that the seeds number; none where the file numbers them.
     """
 
     error_type = StudyError
@@ -48,6 +49,7 @@ class Origin(Record):
     notes: tuple[str, ...] = ()
     performance: str = "P"
     references: tuple[tuple[str, str, float], ...] = ()
+    blocks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -94,6 +94,7 @@ def origin_of(trials: Trials, setup: Mapping[str, str] | None = None) -> Origin:
         notes=(*trials.notes, *_without_removed(trials)),
         performance=trials.performance_name,
         references=trials.references,
+        blocks=trials.blocks,
     )
 
 

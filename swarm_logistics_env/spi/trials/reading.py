@@ -107,6 +107,7 @@ def read_trials(
         _uses_of(table, table_columns, varying, covariates),
         _name_of_performance(table_columns),
         references,
+        tuple(blocks),
     )
 
 

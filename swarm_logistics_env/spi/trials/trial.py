@@ -86,6 +86,7 @@ class Trials:
         columns: what each of its columns was taken for.
         performance_name: what it calls P, with its unit where it names one.
         references: table, parameter and its value that A is relative to, where it is settled.
+        blocks: the names of the blocks that `seed` numbers; none where the file numbers them.
     """
 
     file: str
@@ -95,6 +96,7 @@ class Trials:
     columns: tuple[Column, ...] = ()
     performance_name: str = "P"
     references: tuple[tuple[str, str, float], ...] = ()
+    blocks: tuple[str, ...] = ()
 
     @property
     def n_trials(self) -> int:
