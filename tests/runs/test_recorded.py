@@ -101,6 +101,21 @@ def test_an_event_log_has_the_resilience_of_the_simulators_own_rows(tmp_path: Pa
     assert np.array_equal(curves, same)
 
 
+def test_without_seeds_no_run_of_an_event_log_is_compared_with_one_other(tmp_path: Path) -> None:
+    rows = ["trial,robots,fault,faulty,onset,duration,time"]
+    for fault, faulty in (("none", 0), ("none again", 0), ("jam", 1), ("removed", 1)):
+        rows += [
+            f"{fault} {k},4,{fault},{faulty},100,300,{time + k}"
+            for k in range(3)
+            for time in range(10, 290, 20 + 5 * faulty)
+        ]
+    (resilience,) = resiliences(imported(tmp_path, "\n".join(rows)).findings())
+    assert resilience.problem == (
+        "the runs name no seeds, and each is compared with that of its seed"
+    )
+    assert not resilience.single
+
+
 def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
     rows = ["5,7,10,theirs", "5,3,20,theirs", "10,3,40,theirs", "10,7,21,theirs"]
     study = imported(tmp_path, "\n".join(["robots,seed,delivered,policy", *rows]))

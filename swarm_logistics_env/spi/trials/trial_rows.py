@@ -98,7 +98,16 @@ def _rate(row: Row, finished: bool | None) -> float:
                 "time_to_finish",
                 f"should not be after its duration {row.number('duration'):g}",
             )
-        return (row.number("work", 0.0) if "work" in row.names else 1.0) / time
+        if "work" not in row.names:
+            return 1.0 / time
+        work = row.number("work", 0.0)
+        if row.text("performance") and row.number("performance") < work:
+            raise row.error(
+                "performance",
+                f"should be its work of {work:g}, as the trial counts as finished; a column "
+                "'finished' says which did not",
+            )
+        return work / time
     lasted = "duration" if row.text("duration") else "time_to_finish"
     if not (row.text("performance") and row.text(lasted)):
         raise row.error(

@@ -89,6 +89,7 @@ def test_a_column_of_yes_and_no_that_nobody_names_is_asked_about(
 def test_times_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     for row, words in (
         ("10,0,no,20,3,0", "column 'duration': '0': should be more than 0"),
+        ("10,600,yes,20,3,600", "column 'delivered': '3': should be its work of 20, as the trial"),
         ("10,700,yes,20,20,600", "column 'completion_time': '700': should not be after its durat"),
         ("10,,yes,20,3,600", "column 'completion_time': nothing: should be a number"),
     ):
