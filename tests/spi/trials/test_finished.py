@@ -64,8 +64,11 @@ def test_a_word_of_neither_list_is_refused_with_what_to_say(
         assert read(tmp_path, words, values=[option])[-1] == 3 / 600
 
 
-def test_a_column_without_a_word_is_as_none(tmp_path: Path) -> None:
-    assert read(tmp_path, ("", "", "")) == [20 / 100, 20 / 110, 20 / 600]
+def test_without_a_word_trials_count_as_finished_if_their_work_is_done(tmp_path: Path) -> None:
+    with pytest.raises(spi.IndicatorError, match="line 4, column 'delivered': '3': should be its"):
+        read(tmp_path, ("", "", ""))
+    done = read(tmp_path, ("", "", ""), values=["delivered:3=20"])
+    assert done == [20 / 100, 20 / 110, 20 / 600]
 
 
 @pytest.mark.parametrize(
