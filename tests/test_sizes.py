@@ -15,7 +15,7 @@ import pytest
 import swarm_logistics_env
 
 MOST_LINES, MOST_PARAMETERS = 80, 12
-MOST_LINES_OF_CODE = 26_000
+MOST_LINES_OF_CODE = 26_100
 NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
            tokenize.ENDMARKER)  # fmt: skip
 PACKAGE = Path(swarm_logistics_env.__file__).parent

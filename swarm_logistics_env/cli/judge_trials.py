@@ -64,8 +64,10 @@ def judge_trials(
 def _show_how_read(trials: Trials, source: str) -> None:
     """Print what each column was taken for, and the conditions with their trials."""
     columns = [(column.name, column.use, _values_of(column)) for column in trials.columns]
-    show_table(f"{source}: {len(trials.rows)} trials", ("column", "read as", "values"), columns)
-    conditions = Counter((_labels(trial), trial.n_robots) for trial in trials.rows)
+    show_table(f"{source}: {trials.n_trials} trials", ("column", "read as", "values"), columns)
+    conditions: Counter[tuple[Texts, int | None]] = Counter()
+    for trial in trials.rows:
+        conditions[_labels(trial), trial.n_robots] += trial.n_trials
     sizes_of: dict[Texts, list[tuple[int | None, int]]] = {}
     for (labels, n_robots), count in conditions.items():
         sizes_of.setdefault(labels, []).append((n_robots, count))
@@ -132,4 +134,19 @@ def pairs(option: str, texts: Repeated) -> dict[str, str]:
         if not (name and equals and value):
             raise StudyError(f"{option} {text}: should be NAME=VALUE")
         values[name] = value
+    return values
+
+
+def numbers(option: str, texts: Repeated) -> dict[str, float]:
+    """Return the names and numbers of an option that may be repeated.
+
+    Raises:
+        StudyError: one is not NAME=NUMBER.
+    """
+    values = {}
+    for name, value in pairs(option, texts).items():
+        try:
+            values[name] = float(value)
+        except ValueError:
+            raise StudyError(f"{option} {name}={value}: should be NAME=NUMBER") from None
     return values

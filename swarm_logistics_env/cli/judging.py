@@ -25,7 +25,7 @@ from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.spi.trials.readers.folder import TRIAL_SUFFIXES
 from swarm_logistics_env.verdicts.results import StudyResults
 
-from .judge_trials import judge_trials, pairs
+from .judge_trials import judge_trials, numbers, pairs
 from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption, policies_of
 from .study_choice import ask_in_world, study_of, switch_to_clearing
 from .study_commands import (
@@ -115,6 +115,14 @@ def judge_command(
             help="A cell read as another, e.g. fault:kein=none; may be repeated.",
         ),
     ] = None,
+    references: Annotated[
+        Repeated,
+        Option(
+            "--reference",
+            metavar="NAME=NUMBER",
+            help="Value of a parameter that A is relative to; may be repeated.",
+        ),
+    ] = None,
     sum_over: Annotated[
         str | None,
         Option(
@@ -156,8 +164,8 @@ def judge_command(
     """
     trials_options = {
         "--column": columns, "--ignore": ignore, "--duration": duration, "--value": values,
-        "--sum-over": sum_over, "--decimal": decimal, "--thousands": thousands, "--check": check,
-        "--setup": setup,
+        "--reference": references, "--sum-over": sum_over, "--decimal": decimal,
+        "--thousands": thousands, "--check": check, "--setup": setup,
     }  # fmt: skip
     policy_options = {
         "--seeds": seeds, "--first-seed": first_seed, "--minutes": minutes,
@@ -176,6 +184,7 @@ def judge_command(
                 "columns": pairs("--column", columns),
                 "ignore": ignore or (),
                 "values": values or (),
+                "reference": numbers("--reference", references),
                 "sum_over": sum_over,
                 "duration": duration,
                 "decimal": decimal,

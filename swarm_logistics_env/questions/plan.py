@@ -31,9 +31,11 @@ class Origin(Record):
         paired: whether its rows name their seeds.
         seeds: those that they name, ascending; empty: none.
         setup: what the user states about the trials, name and value.
-        trials: the first of every condition, in the file's order.
+        trials: one of every condition, in the order of their policies and conditions.
         notes: sentences on how the file was read.
         performance: what the file calls P, with its unit where it names one.
+        references: table, parameter and its value that A is relative to, where it is settled.
+        blocks: the names of the blocks that the seeds number; none where the file numbers them.
     """
 
     error_type = StudyError
@@ -46,6 +48,8 @@ class Origin(Record):
     trials: tuple[Trial, ...] = ()
     notes: tuple[str, ...] = ()
     performance: str = "P"
+    references: tuple[tuple[str, str, float], ...] = ()
+    blocks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

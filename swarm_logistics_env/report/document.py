@@ -193,7 +193,9 @@ def what_p_is(plan: Plan) -> str:
 
 def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:
     """Return what is known of the trials, the set-up that the user states, and the methods."""
-    shared = "Paired by the seeds that it names" if origin.paired else "Unpaired: it names no seeds"
+    shared = "Unpaired: it names no seeds"
+    if origin.paired:
+        shared = f"Paired by the {'blocks' if origin.blocks else 'seeds'} that it names"
     text = (
         f"Study {plan.specification.name!r}: {len(plan.cases)} conditions, imported from "
         f"{origin.file}. {shared}. Their conditions are known as far as the file tells them "
@@ -219,6 +221,8 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
         runs = "trials" if plan.origin else "simulated runs"
         count = f"at least {n}" if looks else f"{n}"
         trials = f"{count} {runs} of each of {len(plan.cases)} conditions, paired by seed"
+        if plan.origin and any(trial.n_trials > 1 for trial in plan.origin.trials):
+            trials = f"{n} blocks, by the means of their trials in {len(plan.cases)} conditions"
         test = "the paired t-test of a logarithm"
     else:
         trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
+from shlex import quote
 
 import numpy as np
 from more_itertools import map_reduce
@@ -31,7 +32,8 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
 
     Swarm sizes without fault, failure modes and the values of each parameter become a table each;
     the values of everything else that the file varies make tables of their own. A parameter's x_o
-    is its value in the first row without a fault. With seeds the study is paired, else it is not.
+    is the one that `Trials.references` names. With seeds the study is paired, else it is not. The
+    order of the file's rows decides nothing.
 
     Args:
         trials: of the file.
@@ -39,14 +41,15 @@ def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = 
         setup: name and value of what the report is to say of the conditions.
 
     Raises:
-        StudyError: a trial stands alone, or nothing that it can be relative to is there.
+        StudyError: a trial stands alone, nothing that it can be relative to is there, or nothing
+            settles which value of a parameter A is relative to.
     """
     conditions, origin = _conditions(trials), origin_of(trials, setup)
     specification = Specification(
         name=file_name(Path(trials.file).stem),
         task=RECORDED.name,
         policies=tuple(
-            PolicySpec(name=name) for name in dict.fromkeys(row.policy for row in trials.rows)
+            PolicySpec(name=name) for name in dict.fromkeys(row.policy for row in origin.trials)
         ),
         seeds=max(map(len, conditions.values())),
     )
@@ -87,14 +90,28 @@ def origin_of(trials: Trials, setup: Mapping[str, str] | None = None) -> Origin:
         paired=trials.paired,
         seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
         setup=tuple((setup or {}).items()),
-        trials=tuple(replace(rows[0], times=None) for rows in _conditions(trials).values()),
+        trials=tuple(_named(rows) for rows in _conditions(trials).values()),
         notes=(*trials.notes, *_without_removed(trials)),
         performance=trials.performance_name,
+        references=trials.references,
+        blocks=trials.blocks,
     )
 
 
 def _conditions(trials: Trials) -> dict[tuple[object, ...], list[Trial]]:
-    return map_reduce(trials.rows, lambda row: row.condition)
+    """Return the trials of each condition, both in an order that is not the file's."""
+    return map_reduce(sorted(trials.rows, key=_order), lambda row: row.condition)
+
+
+def _order(row: Trial) -> tuple[object, ...]:
+    condition = row.n_robots or 0, row.parameters, row.fault, row.faulty, row.onset
+    measured = row.performance, row.times or (), row.contacts or 0.0, row.duration or 0.0
+    return (row.policy.casefold(), row.policy, row.table, *condition, row.seed or 0, *measured)
+
+
+def _named(trials: Sequence[Trial]) -> Trial:
+    """Return what a condition is, by one of its trials, with the first line that it stands in."""
+    return replace(trials[0], line=min(row.line for row in trials), times=None)
 
 
 def _without_removed(trials: Trials) -> Iterator[str]:
@@ -115,7 +132,7 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
     """
     tables = [
         (title, [Arm(setting, _case(origin, row)) for setting, row in rows])
-        for title, rows in _tables(origin.trials)
+        for title, rows in _tables(origin)
     ]
     return Plan(
         specification,
@@ -165,14 +182,15 @@ _Varied = list[tuple[Setting, Trial]]  # the rows of a table, the original condi
 _Fixed = tuple[tuple[str, float], ...]  # name and value of what is the same in a table
 
 
-def _tables(trials: Sequence[Trial]) -> Iterator[tuple[str, _Varied]]:
+def _tables(origin: Origin) -> Iterator[tuple[str, _Varied]]:
     """Yield what can be compared: all trials that differ in one thing alone, for each thing.
 
     Yields:
         The heading in the report, and the rows with what each has of that thing.
     """
+    references = {(table, name): x_o for table, name, x_o in origin.references}
     by_table: dict[tuple[str, str], list[Trial]] = map_reduce(
-        trials, lambda row: (row.policy, row.table)
+        origin.trials, lambda row: (row.policy, row.table)
     )
     for (_, table), rows in by_table.items():
         plain = [row for row in rows if row.fault == NO_FAULT_WORD]
@@ -181,7 +199,7 @@ def _tables(trials: Sequence[Trial]) -> Iterator[tuple[str, _Varied]]:
         yield from _split(f"{of}Scalability", sized, lambda row: row.parameters, _sizes)
         yield from _split(f"{of}Fault tolerance and robustness", rows, _all_but(None), _faults)
         for name in dict.fromkeys(name for row in plain for name, _ in row.parameters):
-            values = partial(_values, name, dict(plain[0].parameters)[name])
+            values = partial(_values, name, references.get((table, name)))
             yield from _split(f"{of}Adaptability to {name}", plain, _all_but(name), values)
 
 
@@ -227,14 +245,26 @@ def _faults(group: Sequence[Trial]) -> _Varied:
     return [(Setting("fault", row.fault, row.faulty, row.onset), row) for row in rows]
 
 
-def _values(name: str, x_o: float, group: Sequence[Trial]) -> _Varied:
+def _values(name: str, x_o: float | None, group: Sequence[Trial]) -> _Varied:
     by_value = {dict(row.parameters)[name]: row for row in group}
-    values = sorted(by_value, key=lambda x: x != x_o)  # a stable sort: x_o, then as in the file
-    if values[0] == 0.0 and len(values) > 1:
+    if len(by_value) == 1:
+        return []
+    options = [f"--reference {quote(f'{name}={x:g}')}" for x in sorted(by_value) if x]
+    line = min(row.line for row in group)
+    if x_o is None:
         raise StudyError(
-            f"line {by_value[0.0].line}: {name} = 0 is x_o, as in the first row, "
-            "and A is relative to x_o: let a row with another value stand first"
+            f"line {line}: A is relative to one value of {name!r}, and no condition "
+            "without a fault has more trials than all others: say "
+            f"{' or '.join(options)}, or leave it out by --ignore {quote(name)}"
         )
+    if x_o == 0.0:
+        raise StudyError(
+            f"line {line}: {name} = 0 is the reference, and A is relative to it: say "
+            f"{' or '.join(options)}"
+        )
+    if x_o not in by_value:
+        return []
+    values = sorted(by_value, key=lambda x: (x != x_o, x))
     return [(Setting("parameter", name, value), by_value[value]) for value in values]
 
 
@@ -250,6 +280,8 @@ def _refuse_unused(origin: Origin, plan: Plan) -> None:
                 )
             varied = ", ".join(repr(name) for name, _ in row.parameters)
             hint = f"; columns taken for parameters: {varied}" if varied else ""
+            settled = ", ".join(f"{name} = {x_o:g}" for _, name, x_o in origin.references)
+            hint += f"; references: {settled}" if settled else ""
             raise StudyError(
                 f"line {row.line}: stands alone: should differ from some other row in the fault, "
                 f"the number of robots or one parameter alone{hint}"

@@ -46,7 +46,8 @@ class Matching(NamedTuple):
         matches: name, cell of the old study, and of the new one.
         unmatched: of each policy that the other study gives nothing to compare with: its label, a
             sentence that says what is missing, and the names of its conditions.
-        seeds: the shared ones; None: one of the studies has no seeds to share.
+        seeds: the shared ones; None: one of the studies has no seeds to share, or they number
+            blocks of other names.
         notes: sentences on conditions and seeds that only one of the studies has.
     """
 
@@ -87,7 +88,9 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
                 names_text = f"{named}, {'; '.join(alone)}"
                 notes.append(f"Only in the {study} study, and not compared: {names_text}.")
     seeds = None
-    if old.plan.paired and new.plan.paired:
+    if old.plan.paired and new.plan.paired and _blocks(old) != _blocks(new):
+        notes.append("Their blocks have other names, so that runs are compared without pairs.")
+    elif old.plan.paired and new.plan.paired:
         seeds = tuple(sorted({*old.plan.seeds} & {*new.plan.seeds}))
     for study, results in (("old", old), ("new", new)):
         if results.damage:
@@ -98,6 +101,11 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
                 f"Runs are paired over the shared seeds, {seeds_in_words(seeds)}."
             )
     return Matching(tuple(matches), tuple(unmatched), seeds, tuple(notes))
+
+
+def _blocks(results: StudyResults) -> tuple[str, ...]:
+    """Return the names of the blocks that a study's seeds number; none: seeds are numbers."""
+    return results.plan.origin.blocks if results.plan.origin else ()
 
 
 def _judged(results: StudyResults) -> _Judged:

@@ -94,6 +94,8 @@ def _resilience(
     problem = None
     if removed is None:
         problem = "no runs with the robots removed are there to compare with"
+    elif not results.plan.paired:
+        problem = "the runs name no seeds, and each is compared with that of its seed"
     elif null is None or not results.timed_outcomes[null]:
         problem = "the runs of the no-fault null are missing"
     elif any(

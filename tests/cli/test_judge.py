@@ -109,6 +109,12 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
         ("lab.csv --column performance", "--column performance: should be NAME=VALUE"),
         ("lab.csv --column performance=boxe", "'boxe': did you mean 'boxes'?"),
         ("lab.csv", "has no column 'performance'"),
+        ("lab.csv --reference width", "--reference width: should be NAME=VALUE"),
+        (
+            "lab.csv --column performance=boxes --reference width=2",
+            "has no parameter 'width' that varies",
+        ),
+        ("homing --reference width=2", "--reference is not for a policy, and 'homing' is one"),
         ("lab.csv --setup nowhere.toml", "--setup nowhere.toml: should be NAME=VALUE"),
         ("lab.csv --seeds 5", "--seeds is not for a file of trials, and 'lab.csv' is one"),
         ("model.zip", "executes the code"),

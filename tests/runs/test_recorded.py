@@ -1,13 +1,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from swarm_logistics_env import spi
+from swarm_logistics_env import judge, spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.comparison import OTHER_BEHAVIOUR
 from swarm_logistics_env.report.document import document
@@ -18,15 +20,18 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.mid_run_faults import resiliences
 
 
-def imported(tmp_path: Path, text: str, **stated: str) -> Study:
+def imported(
+    tmp_path: Path, text: str, reference: Mapping[str, float] | None = None, **stated: str
+) -> Study:
     (tmp_path / "table.csv").write_text(text)
-    import_results(spi.read_trials(tmp_path / "table.csv"), tmp_path / "out", stated)
+    trials = spi.read_trials(tmp_path / "table.csv", reference=reference)
+    import_results(trials, tmp_path / "out", stated)
     return Study.stored(tmp_path / "out")
 
 
 # Own names for the fault and the parameter, no seeds.
-WHOLE, BROKEN, REMOVED = [12.5, 11.25, 13.1], [10.5, 9.75, 11.5], [10.2, 11.0]
-NARROW, FEW = [9.5, 10.55, 10.75], [6.5, 7.5, 6.25]
+WHOLE, BROKEN, REMOVED = [11.25, 12.5, 13.1], [9.75, 10.5, 11.5], [10.2, 11.0]
+NARROW, FEW = [9.5, 10.55, 10.75], [6.25, 6.5, 7.5]
 LAB = "robots;fault;faulty;width;delivered"
 for condition, measured in {
     "8;;;2": WHOLE, "8;wheel;1;2": BROKEN, "8;removed;1;2": REMOVED, "8;;;1.5": NARROW, "4;;;2": FEW
@@ -35,7 +40,7 @@ for condition, measured in {
 
 
 def test_indicators_of_a_lab_file_are_those_of_spi_by_hand(tmp_path: Path) -> None:
-    study = imported(tmp_path, LAB, arena="4 m x 4 m")
+    study = imported(tmp_path, LAB, {"width": 2.0}, arena="4 m x 4 m")
     by_hand = {
         "S": spi.scalability(FEW, WHOLE, n=4, m=4, paired=False),
         "FT": spi.fault_tolerance(WHOLE, BROKEN, REMOVED, n=8, m=1, paired=False),
@@ -60,7 +65,7 @@ def test_each_value_of_what_else_varies_has_a_table_of_its_own(tmp_path: Path) -
         rows += [f"I,ours,{n},none,0,2,{n + k}" for k in (0, 1, 2)]
         rows += [f"I,ours,{n},jam,1,2,{n - k}" for k in (1, 2, 3)]
     rows += ["II,ours,8,none,0,2,8", "II,ours,8,none,0,1,6"]
-    table = imported(tmp_path, "\n".join(rows)).indicators()
+    table = imported(tmp_path, "\n".join(rows), {"width": 2.0}).indicators()
     assert table[["table", "indicator"]].to_numpy().tolist() == [
         ["I: Scalability", "S"],
         ["I: Fault tolerance and robustness (N = 8, width = 2)", "R"],
@@ -96,6 +101,21 @@ def test_an_event_log_has_the_resilience_of_the_simulators_own_rows(tmp_path: Pa
     assert np.array_equal(curves, same)
 
 
+def test_without_seeds_no_run_of_an_event_log_is_compared_with_one_other(tmp_path: Path) -> None:
+    rows = ["trial,robots,fault,faulty,onset,duration,time"]
+    for fault, faulty in (("none", 0), ("none again", 0), ("jam", 1), ("removed", 1)):
+        rows += [
+            f"{fault} {k},4,{fault},{faulty},100,300,{time + k}"
+            for k in range(3)
+            for time in range(10, 290, 20 + 5 * faulty)
+        ]
+    (resilience,) = resiliences(imported(tmp_path, "\n".join(rows)).findings())
+    assert resilience.problem == (
+        "the runs name no seeds, and each is compared with that of its seed"
+    )
+    assert not resilience.single
+
+
 def test_seeds_make_it_paired_whatever_their_order(tmp_path: Path) -> None:
     rows = ["5,7,10,theirs", "5,3,20,theirs", "10,3,40,theirs", "10,7,21,theirs"]
     study = imported(tmp_path, "\n".join(["robots,seed,delivered,policy", *rows]))
@@ -129,7 +149,54 @@ def test_conditions_are_paired_over_the_blocks_that_they_share(tmp_path: Path) -
     )
     assert apart.problem == "N = 10: 1 of 3 runs missing; N = 20: 2 of 3 runs missing"
     # P is of all runs of a condition.
-    assert [cell.by_seed.tolist() for cell in results.cells] == [[10, 20, 12], [21, 30], [9]]
+    assert [cell.by_seed.tolist() for cell in results.cells] == [[10, 12, 20], [21, 30], [9]]
+
+
+@pytest.mark.parametrize("columns", [["map"], ["map", "seed"], []], ids=["blocks", "pairs", "none"])
+def test_the_order_of_rows_decides_nothing(columns: list[str]) -> None:
+    draw = np.random.default_rng(0)
+    rows = [
+        (policy, n, fault, m, width, name_of_map, seed, p + draw.normal(0.0, 0.4))
+        for policy in ("ours", "Base")
+        for n, fault, m, width, p in (
+            (4, "none", 0, 2, 9.0),
+            (8, "none", 0, 2, 17.0),
+            (8, "none", 0, 1.5, 12.0),
+            (8, "jam", 1, 2, 15.0),
+            (8, "JAM", 2, 2, 11.0),
+            (8, "removed", 1, 2, 15.5),
+            (8, "none again", 0, 2, 17.0),
+        )
+        for name_of_map in ("hall", "yard", "roof")
+        for seed in range(2 if width == 2 else 1)
+    ]
+    names = ["policy", "robots", "fault", "faulty", "width", "map", "seed", "delivered"]
+    frame = pd.DataFrame(rows, columns=names).drop(columns={"map", "seed"} - {*columns})
+    first, *others = (
+        judge(frame.sample(frac=1.0, random_state=state), reference={"width": 2.0})
+        for state in range(2)
+    )
+    assert first.plan.paired == bool(columns)
+    assert first.policies == ("Base", "ours")
+    assert len(first.verdicts) == 2 * (1 + 1 + 2 + 1)
+    for results in others:
+        assert results.verdict_table.equals(first.verdict_table)
+        assert results.cell_table.equals(first.cell_table)
+        assert [cell.words for cell in results.cells] == [cell.words for cell in first.cells]
+        assert results.plan.origin
+        assert first.plan.origin
+        assert results.plan.origin.notes == first.plan.origin.notes
+
+
+def test_the_reference_of_a_is_no_matter_of_the_first_row(tmp_path: Path) -> None:
+    head, *rows = LAB.splitlines()
+    trials = [row for row in rows if row.startswith("8;;")]
+    for k, ordered in enumerate((trials, trials[::-1])):
+        text = "\n".join([head, *ordered, "8;;;2;12"])
+        (tmp_path / f"{k}").mkdir()
+        (verdict,) = imported(tmp_path / f"{k}", text).findings().verdicts
+        assert verdict.compared.label == "width 2 -> 1.5"
+        assert verdict.on_property.adjusted == "open"
 
 
 HEAD = "robots,fault,faulty,width,delivered\n"
@@ -140,7 +207,8 @@ HEAD = "robots,fault,faulty,width,delivered\n"
     [
         (HEAD + "5,,,,9\n", "line 2: stands alone"),
         (HEAD + "25,none,0,,9\n20,FM1,1,,9\n", "line 3: has the fault 'FM1', but no row"),
-        (HEAD + "5,,,0,9\n5,,,2,9\n", "line 2: width = 0 is x_o"),
+        (HEAD + "5,,,0,9\n5,,,0,8\n5,,,2,9\n", "width = 0 is the reference, and A is relative"),
+        (HEAD + "5,,,1,9\n5,,,2,9\n", "say --reference width=1 or --reference width=2, or leave"),
         (
             "robots,tags,delivered\n4,8,9\n4,8,8\n8,16,20\n",
             "line 2: the number of robots and 'tags' change together",

@@ -6,8 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from swarm_logistics_env import judge as judge_trials
 from swarm_logistics_env import spi
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.studies import Study
@@ -202,3 +204,19 @@ def test_conditions_without_a_run_are_not_the_same_runs() -> None:
     outcome = Outcome(digest="1")
     assert same_runs([outcome], [outcome])
     assert not same_runs([], [])
+
+
+def test_blocks_of_other_names_are_no_pairs() -> None:
+    """Their numbers are those of other maps."""
+
+    def trials(*names: str) -> StudyResults:
+        rows = [(n, name, 2 * n + k) for n in (4, 8) for k, name in enumerate(names)]
+        return judge_trials(pd.DataFrame(rows, columns=["robots", "map", "P"]))
+
+    before = trials("hall", "roof", "yard")
+    assert match(before, trials("yard", "hall", "roof")).seeds == (0, 1, 2)
+    others = match(before, trials("roof", "tower", "yard"))
+    assert others.seeds is None
+    assert others.notes == (
+        "Their blocks have other names, so that runs are compared without pairs.",
+    )

@@ -2,51 +2,126 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from math import fsum
+from shlex import quote
+
+from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .table import Row, Table
+from .table import BLOCK_SIGN, Columns, Row, Table
 from .trial import Trial
+from .trial_columns import MEANING, SEEDS, bare
 
 
 def numbered_blocks(rows: Sequence[Row]) -> dict[str, int]:
-    """Return a number for each block, in the file's order; none where blocks are numbers."""
+    """Return a number for each block, by its name; none where blocks are numbers."""
     if all(row.is_numbered_block() for row in rows):
         return {}
-    names = dict.fromkeys(row.text("seed") for row in rows if row.text("seed"))
+    names = sorted({row.text("seed") for row in rows} - {""})
     return {name: number for number, name in enumerate(names)}
 
 
-def paired_within_blocks(trials: Sequence[Trial]) -> list[Trial]:
-    """Return trials with a pair of their own where a block holds several of a condition.
+def paired_by_blocks(
+    table: Table, columns: Columns, trials: Sequence[Trial], mapped: Mapping[str, str]
+) -> tuple[list[Trial], list[str]]:
+    """Return the trials of which each block has one in a condition, and notes on how.
 
-    Within a block, as a day or a map, trials are alike but for chance: the first of one condition
-    is paired with the first of another, in the file's order.
+    Args:
+        table, columns: that the trials were read from.
+        mapped: what a column is to its name in the file, as somebody says.
+
+    Raises:
+        IndicatorError: some trials have no seed, or two of a condition have the same one.
     """
-    counts: Counter[tuple[object, int | None]] = Counter()
-    pairs: dict[tuple[int | None, int], int] = {}
-    paired = []
-    for trial in trials:
-        key = trial.condition, trial.seed
-        pair = pairs.setdefault((trial.seed, counts[key]), len(pairs))
-        counts[key] += 1
-        paired.append(replace(trial, seed=pair))
-    return paired
+    block = columns.names.get("seed", "seed")
+    _check_seeds(table, trials, of_seeds=_are_seeds(mapped, columns.blocks))
+    means, notes = _one_trial_a_block(trials, block)
+    notes += _notes_on_joined(table, columns.blocks)
+    notes += _notes_on_partners(means, block)
+    return means, notes
 
 
-def holds_several(trials: Sequence[Trial]) -> bool:
-    """Return whether some block holds several trials of a condition, and each is in a block."""
-    if any(trial.seed is None for trial in trials):
-        return False
-    keys = [(trial.condition, trial.seed) for trial in trials]
-    return len({*keys}) < len(keys)
+def _one_trial_a_block(trials: Sequence[Trial], block: str) -> tuple[list[Trial], list[str]]:
+    """Return one trial for each block and condition, the mean of those that it holds, and notes.
+
+    What a block has, as a map that makes a fault cost more, all its trials share. They are no
+    independent pairs: the block is the unit, whether it holds few trials or many.
+
+    Args:
+        block: what the file calls a block.
+    """
+    if trials[0].seed is None:
+        return [*trials], []
+    groups: dict[object, list[Trial]] = map_reduce(trials, lambda row: (row.condition, row.seed))
+    counts = sorted({len(group) for group in groups.values()})
+    if counts[-1] == 1:
+        return [*trials], []
+    if len({trial.seed for trial in trials}) == 1:
+        note = f"All trials are of one {block}: they are not paired, and tell of no other {block}."
+        return [replace(trial, seed=None) for trial in trials], [note]
+    means = [_mean_of(group) for group in groups.values()]
+    several = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
+    note = (
+        f"{several} trials of one {block} and condition count as one trial, their mean, as they "
+        f"share what differs between blocks; every {block} counts alike."
+    )
+    notes = [note]
+    if any(trial.times is not None for trial in trials):
+        notes.append("The times of their deliveries are left out.")
+    return means, notes
 
 
-def check_pairing(table: Table, trials: Sequence[Trial]) -> None:
+def _mean_of(trials: Sequence[Trial]) -> Trial:
+    """Return the mean of a block's trials in one condition, as a trial."""
+    if len(trials) == 1:
+        return trials[0]
+    contacts = [trial.contacts for trial in trials if trial.contacts is not None]
+    durations = {trial.duration for trial in trials}
+    # By exact sums, which are the same in any order.
+    return replace(
+        min(trials, key=lambda trial: trial.line),
+        performance=fsum(trial.performance for trial in trials) / len(trials),
+        times=None,
+        duration=durations.pop() if len(durations) == 1 else None,
+        contacts=fsum(contacts) / len(contacts) if contacts else None,
+        n_trials=len(trials),
+    )
+
+
+def _notes_on_joined(table: Table, blocks: Sequence[str]) -> Iterator[str]:
+    """Yield which column of several that make a block has values that blocks share."""
+    if len(blocks) < 2:
+        return
+    n_blocks = len({*zip(*map(table.column, blocks))})
+    for name in blocks:
+        n_values = len({*table.column(name)})
+        if 1 < n_values < n_blocks and bare(name) not in SEEDS:
+            left_out = " ".join(f"--ignore {quote(other)}" for other in blocks if other != name)
+            yield (
+                f"Pairs are of one {BLOCK_SIGN.join(blocks)}, so verdicts are of the {n_values} "
+                f"values of {name!r} alone; {left_out} compares their means, for all such values."
+            )
+
+
+def _are_seeds(columns: Mapping[str, str], blocks: Sequence[str]) -> bool:
+    """Return whether a block is, or holds, a seed, of which a condition has one run.
+
+    Args:
+        columns: what a column is to its name in the file, as somebody says.
+        blocks: columns that make a block together.
+    """
+    words = {name: word for word, name in columns.items() if MEANING.get(word) == "seed"}
+    return any(bare(words.get(name, name)) in SEEDS for name in blocks)
+
+
+def _check_seeds(table: Table, trials: Sequence[Trial], *, of_seeds: bool) -> None:
     """Refuse runs without a seed beside others, and two of one seed in a condition.
+
+    Args:
+        of_seeds: whether a condition has one run of each, which blocks need not have.
 
     Raises:
         IndicatorError: there are some.
@@ -62,14 +137,15 @@ def check_pairing(table: Table, trials: Sequence[Trial]) -> None:
                 "the column out"
             )
         of_seed = conditions.setdefault(trial.condition, {})
-        if (first := of_seed.setdefault(trial.seed, trial)) is not trial:
+        if (first := of_seed.setdefault(trial.seed, trial)) is not trial and of_seeds:
             raise IndicatorError(
                 f"{location}: has seed {trial.seed} like line {first.line}, two rows of one "
-                "seed in one condition: should be one, or leave the column out"
+                "seed in one condition: should be one; where it names what several trials share, "
+                "as a map does, say --column block=NAME"
             )
 
 
-def notes_on_pairs(trials: Sequence[Trial], block: str) -> Iterator[str]:
+def _notes_on_partners(trials: Sequence[Trial], block: str) -> Iterator[str]:
     """Yield which policies have less than all blocks, and how many runs have no partner.
 
     Args:
@@ -80,7 +156,7 @@ def notes_on_pairs(trials: Sequence[Trial], block: str) -> Iterator[str]:
     for trial in trials:
         conditions = by_table.setdefault((trial.policy, trial.table), {})
         conditions.setdefault(trial.condition, set()).add(trial.seed)
-    for (policy, table), conditions in by_table.items():
+    for (policy, table), conditions in sorted(by_table.items()):
         title = f"{policy}, {table}" if table else policy
         in_any, in_all = set.union(*conditions.values()), set.intersection(*conditions.values())
         if len(in_any) < len(every):

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .pairing import (
-    check_pairing,
-    holds_several,
-    notes_on_pairs,
-    numbered_blocks,
-    paired_within_blocks,
-)
+from .finished import are_words, finished_words, says_yes
+from .pairing import numbered_blocks, paired_by_blocks
 from .readers import read_table
+from .references import notes_on_references, references_of
 from .table import Columns, Table, rows_of
 from .trial import Column, Trial, Trials
-from .trial_columns import bare, columns_of
+from .trial_columns import MORE_IS_BETTER, bare, columns_of
 from .trial_rows import check_labels, events_of, performance_of, trial_of
+from .units import in_seconds, unit_of_time, word_of_time
 from .values import FaultNames, summed_over, with_values
 
 if TYPE_CHECKING:
@@ -31,7 +28,6 @@ if TYPE_CHECKING:
 # of the trials or than any plan has levels.
 FEWEST_OF_COVARIATE = 6
 MOST_LEVELS = 50
-_IS_A_TIME = re.compile(r"(?i)\b(times?|duration|makespan|latency)\b|\[(s|sec|min|steps?)\]")
 
 
 def read_trials(
@@ -44,6 +40,7 @@ def read_trials(
     duration: float | None = None,
     decimal: str | None = None,
     thousands: str | None = None,
+    reference: Mapping[str, float] | None = None,
 ) -> Trials:
     """Read one run a row, or one delivery a row (an event log).
 
@@ -65,6 +62,8 @@ def read_trials(
         decimal: the sign before decimals, "." or ","; None: ".", unless cells show a comma.
         thousands: the sign between thousands, "." or ","; None: none, and a file is refused in
             which either may stand there.
+        reference: parameters and the value that A is relative to, e.g. {"width": 2.0}; of one that
+            is not named: its value in the condition without a fault that has most trials.
 
     Raises:
         IndicatorError: the file cannot be read, or a line of it cannot be; names line, column and
@@ -75,18 +74,15 @@ def read_trials(
     if sum_over is not None:
         table = summed_over(table, sum_over, mapped)
     table_columns, guesses = columns_of(table, mapped, ignore, decimal, thousands)
-    if not table.cells:
-        raise IndicatorError(
-            f"{table.source} holds no trial: should have a row for each below the names"
-        )
     rows = [*rows_of(table, table_columns)]
     varying, covariates = _parameters(table, table_columns)
     faults = FaultNames(rows)
-    _check_columns(table, table_columns, faults)
+    _check_columns(table, table_columns, faults, mapped)
     blocks = numbered_blocks(rows)
     unnamed = Path(table.source).stem or table.source
     is_log = "time" in table_columns.names
-    performances = ((0.0 if is_log else performance_of(row)) for row in rows)
+    finished = finished_words(rows) if "time_to_finish" in table_columns.names else {}
+    performances = ((0.0 if is_log else performance_of(row, finished)) for row in rows)
     pairs = [
         (trial_of(row, faults, varying, duration, blocks, unnamed, performance=p), row)
         for row, p in zip(rows, performances)
@@ -94,18 +90,15 @@ def read_trials(
     if "trial" in table_columns.names and not is_log:
         check_labels(pairs)
     trials = events_of(pairs) if is_log else [trial for trial, _ in pairs]
-    block = table_columns.names.get("seed", "seed")
     notes = [*table.notes, *guesses, *faults.notes]
-    if blocks and holds_several(trials):
-        trials = paired_within_blocks(trials)
-        notes.append(f"Several trials of one {block} and condition are paired in the file's order.")
-    check_pairing(table, trials)
     if "time_to_finish" not in table_columns.names:  # a rate compares trials of any length
         _check_durations(table, trials)
     notes += _notes_on_conditions(trials, table_columns, varying, covariates)
     conditions = [trial.condition for trial, _ in pairs]
     notes += _notes_on_left_out({name: table.column(name) for name in ignore}, conditions)
-    notes += notes_on_pairs(trials, block)
+    trials, notes_on_pairs = paired_by_blocks(table, table_columns, trials, mapped)
+    references = tuple(references_of(table.source, trials, varying, reference or {}))
+    notes += [*notes_on_pairs, *notes_on_references(references, reference or {})]
     return Trials(
         Path(table.source).name or table.source,
         table.digest,
@@ -113,6 +106,8 @@ def read_trials(
         tuple(notes),
         _uses_of(table, table_columns, varying, covariates),
         _name_of_performance(table_columns),
+        references,
+        tuple(blocks),
     )
 
 
@@ -121,8 +116,7 @@ def _notes_on_conditions(
 ) -> Iterator[str]:
     """Yield what P is where it is a rate, and what tells the conditions apart, or does not."""
     if "time_to_finish" in columns.names:
-        time = columns.names["time_to_finish"]
-        yield f"P is {columns.names.get('work', '1')} divided by {time}: more is better."
+        yield f"P is {_work_by_time(columns).replace('/', 'divided by', 1)}: more is better."
     for name in covariates:
         yield f"{name!r} differs from trial to trial: it tells no conditions apart."
     counts = Counter(trial.condition for trial in trials)
@@ -188,25 +182,33 @@ def _name_of_performance(columns: Columns) -> str:
     """Return what the file calls P."""
     names = columns.names
     if "time_to_finish" in names:
-        return f"{names.get('work', '1')} / {names['time_to_finish']}"
+        return _work_by_time(columns)
     if "time" in names:
         return "deliveries"
     return "P" if bare(names["performance"]) in ("p", "performance") else names["performance"]
 
 
-def _check_columns(table: Table, columns: Columns, faults: FaultNames) -> None:
-    """Refuse a file without the columns that no other can stand for, all of them at once."""
+def _work_by_time(columns: Columns) -> str:
+    """Return what P is where it is a rate, with the unit in which it is one."""
+    name = columns.names["time_to_finish"]
+    unit = unit_of_time(name)
+    if unit and "time_to_finish" in columns.seconds:
+        name = in_seconds(name, unit)
+    return f"{columns.names.get('work', '1')} / {name}"
+
+
+def _check_columns(
+    table: Table, columns: Columns, faults: FaultNames, mapped: Mapping[str, str]
+) -> None:
+    """Refuse a file without the columns that no other can stand for, all of them at once.
+
+    Args:
+        mapped: what a column is to its name in the file, as somebody says.
+    """
     names = columns.names
     lacking = {}
     if not {"performance", "time", "time_to_finish"} & names.keys():
         lacking["performance"] = "column 'performance', or time, for one delivery a row"
-    name = names.get("performance", "")
-    if "time_to_finish" not in names and _IS_A_TIME.search(name) and "per" not in name.split():
-        raise IndicatorError(
-            f"{table.source}: {name!r} is a time by its name, of which less is better: say "
-            f"--column time_to_finish={name!r}, and --column work=NAME if what was done in it "
-            "varies"
-        )
     if faults.any_fails and "faulty" not in names:
         lacking["faulty"] = "column 'faulty', for how many robots fail"
     if lacking:
@@ -214,6 +216,42 @@ def _check_columns(table: Table, columns: Columns, faults: FaultNames) -> None:
         raise IndicatorError(
             f"{table.source} has no {' and no '.join(lacking.values())}: it has "
             f"{', '.join(map(repr, table.header))}; say which it is by {options}, or add it"
+        )
+    if MORE_IS_BETTER not in mapped:
+        _refuse_time_as_performance(table, columns)
+    if "time_to_finish" in names and "finished" not in names:
+        _refuse_unnamed_finished(table, columns)
+
+
+def _refuse_time_as_performance(table: Table, columns: Columns) -> None:
+    """Ask of a performance that is a time by its name whether more of it is better."""
+    name = columns.names.get("performance", "")
+    word = word_of_time(name)
+    if word is None:
+        return
+    raise IndicatorError(
+        f"{table.source}: {name!r} is a time by its name ({word}): where less is better, as of the "
+        f"time until all is done, say --column time_to_finish={name!r}, and --column work=NAME if "
+        f"what was done in it varies; where more is better, --column {MORE_IS_BETTER}={name!r}"
+    )
+
+
+def _refuse_unnamed_finished(table: Table, columns: Columns) -> None:
+    """Ask of a column that may say which trials finished, and would be a parameter."""
+    for name in columns.parameters:
+        cells = {*table.column(name)}
+        means = says_yes(bare(name))
+        is_number = all(cell.replace(".", "").isdigit() for cell in cells)
+        if not are_words(cells) or (is_number and means is None):
+            continue
+        values = "".join(
+            f" --value {quote(f'finished:{cell}=' + ('no' if says_yes(cell) else 'yes'))}"
+            for cell in sorted(cells)
+            if means is False
+        )
+        raise IndicatorError(
+            f"{table.source}: {name!r} may say which trials finished: say --column "
+            f"{quote(f'finished={name}')}{values}, or leave it out by --ignore {quote(name)}"
         )
 
 

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import NamedTuple
 
 from swarm_logistics_env.spi.inputs import IndicatorError
@@ -81,6 +82,7 @@ class Columns(NamedTuple):
         blocks: columns that make a block together.
         decimal: the sign before decimals.
         thousands: the sign between thousands; None: none, but where it can be nothing else.
+        seconds: what a column is to how many seconds its unit has; none: it is not converted.
     """
 
     names: Mapping[str, str]
@@ -89,6 +91,7 @@ class Columns(NamedTuple):
     blocks: Sequence[str]
     decimal: str
     thousands: str | None
+    seconds: Mapping[str, float] = MappingProxyType({})
 
 
 class Row:
@@ -134,8 +137,14 @@ class Row:
     def number(
         self, column: str, least: float = -math.inf, *, must_be_whole: bool = False
     ) -> float:
-        """Return a cell as a finite number of at least `least`, by what its column is."""
-        return self._number_in(self.text(column), column, least, must_be_whole, is_parameter=False)
+        """Return a cell as a finite number of at least `least`, by what its column is.
+
+        A time is in seconds, whatever its unit in the file.
+        """
+        value = self._number_in(self.text(column), column, least, must_be_whole, is_parameter=False)
+        factor = self._columns.seconds.get(column, 1.0)
+        # So that 9 ms are 0.009 s, not the next number.
+        return value if factor == 1.0 else round(value * factor, 12)
 
     def parameter(self, name: str) -> float:
         """Return a cell of a parameter as a finite number, by the column's name in the file."""

@@ -27,12 +27,13 @@ class Trial:
         faulty: m, 0 without a fault.
         onset: when they fail [s].
         parameters: name and value of everything else that varies in the file.
-        seed: shared by the trials that belong together; a number for each block where the file
-            names blocks by a text, as a map; None: the file pairs none.
+        seed: shared by the trials that belong together; a number for each block, in the order of
+            their names, where the file names blocks by a text, as a map; None: the file pairs none.
         performance: P, 0 or more; of an event log the number of deliveries.
         times: of the deliveries [s], ascending; None: not recorded.
         duration: of the trial [s]; None: not given.
         contacts: per robot-minute [1/min]; None: not recorded.
+        n_trials: of the file, of which it is the mean: several of one block and condition.
     """
 
     line: int
@@ -48,6 +49,7 @@ class Trial:
     times: tuple[float, ...] | None = None
     duration: float | None = None
     contacts: float | None = None
+    n_trials: int = 1
 
     @property
     def condition(self) -> tuple[object, ...]:
@@ -74,7 +76,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class Trials:
-    """All runs of a file, in its order.
+    """All runs of a file, in its order; of several in one block and condition their mean.
 
     Attributes:
         file: its name.
@@ -83,6 +85,8 @@ class Trials:
         notes: sentences on how the file was read.
         columns: what each of its columns was taken for.
         performance_name: what it calls P, with its unit where it names one.
+        references: table, parameter and its value that A is relative to, where it is settled.
+        blocks: the names of the blocks that `seed` numbers; none where the file numbers them.
     """
 
     file: str
@@ -91,6 +95,13 @@ class Trials:
     notes: tuple[str, ...] = ()
     columns: tuple[Column, ...] = ()
     performance_name: str = "P"
+    references: tuple[tuple[str, str, float], ...] = ()
+    blocks: tuple[str, ...] = ()
+
+    @property
+    def n_trials(self) -> int:
+        """How many trials the file holds."""
+        return sum(row.n_trials for row in self.rows)
 
     @property
     def paired(self) -> bool:

@@ -9,10 +9,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from swarm_logistics_env.spi.inputs import IndicatorError
 
 from .table import BLOCK_SIGN, Columns, Table
+from .units import SECONDS, NamedUnit, is_per_minute, unit_of_time, without_unit
 
+MORE_IS_BETTER = "more_is_better"  # for --column, of a performance that is a time by its name
 # What a column is, and the words that name it in files; small letters, "_" for all that is none.
 COLUMN_NAMES: dict[str, tuple[str, ...]] = {
-    "performance": ("p", "delivered", "items", "score", "throughput", "avg_throughput"),
+    "performance": (
+        *("p", "delivered", "items", "score", "throughput", "avg_throughput"),
+        MORE_IS_BETTER,
+    ),
     "n_robots": ("robots", "n", "swarm_size", "num_agents", "n_agents", "agents"),
     "fault": ("failure", "mode", "fault_mode", "failure_mode"),
     "faulty": ("m", "failed", "n_faulty"),
@@ -22,7 +27,7 @@ COLUMN_NAMES: dict[str, tuple[str, ...]] = {
     "trial": ("run", "id"),
     "time": (),
     "time_to_finish": ("finish_time", "completion_time", "makespan"),
-    "finished": (),
+    "finished": ("success", "succeeded", "solved"),
     "work": (),
     "duration": ("length",),
     "table": (),
@@ -30,6 +35,8 @@ COLUMN_NAMES: dict[str, tuple[str, ...]] = {
 }
 MEANING = {word: column for column, words in COLUMN_NAMES.items() for word in (column, *words)}
 TEXTS = ("fault", "policy", "trial", "table", "finished")  # columns that hold no numbers
+TIMES = ("onset", "time", "time_to_finish", "duration")
+SEEDS = ("seed", "pair")  # blocks of one run each in every condition
 _ROBOT = re.compile(r"(robot|agent|drone|bot)(_?(id|no|nr|num|number|name|index|label))?|id_robot")
 # How a decimal comma looks that can stand between no thousands.
 _DECIMAL_COMMA = re.compile(r"[+-]?(\d+,(\d{1,2}|\d{4,})|0,\d+|\d{4,},\d+)")
@@ -54,8 +61,8 @@ def columns_of(
         thousands: the sign between thousands; None: none, but where it can be nothing else.
 
     Raises:
-        IndicatorError: a column is not there, is named twice, or may be a misspelled one; or rows
-            are of robots instead of trials.
+        IndicatorError: a column is not there, is named twice, may be a misspelled one, or has no
+            unit that its times can have; there are no rows, or they are of robots, not of trials.
     """
     for option, sign in (("--decimal", decimal), ("--thousands", thousands)):
         if sign not in (None, ".", ","):
@@ -74,7 +81,18 @@ def columns_of(
         for name in numbers:
             _refuse_thousands(table, name)
     ignored = [name for name in table.header if name in ignore]
-    table_columns = Columns(names, parameters, ignored, blocks, decimal or ".", thousands)
+    units = _units_of_times(table, names)
+    seconds = {column: SECONDS[unit.unit] for column, unit in units.items() if unit.unit in SECONDS}
+    notes += [
+        f"{names[column]!r} is converted to seconds."
+        for column, factor in seconds.items()
+        if factor != 1.0
+    ]
+    table_columns = Columns(names, parameters, ignored, blocks, decimal or ".", thousands, seconds)
+    if not table.cells:
+        raise IndicatorError(
+            f"{table.source} holds no trial: should have a row for each below the names"
+        )
     _refuse_rows_of_robots(table, table_columns)
     return table_columns, notes
 
@@ -107,7 +125,7 @@ def _names(
         if is_robot(name):
             of_robots.append(name)
             continue
-        meaning = MEANING.get(word)
+        meaning = meaning_of(name)
         if meaning is None or (meaning in chosen and name not in COLUMN_NAMES):
             close = difflib.get_close_matches(word, MEANING, n=1, cutoff=0.75)
             if close and meaning is None and len(word) > 3 and not table.kind:
@@ -140,11 +158,45 @@ def _with_content(table: Table, columns: Mapping[str, str]) -> list[str]:
     return [
         name
         for name in table.header
-        if MEANING.get(bare(name)) != "seed"
+        if meaning_of(name) != "seed"
         or name in columns.values()
         or not table.cells
         or any(table.column(name))
     ]
+
+
+def _units_of_times(table: Table, names: Mapping[str, str]) -> dict[str, NamedUnit]:
+    """Return the units that the names of times have, by what the column is.
+
+    Raises:
+        IndicatorError: a time has a unit of something else, times have units that cannot be
+            converted into each other, or contacts are not per minute.
+    """
+    units: dict[str, NamedUnit] = {}
+    for column in TIMES:
+        name = names.get(column, "")
+        try:
+            unit = unit_of_time(name)
+        except ValueError as error:
+            raise IndicatorError(
+                f"{table.source}: {name!r} ({column}) has the unit {error}: should have one of "
+                f"time, {', '.join(SECONDS)} or steps: rename it, or leave it out by "
+                f"--ignore {name!r}"
+            ) from None
+        if unit:
+            units[column] = unit
+    in_steps = {column: unit for column, unit in units.items() if unit.unit not in SECONDS}
+    if 0 < len(in_steps) < len(units):
+        named = " and ".join(repr(names[column]) for column in units)
+        raise IndicatorError(
+            f"{table.source}: {named} have times in steps and in others: should have one unit"
+        )
+    contacts = names.get("contacts", "")
+    if not is_per_minute(contacts):
+        raise IndicatorError(
+            f"{table.source}: {contacts!r}: contacts should be per robot and minute"
+        )
+    return units
 
 
 def _decimal_comma(table: Table, names: Sequence[str]) -> str | None:
@@ -206,6 +258,14 @@ def _all_but_performance(table: Table, columns: Columns) -> list[str]:
 def is_robot(name: str) -> bool:
     """Return whether a column tells robots apart, by its name."""
     return _ROBOT.fullmatch(bare(name)) is not None
+
+
+def meaning_of(name: str) -> str | None:
+    """Return what a column is by its name, a key of `COLUMN_NAMES`; None: it is not known."""
+    word = bare(name)
+    stem = without_unit(word)
+    is_time = MEANING.get(stem) in TIMES and stem != "length"  # whose "min" may be the least
+    return MEANING.get(stem if is_time else word)
 
 
 def bare(name: str) -> str:

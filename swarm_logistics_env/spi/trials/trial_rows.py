@@ -9,8 +9,6 @@ from .table import Row
 from .trial import NO_FAULT_WORD, REPEATED, Trial
 from .values import FaultNames
 
-_NOT_FINISHED = ("no", "n", "false", "f", "0", "0.0")
-
 
 def trial_of(
     row: Row,
@@ -78,21 +76,38 @@ def check_labels(rows: Sequence[tuple[Trial, Row]]) -> None:
             raise row.error("trial", f"is in line {first.line} too: should name one run a row")
 
 
-def performance_of(row: Row) -> float:
-    """Return P of a row that is a run: what the column says, or work by time."""
+def performance_of(row: Row, finished: Mapping[str, bool]) -> float:
+    """Return P of a row that is a run: what the column says, or work by time.
+
+    Args:
+        finished: what each cell of the column `finished` says; none where nothing does.
+    """
     if "time_to_finish" in row.names:
-        return _rate(row)
+        return _rate(row, finished.get(row.text("finished")))
     return row.number("performance", 0.0)
 
 
-def _rate(row: Row) -> float:
-    """Return what was done in a trial by the time that it took."""
-    has_ended = row.text("finished").casefold() not in _NOT_FINISHED
-    if row.text("time_to_finish") and has_ended:
-        time = row.number("time_to_finish", 0.0)
-        if not time:
-            raise row.error("time_to_finish", "should be more than 0")
-        return (row.number("work", 0.0) if "work" in row.names else 1.0) / time
+def _rate(row: Row, finished: bool | None) -> float:
+    """Return what was done in a trial by the time that it took [1/s, or 1/step]."""
+    if finished is None:
+        finished = bool(row.text("time_to_finish"))
+    if finished:
+        time = _time(row, "time_to_finish")
+        if row.text("duration") and time > row.number("duration"):
+            raise row.error(
+                "time_to_finish",
+                f"should not be after its duration {row.number('duration'):g}",
+            )
+        if "work" not in row.names:
+            return 1.0 / time
+        work = row.number("work", 0.0)
+        if row.text("performance") and row.number("performance") < work:
+            raise row.error(
+                "performance",
+                f"should be its work of {work:g}, as the trial counts as finished; a column "
+                "'finished' says which did not",
+            )
+        return work / time
     lasted = "duration" if row.text("duration") else "time_to_finish"
     if not (row.text("performance") and row.text(lasted)):
         raise row.error(
@@ -100,7 +115,14 @@ def _rate(row: Row) -> float:
             "of a trial that did not finish, columns should say how long it lasted (duration) and "
             "what was done by then (performance)",
         )
-    return row.number("performance", 0.0) / row.number(lasted, 0.0)
+    return row.number("performance", 0.0) / _time(row, lasted)
+
+
+def _time(row: Row, column: str) -> float:
+    time = row.number(column, 0.0)
+    if not time:
+        raise row.error(column, "should be more than 0")
+    return time
 
 
 def events_of(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:

@@ -13,7 +13,7 @@ from swarm_logistics_env.spi.inputs import IndicatorError
 
 from .table import Columns, Row, Table
 from .trial import NO_FAULT_WORD, REMOVED_WORD, REPEATED
-from .trial_columns import MEANING, bare
+from .trial_columns import MEANING, meaning_of
 
 _NO_FAULT_WORDS = (NO_FAULT_WORD, "no fault", "no_fault", "baseline", "healthy", "0", "-")
 _FAULT_NAMES = {
@@ -44,7 +44,8 @@ def with_values(table: Table, columns: Mapping[str, str], values: Sequence[str])
             raise IndicatorError(f"--value {value}: should be COLUMN:CELL=NEW, as fault:kein=none")
         column, old, new = (part.strip() for part in parts.groups())
         number = _column_number(table, columns, column, "--value")
-        rows = [row for row in cells if row[number] == old]
+        # By the cells of the file, so that two of them can be exchanged.
+        rows = [row for row, read in zip(cells, table.cells) if read[number] == old]
         if not rows:
             raise IndicatorError(
                 f"--value {value}: {table.source} has no cell {old!r} in the column "
@@ -57,8 +58,8 @@ def with_values(table: Table, columns: Mapping[str, str], values: Sequence[str])
 
 
 def _column_number(table: Table, columns: Mapping[str, str], column: str, option: str) -> int:
-    meanings = {MEANING[bare(name)]: name for name in table.header if bare(name) in MEANING}
-    by_meaning = {**meanings, **table.meanings, **columns}
+    by_meaning = {meaning_of(name): name for name in table.header} | {**table.meanings}
+    by_meaning |= {MEANING.get(word): name for word, name in columns.items()}
     name = column if column in table.index else by_meaning.get(MEANING.get(column, column))
     if name not in table.index:
         raise IndicatorError(
@@ -144,8 +145,9 @@ class FaultNames:
     """
 
     def __init__(self, rows: Sequence[Row]) -> None:
-        faults = dict.fromkeys(row.text("fault") for row in rows)
-        # Each fault in small letters to how its first row has it.
+        counts = Counter(row.text("fault") for row in rows)
+        faults = sorted(counts, key=lambda name: (-counts[name], name))
+        # Each fault in small letters to how most rows have it.
         spelled = {name.casefold(): name for name in reversed(faults)}
         has_column = "fault" in rows[0].names
         harmless = _without_faulty_robots(rows) if "faulty" in rows[0].names else set[str]()
@@ -160,7 +162,7 @@ class FaultNames:
                     self.notes.append(
                         f"{shown} in {rows[0].names['fault']!r} is taken for no fault."
                     )
-            elif self._names[name] not in (NO_FAULT_WORD, REPEATED) and name in harmless:
+            elif self._names[name] not in (NO_FAULT_WORD, REPEATED) and name.casefold() in harmless:
                 self._names[name] = NO_FAULT_WORD
                 self.notes.append(
                     f"The fault {name!r} is taken for no fault, as no robot fails by it; "
@@ -184,8 +186,8 @@ class FaultNames:
 
 def _notes_on_misspelled(counts: Counter[str]) -> Iterator[str]:
     """Yield the faults of one row whose names are nearly those of faults of several rows."""
-    frequent = [name for name, count in counts.items() if count > 1]
-    for name, count in counts.items():
+    frequent = sorted(name for name, count in counts.items() if count > 1)
+    for name, count in sorted(counts.items()):
         similar = get_close_matches(name, frequent, n=1, cutoff=0.8)
         if count == 1 and similar:
             yield (
@@ -195,10 +197,10 @@ def _notes_on_misspelled(counts: Counter[str]) -> Iterator[str]:
 
 
 def _without_faulty_robots(rows: Sequence[Row]) -> set[str]:
-    """Return the faults by which no robot fails, where by others some do."""
+    """Return the faults, in small letters, by which no robot fails, where by others some do."""
     harmless: dict[str, bool] = {}
     for row in rows:
-        fault = row.text("fault")
+        fault = row.text("fault").casefold()
         harmless[fault] = harmless.get(fault, True) and row.text("faulty") in ("", "0", "0.0")
     names = {name for name, value in harmless.items() if value}
     return names if len(names) < len(harmless) else set()

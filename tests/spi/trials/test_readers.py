@@ -111,7 +111,7 @@ def pogema_results() -> list[dict[str, Any]]:
         {
             "metrics": {
                 "avg_throughput": 0.1 * n + seed,
-                "runtime": 1.5,
+                "ISR": 0.5,
                 "throughput_over_time": [0.1, 0.2],
             },
             "env_grid_search": {"num_agents": n, "map_name": f"maze-{seed}", "seed": 0},
@@ -130,8 +130,8 @@ def test_results_of_pogema_are_read(tmp_path: Path) -> None:
     assert trials.performance(policy="RHCR", n_robots=16).tolist() == [1.6, 2.6]
     assert trials.paired
     assert trials.notes[0].startswith("These are results of POGEMA: P is avg_throughput; --column")
-    other = spi.read_trials(path, columns={"performance": "runtime"})
-    assert {row.performance for row in other.rows} == {1.5}
+    other = spi.read_trials(path, columns={"performance": "ISR"})
+    assert {row.performance for row in other.rows} == {0.5}
 
 
 def test_results_of_marl_eval_are_read(tmp_path: Path) -> None:
@@ -255,14 +255,3 @@ def test_a_sign_between_thousands_is_told(tmp_path: Path) -> None:
     assert [row.performance for row in spi.read_trials(path, thousands=",").rows] == [1204, 980]
     with pytest.raises(spi.IndicatorError, match="--thousands ,: should be another sign than --d"):
         spi.read_trials(path, thousands=",", decimal=",")
-
-
-def test_several_trials_of_a_day_are_paired_in_their_order(tmp_path: Path) -> None:
-    path = tmp_path / "t.csv"
-    days = ["Monday", "Monday", "Tuesday"]
-    rows = [f"{n},{day},{n + k}" for n in (4, 8) for k, day in enumerate(days)]
-    path.write_text("\n".join(["robots,day,P", *rows]))
-    trials = spi.read_trials(path)
-    assert [row.seed for row in trials.rows] == [0, 1, 2, 0, 1, 2]
-    note = "Several trials of one day and condition are paired in the file's order."
-    assert trials.notes == (note,)

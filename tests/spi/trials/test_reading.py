@@ -60,8 +60,8 @@ def test_spellings_of_one_file_read_alike(tmp_path: Path, text: str) -> None:
 
 def test_a_mode_is_one_mode_however_it_is_typed(tmp_path: Path) -> None:
     trials = read(tmp_path, "robots,fault,faulty,p\n4,none,0,9\n4,Fm1,1,7\n4,FM1,1,6\n4,fm1,1,5\n")
-    assert [row.fault for row in trials.rows] == ["none", "Fm1", "Fm1", "Fm1"]
-    assert trials.notes[0] == "The faults Fm1 and FM1 are taken for one."
+    assert [row.fault for row in trials.rows] == ["none", "FM1", "FM1", "FM1"]
+    assert trials.notes[0] == "The faults FM1 and Fm1 are taken for one."
 
 
 def test_columns_of_other_names_are_mapped(tmp_path: Path) -> None:
@@ -170,8 +170,7 @@ def test_a_broken_file_is_refused_by_line_column_and_remedy(
 
 def test_a_number_that_splits_the_trials_is_named(tmp_path: Path) -> None:
     text = "robots,temperature,p\n4,20,1\n4,20,2\n8,20,2\n8,21,3\n"
-    (note,) = read(tmp_path, text).notes
-    assert "4 trials in 3 conditions, told apart by temperature" in note
+    assert "4 trials in 3 conditions, told apart by temperature" in read(tmp_path, text).notes[0]
     assert read(tmp_path, text, ignore=["temperature"]).notes == ()
 
 
@@ -335,7 +334,7 @@ B,8,,roof,7
 
 def test_any_text_is_a_block_and_an_empty_column_is_none(tmp_path: Path) -> None:
     trials = read(tmp_path, MAPS)
-    assert [row.seed for row in trials.rows] == [0, 1, 1, 0, 0, 0, 2]
+    assert [row.seed for row in trials.rows] == [0, 2, 2, 0, 0, 0, 1]
     assert trials.performance(policy="A", n_robots=8).tolist() == [3.0, 4.0]
     assert trials.notes == (
         "A has runs of 2 of the file's 3 blocks (map).",
@@ -350,8 +349,13 @@ def test_any_text_is_a_block_and_an_empty_column_is_none(tmp_path: Path) -> None
 def test_a_seed_and_a_map_make_a_block_together(tmp_path: Path) -> None:
     text = "robots,seed,map,p\n4,0,hall,1\n4,1,hall,2\n4,0,yard,3\n8,0,yard,4\n"
     trials = read(tmp_path, text)
-    assert [row.seed for row in trials.rows] == [0, 1, 2, 2]
-    assert "of the same seed and map in some condition" in trials.notes[-1]
+    assert [row.seed for row in trials.rows] == [0, 2, 1, 1]
+    shared, partners = trials.notes
+    assert shared == (
+        "Pairs are of one seed and map, so verdicts are of the 2 values of 'map' alone; --ignore "
+        "seed compares their means, for all such values."
+    )
+    assert "of the same seed and map in some condition" in partners
 
 
 def test_what_differs_in_every_row_tells_no_conditions_apart(tmp_path: Path) -> None:
