@@ -29,7 +29,8 @@ WHOLE, BROKEN, REMOVED = [12.5, 11.25, 13.1], [10.5, 9.75, 11.5], [10.2, 11.0]
 NARROW, FEW = [9.5, 10.55, 10.75], [6.5, 7.5, 6.25]
 LAB = "robots;fault;faulty;width;delivered"
 for condition, measured in {
-    "8;;;2": WHOLE, "8;wheel;1;2": BROKEN, "8;removed;1;2": REMOVED, "8;;;1.5": NARROW, "4;;;2": FEW
+    "8;none;;2": WHOLE, "8;wheel;1;2": BROKEN, "8;removed;1;2": REMOVED, "8;none;;1.5": NARROW,
+    "4;none;;2": FEW,
 }.items():  # fmt: skip
     LAB += "".join(f"\n{condition};{p}" for p in measured)
 

@@ -21,7 +21,7 @@ from .readers import read_table
 from .table import Columns, Table, rows_of
 from .trial import Column, Trial, Trials
 from .trial_columns import bare, columns_of
-from .trial_rows import check_labels, events_of, performance_of, trial_of
+from .trial_rows import check_cells, check_labels, events_of, performance_of, trial_of
 from .values import FaultNames, summed_over, with_values
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def read_trials(
             value.
     """
     mapped = dict(columns or {})
-    table = with_values(read_table(source), mapped, values)
+    table = with_values(read_table(source, mapped, ignore), mapped, values)
     if sum_over is not None:
         table = summed_over(table, sum_over, mapped)
     table_columns, guesses = columns_of(table, mapped, ignore, decimal, thousands)
@@ -81,6 +81,7 @@ def read_trials(
         )
     rows = [*rows_of(table, table_columns)]
     varying, covariates = _parameters(table, table_columns)
+    check_cells(table, table_columns, varying, is_summed=sum_over is not None)
     faults = FaultNames(rows)
     _check_columns(table, table_columns, faults)
     blocks = numbered_blocks(rows)
