@@ -71,9 +71,9 @@ def test_a_second_copy_of_a_file_does_not_count(tmp_path: Path, name: str) -> No
     text = DAY.replace("policy,", "").replace("A,", "")  # so that files name the policies
     write(tmp_path, **{"day1.csv": text, name: text})
     trials = spi.read_trials(tmp_path)
-    note = f"{name} holds the rows of day1.csv, which count once."
+    note = f"{name} holds rows of day1.csv alone, which count once."
     if name == "b.csv":
-        note = "day1.csv holds the rows of b.csv, which count once."
+        note = "day1.csv holds rows of b.csv alone, which count once."
     assert trials.notes == ("The folder holds 1 file: 4 rows.", note)
     assert {row.policy for row in trials.rows} == {"b" if name == "b.csv" else "day1"}
 
@@ -87,10 +87,25 @@ def test_a_workbook_beside_its_csv_counts_once(tmp_path: Path) -> None:
     assert [row.performance for row in trials.rows] == [20.5, 21.0, 12.0, 11.0]
 
 
-def test_files_of_single_trials_may_be_alike(tmp_path: Path) -> None:
-    rows = {"A/1.csv": "10,20", "A/2.csv": "10,20", "A/3.csv": "5,11"}
+def test_an_older_copy_of_a_file_that_grew_does_not_count(tmp_path: Path) -> None:
+    write(tmp_path, **{"day1.csv": DAY, "day1 (1).csv": f"{DAY}A,5,13\n"})
+    trials = spi.read_trials(tmp_path)
+    assert [row.performance for row in trials.rows] == [20.0, 21.0, 12.0, 11.0, 13.0]
+    assert trials.notes[1] == "day1.csv holds rows of day1 (1).csv alone, which count once."
+
+
+def test_files_of_single_trials_may_be_alike_but_for_copies(tmp_path: Path) -> None:
+    rows = {"A/1.csv": "10,20", "A/2.csv": "10,20", "A/t (1).csv": "5,11", "A/t (2).csv": "5,11"}
     write(tmp_path, **{name: f"robots,delivered\n{row}\n" for name, row in rows.items()})
-    assert [row.performance for row in spi.read_trials(tmp_path).rows] == [20.0, 20.0, 11.0]
+    assert [row.performance for row in spi.read_trials(tmp_path).rows] == [20.0, 20.0, 11.0, 11.0]
+    for name in ("A/2 (1).csv", "A/2_backup.csv", "A/Copy of 2.csv", "old/A/2.csv", "A/2.txt"):
+        write(tmp_path, **{name: "robots,delivered\n10,20\n"})
+        assert len(spi.read_trials(tmp_path).rows) == 4
+        (tmp_path / name).unlink()
+    # The same rows under other conditions are others.
+    for robots in (4, 8):
+        write(tmp_path / "swarm", **{f"robots={robots}/0.csv": "delivered\n0\n"})
+    assert [row.n_robots for row in spi.read_trials(tmp_path / "swarm").rows] == [4, 8]
 
 
 def test_a_column_that_is_left_out_need_not_be_in_all_files(tmp_path: Path) -> None:

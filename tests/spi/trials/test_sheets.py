@@ -196,12 +196,11 @@ def test_numbers_that_a_spreadsheet_rounds_are_no_seeds(tmp_path: Path) -> None:
             "line 3, column 'onset': nothing: should be there in each row",
         ),
         ("robots,seed,map,p\n4,0,hall,1\n4,1,,2\n", "line 3, column 'map': nothing: should be th"),
+        ("policy,robots,p\nA,4,1\n=A2,4,2\n", "line 3, column 'policy': '=A2': should be a value"),
         ("trial,seed,robots,time\n1,0,4,2\n,0,4,3\n", "line 3, column 'trial': nothing: should"),
     ],
 )
-def test_a_label_in_the_first_row_of_a_group_alone_is_refused(
-    tmp_path: Path, text: str, words: str
-) -> None:
+def test_a_label_that_a_row_lacks_is_refused(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "t.csv"
     path.write_text(text)
     with pytest.raises(spi.IndicatorError) as caught:

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from swarm_logistics_env.spi.inputs import IndicatorError
-from swarm_logistics_env.spi.trials.table import NoTrialsError, Table
+from swarm_logistics_env.spi.trials.table import Formula, NoTrialsError, Table
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _LINE_SIGNS = "\n\v\f\r\x85\u2028\u2029"  # what some program or other takes for a line's end
@@ -159,4 +159,6 @@ def _read(cell: str) -> str:
     cell = cell.lstrip(" ")
     if cell.startswith("'") and _FORMULA.match(cell):
         cell = cell[1:]
+    elif cell.startswith("=") and not cell.startswith('="'):  # which stands before a text
+        return Formula(cell)
     return re.sub(rf"[{_LINE_SIGNS}]+", " ", cell.strip())

@@ -14,9 +14,10 @@ from swarm_logistics_env.spi.trials.trial_columns import MEANING, bare
 TRIAL_SUFFIXES = (".csv", ".tsv", ".txt", ".json", ".xlsx", ".xlsm", ".parquet")
 # What editors and systems put beside files: locks, drafts, pictures of a folder.
 _HIDDEN = re.compile(r"[.~].*|__MACOSX|thumbs\.db|desktop\.ini", re.IGNORECASE)
-# How names of copies look: "day1 (1).csv", "day1 - Copy.csv", "backup/day1.csv".
-_COPY = re.compile(r"(?i)\(\d+\)|(?<![a-z])(copy|kopie|copie|backup|bak|old|orig)(?![a-z])")
-_FEWEST_OF_COPY = 3  # different rows that two files do not share by chance
+# How names of copies look, beside "day1 (1).csv": "day1 - Copy.csv", "backup/day1.csv".
+_COPY = re.compile(r"(?<![a-z])(copy|kopie|copie|backup|bak|old|orig)(?![a-z])", re.IGNORECASE)
+_NUMBER_OF_COPY = re.compile(r" ?\(\d+\)$")  # which browsers add
+_FEWEST_OF_COPY = 4  # different rows that two files do not share by chance
 
 
 def read(
@@ -103,20 +104,45 @@ def _first_line(path: Path) -> list[str]:
 def _leave_copies_out(
     folder: Path, tables: dict[Path, Table], named: dict[Path, dict[str, str]]
 ) -> Iterator[str]:
-    """Take files out that hold the rows of another one, and yield which."""
-    first_files: dict[Hashable, Path] = {}
-    for path in sorted(tables, key=lambda path: (len(path.parts), len(path.name), path)):
-        rows = _comparable(tables[path])
-        name = path.relative_to(folder)
-        first = first_files.setdefault((*named[path].items(), rows), path)
-        is_copy = len({*rows}) >= _FEWEST_OF_COPY or _COPY.search(str(name))
-        if first != path and is_copy:
-            yield f"{name} holds the rows of {first.relative_to(folder)}, which count once."
-            del tables[path]
+    """Take files out whose rows another one begins with, and yield which.
+
+    Files of few rows may be alike by chance: their names have to say that one is a copy.
+    """
+    rows_of = {path: _comparable(table) for path, table in tables.items()}
+    # The longest come first, and of equal ones those whose names are the shortest.
+    order = sorted(
+        tables, key=lambda path: (-len(rows_of[path]), len(path.parts), len(path.name), path)
+    )
+    counted: dict[Hashable, list[Path]] = {}
+    for path in order:
+        rows = rows_of[path]
+        is_telling = len({*rows[1:]}) >= _FEWEST_OF_COPY
+        alike = counted.setdefault((*named[path].items(), rows[:2]), [])
+        for first in alike:
+            is_copy = is_telling or _is_copy(path.relative_to(folder), first.relative_to(folder))
+            if is_copy and rows_of[first][: len(rows)] == rows:
+                yield (
+                    f"{path.relative_to(folder)} holds rows of {first.relative_to(folder)} alone, "
+                    "which count once."
+                )
+                del tables[path]
+                break
+        else:
+            alike.append(path)
+
+
+def _is_copy(path: Path, other_path: Path) -> bool:
+    """Return whether one of two files is a copy of the other by their names."""
+    if _COPY.search(str(path)) or _COPY.search(str(other_path)):
+        return True
+    stems = path.stem, other_path.stem
+    plain_stems = [_NUMBER_OF_COPY.sub("", stem) for stem in stems]
+    is_one_name = plain_stems[0] == stems[1] or plain_stems[1] == stems[0]
+    return is_one_name and path.parent == other_path.parent
 
 
 def _comparable(table: Table) -> tuple[tuple[str, ...], ...]:
-    """Return names and cells of a table in one order and spelling, in whatever kind of file."""
+    """Return the names and rows of a table in one order and spelling, of whatever kind of file."""
     names = sorted({*table.header} - {""})
     columns = [map(_spelled, table.column(name)) for name in names]
     return (*names,), *zip(*columns)
