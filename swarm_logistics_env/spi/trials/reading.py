@@ -75,10 +75,6 @@ def read_trials(
     if sum_over is not None:
         table = summed_over(table, sum_over, mapped)
     table_columns, guesses = columns_of(table, mapped, ignore, decimal, thousands)
-    if not table.cells:
-        raise IndicatorError(
-            f"{table.source} holds no trial: should have a row for each below the names"
-        )
     rows = [*rows_of(table, table_columns)]
     varying, covariates = _parameters(table, table_columns)
     check_cells(table, table_columns, varying, is_summed=sum_over is not None)

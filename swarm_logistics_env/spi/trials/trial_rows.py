@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from shlex import quote
 
+from swarm_logistics_env.spi.inputs import IndicatorError
+
 from .table import Columns, Formula, Row, Table
 from .trial import NO_FAULT_WORD, REPEATED, Trial
 from .values import NOT_KNOWN, ZERO, FaultNames
@@ -21,13 +23,19 @@ _DIGITS = 15  # that a spreadsheet keeps of a number
 def check_cells(table: Table, columns: Columns, varying: Sequence[str], *, is_summed: bool) -> None:
     """Refuse what a spreadsheet put in place of a value, and labels that only some rows have.
 
+    A table without rows is refused, too.
+
     Args:
         varying: names of the parameters.
         is_summed: whether rows of robots were summed.
 
     Raises:
-        IndicatorError: there is such a cell; the first of its column is named.
+        IndicatorError: there is such a cell, of which the first of its column is named.
     """
+    if not table.cells:
+        raise IndicatorError(
+            f"{table.source} holds no trial: should have a row for each below the names"
+        )
     names = columns.names
     used = {*names.values(), *columns.blocks, *varying}
     for name in table.header:
