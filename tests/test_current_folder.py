@@ -42,7 +42,7 @@ n_robots = 3
 duration = 5.0
 """
 TRIALS = (
-    "robots;fault;faulty;boxes\n8;;;12\n8;;;11\n8;;;13\n8;wheel;1;10\n8;wheel;1;9\n8;wheel;1;11"
+    "robots;fault;faulty;boxes\n8;none;;12\n8;none;;11\n8;none;;13\n8;wheel;1;10\n8;wheel;1;9\n8;wheel;1;11"
 )
 
 
