@@ -96,6 +96,9 @@ class Demonstrations:
     def to_parquet(self, path: str | Path) -> None:
         """Write a row for each decision: seed, robot, step, observation, action, reward, failed.
 
+        Each page has a checksum, so that pyarrow tells of a damaged file if it is read with
+        `page_checksum_verification=True`.
+
         Raises:
             SetupError: pyarrow is missing, or the file cannot be written.
         """
@@ -124,7 +127,9 @@ class Demonstrations:
                         "truncated": _ends(n_steps, not episode.terminated),
                     }
                 ).replace_schema_metadata(about)
-                writer = writer or parquet.ParquetWriter(part, table.schema)
+                writer = writer or parquet.ParquetWriter(
+                    part, table.schema, write_page_checksum=True
+                )
                 writer.write_table(table)
             if writer is not None:
                 writer.close()

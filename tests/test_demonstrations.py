@@ -71,6 +71,12 @@ def test_files_hold_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     np.testing.assert_array_equal(np.stack(frame["action"]), robot.actions)
     assert frame["truncated"].tolist() == [False] * 19 + [True]
     assert b"scenario" in table.schema.metadata
+    # A checksum tells of a page in which a number is damaged.
+    content = bytearray((tmp_path / "homing.parquet").read_bytes())
+    content[content.index(np.float32(robot.observations[0, 0]).tobytes())] ^= 1
+    (tmp_path / "homing.parquet").write_bytes(content)
+    with pytest.raises(OSError, match="CRC checksum verification failed"):
+        parquet.read_table(tmp_path / "homing.parquet", page_checksum_verification=True)
 
 
 def test_imitation_learning_takes_the_transitions() -> None:

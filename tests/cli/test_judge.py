@@ -15,9 +15,9 @@ from swarm_logistics_env.studies import Study
 from tests.cli.conftest import Command
 
 LAB = """robots;fault;faulty;boxes
-8;;;12.5
-8;;;11.25
-8;;;13.1
+8;none;;12.5
+8;none;;11.25
+8;none;;13.1
 8;wheel;1;10.5
 8;wheel;1;9.75
 8;wheel;1;11.5

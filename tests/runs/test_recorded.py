@@ -34,7 +34,8 @@ WHOLE, BROKEN, REMOVED = [11.25, 12.5, 13.1], [9.75, 10.5, 11.5], [10.2, 11.0]
 NARROW, FEW = [9.5, 10.55, 10.75], [6.25, 6.5, 7.5]
 LAB = "robots;fault;faulty;width;delivered"
 for condition, measured in {
-    "8;;;2": WHOLE, "8;wheel;1;2": BROKEN, "8;removed;1;2": REMOVED, "8;;;1.5": NARROW, "4;;;2": FEW
+    "8;none;;2": WHOLE, "8;wheel;1;2": BROKEN, "8;removed;1;2": REMOVED, "8;none;;1.5": NARROW,
+    "4;none;;2": FEW,
 }.items():  # fmt: skip
     LAB += "".join(f"\n{condition};{p}" for p in measured)
 

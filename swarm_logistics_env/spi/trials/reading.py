@@ -17,7 +17,7 @@ from .references import notes_on_references, references_of
 from .table import Columns, Table, rows_of
 from .trial import Column, Trial, Trials
 from .trial_columns import MORE_IS_BETTER, bare, columns_of
-from .trial_rows import check_labels, events_of, performance_of, trial_of
+from .trial_rows import check_cells, check_labels, events_of, performance_of, trial_of
 from .units import in_seconds, unit_of_time, word_of_time
 from .values import FaultNames, summed_over, with_values
 
@@ -70,12 +70,13 @@ def read_trials(
             value.
     """
     mapped = dict(columns or {})
-    table = with_values(read_table(source), mapped, values)
+    table = with_values(read_table(source, mapped, ignore), mapped, values)
     if sum_over is not None:
         table = summed_over(table, sum_over, mapped)
     table_columns, guesses = columns_of(table, mapped, ignore, decimal, thousands)
     rows = [*rows_of(table, table_columns)]
     varying, covariates = _parameters(table, table_columns)
+    check_cells(table, table_columns, varying, is_summed=sum_over is not None)
     faults = FaultNames(rows)
     _check_columns(table, table_columns, faults, mapped)
     blocks = numbered_blocks(rows)

@@ -14,12 +14,25 @@ from swarm_logistics_env.spi.inputs import IndicatorError
 
 BLOCK_SIGN = " and "  # between the names of the columns that make a block together
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_LIKE_A_NUMBER = re.compile(r"[+-]?[\d.,'’\s]*([eE][+-]?\d+)?")  # however it is written
+_LIKE_A_NUMBER = re.compile(r"[+-]?\d*[.,]?\d*([eE][+-]?\d+)?")  # also a decimal comma, or nothing
 # With signs between thousands: "1,204", "1.204.000,5" or "1 204".
 _GROUPED = re.compile(r"[+-]?\d{1,3}(([.,'’\s])\d{3})(\2\d{3})*([.,]\d+)?")
 # Signs that stand between thousands and nowhere else in a number.
 _SURELY_GROUPED = re.compile(r"[+-]?\d{1,3}(['’\s])\d{3}(\1\d{3})*([.,]\d+)?")
-_LARGEST_EXACT = 2**53  # from here on programs that hold numbers as floats round whole ones
+_MEASURED = ("performance", "time", "time_to_finish", "contacts")  # in each trial anew
+LARGEST_EXACT = 2**53  # from here on programs that hold numbers as floats round whole ones
+
+
+class NoTrialsError(IndicatorError):
+    """A file that can be read and holds no trials, as an empty one."""
+
+
+class MergedCell(str):
+    """A cell to which a sheet carries the value of another one, by merging both."""
+
+
+class Formula(str):
+    """A formula whose value a workbook does not have."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +83,11 @@ class Table:
         if self.origins:
             return self.origins[row]
         return f"{self.source}, {self.line_word} {self.lines[row]}"
+
+    def error(self, row: int, name: str, cell: str, should: str) -> IndicatorError:
+        """Return the error that a cell in a column of that name cannot be."""
+        shown = repr(cell) if cell else "nothing"
+        return IndicatorError(f"{self.location(row)}, column {name!r}: {shown}: {should}")
 
 
 class Columns(NamedTuple):
@@ -153,6 +171,9 @@ class Row:
     def _number_in(
         self, cell: str, column: str, least: float, must_be_whole: bool, *, is_parameter: bool
     ) -> float:
+        if isinstance(cell, MergedCell) and column in _MEASURED:
+            should = "should be of one trial alone, as it is measured; no merged cell"
+            raise self._error(cell, self.names.get(column), column, should)
         value = _value_of(cell, self._columns.decimal, self._columns.thousands)
         if math.isfinite(value) and value >= least and (not must_be_whole or value.is_integer()):
             return value
@@ -164,6 +185,8 @@ class Row:
     def _hint(self, cell: str, column: str, is_parameter: bool) -> str:
         """Return what would make a cell a number."""
         decimal = self._columns.decimal
+        if cell.startswith(("[", "{", '"')):  # as JSON has it
+            return ", or a list of numbers alone"
         if "," in cell and decimal == ".":
             return (
                 " without a sign between thousands; --decimal , where decimals have a comma, or "
@@ -200,7 +223,7 @@ class Row:
         value = self.number(column, least, must_be_whole=True)
         if re.fullmatch(r"\+?\d+", cell):
             return int(cell)
-        if "e" in cell.lower() or value >= _LARGEST_EXACT:
+        if "e" in cell.lower() or value >= LARGEST_EXACT:
             raise self.error(
                 column,
                 "should be a whole number with all its digits, as whoever writes it so rounds it",
@@ -209,8 +232,10 @@ class Row:
 
     def is_numbered_block(self) -> bool:
         """Return whether the cell of the block is meant as a number, or empty."""
+        cell = self.text("seed")
         is_joined = len(self._columns.blocks) > 1
-        return not is_joined and _LIKE_A_NUMBER.fullmatch(self.text("seed")) is not None
+        is_number = _LIKE_A_NUMBER.fullmatch(cell) or _GROUPED.fullmatch(cell)
+        return not is_joined and is_number is not None
 
     def error(self, column: str, should: str) -> IndicatorError:
         """Return the error that a cell cannot be."""
@@ -219,8 +244,7 @@ class Row:
     def _error(self, cell: str, name: str | None, column: str, should: str) -> IndicatorError:
         if name is None:
             return IndicatorError(f"{self.location}: {column} is missing: {should}")
-        shown = repr(cell) if cell else "nothing"
-        return IndicatorError(f"{self.location}, column {name!r}: {shown}: {should}")
+        return self._table.error(self._number, name, cell, should)
 
 
 def rows_of(table: Table, columns: Columns) -> Iterator[Row]:

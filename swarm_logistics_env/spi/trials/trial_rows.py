@@ -2,12 +2,110 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from shlex import quote
 
-from .table import Row
+from swarm_logistics_env.spi.inputs import IndicatorError
+
+from .table import Columns, Formula, Row, Table
 from .trial import NO_FAULT_WORD, REPEATED, Trial
-from .values import FaultNames
+from .values import NOT_KNOWN, ZERO, FaultNames
+
+# What a spreadsheet shows in place of a value, in any language: "#DIV/0!", "#NV", "Err:502".
+_ERROR = re.compile(r"#[¡¿]?[\w/ ]+[!?]|#N/[AD]|#NV|#{3,}|Err:\d{3}")
+_ROUNDED = re.compile(r"\d([.,]\d+)?[eE]\+\d\d")  # as a spreadsheet shows a long number
+_DIGITS = 15  # that a spreadsheet keeps of a number
+
+
+def check_cells(table: Table, columns: Columns, varying: Sequence[str], *, is_summed: bool) -> None:
+    """Refuse what a spreadsheet put in place of a value, and labels that only some rows have.
+
+    A table without rows is refused, too.
+
+    Args:
+        varying: names of the parameters.
+        is_summed: whether rows of robots were summed.
+
+    Raises:
+        IndicatorError: there is such a cell, of which the first of its column is named.
+    """
+    if not table.cells:
+        raise IndicatorError(
+            f"{table.source} holds no trial: should have a row for each below the names"
+        )
+    names = columns.names
+    used = {*names.values(), *columns.blocks, *varying}
+    for name in table.header:
+        if name in used:
+            _refuse_spoiled(table, name)
+        if name in columns.blocks or name == names.get("trial"):
+            _refuse_rounded(table, name)
+        if name in columns.blocks:
+            _refuse_unknown_number(table, name)
+    labels = [names.get(label) for label in ("policy", "table", "n_robots")]
+    if is_summed or "time" in names:  # several rows make a trial
+        labels.append(names.get("trial"))
+    if len(columns.blocks) > 1:  # one alone is checked with the pairs
+        labels += columns.blocks
+    every_row = range(len(table.cells))
+    for label in filter(None, labels):
+        _refuse_gaps(table, label, every_row)
+    if {"onset", "faulty"} <= names.keys():
+        faulty = table.column(names["faulty"])
+        with_fault = [row for row in every_row if faulty[row] not in ("", *ZERO)]
+        _refuse_gaps(table, names["onset"], with_fault)
+
+
+def _refuse_spoiled(table: Table, name: str) -> None:
+    """Refuse the error of a formula, and a formula that nobody computed."""
+    for row, cell in enumerate(table.column(name)):
+        if isinstance(cell, Formula):
+            should = (
+                "should be a value, as nobody computed this formula: open the file in a "
+                "spreadsheet and save it"
+            )
+            raise table.error(row, name, cell, should)
+        if cell.startswith(("#", "Err:")) and _ERROR.fullmatch(cell):
+            should = "should be a value, where a spreadsheet shows the error of a formula"
+            raise table.error(row, name, cell, should)
+
+
+def _refuse_rounded(table: Table, name: str) -> None:
+    """Refuse labels that a spreadsheet has rounded, so that several may have become one."""
+    cells = table.column(name)
+    long = {cell for cell in cells if cell.isdecimal() and len(cell) > _DIGITS}
+    is_rounded = not any(cell[_DIGITS:].strip("0") for cell in long)
+    for row, cell in enumerate(cells):
+        if _ROUNDED.fullmatch(cell) or (is_rounded and cell in long):
+            should = (
+                f"should have all its digits, of which a spreadsheet keeps {_DIGITS}: let the "
+                "column be of texts before they are put in"
+            )
+            raise table.error(row, name, cell, should)
+
+
+def _refuse_unknown_number(table: Table, name: str) -> None:
+    """Refuse a word for no value among numbers; among names it is one."""
+    cells = table.column(name)
+    unknown = [row for row, cell in enumerate(cells) if cell and cell.casefold() in NOT_KNOWN]
+    numbers = {*cells} - {cells[row] for row in unknown} - {""}
+    if unknown and numbers and all(map(str.isdecimal, numbers)):
+        row = unknown[0]
+        raise table.error(row, name, cells[row], "should be a number, as in other rows")
+
+
+def _refuse_gaps(table: Table, name: str, rows: Sequence[int]) -> None:
+    """Refuse an empty cell where other rows have a label: it belongs to each row."""
+    cells = table.column(name)
+    empty = [row for row in rows if not cells[row]]
+    if empty and len(empty) < len(rows):
+        should = (
+            "should be there in each row, as in others, also where a group has it in its first "
+            f"row alone; --value {quote(f'{name}:=NEW')} fills all such cells"
+        )
+        raise table.error(empty[0], name, "", should)
 
 
 def trial_of(

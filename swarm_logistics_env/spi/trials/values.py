@@ -22,7 +22,8 @@ _FAULT_NAMES = {
     REPEATED: REPEATED,
     "none again": REPEATED,
 }
-_NOT_KNOWN = ("", "na", "n/a", "nan", "null")  # what programs and people write for no value
+NOT_KNOWN = ("", "na", "n/a", "nan", "null")  # what programs and people write for no value
+ZERO = ("0", "0.0")  # of robots that fail, by a row's word
 _REPLACEMENT = re.compile(r"([^:]+):(.*)=([^=]*)", re.DOTALL)
 
 
@@ -155,7 +156,8 @@ class FaultNames:
         self._names: dict[str, str] = {}
         for name in faults:
             self._names[name] = _FAULT_NAMES.get(name.casefold(), spelled[name.casefold()])
-            if name.casefold() in _NOT_KNOWN:
+            if name.casefold() in NOT_KNOWN:
+                _refuse_unnamed(rows, name)
                 self._names[name] = NO_FAULT_WORD
                 if has_column:
                     shown = repr(name) if name else "An empty cell"
@@ -184,6 +186,21 @@ class FaultNames:
         return any(name not in (NO_FAULT_WORD, REPEATED) for name in self._names.values())
 
 
+def _refuse_unnamed(rows: Sequence[Row], name: str) -> None:
+    """Refuse a row that names no fault where others do, unless it says that no robot failed."""
+    if all(row.text("fault").casefold() in NOT_KNOWN for row in rows):
+        return
+    for row in rows:
+        if row.text("fault") == name and row.text("faulty") not in ZERO:
+            replacement = quote(f"{row.names['fault']}:{name}={NO_FAULT_WORD}")
+            raise row.error(
+                "fault",
+                f"should name what failed, as other rows do, or be {NO_FAULT_WORD}; --value "
+                f"{replacement} says so of all such cells, unless a group has its name in its "
+                "first row alone",
+            )
+
+
 def _notes_on_misspelled(counts: Counter[str]) -> Iterator[str]:
     """Yield the faults of one row whose names are nearly those of faults of several rows."""
     frequent = sorted(name for name, count in counts.items() if count > 1)
@@ -201,6 +218,6 @@ def _without_faulty_robots(rows: Sequence[Row]) -> set[str]:
     harmless: dict[str, bool] = {}
     for row in rows:
         fault = row.text("fault").casefold()
-        harmless[fault] = harmless.get(fault, True) and row.text("faulty") in ("", "0", "0.0")
+        harmless[fault] = harmless.get(fault, True) and row.text("faulty") in ZERO
     names = {name for name, value in harmless.items() if value}
     return names if len(names) < len(harmless) else set()

@@ -89,6 +89,7 @@ def test_a_file_that_is_not_what_its_name_says_is_refused(
         ("b.parquet", parquet_bytes[:-9], "is a damaged table in Parquet"),
         ("a.json", b"N,P\n4,1\n", "is no JSON"),
         ("b.json", b"[1, 2]", "should be results as POGEMA writes them"),
+        ("c.json", b"[" * 50_000, "c.json is nested too deep"),
         ("b.csv", b"\x1f\x8b\x08", "packed by gzip: should be unpacked"),
     ):
         path = tmp_path / name
@@ -97,7 +98,7 @@ def test_a_file_that_is_not_what_its_name_says_is_refused(
             spi.read_trials(path)
     with zipfile.ZipFile(tmp_path / "c.xlsx", "w") as archive:
         archive.writestr("nothing.txt", "no workbook")
-    with pytest.raises(spi.IndicatorError, match=r"c\.xlsx cannot be read"):
+    with pytest.raises(spi.IndicatorError, match=r"c\.xlsx is a damaged workbook"):
         spi.read_trials(tmp_path / "c.xlsx")
     monkeypatch.setattr(workbook, "LARGEST", 10)
     for name in ("real.xlsx", "real.parquet"):
@@ -153,6 +154,74 @@ def test_results_of_marl_eval_are_read(tmp_path: Path) -> None:
     # The absolute metric, or else the last evaluation, whose episodes are no trials of their own.
     assert trials.performance(n_robots=8).tolist() == [1.5, 5.0]
     assert not trials.paired
+
+
+LAST = {"step_count": 1, "return": [1.0, 2.0]}
+
+
+@pytest.mark.parametrize(
+    ("steps", "words"),
+    [
+        (
+            {"s": {**LAST, "return": [1.0, None]}},
+            "run env > task > alg > b, column 'return': '[1.0,",
+        ),
+        (
+            {"s": {**LAST, "return": [[1.0], [2.0]]}},
+            "run env > task > alg > b, column 'return': '[",
+        ),
+        ({"s": {**LAST, "return": ["1.0"]}}, "run env > task > alg > b, column 'return': '["),
+        (
+            {"s": {**LAST, "return": [float("nan")]}},
+            "run env > task > alg > b, column 'return': '[",
+        ),
+        ({"s": {**LAST, "return": [10**400]}}, "run env > task > alg > b, column 'return': '["),
+        ({"s": {**LAST, "return": []}}, "run env > task > alg > b, column 'return': '[]'"),
+        ({"s": {**LAST, "return": None}}, "run env > task > alg > b, column 'return': 'null'"),
+        ({"absolute_metrics": {"return": [None]}}, "run env > task > alg > b, column 'return': '["),
+        ({"s": {**LAST, "step_count": None}}, "run env > task > alg > b, s: step_count is null"),
+        ({"s": {**LAST, "step_count": "1"}}, 'run env > task > alg > b, s: step_count is "1"'),
+        ({}, "run env > task > alg > b: holds no metric, as other runs do"),  # it has failed
+        (None, "run env > task > alg > b: holds no metric, as other runs do"),
+    ],
+)
+def test_a_result_that_is_no_number_is_refused_by_run_and_metric(
+    tmp_path: Path, steps: object, words: str
+) -> None:
+    path = tmp_path / "metrics.json"
+    path.write_text(json.dumps({"env": {"task": {"alg": {"a": {"s": LAST}, "b": steps}}}}))
+    with pytest.raises(spi.IndicatorError) as caught:
+        spi.read_trials(path)
+    assert str(caught.value).startswith(f"{path}, {words}")
+
+
+def test_a_metric_that_is_not_read_may_be_no_number(tmp_path: Path) -> None:
+    path = tmp_path / "metrics.json"
+    step = {**LAST, "win_rate": [None], "loss": float("nan")}
+    path.write_text(json.dumps({"env": {"task": {"alg": {"a": {"s": step}}}}}))
+    assert [row.performance for row in spi.read_trials(path).rows] == [1.5]
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        ("metrics", {"avg_throughput": None}, "record 2, column 'avg_throughput': 'null': should"),
+        ("metrics", {"avg_throughput": "0.5"}, "record 2, column 'avg_throughput': '\"0.5\"': sho"),
+        ("metrics", {}, "record 2, column 'avg_throughput': nothing: should be a number"),
+        ("metrics", None, "record 2: metrics is null: should be names with values"),
+        ("env_grid_search", None, "record 2: env_grid_search is null: should be names with val"),
+    ],
+)
+def test_a_record_of_pogema_without_a_number_is_refused(
+    tmp_path: Path, place: str, value: object, words: str
+) -> None:
+    results = pogema_results()
+    results[1][place] = value
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps(results))
+    with pytest.raises(spi.IndicatorError) as caught:
+        spi.read_trials(path)
+    assert str(caught.value).startswith(f"{path}, {words}")
 
 
 class Deliveries(gymnasium.Env[np.ndarray, Any]):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import pkgutil
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -27,8 +28,14 @@ __all__ = ["read_table"]
 _NO_KINDS = ("csv_text", "data_frame", "folder")  # which are read where no kind is recognised
 
 
-def read_table(source: str | Path | pd.DataFrame) -> Table:
+def read_table(
+    source: str | Path | pd.DataFrame, columns: Mapping[str, str], ignore: Sequence[str]
+) -> Table:
     """Return the table in a file, in the files of a folder, or of a data frame.
+
+    Args:
+        columns: what a column is to its name, as somebody says.
+        ignore: names of columns that files of a folder need not have.
 
     Raises:
         IndicatorError: it cannot be read.
@@ -37,7 +44,7 @@ def read_table(source: str | Path | pd.DataFrame) -> Table:
         return data_frame.read(source)
     path = Path(source)
     if path.is_dir():
-        return folder.read(path, _read_file)
+        return folder.read(path, _read_file, columns, ignore)
     return _read_file(path)
 
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from swarm_logistics_env.spi.inputs import IndicatorError
-from swarm_logistics_env.spi.trials.table import Table
+from swarm_logistics_env.spi.trials.table import Formula, NoTrialsError, Table
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _LINE_SIGNS = "\n\v\f\r\x85\u2028\u2029"  # what some program or other takes for a line's end
@@ -78,7 +78,7 @@ def _text(path: Path, content: bytes) -> tuple[str, list[str]]:
 def _cells(path: Path, text: str) -> tuple[list[str], dict[int, list[str]]]:
     """Return the columns' names, and the cells of every row with any, by line."""
     if not text.strip():
-        raise IndicatorError(f"{path} is empty: should have a row of column names, then the trials")
+        raise NoTrialsError(f"{path} is empty: should have a row of column names, then the trials")
     excel = _EXCEL.match(text)
     start = excel.end() if excel else len(text) - len(text.lstrip(" \r\n"))
     if excel:
@@ -90,7 +90,7 @@ def _cells(path: Path, text: str) -> tuple[list[str], dict[int, list[str]]]:
         delimiter = max(";\t,|", key=re.sub(_QUOTED, "", head).count)
     rows = {line: cells for line, cells in _rows(path, text, start, delimiter) if any(cells)}
     if not rows:
-        raise IndicatorError(f"{path} is empty: should have a row of column names, then the trials")
+        raise NoTrialsError(f"{path} is empty: should have a row of column names, then the trials")
     header = rows.pop(min(rows))
     n_columns = len(header)
     for line, cells in rows.items():
@@ -159,4 +159,6 @@ def _read(cell: str) -> str:
     cell = cell.lstrip(" ")
     if cell.startswith("'") and _FORMULA.match(cell):
         cell = cell[1:]
+    elif cell.startswith("=") and not cell.startswith('="'):  # which stands before a text
+        return Formula(cell)
     return re.sub(rf"[{_LINE_SIGNS}]+", " ", cell.strip())

@@ -44,14 +44,15 @@ def header_of(frame: pd.DataFrame) -> list[str]:
 def cells_of(frame: pd.DataFrame) -> list[Sequence[str]]:
     """Return the cells of a frame as texts, a sequence for each row."""
     columns = [
-        [_text(value, is_missing) for value, is_missing in zip(column, column.isna())]
+        ["" if is_missing else cell_text(value) for value, is_missing in zip(column, column.isna())]
         for _, column in frame.items()
     ]
     return list(zip(*columns))
 
 
-def _text(value: Any, is_missing: bool) -> str:
-    if is_missing:
+def cell_text(value: Any) -> str:
+    """Return a value as the text of a cell, in one line; None is an empty cell."""
+    if value is None:
         return ""
     if isinstance(value, float):  # numpy's, too
         return repr(float(value))

@@ -25,7 +25,7 @@ def read(path: Path, content: bytes, digest: str) -> Table | None:
         return None
     try:
         environment = json.loads(first[1:]).get("env_id")
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     table = csv_text.read(path, rest, digest)
     chosen = [name for name in table.header if MEANING.get(bare(name)) == "performance"]
