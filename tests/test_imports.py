@@ -34,7 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "fast_kernels": {"numba_fence"},
     "kernels": {"fast_kernels", "numba_fence"},
     "records": {"errors", "spi"},
-    "floor": {"kernels"},
+    "floor": {"errors", "kernels"},
     "scenario": {"errors", "floor", "records", "scenario_checks", "streams"},
     "scenario_checks": set(),
     "code_files": {"errors"},
