@@ -37,7 +37,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "floor": {"errors", "kernels"},
     "scenario": {"errors", "floor", "records", "scenario_checks", "streams"},
     "scenario_checks": set(),
-    "code_files": {"errors"},
+    "current_folder": set(),
+    "code_files": {"current_folder", "errors"},
     "fingerprint": {"code_files"},
     "observations": FOUNDATION,
     "bodies": FOUNDATION | {"code_files"},
@@ -47,15 +48,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "swarm_logistics_v0": WORLD | {"environment"},
     "motion": FOUNDATION | {"observations"},
     "wrappers": ENVIRONMENT | {"motion", "spi"},
-    "policies": WORLD | {"code_files", "fingerprint", "motion"},
+    "policies": WORLD | {"code_files", "current_folder", "fingerprint", "motion"},
     "adapters": ENVIRONMENT | {"motion", "policies", "wrappers"},
     "episode": WORLD | {"policies", "environment"},  # that a policy names
     "spi": set(),
     "watch": RUNS | {"rendering", "spi"},
-    "tasks": RUNS | {"code_files", "fingerprint"},
+    "tasks": RUNS | {"code_files", "current_folder", "fingerprint"},
     "questions": {"errors", "policies", "records", "spi", "tasks"},
     # Neither knows the other: what was played, and what it says.
-    "runs": RUNS | {"code_files", "fingerprint", "progress_bar", "questions", "spi", "tasks"},
+    "runs": RUNS | {"current_folder", "fingerprint", "progress_bar", "questions", "spi", "tasks"},
     "verdicts": {"errors", "questions", "records", "spi", "tasks"},
     "report": {
         "errors",

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 from typer import Exit, Option, echo
 
-from swarm_logistics_env.code_files import search_current_folder
+from swarm_logistics_env.current_folder import search_current_folder
 from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.records import plain
 
