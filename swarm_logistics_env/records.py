@@ -116,8 +116,9 @@ class Record(BaseModel):
     @classmethod
     def _truth_is_no_number(cls, fields: object) -> object:
         # Python and pydantic take True for 1; in TOML and JSON it is another kind of value.
-        for name, field in cls.model_fields.items() if isinstance(fields, dict) else ():
-            value = fields.get(name)
+        values = fields if isinstance(fields, dict) else {}
+        for name, field in cls.model_fields.items():
+            value = values.get(name)
             if _has_truth(value) and _is_of_numbers(field.annotation):
                 raise ValueError(
                     f"{cls.__name__}.{name} = {_short(value)}: should have a number, not a bool"

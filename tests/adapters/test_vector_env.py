@@ -182,7 +182,7 @@ def test_gymnasiums_wrappers_go_around_it() -> None:
 def test_each_row_has_the_picture_of_its_world(tmp_path: Path) -> None:
     pytest.importorskip("pygame")
     env = rows(render_mode="rgb_array")
-    recorder = RecordVideo(env, str(tmp_path), episode_trigger=lambda episode: True)
+    recorder = RecordVideo(env, str(tmp_path / "films"), episode_trigger=lambda episode: True)
     recorder.reset(seed=0)  # it takes its first pictures
     recorder.recorded_frames.clear()  # or it would write them as a film
     pictures = env.render()
