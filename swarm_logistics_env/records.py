@@ -14,7 +14,7 @@ import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args, get_origin
 
 from pydantic import (
     BaseModel,
@@ -112,6 +112,19 @@ class Record(BaseModel):
                 )
         return fields
 
+    @model_validator(mode="before")
+    @classmethod
+    def _truth_is_no_number(cls, fields: object) -> object:
+        # Python and pydantic take True for 1; in TOML and JSON it is another kind of value.
+        values = fields if isinstance(fields, dict) else {}
+        for name, field in cls.model_fields.items():
+            value = values.get(name)
+            if _has_truth(value) and _is_of_numbers(field.annotation):
+                raise ValueError(
+                    f"{cls.__name__}.{name} = {_short(value)}: should have a number, not a bool"
+                )
+        return fields
+
     def replace(self, **fields: Any) -> Self:
         """Return a copy with `fields` changed, validated like a new record."""
         return type(self)(**{**dict(self), **fields})
@@ -140,10 +153,11 @@ class Record(BaseModel):
     def _problem(cls, problem: dict[str, Any]) -> str:
         # Parts such as "constrained-int" name a branch of a union, not a field.
         parts = [str(part) for part in problem["loc"]]
+        if problem["type"] == "extra_forbidden" and len(parts) == 1:
+            (unknown,) = parts
+            return f"{cls.__name__} has no field {unknown!r}{suggest(unknown, cls.model_fields)}"
         name = ".".join(part for part in parts if part.isidentifier() or part.isdigit())
         field = f"{cls.__name__}.{name}" if name else cls.__name__
-        if problem["type"] == "extra_forbidden" and len(problem["loc"]) == 1:
-            return f"{cls.__name__} has no field {name!r}{suggest(name, cls.model_fields)}"
         message = _in_plain_words(problem)
         if message.startswith(f"{cls.__name__}"):
             return message
@@ -252,6 +266,26 @@ def _in_plain_words(problem: dict[str, Any]) -> str:
         return f"should have at least {least} item{'' if least == 1 else 's'}"
     message = str(problem["msg"]).removeprefix("Value error, ")
     return re.sub("^(Input|String) should", "should", message)
+
+
+def _has_truth(value: object) -> bool:
+    """Return whether a value is a bool, or a list or tuple with one, however deep."""
+    if isinstance(value, list | tuple):
+        return any(map(_has_truth, value))
+    return isinstance(value, bool)
+
+
+def _is_of_numbers(annotation: Any) -> bool:
+    """Return whether a field of this type takes numbers and, beside them, at most text or none."""
+    kinds = set[Any]()
+    waiting = [annotation]
+    while waiting:
+        kind = waiting.pop()
+        is_annotated = get_origin(kind) is Annotated
+        parts = get_args(kind)[:1] if is_annotated else get_args(kind)
+        waiting += parts
+        kinds |= set() if parts else {kind}
+    return bool(kinds & {int, float}) and kinds <= {int, float, str, type(None), ...}
 
 
 def _short(value: object) -> str:

@@ -102,21 +102,24 @@ def check_requests(scenario: Any) -> None:
 
 def check_room(scenario: Any) -> None:
     """Check that robots, items and obstacles fit into the cells or the room that they have."""
+    plan = scenario.plan
     storage = starts = scenario.storage_width * scenario.warehouse_height
     room = f"a storage of {scenario.storage_width:g} x {scenario.warehouse_height:g} m"
-    if scenario.plan is not None:
-        storage, starts = scenario.plan.storage_area, scenario.plan.start_area
-        room = "the cells that the plan has for them"
+    start_room = room
+    if plan is not None:
+        storage, starts = plan.storage_area, plan.start_area
+        room = 'the storage cells (":") of the plan'
+        start_room = f"the {plan.start_name} of the plan"
     obstacle_cover = scenario.n_obstacles * scenario.obstacle_radius**2
-    for count, name, radius, area in (
-        (scenario.n_obstacles, "n_obstacles", scenario.obstacle_radius, storage),
-        (scenario.n_robots, "n_robots", scenario.robot_radius, starts),
-        (scenario.n_items, "n_items", scenario.item_radius, storage),
+    for count, name, radius, area, place in (
+        (scenario.n_obstacles, "n_obstacles", scenario.obstacle_radius, storage, room),
+        (scenario.n_robots, "n_robots", scenario.robot_radius, starts, start_room),
+        (scenario.n_items, "n_items", scenario.item_radius, storage, room),
     ):
         cover = 0.0 if name == "n_obstacles" else obstacle_cover
         most = int((DENSEST_COVER * area / math.pi - cover) / radius**2)
         if count > most:
             raise ValueError(
-                f"{name} = {count} of radius {radius} m do not fit into {room}: should be "
+                f"{name} = {count} of radius {radius} m do not fit into {place}: should be "
                 f"at most {max(most, 0)} (discs may cover {DENSEST_COVER:.0%} of it)"
             )

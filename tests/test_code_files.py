@@ -65,6 +65,32 @@ def test_modules_are_kept_apart_and_executed_once(
     assert sys.modules["gains"] is stranger
 
 
+IMPORTS = {
+    "from": "from importlib import import_module",
+    "whole": "import importlib.util as util, importlib\nimport_module = importlib.import_module",
+    "function": "def import_module(name): return __import__(name)",
+}
+
+
+@pytest.mark.parametrize("imports", IMPORTS.values(), ids=IMPORTS.keys())
+def test_a_neighbour_that_is_imported_by_a_call_is_that_of_the_folder(
+    tmp_path: Path, imports: str
+) -> None:
+    policies = []
+    for number in (1, 2):
+        path = write(tmp_path / str(number), number)
+        path.write_text(
+            f"{imports}\nGAIN = import_module('gains').GAIN\nclass Mine:\n    gain = GAIN\n"
+            "    def reset(self, n_robots, seed): pass\n"
+            "    def act(self, observations): return import_module('late').LATE\n"
+        )
+        policies.append(load(f"{path}:Mine"))
+    for number, policy in enumerate(policies, start=1):
+        assert policy.gain == number  # type: ignore[attr-defined]
+        assert policy.act(None) == (number, number)  # type: ignore[arg-type]
+    assert not {"gains", "late"} & sys.modules.keys()
+
+
 def test_packages_of_another_environment_are_no_code_of_the_users(tmp_path: Path) -> None:
     assert is_users_own(str(tmp_path / "mine.py"))
     assert is_users_own(None)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from swarm_logistics_env.code_files import CurrentFolder
+from swarm_logistics_env.current_folder import CurrentFolder
 from tests.conftest import ROOT
 
 # What libraries look for and do without, and what is started beside a program.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import pytest
-from pydantic import Field, PositiveFloat
+from pydantic import Field, JsonValue, PositiveFloat
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
 from swarm_logistics_env.records import Record, atomic_write, read_table
@@ -20,6 +20,9 @@ class Lamp(Record):
     colours: tuple[str, ...] = ("red",)
     name: str
     sizes: Annotated[tuple[PositiveFloat, ...], Field(min_length=2)] = (1.0, 2.0)
+    watts: int | Annotated[tuple[int, ...], Field(min_length=1)] | None = None
+    is_on: bool = True
+    notes: dict[str, JsonValue] = Field(default_factory=dict)
 
 
 @pytest.mark.parametrize(
@@ -27,7 +30,12 @@ class Lamp(Record):
     [
         ({"power": -1.0}, r"^Lamp.power = -1.0: should be greater than 0$"),
         ({"powr": 3}, r"Lamp has no field 'powr'; did you mean 'power'\?"),
-        ({"xyz": 3}, "Lamp has no field 'xyz'; known: colours, name, power, sizes"),
+        ({"xyz": 3}, "Lamp has no field 'xyz'; known: colours, is_on, name, notes, power, sizes"),
+        ({"power ": 3}, r"Lamp has no field 'power '; did you mean 'power'\?"),
+        ({"lamp.power": 3}, r"Lamp has no field 'lamp.power'; did you mean 'power'\?"),
+        ({"power": True}, "^Lamp.power = True: should have a number, not a bool$"),
+        ({"watts": [5, False]}, r"^Lamp.watts = \[5, False\]: should have a number, not a bool$"),
+        ({"sizes": (True, 2)}, "^Lamp.sizes = .*: should have a number, not a bool$"),
         ({"colours": ("red", 7)}, r"Lamp.colours.1 = 7: "),
         ({"colours": "red"}, r"^Lamp.colours = 'red': should be a list$"),
         ({"sizes": [1.0]}, r"^Lamp.sizes = \[1.0\]: should have at least 2 items$"),
@@ -44,6 +52,13 @@ def test_what_is_wrong_is_named_in_an_error_of_the_records_own_type(
         Lamp(name="b").replace(**fields)
     with pytest.raises(PolicyError, match=r"^Lamp\.name is missing$"):
         Lamp()  # type: ignore[call-arg]
+
+
+def test_a_bool_stays_one_where_it_may_be() -> None:
+    lamp = Lamp(name="a", is_on=False, notes={"new": True})
+    assert Lamp.from_json(lamp.to_json()) == lamp
+    with pytest.raises(PolicyError, match="watts = True: should have a number"):
+        Lamp.from_json('{"name": "a", "watts": true}')
 
 
 def test_json_there_and_back() -> None:

@@ -38,7 +38,7 @@ def test_functions_are_short_and_take_few_parameters(path: Path) -> None:
 
 
 def test_no_two_modules_have_one_name() -> None:
-    names = [path.stem for path in PACKAGE.rglob("*.py") if path.stem != "__init__"]
+    names = [path.stem for path in PACKAGE.rglob("*.py") if not path.stem.startswith("__")]
     assert {name for name in names if names.count(name) > 1} == set()
 
 

@@ -10,10 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.streams import generator
 from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.faults import LOST_AS_A_WHOLE, failed_robots
+from swarm_logistics_env.warehouse.faults import GRACE, LOST_AS_A_WHOLE, failed_robots
 from swarm_logistics_env.warehouse.state import NOBODY
 from swarm_logistics_env.warehouse.state import WarehouseState as State
+
+BLOCK = 32  # so many holds and breaks are of one stream
 
 Able = dict[str, Any]  # what one robot can do
 
@@ -50,6 +53,10 @@ class Faults:
         self.gone = [False] * scenario.n_robots
         self.plan(planned)
 
+    def change(self, scenario: Scenario) -> None:
+        """Let these conditions hold from now on."""
+        self._scenario = scenario
+
     def plan(self, planned: Sequence[Planned]) -> None:
         """Let these faults hold from now on; who is gone stays gone."""
         self._planned = list(planned)
@@ -70,12 +77,13 @@ class Faults:
                 continue
             if one.struck is None:
                 is_whole = now.robot_present.tolist() == before.robot_present.tolist()
-                views = [able["view_range"] for able in left]
+                # All that begins at one moment strikes whom it would by itself.
+                views = before.view_range.tolist()
                 # Who is removed in this very step no longer stands where it was struck.
                 chosen = world._occurrences[number].robots.tolist()
                 one.struck = self._in_role(one, now, views) if is_whole else chosen
             for robot in one.struck:
-                if one.breaks is None or self._is_broken(one, robot, now):
+                if one.breaks is None or self._is_broken(one, robot, now.step):
                     self._take(one, left[robot], now.step)
         for robot, able in enumerate(left):
             self.gone[robot] |= not able.pop("there")
@@ -120,14 +128,19 @@ class Faults:
         able["modes"] = (*able["modes"], one.mode)
         able["there"] = able["there"] and lost.present
 
-    def _is_broken(self, one: Planned, robot: int, now: State) -> bool:
-        """Return whether an intermittent fault holds, which the robot's own stream decides."""
-        others = [
-            other.mode
-            for other in self._planned
-            if other is not one and other.holds(now.step) and robot in (other.struck or ())
-        ]
-        return now.failure_modes[robot].count(one.mode) > others.count(one.mode)
+    def _is_broken(self, one: Planned, robot: int, step: int) -> bool:
+        """Return whether an intermittent fault holds, by the robot's own stream of both times."""
+        assert one.breaks is not None
+        period = self._scenario.control_period
+        n_switches = 0
+        until = 0.5 * period * one.begins
+        while until <= step * period + GRACE:
+            if n_switches % BLOCK == 0:
+                block = n_switches // BLOCK
+                rng = generator(self._seed, f"intermittent {one.mode}", robot, block)
+            until += rng.exponential(one.breaks[n_switches % 2])
+            n_switches += 1
+        return n_switches % 2 == 1
 
     def _in_role(self, one: Planned, now: State, views: list[float]) -> list[int]:
         """Return the robots that a fault by role strikes: those in it, then those nearest."""

@@ -181,8 +181,9 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         return step.observations.copy(), rewards, step.terminated, step.truncated, infos
 
     def render(self) -> tuple[Any, ...]:
-        """Return a picture (H, W, 3) of each world."""
-        return tuple(env.render() for env in self.worlds)
+        """Return a picture (H, W, 3) of each row's world, as recorders of Gymnasium expect."""
+        pictures = [env.render() for env in self.worlds]
+        return tuple(pictures[world] for world in self._worlds.world_of)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Release threads and what rendering holds."""

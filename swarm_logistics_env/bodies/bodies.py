@@ -137,6 +137,9 @@ def _known_class(name: str) -> Callable[[], Bodies]:
         code = import_module(f"{__package__}.{module}")
     except ImportError as error:
         raise BodiesError(f"bodies {name!r} ({error}): {how_to_install(extra)}") from error
+    except RAISED_BY_OTHERS as error:  # of a package that this machine cannot load
+        kind = type(error).__name__
+        raise BodiesError(f"bodies {name!r} cannot be imported: {kind}: {error}") from error
     make: Callable[[], Bodies] = getattr(code, class_name)
     return make
 

@@ -10,9 +10,9 @@ carried adds its mass to its robot, and robots drive through free ones.
 from __future__ import annotations
 
 import math
+import os
 from xml.etree import ElementTree as Xml
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +20,19 @@ from swarm_logistics_env.errors import BodiesError
 from swarm_logistics_env.scenario import Scenario
 
 from .bodies import Orders, Placement, Poses
+
+try:
+    import mujoco
+except Exception:
+    # It refuses a MUJOCO_GL that this machine cannot draw with, and nothing is drawn here.
+    drawing = os.environ.get("MUJOCO_GL")
+    if drawing is None:
+        raise
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        import mujoco
+    finally:
+        os.environ["MUJOCO_GL"] = drawing
 
 _TIMESTEP = 0.005  # [s] at most
 _ITEM_MASS = 0.3  # of a robot's mass, that a carried item adds

@@ -6,6 +6,7 @@ import gc
 import os
 import shlex
 import sys
+import traceback
 from collections.abc import Iterable
 from importlib import import_module
 from typing import Annotated, Any
@@ -13,7 +14,8 @@ from typing import Annotated, Any
 import typer
 from typer import Exit, Option, echo
 
-from swarm_logistics_env.code_files import search_current_folder
+from swarm_logistics_env.code_files import is_users_own
+from swarm_logistics_env.current_folder import search_current_folder
 from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.records import plain
 
@@ -35,6 +37,8 @@ COMMANDS = {
 
 class Application:
     """The command line. A call ends the process with 0 (done), 2 (bad input) or 130 (Ctrl-C).
+
+    It ends with 1 where code of the user's own fails, whose traceback is shown.
 
     A command ends otherwise by raising `typer.Exit(code)`.
     """
@@ -68,9 +72,13 @@ class Application:
             raise RuntimeError("a policy or a task called sys.exit()") from error
         except Exception as error:
             sentence = _sentence(error)
-            if sentence is None:
+            if sentence is not None:
+                return _complain(sentence, 2)
+            report = _users_part(error)
+            if report is None:
                 raise
-            return _complain(sentence, 2)
+            sys.stderr.write(report)
+            return 1
         return code if isinstance(code, int) else 0
 
 
@@ -129,6 +137,19 @@ def _sentence(error: Exception) -> str | None:
     # The operating system refuses for reasons of its own: a disk that is full, a name too long.
     if isinstance(error, SwarmLogisticsError | IndicatorError | OSError):
         return str(error)
+    return None
+
+
+def _users_part(error: Exception) -> str | None:
+    """Return the traceback from the user's own code on; None: no code of the user's was called."""
+    report = traceback.TracebackException.from_exception(error)
+    is_called = False
+    for number, frame in enumerate(report.stack):
+        # What is above this file started the command; generated code has a name as <string>.
+        is_called |= frame.filename == __file__
+        if is_called and frame.filename[0] != "<" and is_users_own(frame.filename):
+            report.stack = traceback.StackSummary.from_list(report.stack[number:])
+            return "".join(report.format())
     return None
 
 

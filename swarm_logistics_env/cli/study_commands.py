@@ -225,7 +225,8 @@ def plan_command(
     plan = study_of(study_name, None, seeds, policy_specs, trust_code, first_seed=first_seed).plan()
     uses: dict[str, list[str]] = {}
     for _, table, arm in plan.cells:
-        uses.setdefault(arm.case.key, []).append(f"{table} ({arm.setting})")
+        for case in arm.case.trainings:  # as the plan counts them
+            uses.setdefault(case.key, []).append(f"{table} ({arm.setting})")
     rows = (
         (case.policy.title, str(case.scenario.n_robots), "; ".join(uses[case.key]))
         for case in plan.cases

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
@@ -116,20 +118,30 @@ def changed_fields(changes: Repeated, bodies: str | None) -> dict[str, Any]:
     """Return the fields that `--set` and `--bodies` change, with their values.
 
     Raises:
-        ScenarioError: a change is not FIELD=VALUE.
+        ScenarioError: a change is not FIELD=VALUE, or a field is changed twice.
     """
+    texts = [*(changes or []), *([] if bodies is None else [f"bodies={bodies}"])]
     fields: dict[str, Any] = {}
-    for change in changes or []:
+    for change in texts:
         name, equals, value = change.partition("=")
-        if not equals:
+        name = name.strip()
+        if not (equals and name):
             raise ScenarioError(f"--set {change}: should be FIELD=VALUE")
-        try:
-            fields[name] = json.loads(value)
-        except (json.JSONDecodeError, RecursionError):
-            fields[name] = value
-    if bodies is not None:
-        fields["bodies"] = bodies
+        if name in fields:
+            raise ScenarioError(f"--set {change}: {name} is set twice: should be set once")
+        fields[name] = _value_of(value.strip())
     return fields
+
+
+def _value_of(text: str) -> Any:
+    """Return the value that a text is in JSON or TOML; else the text itself."""
+    with contextlib.suppress(ValueError, RecursionError):
+        return json.loads(text)
+    with contextlib.suppress(ValueError, RecursionError):
+        (value,) = tomllib.loads(f"value = {text}").values()
+        if isinstance(value, int | float | str):  # TOML has dates as well
+            return value
+    return text
 
 
 def faults_of(texts: Repeated, scenario: Scenario) -> list[Fault]:

@@ -130,7 +130,7 @@ def checked_count(name: str, value: int, least: int = 1) -> int:
         number = operator.index(value)
     except TypeError:
         number = least - 1
-    if number < least:
+    if number < least or isinstance(value, bool):
         raise SetupError(f"{name} = {value!r}: should be a whole number of at least {least}")
     return number
 

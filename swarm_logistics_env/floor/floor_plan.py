@@ -9,6 +9,7 @@ The first line is the side of the highest y. The world's outer walls stand aroun
 
 from __future__ import annotations
 
+import codecs
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -19,11 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .benchmark_map import is_benchmark_map, rows_of_benchmark_map
+from swarm_logistics_env.errors import suggest
+
+from .benchmark_map import is_benchmark_map, refuse_unknown_signs, rows_of_benchmark_map
 
 WALL, RACK, FREE, STORAGE, START, DOCK = range(6)  # kinds of cells; the first two are solid
 NO_DOCK = -1
-MOST_CELLS = 1_000  # along a side
+MOST_CELLS = 1_024  # along a side: the largest maps of MovingAI
 _KINDS = {"#": WALL, "=": RACK, ".": FREE, ":": STORAGE, "+": START}
 _DOCKS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _FOLDER = Path(__file__).parent / "plans"
@@ -53,15 +56,23 @@ def plan_text(floor: str) -> str:
         return floor
     if "\n" not in floor and _is_file(floor):
         try:
-            floor = Path(floor).read_text(encoding="utf-8-sig")
+            floor = _read_text(Path(floor))
         except (OSError, UnicodeError) as error:
             raise ValueError(f"cannot read the plan: {error}") from None
     elif "\n" not in floor and not _looks_like_rows(floor):
-        names = ", ".join(plan_names())
-        raise ValueError(f"should be a shipped plan ({names}), a file, or rows of a plan")
+        raise ValueError(
+            "should be a shipped plan, a file, or rows of a plan" + suggest(floor, plan_names())
+        )
     if is_benchmark_map(floor):
         return _ROW_END.join(rows_of_benchmark_map(floor))
-    return _ROW_END.join(floor.strip("\r\n").replace("\r\n", "\n").split("\n"))
+    rows = [row.rstrip() for row in floor.rstrip().lstrip("\r\n").splitlines()]
+    return _ROW_END.join(rows)
+
+
+def _read_text(path: Path) -> str:
+    content = path.read_bytes()
+    is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return content.decode("utf-16" if is_utf_16 else "utf-8-sig")
 
 
 def floor_title(text: str) -> str:
@@ -167,6 +178,12 @@ class FloorPlan(NamedTuple):
         return starts
 
     @property
+    def start_name(self) -> str:
+        """What the cells are in which robots start."""
+        has_start = bool((self.kind == START).any())
+        return 'start cells ("+")' if has_start else 'storage (":") and free floor (".")'
+
+    @property
     def start_area(self) -> float:
         """Area of the cells in which robots start [m2]."""
         return int(self.start_cells.sum()) * self.cell_size * self.cell_size
@@ -217,15 +234,11 @@ def _check_rows(rows: list[str]) -> None:
             f"a plan of {len(rows[0])} x {len(rows)} cells: should be at most "
             f"{MOST_CELLS} x {MOST_CELLS}"
         )
-    known = set(_KINDS) | set(_DOCKS)
-    for line, row in enumerate(rows, 1):
-        for column, sign in enumerate(row, 1):
-            if sign not in known:
-                signs = " ".join(_KINDS)
-                raise ValueError(
-                    f"line {line}, column {column}: {sign!r} is no cell: should be one of {signs} "
-                    "or a letter from A to Z"
-                )
+    signs = " ".join(_KINDS)
+    lines = [*enumerate(rows, start=1)]
+    remedy = f"should be one of {signs} or a letter from A to Z"
+    refuse_unknown_signs(lines, {*_KINDS, *_DOCKS}, remedy)
+    for line, row in lines:
         if len(row) != len(rows[0]):
             raise ValueError(
                 f"line {line} has {len(row)} cells: should have as many as line 1, {len(rows[0])}"

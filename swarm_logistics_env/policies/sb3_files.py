@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.code_files import allow_all_imports
+from swarm_logistics_env.current_folder import allow_all_imports
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError, how_to_install
 from swarm_logistics_env.motion.frame import OUTPUTS
 from swarm_logistics_env.motion.network_inputs import INPUTS

@@ -18,7 +18,7 @@ from functools import partial
 from types import ModuleType
 from typing import Self
 
-from swarm_logistics_env.code_files import current_folder_modules
+from swarm_logistics_env.current_folder import current_folder_modules
 from swarm_logistics_env.errors import StudyError, how_to_install, suggest, users_line
 from swarm_logistics_env.progress_bar import ProgressBar
 from swarm_logistics_env.tasks.task import Outcome, Run

@@ -24,7 +24,7 @@ from unittest.mock import patch
 
 import cloudpickle
 
-from swarm_logistics_env.code_files import current_folder_modules, search_current_folder
+from swarm_logistics_env.current_folder import current_folder_modules, search_current_folder
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, StudyError
 from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.tasks.task import Outcome, Run

@@ -20,7 +20,7 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, NonNegativeFlo
 from pydantic.dataclasses import dataclass as validated
 
 from swarm_logistics_env import streams
-from swarm_logistics_env.code_files import allow_import
+from swarm_logistics_env.current_folder import allow_import
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, StudyError, suggest
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.records import canonical_json

@@ -27,7 +27,7 @@ from pydantic import (
 
 from swarm_logistics_env.errors import FaultError, SwarmLogisticsError
 from swarm_logistics_env.records import Record
-from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.scenario import LARGEST, Scenario
 from swarm_logistics_env.streams import generator, row_keys
 
 from .failure_modes import FAILURE_MODES, FailureMode, failure_mode
@@ -259,7 +259,7 @@ class Occurrence:
         """
         fault = self.fault
         if not fault.is_active(time):
-            return fault.onset if fault.onset > time + GRACE else math.inf
+            return fault.onset if fault.onset > time else math.inf
         changes = [math.inf if fault.duration is None else fault.onset + fault.duration]
         if self.mode.wears:
             changes.append(next_step)
@@ -326,6 +326,9 @@ def apply_faults(
     Returns:
         Which robots a fault takes out of the arena, (N,).
     """
+    # By what robots do and see as faults begin, so that those of one moment choose alike.
+    for occurrence in occurrences:
+        occurrence.choose_by_role(state)
     able = state.able
     speed = np.resize(scenario.speed_mix, state.n_robots)
     sensing = np.resize(scenario.sensing_mix, state.n_robots)
@@ -340,7 +343,6 @@ def apply_faults(
     is_removed = np.zeros(state.n_robots, np.bool_)
     modes: list[list[str]] = [[] for _ in range(state.n_robots)]
     for occurrence in occurrences:
-        occurrence.choose_by_role(state)
         mode = occurrence.mode
         robots = occurrence.holds_for(state.time)
         speed_left, view_left = occurrence.remaining_factors(state.time, scenario.duration)
@@ -359,3 +361,19 @@ def apply_faults(
     state.failure_modes = tuple(map(tuple, modes))
     state.failed = np.array([bool(names) for names in modes])
     return is_removed
+
+
+def step_of_change(occurrences: Sequence[Occurrence], step: int, period: float) -> int:
+    """Return the first control step after `step` that ends when a fault has begun or ended.
+
+    It is beyond the end of any episode if none does.
+
+    Args:
+        occurrences: the faults; `apply_faults` has chosen the robots of those that hold.
+        step: control steps since the start.
+        period: of a control step [s].
+    """
+    next_step = step + 1
+    changes = (fault.next_change(step * period, next_step * period) for fault in occurrences)
+    change = min(changes, default=LARGEST)
+    return max(math.ceil((min(change, LARGEST) - GRACE) / period), next_step)

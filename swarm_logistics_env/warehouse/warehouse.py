@@ -15,11 +15,11 @@ from swarm_logistics_env.bodies import load_bodies
 from swarm_logistics_env.errors import ScenarioError, SetupError
 from swarm_logistics_env.floor.ways import FloorMap
 from swarm_logistics_env.observations import n_columns
-from swarm_logistics_env.scenario import CHANGES_DURING_RUN, LARGEST, Scenario
+from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
 
 from . import stepping
 from .commands import MESSAGE, as_array, not_finite
-from .faults import GRACE, Fault, FaultLike, Occurrence, apply_faults, checked_faults
+from .faults import Fault, FaultLike, Occurrence, apply_faults, checked_faults, step_of_change
 from .floor_cells import floor_map, floor_of
 from .grid import blank_grid
 from .layout import lay_out
@@ -376,14 +376,10 @@ class Warehouse:
     def _apply_faults(self) -> None:
         state = self.state
         period = self.scenario.control_period
-        now, next_step = state.time, (state.step + 1) * period
-        changes = (occurrence.next_change(now, next_step) for occurrence in self._occurrences)
-        change = min(changes, default=math.inf)
-        state.progress.is_changed[0] = True
-        # The first step that ends when it has come; or none of any episode.
-        is_ever = change <= LARGEST
-        state.progress.pause_step[0] = math.ceil((change - GRACE) / period) if is_ever else NOBODY
         is_removed = apply_faults(state, self.scenario, self._occurrences)
+        state.progress.is_changed[0] = True
+        # Only now is known which robots fail, whose breaks are changes, too.
+        state.progress.pause_step[0] = step_of_change(self._occurrences, state.step, period)
         for robot in np.flatnonzero(is_removed & state.robot_present).tolist():
             stepping.remove(self._address, robot)
 

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import doctest
+from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
-from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
+from gymnasium.wrappers.vector import (
+    NormalizeObservation,
+    RecordEpisodeStatistics,
+    RecordVideo,
+)
 
 from swarm_logistics_env.adapters import CentralEnv, SwarmRows, vector_env
 from swarm_logistics_env.errors import CommandError, SetupError
@@ -172,6 +177,19 @@ def test_gymnasiums_wrappers_go_around_it() -> None:
     assert observations.shape == (5, 95)
     assert truncations.all()
     assert infos["episode"]["l"].tolist() == [N_STEPS] * 5
+
+
+def test_each_row_has_the_picture_of_its_world(tmp_path: Path) -> None:
+    pytest.importorskip("pygame")
+    env = rows(render_mode="rgb_array")
+    recorder = RecordVideo(env, str(tmp_path / "films"), episode_trigger=lambda episode: True)
+    recorder.reset(seed=0)  # it takes its first pictures
+    recorder.recorded_frames.clear()  # or it would write them as a film
+    pictures = env.render()
+    assert len(pictures) == env.num_envs == 6
+    for row, world in enumerate((0, 0, 0, 1, 1, 1)):
+        np.testing.assert_array_equal(pictures[row], env.worlds[world].render())
+    env.close()
 
 
 def test_the_example_of_its_docstring_runs() -> None:

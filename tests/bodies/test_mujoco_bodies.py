@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -13,6 +16,24 @@ from swarm_logistics_env.policies import load
 
 pytest.importorskip("mujoco")
 DRIVES = ("holonomic", "differential")
+
+
+@pytest.mark.parametrize("name", ["wgl", "osmesa", "nothing"])
+def test_bodies_need_nothing_that_draws(name: str) -> None:
+    """A cluster may name in MUJOCO_GL what the machine does not have."""
+    script = (
+        "import os\nfrom swarm_logistics_env.bodies import load_bodies\n"
+        "print(load_bodies('mujoco'), os.environ['MUJOCO_GL'])"
+    )
+    printed = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, "MUJOCO_GL": name},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert "MujocoBodies" in printed
+    assert printed.split()[-1] == name
 
 
 def placed(drive: Any, positions: Any) -> Any:

@@ -15,6 +15,7 @@ from swarm_logistics_env import Scenario, policies
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.cli.app import command_line
 from swarm_logistics_env.cli.terminal import show
+from swarm_logistics_env.cli.world_choice import changed_fields
 from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.report.section import Section
 from swarm_logistics_env.train import preset_names
@@ -40,6 +41,12 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
         ("run --twin", "are for a film, with --film"),
         ("watch --until 5", "--until 5: should be above 0 s, together with --save"),
         ("watch --save nowhere/x.html", "should be a file in a folder that can be"),
+        ("run --set scenario.duration=2", "'scenario.duration'; did you mean 'duration'?"),
+        ("run --set =2", "--set =2: should be FIELD=VALUE"),
+        ("run --set duration=2 --set duration=4", "--set duration=4: duration is set twice"),
+        ("run --set bodies=mujoco --bodies dotbots", "bodies is set twice: should be set once"),
+        ("run --set duration=true", "Scenario.duration = True: should have a number, not a bool"),
+        ("run --set floor=aisle", "rows of a plan; did you mean 'aisles'?"),
         ("list robots", "'robots' is not one of 'policies', 'trainings', 'faults', 'studies'"),
         ("study plan quick --policy nobody", "'nobody'"),
         ("study report nowhere", "no study in nowhere"),
@@ -56,6 +63,20 @@ def test_bad_input_is_one_sentence_and_exit_code_2(
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("changes", "fields"),
+    [
+        (["duration = 2"], {"duration": 2}),
+        (["duration=1_0", "max_speed=+1.5"], {"duration": 10, "max_speed": 1.5}),
+        (["speed_mix = [1.0, 0.5]", "floor=null"], {"speed_mix": [1.0, 0.5], "floor": None}),
+        (["floor = aisles", "bodies='mujoco'"], {"floor": "aisles", "bodies": "mujoco"}),
+        (["floor=::A\n:::", "name=2026-01-01"], {"floor": "::A\n:::", "name": "2026-01-01"}),
+    ],
+)
+def test_values_are_those_of_json_and_toml(changes: list[str], fields: dict[str, Any]) -> None:
+    assert changed_fields(changes, None) == fields
+
+
 def test_an_error_of_usage_is_a_line_and_names_the_help(command: Command) -> None:
     missing = command("list", code=2)
     choices = "policies, trainings, faults, studies, scenario"
@@ -63,8 +84,9 @@ def test_an_error_of_usage_is_a_line_and_names_the_help(command: Command) -> Non
     assert "Help: swarm-logistics run --help" in command("run --sed 3", code=2)
 
 
-def test_the_package_is_the_command() -> None:
-    words = [sys.executable, "-m", "swarm_logistics_env", "--version"]
+@pytest.mark.parametrize("module", ["swarm_logistics_env", "swarm_logistics_env.cli"])
+def test_the_package_is_the_command(module: str) -> None:
+    words = [sys.executable, "-m", module, "--version"]
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     assert printed.strip() == swarm_logistics_env.__version__
 
@@ -109,7 +131,9 @@ class Unmade(Lazy):
 """
 
 
-def test_a_policy_of_ones_own_that_cannot_be_made_is_one_sentence(command: Command) -> None:
+def test_a_policy_of_ones_own_that_cannot_be_made_is_one_sentence(
+    command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
     Path("own_policy.py").write_text(OWN)
     for name, said in (
         ("own_policy:Unmade", "'own_policy:Unmade' cannot be made: KeyError: 'gain'"),
@@ -117,8 +141,12 @@ def test_a_policy_of_ones_own_that_cannot_be_made_is_one_sentence(command: Comma
         ("own_policy", "no policy 'own_policy' (a name, 'my.py:Class', 'package.module:Class'"),
     ):
         assert said in command(f"run --policy {name} {SMALL}", code=2)
-    with pytest.raises(ZeroDivisionError, match="the motor is gone"):  # its traceback says where
-        command(f"run --policy own_policy:Torn {SMALL}")
+    # Its traceback says where, without the frames that called it.
+    assert app.run(f"run --policy own_policy:Torn {SMALL}".split()) == 1
+    printed = capsys.readouterr().err.splitlines()
+    assert printed[-1] == "ZeroDivisionError: the motor is gone"
+    (frame,) = [line for line in printed if line.startswith("  File")]
+    assert "own_policy.py" in frame
     with pytest.raises(RuntimeError, match=r"called sys.exit\(\)"):
         command(f"run --policy own_policy:Leaving {SMALL}")
 

@@ -18,6 +18,7 @@ import pytest
 
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.policies.spec import WEIGHTS
+from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.studies import Study
 from tests.cli.conftest import Command
@@ -30,6 +31,7 @@ scenario = { warehouse_width = 4, warehouse_height = 3, n_robots = 4, n_items = 
 values = [2, 4]
 """
 RUN = "study run mine.toml --engine local"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.fixture(autouse=True)
@@ -99,6 +101,21 @@ def test_study_plan_prints_conditions_once_and_what_they_take(file: Path, comman
     assert "Scalability (N = 4); Fault tolerance and robustness (no fault)" in printed
     assert "4 conditions (1 shared) x 3 seeds from 1000 on = 12 runs" in printed
     assert list(Path().iterdir()) == [file]
+
+
+def test_every_study_that_is_shipped_or_an_example_is_planned(command: Command) -> None:
+    # Those in tasks/ need packages that nothing else does.
+    files = sorted(EXAMPLES.glob("*.toml")) + sorted(EXAMPLES.glob("questions/*.toml"))
+    assert len(files) > 10
+    for study in (*PRESETS, *map(str, files)):
+        assert " conditions" in command(f"study plan {study}"), study
+
+
+def test_of_all_trainings_each_has_its_conditions(command: Command) -> None:
+    printed = command("study plan mine.toml --policy ppo-robust@all")
+    for training in ("ppo-robust@0", "ppo-robust@5"):
+        (row,) = [row for row in printed.splitlines() if training in row and "(N = 2)" in row]
+        assert "Scalability" in row
 
 
 SLOW = """

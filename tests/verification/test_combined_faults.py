@@ -9,7 +9,7 @@ import math
 import pickle
 import random
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import REWARD_TERMS
+from swarm_logistics_env.episode import Play
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from swarm_logistics_env.warehouse.faults import ROLES
 from swarm_logistics_env.warehouse.state import WarehouseState
@@ -40,10 +41,11 @@ class Case:
     later: tuple[Planned, ...] | None
     weights: dict[str, float]
     aim: str
+    changes: dict[str, float] = field(default_factory=dict)
 
 
 @st.composite
-def planned_faults(draw: st.DrawFn, n_robots: int, least: int) -> Planned:
+def planned_faults(draw: st.DrawFn, n_robots: int) -> Planned:
     mode = draw(st.sampled_from(sorted(FAILURE_MODES)))
     begins = draw(st.integers(0, 50)) if mode != "removed" else draw(st.integers(2, 60))
     ends = None if mode == "removed" else draw(st.none() | st.integers(begins + 1, begins + 40))
@@ -52,7 +54,9 @@ def planned_faults(draw: st.DrawFn, n_robots: int, least: int) -> Planned:
     robots = draw(st.integers(1, n_robots) if role else st.integers(1, n_robots) | named.map(tuple))
     has_factor = mode in ("motor_slow", "motor_wear", "view_reduced")
     factor = draw(st.none() | st.sampled_from([0.0, 0.25, 0.9])) if has_factor else None
-    breaks = draw(st.just((0.5, 0.5)) | st.none()) if mode != "removed" and least == 0 else None
+    breaks = None
+    if mode != "removed":
+        breaks = draw(st.none() | st.sampled_from([(0.5, 0.5), (0.2, 1.0), (2.0, 0.1)]))
     return Planned(mode, robots, begins, ends, factor, breaks, role)
 
 
@@ -69,14 +73,16 @@ def cases(draw: st.DrawFn) -> Case:
         sensing_mix=draw(st.sampled_from([(1.0,), (1.0, 0.4)])),
         drive=draw(st.sampled_from(["holonomic", "differential"])),
     )  # fmt: skip
-    # The last alone may have breaks, which its robots' own streams decide.
-    some = st.lists(planned_faults(n, 1), min_size=1, max_size=3)
-    planned = (*draw(some), draw(planned_faults(n, 0)))
-    later = draw(st.none() | some.map(tuple))
+    some = st.lists(planned_faults(n), min_size=1, max_size=4).map(tuple)
+    planned = draw(some)
+    later = draw(st.none() | some)
+    limits = {"max_speed": 1.0, "view_range": 0.5, "ranger_range": 1.5}
+    changed = draw(st.sets(st.sampled_from(sorted(limits))))
     terms = draw(st.sets(st.sampled_from(sorted(REWARD_TERMS)), min_size=1))
     weights = {name: draw(st.sampled_from([0.5, 1.0, -2.0])) for name in sorted(terms)}
     aim = draw(st.sampled_from(["nothing", "the end", "a removal"]))
-    return Case(draw(st.integers(0, 2**32)), scenario, planned, later, weights, aim)
+    changes = {name: limits[name] for name in sorted(changed)}
+    return Case(draw(st.integers(0, 2**32)), scenario, planned, later, weights, aim, changes)
 
 
 def commands_of(world: Warehouse, source: random.Random) -> list[list[float]]:
@@ -115,11 +121,16 @@ def play(case: Case, last: int) -> list[int]:
     watch.look()
     found = []
     while env.agents:
-        if case.later is not None and before.step == STEPS // 2:
-            world.set_faults([one.fault(period) for one in case.later])
-            watch.faults_changed()
-            faults.plan(case.later)
+        if before.step == STEPS // 3:
+            world.change(**case.changes)
+            faults.change(world.scenario)
             able = check_able(world, faults, before)
+        if before.step == STEPS // 2:
+            if case.later is not None:
+                world.set_faults([one.fault(period) for one in case.later])
+                watch.faults_changed()
+                faults.plan(case.later)
+                able = check_able(world, faults, before)
             # Who is removed so terminates in the step that follows, so `before` stays as it is.
             copy = pickle.loads(pickle.dumps(world))
         commands = commands_of(world, rng)
@@ -127,6 +138,7 @@ def play(case: Case, last: int) -> list[int]:
         rows, paid, terminated, truncated = env.step_arrays(commands)
         if copy is not None:
             assert np.array_equal(copy.step(commands), rows)
+            assert copy.state.failure_modes == world.state.failure_modes
         now = deepcopy(world.state)
         assert world.state.robot_message.tolist() == radio.messages(commands, able)
         able = check_able(world, faults, before)
@@ -193,3 +205,24 @@ def test_faults_that_meet_leave_pay_and_end_as_the_reference_says(case: Case) ->
     if case.aim == "a removal":
         gone = Planned("removed", (case.number % case.scenario.n_robots,), 2 * step)
         play(replace(case, planned=(*case.planned, gone)), STEPS)
+
+
+@given(case=cases())
+@settings(max_examples=EXAMPLES, report_multiple_bugs=False)
+def test_many_steps_in_one_call_pass_over_no_beginning_or_end_of_a_fault(case: Case) -> None:
+    scenario, period = case.scenario, case.scenario.control_period
+    planned = [one.fault(period) for one in case.planned]
+    by_step = Play(scenario, policies.load("ppo-delivery"), case.number, planned)
+    by_event = Play(scenario, policies.load("ppo-delivery"), case.number, planned)
+    faults = Faults(scenario, case.number, case.planned)
+    world, before = by_step.world, deepcopy(by_step.world.state)
+    positions = np.empty((STEPS, scenario.n_robots, 2))
+    while not by_event.is_over:
+        modes = by_event.world.state.failure_modes
+        n_steps = by_event.advance_to_event(positions)
+        for step in range(n_steps):
+            check_able(world, faults, before)
+            assert world.state.failure_modes == modes
+            before = deepcopy(world.state)
+            by_step.step()
+            assert np.array_equal(positions[step], world.state.robot_position)

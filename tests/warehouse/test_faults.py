@@ -250,3 +250,30 @@ def test_a_neighbour_is_whom_the_carrier_sees_not_who_sees_it() -> None:
     state.robot_item[0], state.item_carrier[state.requested] = state.requested, 0
     state.view_range[:] = [1.0, 0.1, 2.0, 2.0]
     assert roles_of(state).tolist() == ["carrier", "neighbour", "searching", "searching"]
+
+
+def test_faults_by_role_that_begin_together_strike_the_same_robots() -> None:
+    world = Warehouse(Scenario(n_robots=3, n_items=2, n_requests=2))
+    world.reset(0)
+    state = world.state
+    state.robot_position = np.array([[5.0, 5.0], [1.0, 1.0], [5.8, 5.0]])
+    state.robot_item[:2] = state.open_requests
+    state.item_position[state.open_requests] = state.robot_position[:2]
+    state.item_carrier[state.open_requests] = 0, 1
+    assert roles_of(state).tolist() == ["carrier", "carrier", "neighbour"]
+    # Of two robots one is the neighbour, whom a dead carrier would no longer see.
+    world.set_faults([Fault(mode, 2, role="neighbour") for mode in ("dead", "FM1")])
+    assert state.failure_modes == (("dead", "FM1"), (), ("dead", "FM1"))
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_a_fault_by_role_comes_and_goes_as_one_of_the_same_robots_by_number(role: str) -> None:
+    world = Warehouse(SMALL)
+    world.reset(5, [Fault("dead", 2, onset=0.5, role=role, intermittent=(0.4, 1.0))])
+    steps(world, *[STAY] * 8, times=5)
+    fault = Fault("dead", world.struck_robots, onset=0.5, intermittent=(0.4, 1.0))
+    wanted = held(fault)
+    assert 0.1 < wanted[5:, list(world.struck_robots)].mean() < 0.6  # two of seven are expected
+    for failed in wanted[5:]:
+        steps(world, *[STAY] * 8)
+        assert world.state.failed.tolist() == failed.tolist()
