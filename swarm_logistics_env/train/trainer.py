@@ -22,7 +22,7 @@ from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.records import atomic_write, read_table
+from swarm_logistics_env.records import atomic_write, read_table, remove_parts
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import (
     evaluate,
@@ -121,7 +121,7 @@ def enter_directory(directory: Path, training: Training, command: str) -> None:
             )
     began = datetime.now(UTC).isoformat(timespec="seconds")
     sessions.append({"began": began, "versions": versions()})
-    with atomic_write(path, TrainingError) as part:
+    with remove_parts(directory), atomic_write(path, TrainingError) as part:
         record = {"command": command, "training": specification, "sessions": sessions}
         part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 
