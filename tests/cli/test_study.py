@@ -110,9 +110,21 @@ app()
 """
 
 
+WAITING = """
+import threading
+from swarm_logistics_env.policies import SwarmDT
+
+class Waiting(SwarmDT):
+    def reset(self, n_robots, seed):
+        super().reset(n_robots, seed)
+        if seed == 5:  # until it is ended
+            threading.Event().wait()
+"""
+
+
 def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
-    file.write_text(FILE.replace("duration = 2", "duration = 500, restock = true"))
-    words = "study run mine.toml --seeds 30 --processes 2 --out out"
+    Path("waiting_policy.py").write_text(WAITING)
+    words = "study run mine.toml --seeds 30 --processes 2 --out out --policy waiting_policy:Waiting"
     process = subprocess.Popen(
         [sys.executable, "-c", SLOW, *words.split()],
         stdout=subprocess.PIPE,
@@ -124,7 +136,7 @@ def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
         assert process.poll() is None, process.communicate()
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=600)
     assert process.returncode == 130
     kept = stored("out")
     assert 0 < kept < 60

@@ -100,7 +100,7 @@ def test_helpers_end_with_the_pool(is_closed: bool) -> None:
     del pool
     gc.collect()
     for helper in helpers:
-        helper.join(10.0)
+        helper.join(600.0)
     assert not any(helper.is_alive() for helper in helpers)
 
 
@@ -170,7 +170,7 @@ def test_a_process_that_was_forked_has_threads_of_its_own() -> None:
     context = multiprocessing.get_context("fork")
     forked = context.Process(target=play_on, args=(pool, made, expected))
     forked.start()
-    forked.join(60.0)
+    forked.join(600.0)
     assert forked.exitcode == 0
     np.testing.assert_array_equal(step(pool, made, commands(1)), expected)
     pool.close()
@@ -193,7 +193,7 @@ print(rows.any())
 @pytest.mark.compiled
 def test_a_program_ends_while_its_pool_is_at_work() -> None:
     command = [sys.executable, "-c", PROGRAM]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
 
 
