@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.runs.store import FILE_NAME, Runs
@@ -130,6 +131,7 @@ def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        env={**os.environ, QUIET: "1"},
         start_new_session=True,
     )
     while stored("out") == 0:

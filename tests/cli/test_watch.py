@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.watch import server
 from tests.cli.conftest import Command
 
@@ -38,6 +39,7 @@ import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.modules["pygame"] = None
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.numba_fence import QUIET
 sys.exit(app.run(["watch", "--port", "0", "--set", "n_robots=5"]))
 """
 
@@ -48,7 +50,7 @@ def test_page_is_served_until_ctrl_c_without_pygame() -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONWARNINGS": "error"},
+        env={**os.environ, "PYTHONWARNINGS": "error", QUIET: "1"},
     )
     assert started.stdout
     found = re.search(r"http://127\.0\.0\.1:(\d+)(/\S+/) in a browser", started.stdout.readline())

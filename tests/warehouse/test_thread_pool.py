@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import multiprocessing
+import os
 import subprocess
 import sys
 import threading
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.errors import CommandError
+from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.warehouse import thread_pool
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
@@ -193,7 +195,10 @@ print(rows.any())
 @pytest.mark.compiled
 def test_a_program_ends_while_its_pool_is_at_work() -> None:
     command = [sys.executable, "-c", PROGRAM]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    environment = {**os.environ, QUIET: "1"}
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=600, check=False, env=environment
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
 
 
