@@ -183,12 +183,14 @@ class WatchServer:
     async def _accept(self, listening: socket.socket, new_protocol: Callable[[], Any]) -> None:
         """Accept connections while there is room; the requests of others wait to be read."""
         loop = asyncio.get_running_loop()
+
+        def new_connection() -> Any:
+            return _Connection(new_protocol(), self._silent_since)
+
         while True:
             try:
                 accepted, _ = await loop.sock_accept(listening)
-                await loop.connect_accepted_socket(
-                    lambda: _Connection(new_protocol(), self._silent_since), accepted
-                )
+                await loop.connect_accepted_socket(new_connection, accepted)
             except OSError:  # it has gone again, or no more files can be open
                 await asyncio.sleep(_FRAME_PERIOD)
             while len(self._silent_since) >= _MOST_CONNECTIONS:
