@@ -9,10 +9,11 @@ import json
 import os
 import re
 import secrets
+import sys
 import tomllib
 import unicodedata
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args, get_origin
 
@@ -27,6 +28,9 @@ from pydantic import (
 
 from swarm_logistics_env.errors import SwarmLogisticsError, suggest
 
+if sys.platform != "win32":
+    import fcntl
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -36,28 +40,60 @@ def atomic_write(path: Path, error_type: type[SwarmLogisticsError]) -> Iterator[
     """Give the path of an empty file beside `path`, of the same ending, which takes its place.
 
     Nobody else has that file, whoever writes `path` at the same time. If the block fails, an older
-    file at `path` stays as it was, and nothing is left beside it. What is no plain file, as
-    /dev/stdout, is written itself.
+    file at `path` stays as it was, and nothing is left beside it. What a writer of `path` left who
+    was killed is removed. What is no plain file, as /dev/stdout, is written itself.
 
     Raises:
         The `error_type`: the file cannot be written; names it and the reason.
     """
     is_plain = path.is_file() or not path.exists()
     target = path.resolve()  # a link stays a link
-    name = f".{path.stem[:40]}.{secrets.token_hex(8)}.part{path.suffix}"
+    stem = path.stem[:40]
+    name = f".{stem}.{secrets.token_hex(8)}.part{path.suffix}"
     part = target.with_name(name) if is_plain else path
+    # A store that is written has a journal beside it.
+    parts = rf"\.{re.escape(stem)}\.[0-9a-f]{{16}}\.part{re.escape(path.suffix)}(-\w+)?"
     try:
-        if is_plain:  # with the usual rights, and never through a link
-            os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-        try:
-            yield part
-            if is_plain:
-                part.replace(target)
-        finally:
-            if is_plain:
-                part.unlink(missing_ok=True)
+        with remove_parts(target.parent, parts) if is_plain else nullcontext():
+            if is_plain:  # with the usual rights, and never through a link
+                os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            try:
+                yield part
+                if is_plain:
+                    part.replace(target)
+            finally:
+                if is_plain:
+                    part.unlink(missing_ok=True)
     except OSError as error:
         raise error_type(f"cannot write {path}: {error.strerror or error}") from error
+
+
+@contextmanager
+def remove_parts(folder: Path, parts: str = r"\..+\.[0-9a-f]{16}\.part.*") -> Iterator[None]:
+    """Remove what writers left in a folder who were killed; nothing while anybody writes there.
+
+    A writer holds a lock of the folder until it ends, or its process does; so does this block.
+    Where there are no such locks, as on Windows, nothing is removed.
+
+    Args:
+        parts: a regular expression of the names of what is removed.
+    """
+    with ExitStack() as stack:
+        if sys.platform != "win32":
+            with suppress(OSError):  # no such folder, or no locks in it
+                lock = os.open(folder, os.O_RDONLY)
+                stack.callback(os.close, lock)
+                with suppress(BlockingIOError):
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    _remove(path for path in folder.iterdir() if re.fullmatch(parts, path.name))
+                fcntl.flock(lock, fcntl.LOCK_SH)
+        yield
+
+
+def _remove(files: Iterable[Path]) -> None:
+    for file in files:
+        with suppress(OSError):  # of somebody else
+            file.unlink()
 
 
 _LONGEST_NAME = 80  # of a file [characters]; with an ending it fits every file system

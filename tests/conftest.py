@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import math
 import os
 import pkgutil
 import sys
@@ -16,6 +17,7 @@ import pytest
 from hypothesis import Phase, settings
 
 import swarm_logistics_env
+from swarm_logistics_env import fast_kernels
 from swarm_logistics_env.studies import Study
 
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
@@ -26,6 +28,9 @@ settings.register_profile(
     "mutants", parent=settings.get_profile("default"), phases=(Phase.explicit, Phase.generate)
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
+
+# Whether compiling is told would depend on the machine's speed, and tests read what is printed.
+fast_kernels._SILENCE = math.inf
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = Path(swarm_logistics_env.__file__).parent

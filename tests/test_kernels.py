@@ -36,7 +36,7 @@ def started(script: str, cache: Path, **variables: str) -> subprocess.Popen[str]
 
 
 def finished(process: subprocess.Popen[str]) -> list[str]:
-    printed, told = process.communicate(timeout=300)
+    printed, told = process.communicate(timeout=600)
     assert process.returncode == 0, told
     return [*printed.splitlines(), told]
 

@@ -26,7 +26,7 @@ def values(notebook: Any) -> list[dict[str, str]]:
 def test_it_runs_and_shows_what_it_made(tmp_path: Path) -> None:
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     nbclient.NotebookClient(
-        notebook, timeout=300, resources={"metadata": {"path": tmp_path}}
+        notebook, timeout=1200, resources={"metadata": {"path": tmp_path}}
     ).execute()
     delivered, video, _, study, findings, demonstrations, env = values(notebook)
     assert int(delivered["text/plain"]) > 0

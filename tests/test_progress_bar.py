@@ -21,6 +21,7 @@ def test_lines_tell_what_is_done_and_what_is_left(
     capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Console, "is_terminal", False)
+    monkeypatch.setattr("rich.console.monotonic", lambda: 0.0)
     (line,) = shown(capsys, 1, 2_000_000, "loss [0.5]").splitlines()
     assert line.startswith("mine: 1 of 2,000,000 runs, ")
     assert line.endswith(", loss [0.5]")  # alone, as lines are sparse

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 from pydantic import Field, JsonValue, PositiveFloat
 
 from swarm_logistics_env.errors import PolicyError, SwarmLogisticsError
-from swarm_logistics_env.records import Record, atomic_write, read_table
+from swarm_logistics_env.records import Record, atomic_write, read_table, remove_parts
 
 
 class Lamp(Record):
@@ -106,6 +107,34 @@ def test_processes_that_write_one_file_at_once_all_succeed(tmp_path: Path) -> No
     assert [one.wait() for one in writing] == [0] * 4
     assert (tmp_path / "x.csv").read_text() in [100 * sign for sign in "abcd"]
     assert [one.name for one in tmp_path.iterdir()] == ["x.csv"]
+
+
+WRITE_AND_DIE = """
+import os, signal, sys
+from pathlib import Path
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.records import atomic_write
+
+with atomic_write(Path(sys.argv[1]), PolicyError) as part:
+    part.with_name(f"{part.name}-journal").touch()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="locks of POSIX")
+def test_what_a_killed_writer_left_is_removed_once_nobody_writes(tmp_path: Path) -> None:
+    for name in ("x[1].csv", "x.csv", "x.csv"):
+        command = [sys.executable, "-c", WRITE_AND_DIE, name]
+        assert subprocess.run(command, cwd=tmp_path, check=False).returncode == -signal.SIGKILL
+    assert len([*tmp_path.iterdir()]) == 4
+    mine = tmp_path / ".mine.csv"
+    mine.touch()
+    with atomic_write(tmp_path / "x.csv", PolicyError) as part:
+        assert {path.name[:5] for path in tmp_path.iterdir()} == {".x[1]", ".mine", part.name[:5]}
+        with atomic_write(tmp_path / "x[1].csv", PolicyError), remove_parts(tmp_path):
+            assert len([*tmp_path.glob(".x*")]) == 4  # somebody may be at work on them
+    with remove_parts(tmp_path):
+        assert {path.name for path in tmp_path.iterdir()} == {".mine.csv", "x.csv", "x[1].csv"}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links and modes of POSIX")

@@ -49,10 +49,19 @@ class Dying(SwarmDT):
         return super().act(observations)
 """
 
-# Plays the study, in a process group of its own per number of processes that it reads.
+# Plays the study, in a process group of its own per number of processes that it reads. It keeps at
+# most four more runs, and then waits until it is killed.
 SEVERAL_TIMES = """
-import json, os, sys
+import json, os, signal, sys
+from swarm_logistics_env.runs.store import Runs
 from swarm_logistics_env.studies import Study
+
+add, added = Runs.add, []
+def add_or_wait(store, runs):
+    added.extend(runs)
+    if len(added) > 4:
+        signal.pause()
+    add(store, runs)
 
 fields = json.loads(sys.argv[2])
 Study(**{**fields, "seeds": 1, "faults": [], "parameters": []}).run()  # loads what is compiled
@@ -60,6 +69,7 @@ for line in sys.stdin:
     child = os.fork()
     if child == 0:
         os.setpgid(0, 0)
+        Runs.add = add_or_wait
         Study(out=sys.argv[1], **fields).run(processes=int(line))
         os._exit(0)
     print(child, flush=True)
@@ -104,6 +114,7 @@ def test_another_thread_may_ask_a_study_and_play_it(tmp_path: Path) -> None:
 
 def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path) -> None:
     out, total, kept = tmp_path / "out", stored(played), 0
+    moments = random.Random(0)
     with subprocess.Popen(
         [sys.executable, "-c", SEVERAL_TIMES, str(out), json.dumps(SMALL)],
         stdin=subprocess.PIPE,
@@ -118,7 +129,7 @@ def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path
             while stored(out) == kept:
                 os.kill(group, 0)  # it still runs
                 time.sleep(0.002)
-            time.sleep(random.Random().uniform(0, 0.01))
+            time.sleep(moments.uniform(0, 0.01))
             os.killpg(group, signal.SIGKILL)
             assert kept < stored(out) < total
             kept = stored(out)

@@ -67,7 +67,7 @@ class Browser:
 
     def _read(self) -> Any:
         while b"\0" not in self._buffer:
-            ready, _, _ = select.select([self._in], [], [], 60.0)
+            ready, _, _ = select.select([self._in], [], [], 600.0)
             assert ready, "the browser does not answer"
             got = os.read(self._in, 1 << 16)
             assert got, "the browser has ended"
@@ -86,7 +86,7 @@ class Browser:
 
     def wait_for(self, expression: str) -> Any:
         """Return the value of a JavaScript expression once it is true."""
-        for _ in range(600):
+        for _ in range(6000):
             if value := self.value(expression):
                 return value
             time.sleep(0.05)

@@ -47,7 +47,7 @@ class RewardTerms:
     def reweigh(self, weights: Mapping[str, float]) -> None:
         """Pay by other terms or weights from the next step on."""
         self._weights = dict(weights)
-        self._terms = [(term_of(name), weight) for name, weight in weights.items()]
+        self._terms = [(name, term_of(name), weight) for name, weight in weights.items()]
         self.pays_steadily = not _AT_DELIVERIES.issuperset(weights)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -63,12 +63,18 @@ class RewardTerms:
         self._before = Moment(world)
 
     def pay(self, world: Warehouse) -> NDArray[np.float64]:
-        """Return the reward of the step just taken, (N,): one number for each robot."""
+        """Return the reward of the step just taken, (N,): one number for each robot.
+
+        Raises:
+            SetupError: a term of one's own returned what is not finite.
+        """
         before, after = self._before, Moment(world)
         total = np.zeros(world.state.n_robots)
-        for term, weight in self._terms:
+        for name, term, weight in self._terms:
             earned = term(world, before, after)
             if earned is not None:
+                if name not in REWARD_TERMS:
+                    _check_finite(name, earned)
                 total += weight * earned
         self._before = after
         return total
@@ -250,6 +256,13 @@ def term_of(name: str) -> Term:
         raise SetupError(f"no reward term {name!r}{suggest(name, REWARD_TERMS)}")
     term: Term = import_callable("reward term", name, SetupError)
     return term
+
+
+def _check_finite(name: str, earned: Earned) -> None:
+    values = np.ravel(np.asarray(earned, np.float64))
+    finite = np.isfinite(values)
+    if not finite.all():
+        raise SetupError(f"reward term {name!r} = {values[~finite][0]}: should be finite")
 
 
 def finite_number(name: str, value: float) -> float:

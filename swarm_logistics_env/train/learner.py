@@ -103,6 +103,13 @@ def nearest_request(world: World, x: float, y: float) -> int:
     return nearest
 
 
+def check_finite(name: str, numbers: NDArray[Any]) -> None:
+    """Raise a FloatingPointError unless all the numbers are finite."""
+    finite = np.isfinite(numbers)
+    if not finite.all():
+        raise FloatingPointError(f"{name} is {numbers[~finite][0]}")
+
+
 class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environment of the type check
     """Turns observation rows into a network's inputs, and its outputs into commands.
 
@@ -117,6 +124,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     Raises:
         TrainingError, SetupError, ScenarioError, FaultError: the worlds cannot be.
+        FloatingPointError: an observation or a reward is not finite; of `reset` and steps.
     """
 
     def __init__(self, training: Training) -> None:
@@ -168,6 +176,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             self.venv.step_async(self.frame.command(self._outputs))
             observations, more, dones, infos = self.venv.step_wait()
             rewards = rewards + more
+        check_finite("a reward", rewards)
         ended = np.flatnonzero(dones)
         if ended.size:
             last = np.stack([infos[row]["terminal_observation"] for row in ended.tolist()])
@@ -192,6 +201,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         inputs = self.frame.read(observations)
+        check_finite("an observation", inputs)
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
             warehouse, turned = world.warehouse, self.frame.turned[rows]
             floor = warehouse.floor
@@ -352,6 +362,12 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch)
+
+    def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Any:
+        try:
+            return super()._get_action_dist_from_latent(latent_pi)
+        except ValueError as error:  # of torch, whose message has the whole batch
+            raise FloatingPointError("an output of the network is not finite") from error
 
 
 class _TwoReaders(torch.nn.Module):

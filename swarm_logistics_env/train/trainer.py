@@ -17,12 +17,12 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.records import atomic_write, read_table
+from swarm_logistics_env.records import atomic_write, read_table, remove_parts
 from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import (
     evaluate,
@@ -32,6 +32,7 @@ from swarm_logistics_env.train.evaluation import (
 )
 from swarm_logistics_env.train.learner import (
     NetworkView,
+    check_finite,
     device_of,
     make_learner,
     read_checkpoint,
@@ -75,7 +76,7 @@ def train(
 
     Raises:
         TrainingError: the directory holds another training or cannot be used, there is no such
-            device, or `callbacks` are none.
+            device, or `callbacks` are none; or a number is not finite any more, see `_explain_end`.
         SetupError, ScenarioError, FaultError: worlds that cannot be.
     """
     out = Path(out)
@@ -120,7 +121,7 @@ def enter_directory(directory: Path, training: Training, command: str) -> None:
             )
     began = datetime.now(UTC).isoformat(timespec="seconds")
     sessions.append({"began": began, "versions": versions()})
-    with atomic_write(path, TrainingError) as part:
+    with remove_parts(directory), atomic_write(path, TrainingError) as part:
         record = {"command": command, "training": specification, "sessions": sessions}
         part.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 
@@ -135,18 +136,15 @@ def _train(
 ) -> Path:
     """Train a policy, or go on with it, and return the path of its file; see `train`."""
     state = read_checkpoint(out)
-    learner, log = make_learner(training, view, device), TrainingLog()
+    learner = make_learner(training, view, device)
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
-    if state is not None:
-        log = state["log"]
-        restore(learner, state)
-    if learner.num_timesteps < training.agent_steps:
-        log.versions = versions()
-        log.references = log.references or reference_means(training)
-        total, n_learned = training.agent_steps, learner.num_timesteps
-        with ProgressBar(training.name, total, "agent-steps", done=n_learned) as progress:
-            callback = TrainingCallback(training, log, out, progress)
-            learner.learn(total - n_learned, [callback, *callbacks], reset_num_timesteps=False)
+    log = TrainingLog() if state is None else state["log"]
+    with _explain_end(training, out, learner, log):
+        if state is not None:
+            restore(learner, state)
+            check_learner(learner)
+        if learner.num_timesteps < training.agent_steps:
+            _learn(training, out, learner, log, callbacks)
     learner.env.close()
     evaluation = training.evaluation
     log.draw(out / PICTURE, f"{training.name}, N = {evaluation.n_robots}", evaluation.seeds)
@@ -161,6 +159,30 @@ def _train(
     return path
 
 
+def _learn(
+    training: Training, out: Path, learner: Any, log: TrainingLog, callbacks: Sequence[BaseCallback]
+) -> None:
+    """Learn until the training's last agent-step."""
+    log.versions = versions()
+    log.references = log.references or reference_means(training)
+    total = training.agent_steps
+    n_learned = learner.num_timesteps
+    with ProgressBar(training.name, total, "agent-steps", done=n_learned) as progress:
+        callback = TrainingCallback(training, log, out, progress)
+        learner.learn(total - n_learned, [callback, *callbacks], reset_num_timesteps=False)
+
+
+def check_learner(learner: Any) -> None:
+    """Raise a FloatingPointError unless the latest losses, and all that was learned, are finite."""
+    logged = learner.logger.name_to_value
+    losses = [logged.get(f"train/{name}", 0.0) for name in ("value_loss", "policy_gradient_loss")]
+    check_finite("a loss", np.array(losses))
+    policy = learner.policy
+    averages = [mean for means in policy.optimizer.state.values() for mean in means.values()]
+    for numbers in (*policy.parameters(), policy.log_std.exp(), *averages):
+        check_finite("a number of the networks", numbers.detach().cpu().numpy())
+
+
 @contextmanager
 def _explain_disk_errors(out: Path) -> Iterator[None]:
     """Raise a TrainingError that says how to go on where the disk is full or gone."""
@@ -171,6 +193,30 @@ def _explain_disk_errors(out: Path) -> Iterator[None]:
         raise TrainingError(
             f"the training in {out} stopped ({reason}): the same command goes on from its last "
             "checkpoint"
+        ) from error
+
+
+@contextmanager
+def _explain_end(training: Training, out: Path, learner: Any, log: TrainingLog) -> Iterator[None]:
+    """Raise a TrainingError that says at which step a training ended, why, and what is kept."""
+    try:
+        yield
+    except TrainingError:  # of the disk
+        raise
+    except (FloatingPointError, SwarmLogisticsError) as error:
+        kept = "no policy is kept, as none was measured"
+        if log.curve:
+            steps = log.best["agent_steps"]
+            kept = f"kept is {BEST}, with P = {log.best['P']:.4g} at {steps:,} agent-steps"
+        remedy = "mend that, and the same command goes on from the last checkpoint"
+        if isinstance(error, FloatingPointError):
+            remedy = (
+                "the same command would end alike, so train into another directory, with a smaller "
+                f"ppo.learning_rate than {training.ppo.learning_rate:g} or smaller rewards"
+            )
+        raise TrainingError(
+            f"the training in {out} ended at {learner.num_timesteps:,} of "
+            f"{training.agent_steps:,} agent-steps ({error}): {kept}; {remedy}"
         ) from error
 
 
@@ -256,6 +302,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         return True
 
     def _on_rollout_start(self) -> None:
+        check_learner(self.model)
         self._log.cpu_seconds += time.process_time() - self._cpu
         progress = self.num_timesteps / self._training.agent_steps
         if self._training.final_rewards:
@@ -284,6 +331,7 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
             self.model._last_episode_starts = np.ones(training.rows, np.bool_)
 
     def _on_training_end(self) -> None:
+        check_learner(self.model)
         self._log.cpu_seconds += time.process_time() - self._cpu
         if self._log.curve[-1]["agent_steps"] < self.num_timesteps:
             self._evaluate()

@@ -9,8 +9,11 @@ import asyncio
 import contextlib
 import hmac
 import logging
+import math
+import os
 import re
 import secrets
+import socket
 import threading
 import time
 from collections.abc import Callable
@@ -59,37 +62,38 @@ _HEARTBEAT = (
     10.0  # [s] between signs of life of a page; it is closed half as long after a missing one
 )
 _PATIENCE = 10.0  # [s] with a page that does not take a message
-# Connections that are no page, as one that asks for nothing: each costs a file of this process.
-_MOST_SILENT = 32
-_LONGEST_SILENCE = 60.0  # [s]
-_KEPT_ALIVE = 15.0  # [s] between two requests
+# Connections that are no page: each costs a file of this process. Further ones wait to be accepted.
+_MOST_CONNECTIONS = 64
+_MOST_WAITING = 1024
+_LONGEST_SILENCE = 60.0  # [s] of a connection that asks for nothing, or does not take its answer
+_SHORTEST_SILENCE = 5.0  # [s] the same where others wait
+_NOTE_LASTS = 8.0  # [s]
 
 
 class _Connection:
-    """A connection, which aiohttp serves, and which is dropped if too many are silent for long."""
+    """A connection, which aiohttp serves.
 
-    def __init__(self, served: asyncio.Protocol, silent: dict[asyncio.Transport, None]) -> None:
-        self._served, self._silent = served, silent
+    Args:
+        silent_since: the time since when each connection that is no page has been silent; infinite
+            while it is answered.
+    """
+
+    def __init__(
+        self, served: asyncio.Protocol, silent_since: dict[asyncio.Transport, float]
+    ) -> None:
+        self._served, self._silent_since = served, silent_since
 
     def connection_made(self, transport: asyncio.Transport) -> None:
-        self._silent[transport] = None
-        if len(self._silent) > _MOST_SILENT:
-            self._drop(next(iter(self._silent)))  # the oldest
-        asyncio.get_running_loop().call_later(_LONGEST_SILENCE, self._drop, transport)
+        self._silent_since[transport] = time.monotonic()
         self._served.connection_made(transport)
         self._transport = transport
 
     def connection_lost(self, error: Exception | None) -> None:
-        self._silent.pop(self._transport, None)
+        self._silent_since.pop(self._transport, None)
         self._served.connection_lost(error)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._served, name)
-
-    def _drop(self, transport: asyncio.Transport) -> None:
-        if transport in self._silent:
-            del self._silent[transport]
-            transport.abort()
 
 
 class _Page:
@@ -139,18 +143,17 @@ class WatchServer:
         self.recording = Recording(session)
         self.address = ""
         self._pages: set[_Page] = set()
-        self._silent: dict[asyncio.Transport, None] = {}  # the oldest first
-        self._listening: asyncio.Server | None = None
-        app = web.Application(middlewares=[self._guard])
+        self._noted_at = 0.0
+        self._silent_since: dict[asyncio.Transport, float] = {}
+        self._listening: socket.socket | None = None
+        app = web.Application(middlewares=[self._answer_once, self._guard])
         app.router.add_get("/{token}/live", self._live)
         app.router.add_get("/{token}/recording.html", self._save)
         app.router.add_get("/{token}/{name:.*}", self._file)
         app.on_response_prepare.append(_add_headers)
         logger = logging.getLogger(__name__)
         logger.addFilter(_is_own_error)
-        self._runner = web.AppRunner(
-            app, access_log=None, logger=logger, shutdown_timeout=0.5, keepalive_timeout=_KEPT_ALIVE
-        )
+        self._runner = web.AppRunner(app, access_log=None, logger=logger, shutdown_timeout=0.5)
 
     async def start(self) -> None:
         """Listen on this machine, and compile what a page may ask for.
@@ -159,67 +162,100 @@ class WatchServer:
             SetupError: the port is in use or not allowed.
         """
         await self._runner.setup()
+        listening = socket.socket()
         try:
-            self._listening = await asyncio.get_running_loop().create_server(
-                self._accept, LOOPBACK, self.port, backlog=_MOST_SILENT
-            )
+            if os.name == "posix":  # elsewhere it would share a port that is in use
+                listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.setblocking(False)
+            listening.bind((LOOPBACK, self.port))
+            listening.listen(_MOST_WAITING)
         except OSError as error:
+            listening.close()
             await self._runner.cleanup()
             raise SetupError(
                 f"port = {self.port}: {error.strerror}; --port 0 takes any that is free"
             ) from None
-        self.port = self._listening.sockets[0].getsockname()[1]
+        self._listening = listening
+        self.port = listening.getsockname()[1]
         rehearse(self.session)
         self.address = f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
-    def _accept(self) -> Any:
-        assert self._runner.server is not None
-        return _Connection(self._runner.server(), self._silent)
+    async def _accept(self, listening: socket.socket, new_protocol: Callable[[], Any]) -> None:
+        """Accept connections while there is room; the requests of others wait to be read."""
+        loop = asyncio.get_running_loop()
+
+        def new_connection() -> Any:
+            return _Connection(new_protocol(), self._silent_since)
+
+        while True:
+            try:
+                accepted, _ = await loop.sock_accept(listening)
+                await loop.connect_accepted_socket(new_connection, accepted)
+            except OSError:  # it has gone again, or no more files can be open
+                await asyncio.sleep(_FRAME_PERIOD)
+            while len(self._silent_since) >= _MOST_CONNECTIONS:
+                self._drop_silent(_SHORTEST_SILENCE)
+                await asyncio.sleep(_FRAME_PERIOD)
+
+    def _drop_silent(self, longest: float) -> None:
+        """Drop the connections that have been silent for longer [s]."""
+        now = time.monotonic()
+        for transport, since in self._silent_since.items():
+            if now - since > longest:
+                transport.abort()
 
     async def play(self) -> None:
-        """Let the session go on while a page is open, until this is cancelled."""
+        """Answer, and let the session go on while a page is open, until this is cancelled."""
+        assert self._listening is not None
+        assert self._runner.server is not None
+        accepting = asyncio.create_task(self._accept(self._listening, self._runner.server))
         before = time.monotonic()
         try:
             while True:
                 await asyncio.sleep(_FRAME_PERIOD)
                 now = time.monotonic()
                 elapsed, before = now - before, now
+                self._drop_silent(_LONGEST_SILENCE)
+                if now > self._noted_at + _NOTE_LASTS:
+                    self.session.note = ""
                 if self._pages:
                     self.session.play(elapsed, _FRAME_PERIOD, self.recording.note)
                     current_frame = frame_message(self.session)
                     for page in self._pages:
                         page.tell(current_frame)
         finally:
-            if self._listening is not None:
-                self._listening.close()
+            accepting.cancel()
+            self._listening.close()
             await self._runner.cleanup()
 
     async def _live(self, request: web.Request) -> web.StreamResponse:
         if len(self._pages) >= _MOST_PAGES:
-            raise web.HTTPServiceUnavailable(text="Too many pages are open.\n")
-        socket = web.WebSocketResponse(
+            text = f"{_MOST_PAGES} pages are open, and there can be no more: close one.\n"
+            raise web.HTTPServiceUnavailable(text=text, headers={"Retry-After": "5"})
+        page_socket = web.WebSocketResponse(
             max_msg_size=_LONGEST_ORDER, heartbeat=_HEARTBEAT, compress=False
         )
         transport = request.transport
-        await socket.prepare(request)
+        await page_socket.prepare(request)
         if transport is None:
-            return socket  # it has gone meanwhile
-        self._silent.pop(transport, None)
-        page = _Page(socket, transport)
+            return page_socket  # it has gone meanwhile
+        self._silent_since.pop(transport, None)
+        page = _Page(page_socket, transport)
         try:
             self._pages.add(page)
-            await socket.send_str(encode(fixed_data(self.session)))
-            async for message in socket:
+            await page_socket.send_str(encode(fixed_data(self.session)))
+            async for message in page_socket:
                 try:
                     obey(self.session, message.data if isinstance(message.data, str) else "")
                 except SwarmLogisticsError as error:
-                    await socket.send_str(encode({"problem": str(error)}))
+                    await page_socket.send_str(encode({"problem": str(error)}))
+                self._noted_at = time.monotonic()
                 self.recording.note()
         finally:
             self._pages.discard(page)
             # What it has not taken would keep the connection open.
             asyncio.get_running_loop().call_later(_PATIENCE, transport.abort)
-        return socket
+        return page_socket
 
     async def _file(self, request: web.Request) -> web.StreamResponse:
         name = request.match_info["name"] or "page.html"
@@ -231,6 +267,23 @@ class WatchServer:
         headers = {"Content-Disposition": 'attachment; filename="run.html"'}
         page = await asyncio.to_thread(self.recording.page)
         return web.Response(text=page, content_type="text/html", headers=headers)
+
+    @web.middleware
+    async def _answer_once(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Answer one request of a connection, so that none is dropped with another on its way."""
+        transport = request.transport
+        if transport in self._silent_since:
+            self._silent_since[transport] = math.inf
+        try:
+            response = await handler(request)
+            response.force_close()
+            return response
+        except web.HTTPException as refusal:
+            refusal.force_close()
+            raise
+        finally:
+            if transport in self._silent_since:
+                self._silent_since[transport] = time.monotonic()
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:

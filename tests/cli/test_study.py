@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.questions.presets import PRESETS
@@ -127,21 +128,34 @@ app()
 """
 
 
+WAITING = """
+import threading
+from swarm_logistics_env.policies import SwarmDT
+
+class Waiting(SwarmDT):
+    def reset(self, n_robots, seed):
+        super().reset(n_robots, seed)
+        if seed == 5:  # until it is ended
+            threading.Event().wait()
+"""
+
+
 def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
-    file.write_text(FILE.replace("duration = 2", "duration = 500, restock = true"))
-    words = "study run mine.toml --seeds 30 --processes 2 --out out"
+    Path("waiting_policy.py").write_text(WAITING)
+    words = "study run mine.toml --seeds 30 --processes 2 --out out --policy waiting_policy:Waiting"
     process = subprocess.Popen(
         [sys.executable, "-c", SLOW, *words.split()],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        env={**os.environ, QUIET: "1"},
         start_new_session=True,
     )
     while stored("out") == 0:
         assert process.poll() is None, process.communicate()
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=600)
     assert process.returncode == 130
     kept = stored("out")
     assert 0 < kept < 60

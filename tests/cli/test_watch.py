@@ -6,6 +6,7 @@ import http.client
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import webbrowser
@@ -15,6 +16,7 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.watch import server
 from tests.cli.conftest import Command
 
@@ -37,6 +39,7 @@ import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.modules["pygame"] = None
 from swarm_logistics_env.cli import app
+from swarm_logistics_env.numba_fence import QUIET
 sys.exit(app.run(["watch", "--port", "0", "--set", "n_robots=5"]))
 """
 
@@ -47,19 +50,19 @@ def test_page_is_served_until_ctrl_c_without_pygame() -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONWARNINGS": "error"},
+        env={**os.environ, "PYTHONWARNINGS": "error", QUIET: "1"},
     )
     assert started.stdout
     found = re.search(r"http://127\.0\.0\.1:(\d+)(/\S+/) in a browser", started.stdout.readline())
     assert found
-    connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=30)
+    connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=600)
     connection.request("GET", f"{found[2]}page.js")
     answer = connection.getresponse()
     assert answer.status == 200
     assert answer.read()
-    # The connection stays open: it must not keep the command from ending.
-    started.send_signal(signal.SIGINT)
-    _, errors = started.communicate(timeout=60)
+    with socket.create_connection(("127.0.0.1", int(found[1]))):  # must not keep it from ending
+        started.send_signal(signal.SIGINT)
+        _, errors = started.communicate(timeout=600)
     connection.close()
     assert (started.returncode, errors) == (0, "")
 

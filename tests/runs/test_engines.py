@@ -140,7 +140,7 @@ def test_workers_end_with_a_parent_that_is_killed() -> None:
     killed = subprocess.Popen([sys.executable, "-c", script], start_new_session=True, **pipes)
     try:
         # Its workers write there as well, so that it ends only once they have ended.
-        said, _ = killed.communicate(timeout=30)
+        said, _ = killed.communicate(timeout=600)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(killed.pid, signal.SIGKILL)

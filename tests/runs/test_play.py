@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import faulthandler
+import math
 import multiprocessing
 import re
 import sys
-import time
+import threading
 from types import ModuleType
 from typing import Any
 
@@ -101,28 +103,47 @@ def test_a_study_of_which_a_part_works_goes_on(sizes: dict[str, Any], failing: F
     assert (tally.played, tally.failed, tally.gave_up) == (9, 6, False)
 
 
+start_clock = faulthandler.dump_traceback_later
+
+
 class Hanging(SwarmDT):
-    """Decides for ever, at one seed and one swarm size."""
+    """Waits for ever, at one seed and one swarm size: there alone time passes, and fast.
+
+    So the other runs have a limit that the slowest machine keeps.
+    """
 
     identity = "hanging"
+    limit = math.inf
+    at_the_end: dict[str, Any] = {}  # noqa: RUF012 - of the run that this worker plays
 
-    def act(self, observations: Any) -> Any:
-        while self.seed == 1 and len(observations) == 3:
-            time.sleep(0.1)
-        return super().act(observations)
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        if multiprocessing.parent_process() is not None:
+            vars(faulthandler)["dump_traceback_later"] = Hanging.note_limit
+
+    @staticmethod
+    def note_limit(limit: float, **at_the_end: Any) -> None:
+        Hanging.limit = limit
+        Hanging.at_the_end = at_the_end
 
     def reset(self, n_robots: int, seed: int) -> None:
         super().reset(n_robots, seed)
         self.seed = seed
 
+    def act(self, observations: Any) -> Any:
+        if self.seed == 1 and len(observations) == 3:
+            start_clock(Hanging.limit / 10_000, **Hanging.at_the_end)
+            threading.Event().wait()
+        return super().act(observations)
+
 
 def test_a_run_that_hangs_is_ended_and_has_failed(sizes: dict[str, Any]) -> None:
     before = {process.pid for process in multiprocessing.active_children()}
     study = Study(**{**sizes, "policies": [Hanging()], "seeds": 2, "sizes": [{"values": [2, 3]}]})
-    tally = study.run(processes=2, run_limit=3.0)
+    tally = study.run(processes=2, run_limit=1000.0)
     assert (tally.played, tally.failed) == (4, 1)
     assert tally.error == (
-        "RunLimit: a run took longer than the limit of 3 s (run_limit, --run-limit)"
+        "RunLimit: a run took longer than the limit of 1000 s (run_limit, --run-limit)"
     )
     assert tally.place.startswith(f"{__file__}:")
     rows = study.results()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import json
 import pickle
 import pkgutil
@@ -207,6 +208,61 @@ def test_what_cannot_be_gone_on_with_is_refused(small: Any, done: Path, tmp_path
         (tmp_path / "training.json").write_text(json.dumps({**record, **changed}))
         with pytest.raises(TrainingError, match=r"training.json is damaged"):
             train(small(), tmp_path)
+
+
+def spoil_observations(patch: pytest.MonkeyPatch) -> None:
+    """Let a robot sense what is no number, after 50 decisions."""
+    read, n_reads = MotionView.read, itertools.count()
+
+    def read_nan(frame: MotionView, observations: Any) -> Any:
+        inputs = read(frame, observations)
+        inputs[0, 0] = np.nan if next(n_reads) > 50 else inputs[0, 0]
+        return inputs
+
+    patch.setattr(MotionView, "read", read_nan)
+
+
+OWN_REWARD = """
+def reward(world, before, after):
+    return float("nan") if world.state.time > 5.0 else 0.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({"learning_rate": 1e30}, "output of the network is not finite"),
+        ({"learning_rate": 1e30, "n_minibatches": 1, "epochs": 1}, "network.* is "),
+        ({"rewards": {"contact": -1e30}}, "a loss is inf"),
+        ({"rewards": {"contact": -1e300}}, "a reward is -inf"),
+        ({"rewards": {"own_reward.py:reward": 1.0}}, "reward term '.*:reward' = nan: should be"),
+        ({}, "an observation is nan"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of numpy and stable-baselines3
+def test_a_training_whose_numbers_are_not_finite_ends_in_a_sentence_and_keeps_the_best_policy(
+    small: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    fields: dict[str, Any],
+    reason: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("own_reward.py").write_text(OWN_REWARD)
+    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    if not fields:
+        spoil_observations(monkeypatch)
+    settings = {name: value for name, value in fields.items() if name != "rewards"}
+    ppo = small().ppo.replace(**settings)
+    rewards = fields.get("rewards", {"contact": -1.0})
+    training = small(rewards=rewards, ppo=ppo)
+    for _ in range(2):  # who tries again is told the same
+        with pytest.raises(TrainingError, match=rf"of 640 agent-steps \(.*{reason}.*kept is best"):
+            train(training, tmp_path / "out")
+    assert policies.read_card(tmp_path / "out/best.safetensors").agent_steps < 640
+    saved = read_checkpoint(tmp_path / "out")
+    assert saved is not None
+    assert all(numbers.isfinite().all() for numbers in saved["policy"].values())
 
 
 def full(*_: object, **__: object) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 import pickle
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, swarm_logistics_v0
 from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
 
 STAY = np.zeros((2, 4))
@@ -62,11 +64,11 @@ def test_a_world_that_another_thread_uses_is_refused_and_stays_as_it_is(
     def hold() -> None:
         with env.lock:
             is_held.set()
-            is_over.wait(60.0)
+            is_over.wait(600.0)
 
     other = threading.Thread(target=hold)
     other.start()
-    is_held.wait(60.0)
+    is_held.wait(600.0)
     try:
         with pytest.raises(SetupError, match="another thread is using this world"):
             use(env)
@@ -84,6 +86,7 @@ import sys, threading
 import numpy as np
 from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.numba_fence import QUIET
 world = Warehouse(Scenario(n_robots=30, duration=1000.0, restock=True))
 world.reset(0)
 commands, n_steps = np.full((30, 4), 0.5), [0, 0]
@@ -112,7 +115,10 @@ print(sys.argv[1] == "reset" or sum(n_steps) == world.state.step)
 @pytest.mark.parametrize("beside", ["step", "reset"])
 def test_two_threads_at_one_world_do_not_end_the_process(beside: str) -> None:
     command = [sys.executable, "-c", PROGRAM, beside]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    environment = {**os.environ, QUIET: "1"}
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=600, check=False, env=environment
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
 
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import multiprocessing
+import os
 import subprocess
 import sys
 import threading
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.errors import CommandError
+from swarm_logistics_env.numba_fence import QUIET
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.warehouse import thread_pool
 from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
@@ -100,7 +102,7 @@ def test_helpers_end_with_the_pool(is_closed: bool) -> None:
     del pool
     gc.collect()
     for helper in helpers:
-        helper.join(10.0)
+        helper.join(600.0)
     assert not any(helper.is_alive() for helper in helpers)
 
 
@@ -170,7 +172,7 @@ def test_a_process_that_was_forked_has_threads_of_its_own() -> None:
     context = multiprocessing.get_context("fork")
     forked = context.Process(target=play_on, args=(pool, made, expected))
     forked.start()
-    forked.join(60.0)
+    forked.join(600.0)
     assert forked.exitcode == 0
     np.testing.assert_array_equal(step(pool, made, commands(1)), expected)
     pool.close()
@@ -193,7 +195,10 @@ print(rows.any())
 @pytest.mark.compiled
 def test_a_program_ends_while_its_pool_is_at_work() -> None:
     command = [sys.executable, "-c", PROGRAM]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    environment = {**os.environ, QUIET: "1"}
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=600, check=False, env=environment
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
 
 

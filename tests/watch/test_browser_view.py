@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from swarm_logistics_env import Fault
-from swarm_logistics_env.watch import Session
+from swarm_logistics_env.watch import Session, server
 from swarm_logistics_env.watch.messages import recorded_page
 from tests.watch.conftest import SMALL, Served
 from verification.browser import Browser
@@ -95,6 +95,22 @@ def test_arenas_take_the_room_that_the_window_has_and_nothing_is_cut_off(
         assert browser.value(CUT_OFF) == []
     finally:
         served.stop()
+
+
+def test_on_a_phone_a_note_covers_nothing_and_a_page_that_is_refused_says_why(
+    served: Served, browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "_NOTE_LASTS", 600.0)
+    browser.call("Emulation.setDeviceMetricsOverride", **device((390, 844)))
+    browser.open(served.server.address)
+    browser.wait_for("latest && element('state').hidden")
+    top = browser.value("element('delivered0').getBoundingClientRect().top")
+    browser.value("order({ do: 'toggle', robot: 2 })")
+    browser.wait_for("element('note').textContent")
+    height = browser.value("element('note').getBoundingClientRect().height")
+    assert browser.value("element('delivered0').getBoundingClientRect().top") == top + height
+    browser.value("connects = Array.from({ length: 16 }, connect)")
+    browser.wait_for("element('state').textContent.includes('16 pages are open')")
 
 
 def test_page_tells_that_the_server_has_gone(browser: Browser) -> None:

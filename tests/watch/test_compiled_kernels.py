@@ -34,12 +34,12 @@ async def use():
                 await page.send_str(json.dumps(order))
                 message = {}
                 while message.get("time", 0.0) < 1.0 and order["do"] == "toggle":
-                    message = await page.receive_json(timeout=30)
+                    message = await page.receive_json(timeout=600)
                     assert "problem" not in message, message
             while message.get("seed") != 1:
-                message = await page.receive_json(timeout=30)
+                message = await page.receive_json(timeout=600)
             while message.get("time", 0.0) < 5.0:
-                message = await page.receive_json(timeout=30)
+                message = await page.receive_json(timeout=600)
         async with client.get(server.address + "recording.html") as answer:
             assert answer.status == 200
     playing.cancel()

@@ -41,8 +41,9 @@ function connect() {
   socket = new WebSocket(new URL("live", location.href.replace(/^http/, "ws")));
   socket.onmessage = ({ data }) => receive(JSON.parse(data));
   socket.onopen = () => { retries = 0; frames = []; latest = null; };
-  socket.onclose = () => {
-    tell("The server has gone. Start swarm-logistics watch again and open the address that it prints.", "lost");
+  socket.onclose = async () => {
+    const refusal = await fetch("live").then((answer) => answer.status === 503 && answer.text(), () => "");
+    tell(refusal || "The server has gone. Start swarm-logistics watch again and open the address that it prints.", "lost");
     setTimeout(connect, Math.min(2000, 250 * 2 ** retries++));
   };
 }
