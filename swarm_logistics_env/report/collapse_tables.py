@@ -13,7 +13,7 @@ from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.collapses import Collapse, Edge, edges
 
-from .section import NOTHING, P_LEVEL, Section, bracketed, fixed
+from .section import NOTHING, P_LEVEL, Section, bracketed, fixed, plural
 
 _MOST_CONDITIONS = 2  # that a note of the answer names
 
@@ -42,7 +42,7 @@ def untestable_in_words(by_reason: Mapping[str, Sequence[Cell]], *, names_polici
     words = []
     for reason, cells in by_reason.items():
         first = f"of {cells[0].policy} at {cells[0].words}" if names_policies else cells[0].words
-        more = f" and {len(cells) - 1} conditions more" if len(cells) > 1 else ""
+        more = f" and {plural(len(cells) - 1, 'condition')} more" if len(cells) > 1 else ""
         words.append(f"{first}{more} ({reason})")
     return ", ".join(words)
 
