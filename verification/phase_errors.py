@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 
-SETS, STUDIES = 400, 100
+SETS, STUDIES = 400, 30
 N_RUNS = (12, 20, 30, 60, 128, 200)
 SIZES = (10, 14, 20, 28, 40, 56, 80, 113, 160)
 FILE = Path(__file__).parents[1] / "docs" / "results" / "phase_errors.csv"

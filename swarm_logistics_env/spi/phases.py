@@ -212,7 +212,7 @@ _FLOORS = np.array([0.0, 0.03, 0.08, 0.15, 0.22, 0.3])  # share at the smallest 
 _CEILINGS = 1.0 - _FLOORS  # at the largest
 _MOST_LAPSES = 0.25  # where floor or ceiling may lie further from 0 or 1, no interval is given
 _LEAST_CHANCE = 1e-4  # of a collapse, or logarithms would be infinite
-_CORRELATION = 0.1  # of collapses within a size: shares may scatter by .15 around the logistic
+_CORRELATION = 0.15  # of collapses within a size: their share may scatter by .2 around the curve
 
 
 def critical_size(
@@ -223,7 +223,7 @@ def critical_size(
     The share that collapses is a logistic function of log N that grows with N, from a floor, as
     good runs are taken for collapsed ones, to a ceiling. The value is midway between the two. The
     interval is that of the profile quasi-likelihood, in which collapses within a size correlate by
-    .1, as those of a beta-binomial share, or scatter as much as they do. It is given where the
+    .15, as those of a beta-binomial share, or scatter as much as they do. It is given where the
     sizes show floor and ceiling within a quarter of 0 and 1: half may never collapse otherwise.
 
     Args:

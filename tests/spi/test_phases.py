@@ -73,7 +73,7 @@ def test_what_cannot_show_two_phases_is_untestable_and_says_why(
 
 
 def test_the_planted_critical_size_is_covered() -> None:
-    # 100 studies of each there.
+    # 30 studies of each there.
     shares = coverage(60, Growth(8.0), studies=12)
     assert shares.named > 0.8
     assert shares.missed <= 0.17
