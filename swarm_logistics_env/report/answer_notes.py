@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterator, Sequence
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.tasks.task import DEFAULT
-from swarm_logistics_env.verdicts.collapses import collapses
+from swarm_logistics_env.verdicts.collapses import collapses, untestable
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import UNTESTABLE, Verdict
 
 from . import section, templates
-from .collapse_tables import collapsed_in_words
+from .collapse_tables import collapsed_in_words, untestable_in_words
 from .templates import Slots, fill
 
 _FEW_ITEMS = 1.0  # in a run, of which shares say little
@@ -66,6 +66,9 @@ def _notes_that_apply(
     if named := collapses(results.cells):
         words = collapsed_in_words(named, names_policies=len(results.policies) > 1)
         yield "collapsed_runs", {"conditions": words}
+    if by_reason := untestable(results.cells):
+        words = untestable_in_words(by_reason, names_policies=len(results.policies) > 1)
+        yield "phases_untestable", {"conditions": words}
     if needs_runs:
         yield "more_runs", {"runs": "seeds" if is_paired else "trials a condition"}
     elif any(verdict.conclusion == "open" for verdict in verdicts):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +13,7 @@ from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.collapses import Collapse, Edge, edges
 
-from .section import NOTHING, P_LEVEL, Section, bracketed, fixed
+from .section import NOTHING, P_LEVEL, Section, bracketed, fixed, plural
 
 _MOST_CONDITIONS = 2  # that a note of the answer names
 
@@ -36,6 +37,16 @@ def collapsed_in_words(
     return ", ".join(words) + f" and {left} conditions more (--full)" * (left > 0)
 
 
+def untestable_in_words(by_reason: Mapping[str, Sequence[Cell]], *, names_policies: bool) -> str:
+    """Return which conditions were not tested, and why, e.g. "N = 4 and 2 more (counts ..)"."""
+    words = []
+    for reason, cells in by_reason.items():
+        first = f"of {cells[0].policy} at {cells[0].words}" if names_policies else cells[0].words
+        more = f" and {plural(len(cells) - 1, 'condition')} more" if len(cells) > 1 else ""
+        words.append(f"{first}{more} ({reason})")
+    return ", ".join(words)
+
+
 def _breaks_in_words(collapse: Collapse) -> str:
     """Return how many of the runs collapsed in mid-run, and when; empty where none is known to."""
     breaks = collapse.breaks
@@ -57,7 +68,7 @@ def edge_sections(cells: Sequence[Cell]) -> Iterator[Section]:
         first = edge.cells[0]
         columns = "N", f"collapsed, {P_LEVEL}", "S of all runs", "S of the runs that did not"
         line = (
-            f"{critical_size_in_words(edge)} (logistic in log N, profile likelihood). Two phases "
+            f"{critical_size_in_words(edge)} (logistic in log N, quasi-likelihood). Two phases "
             "are named where a test with 5 % of error over the sizes says so; the other sizes are "
             "told by the one that shows them most clearly."
         )
@@ -70,6 +81,11 @@ def critical_size_in_words(edge: Edge) -> str:
     largest = edge.cells[-1].words
     if edge.size.value > edge.cells[-1].arm.setting.value:
         return f"Less than half of the runs collapse up to {largest}"
+    if edge.size.low == 0.0 and edge.size.high == math.inf:
+        return (
+            f"Half of the runs collapse at about N = {fixed(edge.size.value, 0)}, without "
+            "interval: the sizes do not show both that few and that nearly all runs collapse"
+        )
     return f"Half of the runs collapse at N = {bracketed(edge.size, 0)}"
 
 

@@ -95,6 +95,7 @@ NOTES = {
     "collapsed": "of the trainings at worst {collapsed}",
     "capped": "{mark} P is capped: --clearing or --restock has no cap",
     "collapsed_runs": "runs collapse {conditions}",
+    "phases_untestable": "two phases untestable: {conditions}",
     "open": "open: undecided by these {runs}",
     "more_runs": "open: undecided; so many more {runs} would tell in 4 of 5 studies",
     "open_for_a_reason": "{reasons}",

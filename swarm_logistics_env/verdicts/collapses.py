@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.spi.inputs import Numbers
-from swarm_logistics_env.spi.phases import LEVEL, collapsed_runs, critical_size, two_phases
+from swarm_logistics_env.spi.phases import (
+    FEWEST_RUNS,
+    LEVEL,
+    collapsed_runs,
+    critical_size,
+    two_phases,
+)
 from swarm_logistics_env.tasks.task import Outcome
 
 from .cell import Cell
@@ -48,7 +54,8 @@ class Edge:
         cells: of its sizes, ascending.
         shares: of the runs that collapsed at each, with exact intervals.
         good_runs: P of the runs that did not, at each, shape (n,).
-        size: at which half of the runs collapse, with its interval.
+        size: at which half of the runs collapse, with its interval; its ends are 0 and infinite
+            where none is given.
     """
 
     cells: tuple[Cell, ...]
@@ -72,6 +79,21 @@ def collapses(cells: Sequence[Cell]) -> list[Collapse]:
             share = _share(n_collapsed, len(has_collapsed))
             named.append(Collapse(cell, share, n_collapsed, _breaks(cell.outcomes, has_collapsed)))
     return named
+
+
+def why_untestable(cell: Cell) -> str:
+    """Return why the runs of a condition were not tested for two phases; empty: they were."""
+    return two_phases(cell.by_seed.ravel(), 1.0).untestable if cell.n_seeds else ""
+
+
+def untestable(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
+    """Return the conditions with enough runs that were not tested for two phases, by the reason."""
+    unique = {(cell.policy, cell.arm.case.key): cell for cell in cells}
+    # The largest P is left out of the test.
+    with_runs = [cell for cell in unique.values() if cell.n_seeds > FEWEST_RUNS]
+    by_reason: dict[str, list[Cell]] = map_reduce(with_runs, why_untestable)
+    by_reason.pop("", None)
+    return by_reason
 
 
 def _breaks(outcomes: Sequence[Outcome], has_collapsed: NDArray[np.bool_]) -> Numbers:

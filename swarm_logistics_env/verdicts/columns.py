@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 from swarm_logistics_env.spi import Equivalence, Estimate
 
 from .cell import Cell
+from .collapses import why_untestable
 from .verdict import Verdict
 
 if TYPE_CHECKING:
@@ -77,6 +78,11 @@ CELL_COLUMNS: Columns[Cell] = {
         float,
         lambda cell: cell.stalled,
         "share of runs with less than a quarter of the median P",
+    ),
+    "phases_untestable": (
+        str,
+        lambda cell: why_untestable(cell) or None,
+        "why the runs were not tested for two phases; missing: they were",
     ),
     "contacts": (
         float,

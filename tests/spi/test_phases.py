@@ -8,15 +8,29 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import spi
-from verification.phase_errors import ONE_PHASE, SIZES, coverage, share_named
+from verification.phase_errors import CHOSEN, HELD_OUT, SIZES, Growth, coverage, share_named
+
+# Those that come nearest to the level, and those that exceeded it before ties were spread.
+WORST = (
+    "Poisson 0.4",
+    "Poisson 1 in tens",
+    "Binomial(10, .9)",
+    "80 % zero, else Poisson 2",
+    "50 % zero, else flat",
+    "6 maps, spread 10, scatter 1",
+    "100 - Exp(15)",
+    "60 % zero, else flat",
+    "mean 3, most zero",
+    "mostly capped shares",
+)
 
 
-# `python -m verification.phase_errors` draws 4,000 sets of each.
-@pytest.mark.parametrize("n", [12, 30, 128])
-@pytest.mark.parametrize("kind", ONE_PHASE)
-def test_one_phase_is_seldom_taken_for_two(kind: str, n: int) -> None:
-    # 5 % are allowed; more than 8 % come by chance in .5 % of tests.
-    assert share_named(ONE_PHASE[kind], n, sets=400) <= 0.08
+# `python -m verification.phase_errors` draws 400 sets of each, of all generators.
+@pytest.mark.parametrize("kind", WORST)
+def test_one_phase_is_seldom_taken_for_two(kind: str) -> None:
+    draw = {**CHOSEN, **HELD_OUT}[kind]
+    # 5 % are allowed; more than 12 % come by chance in .1 % of tests.
+    assert share_named(draw, 20, sets=100) <= 0.12
 
 
 def test_two_phases_are_named_with_the_p_between_them() -> None:
@@ -33,16 +47,40 @@ def test_two_phases_are_named_with_the_p_between_them() -> None:
     assert phases.p_value < 1e-3
 
 
-@pytest.mark.parametrize("runs", [[1.0] * 30, [0.0] * 30, [3.0, 9.0] * 4, [0.0] * 29 + [5.0]])
-def test_what_cannot_show_two_phases_shows_one(runs: list[float]) -> None:
-    assert spi.two_phases(runs) == spi.Phases(1.0, None)
+def test_a_phase_that_lost_less_than_a_quarter_has_not_collapsed() -> None:
+    rng = np.random.default_rng(0)
+    slower = np.concatenate([rng.normal(80, 2, 30), rng.normal(100, 2, 30)])
+    assert spi.two_phases(slower) == spi.Phases(1.0, None)
+
+
+@pytest.mark.parametrize(
+    ("runs", "reason"),
+    [
+        ([1.0] * 30, "fewer than 10 runs lie below the largest P"),
+        ([3.0, 9.0] * 4, "fewer than 10 runs lie below the largest P"),
+        ([0.0] * 29 + [5.0], "counts are too small"),
+        ([0.0] * 36 + [1.0] * 17 + [2.0] * 7, "counts are too small"),
+        ([0.0] * 36 + [0.1] * 17 + [0.1 + 0.2] * 3 + [0.3] * 4, "counts are too small"),
+    ],
+)
+def test_what_cannot_show_two_phases_is_untestable_and_says_why(
+    runs: list[float], reason: str
+) -> None:
+    phases = spi.two_phases(runs)
+    assert (phases.p_value, phases.boundary) == (1.0, None)
+    assert phases.untestable.startswith(reason)
+    assert spi.collapsed_runs({25: runs}) is None
 
 
 def test_the_planted_critical_size_is_covered() -> None:
-    # 1,000 studies there.
-    named_share, covered = coverage(60, 8.0, studies=100)
-    assert named_share > 0.85
-    assert covered >= 0.86  # .95 are expected; less than .86 by chance in .1 % of tests
+    # 30 studies of each there.
+    shares = coverage(60, Growth(8.0), studies=12)
+    assert shares.named > 0.8
+    assert shares.missed <= 0.17
+
+
+def test_a_share_that_levels_off_gives_no_interval() -> None:
+    assert coverage(60, Growth(8.0, ceiling=0.7), studies=5).with_interval == 0.0
 
 
 def test_no_size_with_two_phases_tells_no_collapse() -> None:
@@ -51,13 +89,13 @@ def test_no_size_with_two_phases_tells_no_collapse() -> None:
 
 
 def test_the_critical_size_lies_where_half_collapse() -> None:
-    size = spi.critical_size([10, 20, 40], [0, 15, 30], [30, 30, 30])
-    assert size.value == pytest.approx(20.0, rel=0.02)
+    size = spi.critical_size([10, 14, 20, 28, 40], [0, 0, 15, 30, 30], [30] * 5)
+    assert size.value == pytest.approx(20.0, rel=0.03)
     assert size.low is not None
     assert size.high is not None
-    assert 10.0 < size.low < 20.0 < size.high < 40.0
-    # Where no size is beyond it, nothing bounds it from above.
-    assert spi.critical_size([10, 20], [0, 3], [30, 30]).high == math.inf
+    assert 14.0 < size.low < 20.0 < size.high < 28.0
+    # Where few of the runs collapse at every size, nothing bounds it.
+    assert spi.critical_size([10, 20], [0, 3], [30, 30])[1:] == (0.0, math.inf)
     for counts in ([0, 0], [30, 30]):
         with pytest.raises(spi.IndicatorError, match="should be some of the runs, not all"):
             spi.critical_size([10, 20], counts, [30, 30])

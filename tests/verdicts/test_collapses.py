@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from swarm_logistics_env import judge
+from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.collapse_tables import collapsed_in_words
 from swarm_logistics_env.verdicts.collapses import collapses
 
@@ -36,3 +37,13 @@ def test_without_times_nothing_is_said_of_mid_run() -> None:
     collapse, _ = collapses(judge(frame).cells)
     assert len(collapse.breaks) == 0
     assert "mid-run" not in collapsed_in_words([collapse], names_policies=False)
+
+
+def test_counts_too_small_for_phases_are_untestable_in_answer_and_table() -> None:
+    p = [0] * 24 + [1] * 11 + [2] * 5
+    frame = pd.DataFrame({"robots": [4, 8] * 20, "delivered": p})
+    results = judge(frame)
+    reason = "counts are too small: fewer than 5 steps from least to most"
+    assert f"two phases untestable: N = 4 and 1 condition more ({reason})" in answer(results).notes
+    assert {*results.cell_table["phases_untestable"]} == {reason}
+    assert collapses(results.cells) == []
