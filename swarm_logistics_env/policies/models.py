@@ -1,5 +1,6 @@
 """Policies of a learner's model: any network that turns rows into outputs.
 
+How networks of each library are called stands in `networks`, what prepares rows in `normalizers`.
 What `MotionFrame`, `DiscreteActions` and a normaliser do around an environment is done here around
 the model, by the same code, so that it plays as it learned.
 """
@@ -20,18 +21,21 @@ from swarm_logistics_env.fingerprint import fingerprint, package_code
 from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
 from swarm_logistics_env.motion.frame import MotionView
 from swarm_logistics_env.observations import N_COLUMNS, N_NEIGHBOURS
+from swarm_logistics_env.policies.model_spaces import (
+    check_spaces,
+    check_statistics,
+    check_width,
+    width_of,
+)
 from swarm_logistics_env.policies.networks import (
     Decide,
     OnnxNetwork,
     PredictingPolicy,
     Rows,
     TorchNetwork,
-    check_spaces,
-    check_width,
     outputs_of,
     predictor_in,
     tried,
-    width_of,
 )
 from swarm_logistics_env.policies.normalizers import normalizer_of
 from swarm_logistics_env.policies.policy import Described, Policy, check_policy, identity
@@ -41,8 +45,8 @@ from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.warehouse import Warehouse
 
 _CODE = (
-    "policies/models.py", "policies/networks.py", "policies/normalizers.py",
-    "policies/sb3_files.py",
+    "policies/models.py", "policies/model_spaces.py", "policies/networks.py",
+    "policies/normalizers.py", "policies/sb3_files.py",
 )  # fmt: skip
 # Networks whose libraries tell how they are used; a function is the user's own code.
 _OF_LIBRARIES = (TorchNetwork, PredictingPolicy, OnnxNetwork)
@@ -56,18 +60,23 @@ def of(
 ) -> ModelPolicy:
     """Return the policy of a model: whatever turns rows of inputs (N, D) into outputs (N, k).
 
+    Torch modules play in evaluation mode, and get their own mode back after each decision. Of
+    several outputs the one called "action" is played, or the first.
+
     Args:
-        network: a function of rows, a torch module, a model of stable-baselines3 (its most likely
-            action), or an InferenceSession of onnxruntime. It has no memory of its own.
+        network: a function of rows, a torch module, a program of `torch.export`, a model of
+            stable-baselines3 (its most likely action), or an InferenceSession of onnxruntime. It
+            has no memory of its own.
         frame: whether it learned through `MotionFrame`: it reads rows of `motion.INPUTS` and gives
             rows of `motion.OUTPUTS`. Else it reads observations (N, D) and gives commands (N, 4).
             Whole numbers (N,) are actions of `DiscreteActions`, in either case.
         listens: as of `MotionFrame`.
         normalize: what its rows went through: None, a function of rows, a pair (mean, standard
-            deviation), or a `VecNormalize` of stable-baselines3.
+            deviation), or a `VecNormalize` of stable-baselines3, whose statistics may go on.
 
     Raises:
-        PolicyError: `network` or `normalize` is none of these.
+        PolicyError: `network` or `normalize` is none of these, or cannot be played: it is tried
+            once with the rows of a swarm.
 
     Example:
         >>> policy = of(lambda rows: np.tanh(rows[:, :3]), frame=True)
@@ -94,7 +103,7 @@ def within(model: Any, wrap: Callable[[Any], Any], *, normalize: Any = None) -> 
         normalize: of a network, as of `of`.
 
     Raises:
-        PolicyError: one of them is something else.
+        PolicyError: one of them is something else. A network is tried with the first rows.
 
     Example:
         >>> from swarm_logistics_env import Scenario, run_episode
@@ -201,7 +210,7 @@ class ModelPolicy(Described):
         if hasattr(decide, "policy") and hasattr(decide.policy, "observation_space"):
             check_spaces(about, decide.policy, frame)
         check_width(about, width_of(decide), frame)
-        check_width("normalize", width_of(prepare), frame)
+        check_statistics(width_of(prepare), width_of(decide), frame)
         self.configure(Scenario())
         if isinstance(decide, _OF_LIBRARIES):
             self._try_out()

@@ -6,20 +6,18 @@ A network of a library that is not installed is never met, so nothing is importe
 from __future__ import annotations
 
 import contextlib
+import copyreg
 import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError
-from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
-from swarm_logistics_env.motion.frame import OUTPUTS
 from swarm_logistics_env.motion.network_inputs import INPUTS
-from swarm_logistics_env.observations import N_COLUMNS, N_NEIGHBOURS
 from swarm_logistics_env.policies.evaluation_mode import in_evaluation
 
 Rows = NDArray[np.float32]
@@ -141,6 +139,11 @@ class OnnxNetwork:
         self._type = _ONNX_TYPES[kind]
         shape = getattr(inputs[0], "shape", [None, None])
         self._takes_one_row, self.width = _rows_of_shape("the ONNX network", shape)
+        if type(session).__module__.startswith("onnxruntime."):
+            copyreg.pickle(type(session), _taken_apart)  # which it does not offer itself
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self  # it has no memory
 
     def __call__(self, rows: Rows) -> NDArray[Any]:
         """Return the outputs for rows (N, D)."""
@@ -162,6 +165,12 @@ class OnnxNetwork:
             number = next((names.index(name) for name in _ACTION_NAMES if name in names), 0)
         output = np.asarray(outputs[number])
         return output.astype(np.float32) if output.dtype.kind == "f" else output
+
+
+def _taken_apart(session: Any) -> tuple[Any, ...]:
+    """Return what makes the same session in another process: class, model and providers."""
+    model = session._model_path or session._model_bytes
+    return type(session), (model, None, session.get_providers())
 
 
 def _rows_of_shape(about: str, shape: Sequence[Any]) -> tuple[bool, int | None]:
@@ -203,10 +212,11 @@ def outputs_of(decide: Decide, prepare: Decide, rows: Rows, about: str) -> NDArr
         raise
     except RAISED_BY_OTHERS as error:
         kind = type(error).__name__
-        is_framed = rows.shape[1] == len(INPUTS)
-        hint = "" if is_framed else "; if it learned through MotionFrame: frame=True"
+        hint = "; if it learned through MotionFrame: frame=True, in other wrappers: policies.within"
+        if rows.shape[1] == len(INPUTS):
+            hint = ""
         raise PolicyError(
-            f"{about} failed with rows of shape {rows.shape} ({kind}: {error}){hint}"
+            f"{about} failed with rows of shape {rows.shape} ({kind}: {error})" + hint
         ) from error
     if outputs.dtype.kind not in "fiub":
         raise PolicyError(
@@ -243,73 +253,6 @@ def _are_several(outputs: tuple[Any, ...] | list[Any], n_rows: int) -> bool:
         return False
     are_rows = len(shapes) == n_rows and len(shapes[0]) == 1 and len(set(shapes)) == 1
     return shapes[0][0] == n_rows and not are_rows
-
-
-def width_of(part: object) -> int | None:
-    """Return how many numbers a network or a normalizer reads of each row; None: unknown."""
-    width: int | None = getattr(part, "width", None)
-    return width
-
-
-def check_width(about: str, width: int | None, frame: bool) -> None:
-    """Check that a row of as many numbers is met where a network will play.
-
-    Args:
-        about: what reads such rows.
-        width: of a row; None: any.
-        frame: as `policies.of`.
-
-    Raises:
-        PolicyError: it is not.
-    """
-    if width is None or (frame and width == len(INPUTS)):
-        return
-    if frame:
-        raise PolicyError(
-            f"{about} takes rows of shape {(width,)}: with frame=True, or --frame, should be "
-            f"{len(INPUTS)} inputs, as MotionFrame makes them"
-        )
-    if width == len(INPUTS):
-        raise PolicyError(
-            f"{about} takes rows of shape {(width,)} and not {(N_COLUMNS,)}, so it learned through "
-            "MotionFrame: should be read with frame=True, or --frame"
-        )
-    if width < N_COLUMNS or (width - N_COLUMNS) % N_NEIGHBOURS:
-        raise PolicyError(
-            f"{about} takes rows of shape {(width,)}: should be {(N_COLUMNS,)}, as observations "
-            f"without messages, or with frame=True {(len(INPUTS),)}; wrappers in which it learned "
-            "are named by --env, or policies.within"
-        )
-
-
-def check_spaces(about: str, model: Any, frame: bool) -> None:
-    """Check that a model of stable-baselines3 maps what it will be given to what is taken.
-
-    Raises:
-        PolicyError: it does not.
-    """
-    rows, commands = model.observation_space.shape, model.action_space.shape
-    if rows is not None and len(rows) == 1:
-        check_width(about, rows[0], frame)
-    if rows is None or commands is None:
-        raise PolicyError(
-            f"{about} maps {model.observation_space} to {model.action_space}: should map a row of "
-            "observations, in one Box, to a row of commands or to one number"
-        )
-    n_actions = getattr(model.action_space, "n", None)
-    is_number = commands == () and n_actions == len(MOTION_ACTIONS if frame else ACTIONS)
-    is_box = hasattr(model.action_space, "low") and len(commands) == 1
-    n_messages = commands[0] - 4 if is_box and not frame else 0
-    expected = (len(INPUTS),) if frame else (N_COLUMNS + N_NEIGHBOURS * n_messages,)
-    taken = (len(OUTPUTS),) if frame else (4 + n_messages,)
-    is_taken = is_number or (is_box and n_messages >= 0 and commands == taken)
-    if rows != expected or not is_taken:
-        raise PolicyError(
-            f"{about} maps observations {rows} to {model.action_space}: should map "
-            f"({N_COLUMNS},) to (4,), or through MotionFrame ({len(INPUTS)},) to "
-            f"({len(OUTPUTS)},), or to one of {len(ACTIONS)} or {len(MOTION_ACTIONS)} actions of "
-            "DiscreteActions; wrappers in which it learned are named by --env, or policies.within"
-        )
 
 
 def tried(decide: Decide, prepare: Decide, rows: Rows, about: str) -> Decide:

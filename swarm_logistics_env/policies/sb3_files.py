@@ -112,8 +112,12 @@ def read_model(path: Path) -> Any:
             data = json.loads(archive.read("data"))
         with allow_all_imports(), one_thread():
             importlib.import_module(package)
-            objects = {key: _restored(path, key, data[key]) for key in _NEEDED if key in data}
-            package, name = _algorithm_of(path, data, objects.get("policy_class", object))
+            if "recurrent" in str(data["policy_class"].get("__module__")):
+                raise PolicyError(
+                    f"{path} is recurrent: should have no memory, as each row is a robot"
+                )
+            objects = {key: _restored(path, key, data[key]) for key in _NEEDED}
+            package, name = _algorithm_of(data, objects["policy_class"])
             return getattr(importlib.import_module(package), name).load(path, device="cpu")
     except ModuleNotFoundError as error:
         if error.name != package:
@@ -154,12 +158,9 @@ def _restored(path: Path, key: str, item: Any) -> Any:
         ) from error
 
 
-def _algorithm_of(path: Path, data: dict[str, Any], policy_class: type) -> tuple[str, str]:
+def _algorithm_of(data: dict[str, Any], policy_class: type) -> tuple[str, str]:
     """Return the package and the name of the class that reads a file."""
-    modules = [base.__module__ for base in getattr(policy_class, "__mro__", ())]
-    if any("recurrent" in module for module in modules):
-        raise PolicyError(f"{path} is recurrent: should have no memory, as each row is a robot")
-    for module in modules:
+    for module in [base.__module__ for base in policy_class.__mro__]:
         for begin, _, package, name in _ALGORITHMS:
             if module.startswith(begin):
                 return package, name
