@@ -77,7 +77,7 @@ def torch_modules_of(values: Iterable[object]) -> list[Any]:
 
 def _parts_of(value: Any) -> Iterator[object]:
     """Yield what a value holds, without calling code of its own."""
-    kind = type(value)
+    kind: Any = type(value)
     if value is None or kind in (bool, int, float, complex, str, bytes):
         return
     if isinstance(value, types.ModuleType | type):
