@@ -308,7 +308,8 @@ def predictor_in(network: Any) -> Any | None:
     """Return what predicts as policies of stable-baselines3 do, in a model or a bound method."""
     if inspect.ismethod(network) and network.__name__ == "predict":
         network = network.__self__
-    for policy in (getattr(network, "policy", None), network):
+    candidates: list[Any] = [getattr(network, "policy", None), network]
+    for policy in candidates:
         try:
             parameters = inspect.signature(policy.predict).parameters
         except (AttributeError, TypeError, ValueError):
