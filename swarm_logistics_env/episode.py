@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import CommandError, PolicyError
+from swarm_logistics_env.policies.evaluation_mode import in_evaluation
 from swarm_logistics_env.policies.learned import LearnedPolicy
-from swarm_logistics_env.policies.policy import Policy, decide_in_one_thread, one_thread, start
+from swarm_logistics_env.policies.policy import Policy, decide_in_use, one_thread, start
 from swarm_logistics_env.scenario import CHIPMUNK, Scenario
 from swarm_logistics_env.warehouse import Warehouse
 from swarm_logistics_env.warehouse.contacts import NO_MEASURES, ContactMeasures
@@ -107,13 +108,13 @@ class Play:
         if not self.is_over:
             if self._env is None:
                 self._rows = self.world.observe()  # others, if the caller changed the world
-            with one_thread():
+            with one_thread(), in_evaluation(self._policy):
                 self.advance()
 
     def advance(self) -> None:
-        """Do as `step` in `one_thread`, where nobody changed the world and it is not over."""
+        """Do as `step` within what it does, where nobody changed the world and it is not over."""
         world = self.world
-        commands = decide_in_one_thread(self._policy, self._rows, world.state)
+        commands = decide_in_use(self._policy, self._rows, world.state)
         try:
             if self._env is None:
                 self._rows = world.step(commands)
@@ -202,11 +203,12 @@ def run_episode(
         play = Play(scenario, policy, seed, faults, policy_seed)
         world, is_over = play.world, play.is_over
         positions = np.empty((_MOST_STEPS, *world.state.robot_position.shape))
-        while not is_over:
-            n_steps = play.advance_to_event(positions)
-            digest.update(positions[:n_steps].data)
-            # No end without an event, but for wrappers that end it sooner.
-            is_over = (world.is_eventful or play._env is not None) and play.is_over
+        with in_evaluation(policy):
+            while not is_over:
+                n_steps = play.advance_to_event(positions)
+                digest.update(positions[:n_steps].data)
+                # No end without an event, but for wrappers that end it sooner.
+                is_over = (world.is_eventful or play._env is not None) and play.is_over
     state = world.state
     delivery_times = np.array(state.delivery_times, dtype=np.float64)
     digest.update(delivery_times.tobytes())

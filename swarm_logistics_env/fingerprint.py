@@ -24,7 +24,8 @@ EPISODE_CODE = (
     "episode.py", "fast_kernels.py", "kernels.py", "numba_fence.py", "observations.py",
     "scenario.py", "scenario_checks.py", "streams.py", "bodies/*.py",
     "floor/*.py", "floor/plans/*.txt", "motion/*.py", "policies/*.py", "!policies/__init__.py",
-    "!policies/spec.py", "!policies/files.py", "!policies/models.py", "!policies/sb3_files.py",
+    "!policies/spec.py", "!policies/files.py", "!policies/models.py", "!policies/model_spaces.py",
+    "!policies/networks.py", "!policies/normalizers.py", "!policies/sb3_files.py",
     "warehouse/*.py",
 )  # fmt: skip
 UNSTABLE = "unstable "  # begins the fingerprint of a value that is another one each time

@@ -1,5 +1,6 @@
 """Policies of a learner's model: any network that turns rows into outputs.
 
+How networks of each library are called stands in `networks`, what prepares rows in `normalizers`.
 What `MotionFrame`, `DiscreteActions` and a normaliser do around an environment is done here around
 the model, by the same code, so that it plays as it learned.
 """
@@ -7,6 +8,7 @@ the model, by the same code, so that it plays as it learned.
 from __future__ import annotations
 
 import copy
+import functools
 import hashlib
 from collections.abc import Callable
 from typing import Any, Self
@@ -14,19 +16,41 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError
+from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.fingerprint import fingerprint, package_code
 from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
 from swarm_logistics_env.motion.frame import MotionView
-from swarm_logistics_env.motion.network_inputs import INPUTS
+from swarm_logistics_env.observations import N_COLUMNS, N_NEIGHBOURS
+from swarm_logistics_env.policies.model_spaces import (
+    check_spaces,
+    check_statistics,
+    check_width,
+    width_of,
+)
+from swarm_logistics_env.policies.networks import (
+    Decide,
+    OnnxNetwork,
+    PredictingPolicy,
+    Rows,
+    TorchNetwork,
+    outputs_of,
+    predictor_in,
+    tried,
+)
+from swarm_logistics_env.policies.normalizers import normalizer_of
 from swarm_logistics_env.policies.policy import Described, Policy, check_policy, identity
 from swarm_logistics_env.records import canonical_json
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.warehouse import Warehouse
 
-Rows = NDArray[np.float32]
-Decide = Callable[[Rows], Any]
-_CODE = ("policies/models.py", "policies/sb3_files.py")
+_CODE = (
+    "policies/models.py", "policies/model_spaces.py", "policies/networks.py",
+    "policies/normalizers.py", "policies/sb3_files.py",
+)  # fmt: skip
+# Networks whose libraries tell how they are used; a function is the user's own code.
+_OF_LIBRARIES = (TorchNetwork, PredictingPolicy, OnnxNetwork)
+_LONGEST_MESSAGE = 64  # numbers, as of Scenario.message_size
 _COMMANDS_BY_NUMBER = np.array(list(ACTIONS.values()))
 _OUTPUTS_BY_NUMBER = np.array(list(MOTION_ACTIONS.values()))
 
@@ -36,18 +60,23 @@ def of(
 ) -> ModelPolicy:
     """Return the policy of a model: whatever turns rows of inputs (N, D) into outputs (N, k).
 
+    Torch modules play in evaluation mode, and get their own mode back after each decision. Of
+    several outputs the one called "action" is played, or the first.
+
     Args:
-        network: a function of rows, a torch module, a model of stable-baselines3 (its most likely
-            action), or an InferenceSession of onnxruntime. It has no memory of its own.
+        network: a function of rows, a torch module, a program of `torch.export`, a model of
+            stable-baselines3 (its most likely action), or an InferenceSession of onnxruntime. It
+            has no memory of its own.
         frame: whether it learned through `MotionFrame`: it reads rows of `motion.INPUTS` and gives
             rows of `motion.OUTPUTS`. Else it reads observations (N, D) and gives commands (N, 4).
             Whole numbers (N,) are actions of `DiscreteActions`, in either case.
         listens: as of `MotionFrame`.
         normalize: what its rows went through: None, a function of rows, a pair (mean, standard
-            deviation), or a `VecNormalize` of stable-baselines3.
+            deviation), or a `VecNormalize` of stable-baselines3, whose statistics may go on.
 
     Raises:
-        PolicyError: `network` or `normalize` is none of these.
+        PolicyError: `network` or `normalize` is none of these, or cannot be played: it is tried
+            once with the rows of a swarm.
 
     Example:
         >>> policy = of(lambda rows: np.tanh(rows[:, :3]), frame=True)
@@ -74,7 +103,7 @@ def within(model: Any, wrap: Callable[[Any], Any], *, normalize: Any = None) -> 
         normalize: of a network, as of `of`.
 
     Raises:
-        PolicyError: one of them is something else.
+        PolicyError: one of them is something else. A network is tried with the first rows.
 
     Example:
         >>> from swarm_logistics_env import Scenario, run_episode
@@ -100,6 +129,7 @@ class _BareModel(Described):
         self._decide, content = decider_of(network)
         self._prepare, normalizer = normalizer_of(normalize)
         self._about = type(network).__name__
+        self._tried = None if isinstance(self._decide, _OF_LIBRARIES) else self._decide
         parts = {"network": content, "normalize": normalizer, "code": package_code(*_CODE)}
         self.identity = canonical_json(parts)
 
@@ -108,7 +138,9 @@ class _BareModel(Described):
 
     def act(self, observations: Rows) -> NDArray[Any]:
         """Return an action for each row of observations (N, D)."""
-        return _outputs_of(self._decide, self._prepare, observations, self._about)
+        if self._tried is None:
+            self._tried = tried(self._decide, self._prepare, observations, self._about)
+        return outputs_of(self._tried, self._prepare, observations, self._about)
 
 
 class Within(Described):
@@ -142,6 +174,12 @@ class Within(Described):
         return self._policy.act(*seen)
 
 
+@functools.cache
+def _rows_of_a_swarm() -> Rows:
+    """Return what five robots sense at the start of an episode."""
+    return Warehouse(Scenario(n_robots=5)).reset(seed=0)
+
+
 class ModelPolicy(Described):
     """A model between what a robot senses and its command; made by `of` and `from_sb3`.
 
@@ -169,7 +207,13 @@ class ModelPolicy(Described):
         self._decide, self._prepare = decide, prepare
         self._has_frame, self._listens, self._about = frame, listens, about
         self.identity = canonical_json({"model": parts, "code": package_code(*_CODE)})
+        if hasattr(decide, "policy") and hasattr(decide.policy, "observation_space"):
+            check_spaces(about, decide.policy, frame)
+        check_width(about, width_of(decide), frame)
+        check_statistics(width_of(prepare), width_of(decide), frame)
         self.configure(Scenario())
+        if isinstance(decide, _OF_LIBRARIES):
+            self._try_out()
         self.reset(0, 0)
 
     def __repr__(self) -> str:
@@ -196,8 +240,38 @@ class ModelPolicy(Described):
             PolicyError: the model fails, or its outputs are no commands.
         """
         rows = self._view.read(observations) if self._has_frame else observations
-        outputs = _outputs_of(self._decide, self._prepare, rows, self._about)
-        n_robots = len(observations)
+        actions = self._actions_of(outputs_of(self._decide, self._prepare, rows, self._about), rows)
+        return self._view.command(actions) if self._has_frame else actions
+
+    def _try_out(self) -> None:
+        """Let the network answer once, so that what cannot be played is refused before any run."""
+        rows = _rows_of_a_swarm()
+        self.reset(len(rows), 0)
+        trials = [self._view.read(rows)] if self._has_frame else self._possible_rows(rows)
+        failures: list[PolicyError] = []
+        for trial in trials:
+            try:
+                decide = tried(self._decide, self._prepare, trial, self._about)
+            except PolicyError as error:
+                failures.append(error)
+            else:
+                self._decide = decide
+                self._actions_of(outputs_of(decide, self._prepare, trial, self._about), trial)
+                return
+        raise failures[0]
+
+    def _possible_rows(self, rows: Rows) -> list[Rows]:
+        """Return rows (N, D) for each D that the network may read, as longer ones hold messages."""
+        lengths = [length for part in (self._decide, self._prepare) if (length := width_of(part))]
+        longest = N_COLUMNS + _LONGEST_MESSAGE * N_NEIGHBOURS
+        return [
+            np.pad(rows, [(0, 0), (0, length - N_COLUMNS)])
+            for length in lengths[:1] or range(N_COLUMNS, longest + 1, N_NEIGHBOURS)
+        ]
+
+    def _actions_of(self, outputs: NDArray[Any], rows: Rows) -> NDArray[Any]:
+        """Return outputs as commands (N, 4), or as outputs of the frame (N, 3)."""
+        n_robots = len(rows)
         actions = _OUTPUTS_BY_NUMBER if self._has_frame else _COMMANDS_BY_NUMBER
         if outputs.dtype.kind in "iu" and outputs.size == n_robots:
             numbers = outputs.reshape(n_robots)
@@ -208,39 +282,36 @@ class ModelPolicy(Described):
                 )
             outputs = actions[numbers]
         wanted = (n_robots, actions.shape[1])
-        is_message = not self._has_frame and outputs.ndim == 2 and outputs.shape[1] > wanted[1]
-        if outputs.shape != wanted and not is_message:
+        # Rows have columns for the messages of all neighbours.
+        most = wanted[1] if self._has_frame else 4 + (rows.shape[1] - N_COLUMNS) // N_NEIGHBOURS
+        is_wider = outputs.ndim == 2 and wanted[1] < outputs.shape[1] <= most
+        if outputs.shape != wanted and not (is_wider and len(outputs) == n_robots):
+            columns = "along, aside and gripper" if self._has_frame else "commands of each robot"
             raise PolicyError(
                 f"{self._about} gave outputs of shape {outputs.shape}: should be {wanted}, "
-                + ("along, aside and gripper" if self._has_frame else "commands of each robot")
+                f"{columns}, or ({n_robots},), numbers of actions, as argmax makes of "
+                f"{len(actions)} values"
             )
-        return self._view.command(outputs) if self._has_frame else outputs
-
-
-def _outputs_of(decide: Decide, prepare: Decide, rows: Rows, about: str) -> NDArray[Any]:
-    try:
-        outputs: Any = decide(prepare(rows))
-        if hasattr(outputs, "detach"):  # a tensor, which may have a gradient or be on a GPU
-            outputs = outputs.detach().cpu()
-        return np.asarray(outputs)
-    except RAISED_BY_OTHERS as error:
-        kind = type(error).__name__
-        is_framed = rows.shape[1] == len(INPUTS)
-        hint = "" if is_framed else "; if it learned through MotionFrame: frame=True"
-        raise PolicyError(
-            f"{about} failed with rows of shape {rows.shape} ({kind}: {error}){hint}"
-        ) from error
+        return outputs
 
 
 def decider_of(network: Any) -> tuple[Decide, str]:
-    """Return what turns rows into outputs, and text that changes with it."""
-    policy = getattr(network, "policy", network)  # of a model of stable-baselines3
-    if hasattr(policy, "predict") and hasattr(policy, "state_dict"):
-        return _Predicting(policy), _content_of(policy)
+    """Return what turns rows into outputs, and text that changes with it.
+
+    Raises:
+        PolicyError: `network` is none, or one that cannot be played.
+    """
+    predictor = predictor_in(network)
+    if predictor is not None:
+        has_weights = hasattr(predictor, "state_dict")
+        content = _content_of(predictor) if has_weights else canonical_json(fingerprint(network))
+        return PredictingPolicy(predictor), content
+    if hasattr(network, "module") and hasattr(network, "graph_signature"):
+        network = network.module()  # of a program that torch exported
     if hasattr(network, "state_dict") and callable(network):
-        return _OfTorch(network), _content_of(network)
+        return TorchNetwork(network), _content_of(network)
     if hasattr(network, "run") and hasattr(network, "get_inputs"):
-        return _OfOnnx(network), fingerprint(network)["value"]
+        return OnnxNetwork(network), fingerprint(network)["value"]
     if not callable(network) or isinstance(network, type):
         raise PolicyError(
             f"network = {network!r}: should be a function of rows, a torch module, a model of "
@@ -253,77 +324,6 @@ def _content_of(module: Any) -> str:
     """Return text that changes with a torch module's class and numbers."""
     digest = hashlib.sha256()
     for name, tensor in sorted(module.state_dict().items()):
-        digest.update(name.encode() + np.ascontiguousarray(tensor.cpu().numpy()).tobytes())
+        numbers = tensor.cpu().float() if "bfloat16" in str(tensor.dtype) else tensor.cpu()
+        digest.update(name.encode() + np.ascontiguousarray(numbers.numpy()).tobytes())
     return canonical_json([repr(module), digest.hexdigest(), fingerprint(type(module))])
-
-
-class _OfTorch:
-    def __init__(self, module: Any) -> None:
-        self._module = module
-
-    def __call__(self, rows: Rows) -> Any:
-        import torch
-
-        device = next((p.device for p in self._module.parameters()), None)
-        with torch.no_grad():
-            return self._module(torch.as_tensor(rows, device=device))
-
-
-class _Predicting:
-    def __init__(self, policy: Any) -> None:
-        self._policy = policy
-
-    def __call__(self, rows: Rows) -> Any:
-        actions, _ = self._policy.predict(rows, deterministic=True)
-        return actions
-
-
-class _OfOnnx:
-    def __init__(self, session: Any) -> None:
-        self._session, self._name = session, session.get_inputs()[0].name
-
-    def __call__(self, rows: Rows) -> Any:
-        return self._session.run(None, {self._name: rows})[0]
-
-
-def normalizer_of(normalize: Any) -> tuple[Decide, Any]:
-    """Return what prepares rows, and what identifies it."""
-    if normalize is None:
-        return _unchanged, None
-    statistics = getattr(normalize, "obs_rms", normalize)
-    if hasattr(statistics, "mean") and hasattr(statistics, "var"):
-        epsilon = getattr(normalize, "epsilon", 1e-8)
-        deviation = np.sqrt(np.asarray(statistics.var) + epsilon)
-        scaled = _Scaled(statistics.mean, deviation, getattr(normalize, "clip_obs", np.inf))
-    elif isinstance(normalize, tuple | list) and len(normalize) == 2:
-        mean, deviation = normalize
-        scaled = _Scaled(mean, deviation, np.inf)
-    elif callable(normalize) and not isinstance(normalize, type):
-        return normalize, fingerprint(normalize)
-    else:
-        raise PolicyError(
-            f"normalize = {normalize!r}: should be None, a function of rows, a pair (mean, "
-            "standard deviation) or a VecNormalize of stable-baselines3"
-        )
-    return scaled, scaled.digest()
-
-
-def _unchanged(rows: Rows) -> Rows:
-    return rows
-
-
-class _Scaled:
-    """Rows less their mean, in standard deviations, cut at a limit; rows of zeros stay zeros."""
-
-    def __init__(self, mean: Any, deviation: Any, limit: float) -> None:
-        self._mean = np.asarray(mean, np.float64)
-        self._deviation, self._limit = np.asarray(deviation, np.float64), limit
-
-    def __call__(self, rows: Rows) -> Rows:
-        scaled = np.clip((rows - self._mean) / self._deviation, -self._limit, self._limit)
-        return np.where(rows.any(axis=1, keepdims=True), scaled, 0.0).astype(np.float32)
-
-    def digest(self) -> str:
-        """Return text that changes with its numbers."""
-        numbers = (self._mean.tobytes(), self._deviation.tobytes(), str(self._limit).encode())
-        return hashlib.sha256(b"|".join(numbers)).hexdigest()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.code_files import PACKAGE
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.fingerprint import fingerprint
+from swarm_logistics_env.policies.evaluation_mode import in_evaluation
 from swarm_logistics_env.records import Record, canonical_json
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse.state import WarehouseState
@@ -83,10 +84,10 @@ def one_thread() -> Iterator[None]:
     Its sums are other bits with another number of threads, so that a run would depend on who plays
     it; and networks as small as those of robots are slower on several.
     """
-    if _has_one_thread():
+    torch: Any = sys.modules.get("torch")
+    if torch is None or torch.get_num_threads() == 1:
         yield
         return
-    torch: Any = sys.modules["torch"]
     n_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -112,31 +113,23 @@ def start(policy: Policy, scenario: Scenario, seed: int) -> None:
 def decide(
     policy: Policy, observations: NDArray[np.float32], state: WarehouseState
 ) -> NDArray[np.float64]:
-    """Return the commands of `policy`, with the state for those that need it.
+    """Return the commands of `policy` in use, with the state for those that need it.
 
     A policy that needs the state is a central controller: its commands reach robots that hear.
     They are checked where they are used, by `Warehouse.step`.
     """
-    if _has_one_thread():  # nearly always, and decisions are many
-        return decide_in_one_thread(policy, observations, state)
-    with one_thread():
-        return decide_in_one_thread(policy, observations, state)
+    with one_thread(), in_evaluation(policy):
+        return decide_in_use(policy, observations, state)
 
 
-def decide_in_one_thread(
+def decide_in_use(
     policy: Policy, observations: NDArray[np.float32], state: WarehouseState
 ) -> NDArray[np.float64]:
-    """Do as `decide` where torch has one thread already."""
+    """Do as `decide` where torch has one thread, and networks are in evaluation mode, already."""
     if getattr(policy, "needs_state", False):
         # The protocol knows the one argument that all policies take.
         return mask_unreachable_commands(policy.act(observations, state), state)  # type: ignore[call-arg]
     return policy.act(observations)
-
-
-def _has_one_thread() -> bool:
-    """Return whether torch, if it is loaded, works in one thread."""
-    torch: Any = sys.modules.get("torch")
-    return torch is None or torch.get_num_threads() == 1
 
 
 def mask_unreachable_commands(commands: NDArray[Any], state: WarehouseState) -> NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import importlib
 import json
@@ -11,22 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.current_folder import allow_all_imports
 from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError, how_to_install
-from swarm_logistics_env.motion.frame import OUTPUTS
-from swarm_logistics_env.motion.network_inputs import INPUTS
-from swarm_logistics_env.observations import N_COLUMNS, N_NEIGHBOURS
-from swarm_logistics_env.policies.models import (
-    ModelPolicy,
-    Rows,
-    Within,
-    decider_of,
-    normalizer_of,
-    within,
-)
+from swarm_logistics_env.policies.models import ModelPolicy, Within, decider_of, within
+from swarm_logistics_env.policies.networks import Rows, outputs_of
+from swarm_logistics_env.policies.normalizers import normalizer_of
 from swarm_logistics_env.policies.policy import one_thread
 
 SB3_SUFFIX = ".zip"
@@ -61,7 +53,6 @@ def from_sb3(
         normalize = _unpickled(Path(normalize))
     if wrap is not None:
         return within(model, wrap, normalize=normalize)
-    _check_spaces(path, model, frame)
     prepare, normalizer = normalizer_of(normalize)
     parts = {
         "sha256": _digest_of(path), "frame": frame, "listens": listens, "normalize": normalizer,
@@ -84,6 +75,7 @@ class StableBaselinesModel:
 
     def __init__(self, path: Path) -> None:
         self._decide, _ = decider_of(read_model(path))
+        self._about = path.name
         self.parameters = {"sha256": _digest_of(path)}
 
     def reset(self, n_robots: int, seed: int) -> None:
@@ -91,17 +83,20 @@ class StableBaselinesModel:
 
     def act(self, observations: Rows) -> NDArray[Any]:
         """Return an action for each row of observations (N, D)."""
-        return np.asarray(self._decide(observations))
+        return outputs_of(self._decide, lambda rows: rows, observations, self._about)
 
 
-# By the module of its networks, the class that reads a file.
+# The class that reads a file, by the module of its policy's class or one of its bases, and by what
+# it alone notes in its files, where somebody's own policy has no such base.
 _ALGORITHMS = (
-    ("sb3_contrib.common.maskable", "sb3_contrib", "MaskablePPO"),
-    ("sb3_contrib.tqc", "sb3_contrib", "TQC"),
-    ("sb3_contrib.qrdqn", "sb3_contrib", "QRDQN"),
-    ("stable_baselines3.dqn", "stable_baselines3", "DQN"),
-    ("stable_baselines3.sac", "stable_baselines3", "SAC"),
-    ("stable_baselines3.td3", "stable_baselines3", "TD3"),
+    ("sb3_contrib.common.maskable", None, "sb3_contrib", "MaskablePPO"),
+    ("sb3_contrib.tqc", "top_quantiles_to_drop_per_net", "sb3_contrib", "TQC"),
+    ("sb3_contrib.qrdqn", None, "sb3_contrib", "QRDQN"),
+    ("sb3_contrib.crossq", None, "sb3_contrib", "CrossQ"),
+    ("sb3_contrib.ars", "delta_std", "sb3_contrib", "ARS"),
+    ("stable_baselines3.dqn", "exploration_fraction", "stable_baselines3", "DQN"),
+    ("stable_baselines3.sac", "target_entropy", "stable_baselines3", "SAC"),
+    ("stable_baselines3.td3", "target_policy_noise", "stable_baselines3", "TD3"),
 )
 
 
@@ -115,17 +110,21 @@ def read_model(path: Path) -> Any:
     try:
         with zipfile.ZipFile(path) as archive:
             data = json.loads(archive.read("data"))
-        module = str(data.get("policy_class", {}).get("__module__"))
-        if "recurrent" in module:
-            raise PolicyError(f"{path} is recurrent: should have no memory, as each row is a robot")
-        names = ((p, name) for begin, p, name in _ALGORITHMS if module.startswith(begin))
-        default = "PPO" if "clip_range" in data else "A2C"
-        package, name = next(names, (package, default))
         with allow_all_imports(), one_thread():
+            importlib.import_module(package)
+            if "recurrent" in str(data["policy_class"].get("__module__")):
+                raise PolicyError(
+                    f"{path} is recurrent: should have no memory, as each row is a robot"
+                )
+            objects = {key: _restored(path, key, data[key]) for key in _NEEDED}
+            package, name = _algorithm_of(data, objects["policy_class"])
             return getattr(importlib.import_module(package), name).load(path, device="cpu")
     except ModuleNotFoundError as error:
         if error.name != package:
-            raise PolicyError(f"{path} needs the package {error.name}: install it") from None
+            raise PolicyError(
+                f"{path} needs {error.name}, which it was saved with: install it, or put the "
+                "folder of that file on PYTHONPATH"
+            ) from None
         raise PolicyError(f"{path} needs {package}: {how_to_install('train')}") from None
     except PolicyError:
         raise
@@ -134,38 +133,49 @@ def read_model(path: Path) -> Any:
         raise PolicyError(f"{path} is no model of stable-baselines3: {reason}") from error
 
 
+# What a policy is made of. Without them stable-baselines3 warns, and makes another one.
+_NEEDED = ("policy_class", "policy_kwargs", "observation_space", "action_space")
+
+
+def _restored(path: Path, key: str, item: Any) -> Any:
+    """Return an object in a file's data.
+
+    Raises:
+        PolicyError: it cannot be restored.
+        ModuleNotFoundError: its module is missing.
+    """
+    if not isinstance(item, dict) or ":serialized:" not in item:
+        return item
+    try:
+        return pickle.loads(base64.b64decode(item[":serialized:"]))
+    except ModuleNotFoundError:
+        raise
+    except RAISED_BY_OTHERS as error:
+        kind = type(error).__name__
+        raise PolicyError(
+            f"{path}: its {key} cannot be restored here ({kind}: {error}): should be read with the "
+            "code, and the versions of Python and of packages, that it was saved with"
+        ) from error
+
+
+def _algorithm_of(data: dict[str, Any], policy_class: type) -> tuple[str, str]:
+    """Return the package and the name of the class that reads a file."""
+    for module in [base.__module__ for base in policy_class.__mro__]:
+        for begin, _, package, name in _ALGORITHMS:
+            if module.startswith(begin):
+                return package, name
+    for _, noted, package, name in _ALGORITHMS:
+        if noted in data:
+            return package, name
+    return "stable_baselines3", "PPO" if "clip_range" in data else "A2C"
+
+
 def refuse_untrusted(path: Path, trust_code: bool) -> None:
     """Raise a PolicyError if nobody trusts the code in a file of stable-baselines3."""
     if not trust_code:
         raise PolicyError(
             f"{path} is a file of stable-baselines3: reading it executes the code in it; if you "
             "trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
-        )
-
-
-def _check_spaces(path: Path, model: Any, frame: bool) -> None:
-    """Check that a model maps what it will be given to what is taken."""
-    rows, commands = model.observation_space.shape, model.action_space.shape
-    is_of_frame = rows == (len(INPUTS),)
-    if is_of_frame and not frame:
-        raise PolicyError(
-            f"{path} reads {len(INPUTS)} inputs, so it learned through MotionFrame: should be "
-            "read with frame=True, or --frame"
-        )
-    if frame and not is_of_frame:
-        raise PolicyError(
-            f"{path} reads rows of shape {rows}: with frame=True, or --frame, should be "
-            f"{len(INPUTS)} inputs, as learned through MotionFrame"
-        )
-    is_number = commands == ()
-    n_messages = 0 if frame or is_number or len(commands) != 1 else commands[0] - 4
-    expected = (len(INPUTS),) if frame else (N_COLUMNS + N_NEIGHBOURS * n_messages,)
-    taken = (len(OUTPUTS),) if frame else (4 + n_messages,)
-    if rows != expected or n_messages < 0 or not (is_number or commands == taken):
-        raise PolicyError(
-            f"{path} maps observations {rows} to commands {commands}: should map ({N_COLUMNS},) "
-            f"to (4,), or through MotionFrame ({len(INPUTS)},) to ({len(OUTPUTS)},); wrappers in "
-            "which it learned are named by --env, or policies.within"
         )
 
 
@@ -181,5 +191,11 @@ def _unpickled(path: Path) -> Any:
     try:
         with allow_all_imports():
             return pickle.loads(path.read_bytes())
+    except OSError as error:
+        raise PolicyError(f"cannot read {path}: {error.strerror or error}") from error
+    except ModuleNotFoundError as error:
+        raise PolicyError(
+            f"{path} needs {error.name}, which it was saved with: install it"
+        ) from None
     except RAISED_BY_OTHERS as error:
         raise PolicyError(f"{path} is no file of VecNormalize.save: {error}") from error

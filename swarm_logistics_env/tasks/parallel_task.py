@@ -16,6 +16,7 @@ from pydantic import ConfigDict, PositiveFloat, PositiveInt
 from swarm_logistics_env.code_files import PACKAGE
 from swarm_logistics_env.errors import FaultError, StudyError, suggest
 from swarm_logistics_env.fingerprint import UNSTABLE, fingerprint, package_code
+from swarm_logistics_env.policies.evaluation_mode import in_evaluation
 from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
 from swarm_logistics_env.records import Record, canonical_json
@@ -243,7 +244,8 @@ class ParallelTask:
                 digest.update(repr(sorted((a, float(r)) for a, r in rewards.items())).encode())
                 if len(gains) == steps or not env.agents:
                     break
-                actions = player.act(observation_rows(env, agents, observations))
+                with in_evaluation(player):
+                    actions = player.act(observation_rows(env, agents, observations))
                 observations, rewards, _, _, infos = failing_env.step(
                     agent_actions(env, agents, actions)
                 )

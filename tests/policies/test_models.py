@@ -17,6 +17,7 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.motion.network_inputs import LEAD
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.policies import models
 from swarm_logistics_env.policies.spec import PolicySpec
@@ -86,21 +87,6 @@ def test_whole_numbers_are_discrete_actions() -> None:
         policy.act(np.zeros((4, N_COLUMNS), np.float32))
 
 
-def test_rows_are_normalized_as_they_were_in_training() -> None:
-    seen = []
-
-    def network(rows: Any) -> Any:
-        seen.append(rows)
-        return rows[:, :4]
-
-    mean, deviation = np.full(N_COLUMNS, 2.0), np.full(N_COLUMNS, 4.0)
-    for normalize in ((mean, deviation), lambda rows: (rows - 2.0) / 4.0):
-        policies.of(network, normalize=normalize).act(np.ones((0, N_COLUMNS), np.float32))
-        policy = policies.of(network, normalize=normalize)
-        policy.act(np.full((2, N_COLUMNS), 6.0, np.float32))
-        assert (seen[-1] == 1.0).all()
-
-
 def test_a_model_is_known_by_its_numbers_and_its_form_and_each_run_has_a_memory() -> None:
     torch = pytest.importorskip("torch")
     module = torch.nn.Linear(95, 3)
@@ -117,6 +103,33 @@ def test_a_model_is_known_by_its_numbers_and_its_form_and_each_run_has_a_memory(
     assert run_episode(BRIEF, first, seed=1).digest == run_episode(BRIEF, again, seed=1).digest
 
 
+def test_two_runs_at_once_share_no_memory() -> None:
+    policy = policies.of(linear, frame=True)
+    run, twin = PolicySpec.of(policy).load(), PolicySpec.of(policy).load()
+    rows = np.random.default_rng(0).normal(size=(2, 4, N_COLUMNS)).astype(np.float32)
+    for player in (policy, run, twin):
+        player.reset(4, 0)
+    run.act(rows[0])
+    np.testing.assert_array_equal(twin.act(rows[1]), policy.act(rows[1]))
+
+
+def test_a_network_that_listens_to_nobody_reads_zeros_there() -> None:
+    inputs: dict[bool, Any] = {}
+    rows = np.random.default_rng(0).normal(size=(40, 5, N_COLUMNS)).astype(np.float32)
+    for listens in (True, False):
+
+        def network(read: Any, listens: bool = listens) -> Any:
+            inputs[listens] = read
+            return linear(read)
+
+        policy = policies.of(network, frame=True, listens=listens)
+        policy.reset(5, 0)
+        for step in rows:
+            policy.act(step)
+    assert inputs[True][:, LEAD].any()
+    assert not inputs[False][:, LEAD].any()
+
+
 @pytest.mark.parametrize(
     ("network", "options", "message"),
     [
@@ -125,6 +138,7 @@ def test_a_model_is_known_by_its_numbers_and_its_form_and_each_run_has_a_memory(
         (lambda rows: rows[:, :3], {}, r"shape \(3, 3\): should be \(3, 4\), commands"),
         (None, {}, "network = None: should be a function of rows, a torch module"),
         (dict, {}, "network = <class 'dict'>: should be a function of rows"),
+        (lambda rows: rows[:, :13], {}, "should be .*, as argmax makes of 13 values"),
         (linear, {"normalize": 3.0}, "normalize = 3.0: should be None, a function of rows, a pair"),
     ],
 )
@@ -154,6 +168,9 @@ class Beacon(Wrapper):
 class Eastward:
     """Drives until it is 3 m from the western wall."""
 
+    def configure(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+
     def reset(self, n_robots: int, seed: int) -> None:
         pass
 
@@ -162,8 +179,10 @@ class Eastward:
 
 
 def test_a_policy_with_a_sensor_of_its_own_is_judged_as_any_other(tmp_path: Path) -> None:
-    policy = policies.within(Eastward(), Beacon)
+    driver = Eastward()
+    policy = policies.within(driver, Beacon)
     episode = run_episode(BRIEF, policy, seed=0, faults=["removed:1@1"])
+    assert driver.scenario == BRIEF
     assert episode.failed_robots
     assert run_episode(BRIEF, policy, seed=0, faults=["removed:1@1"]).digest == episode.digest
     # A film and the live view play it, too; a fault may come while it plays.

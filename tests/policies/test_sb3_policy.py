@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -145,3 +147,103 @@ def test_a_model_plays_as_in_the_environment_that_it_learned_in(
 def test_options_for_models_are_refused_without_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.run(["run", "--policy", "homing", "--frame"]) == 2
     assert "--frame: is for a model of stable-baselines3, a .zip file" in capsys.readouterr().err
+
+
+OWN_CODE = """\
+import torch
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.dqn.policies import DQNPolicy
+from stable_baselines3.sac.policies import SACPolicy
+from stable_baselines3.td3.policies import TD3Policy
+
+class Activation(torch.nn.Tanh): ...
+class OfSAC(SACPolicy): ...
+class OfTD3(TD3Policy): ...
+class OfDQN(DQNPolicy): ...
+
+class Features(BaseFeaturesExtractor):
+    def __init__(self, space):
+        super().__init__(space, 4)
+        self.layers = torch.nn.Sequential(torch.nn.Linear(space.shape[0], 4), torch.nn.Dropout())
+
+    def forward(self, rows):
+        return self.layers(rows)
+"""
+
+
+@pytest.mark.parametrize("algorithm", ["SAC", "TD3", "DQN"])
+def test_a_policy_class_of_ones_own_is_read_by_its_algorithm(
+    algorithm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import stable_baselines3
+
+    (tmp_path / "own_code.py").write_text(OWN_CODE)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "own_code", raising=False)
+    own_code = importlib.import_module("own_code")
+
+    def make_env(world: int) -> Any:
+        return DiscreteActions(brief(n_robots=2)) if algorithm == "DQN" else brief(n_robots=2)
+
+    own = {"features_extractor_class": own_code.Features, "activation_fn": own_code.Activation}
+    learned = getattr(stable_baselines3, algorithm)(
+        getattr(own_code, f"Of{algorithm}"), SwarmVecEnv(make_env=make_env, n_worlds=1),
+        policy_kwargs={"net_arch": [4], **own}, buffer_size=8, seed=0, device="cpu",
+    )  # fmt: skip
+    learned.save(tmp_path / "model.zip")
+    rows = np.random.default_rng(0).normal(size=(4, N_COLUMNS)).astype(np.float32)
+    learned.policy.set_training_mode(True)
+    of_object = policies.of(learned).act(rows)
+    assert learned.policy.training
+    read = policies.from_sb3(tmp_path / "model.zip", trust_code=True)
+    np.testing.assert_array_equal(read.act(rows), of_object)
+    np.testing.assert_array_equal(policies.of(learned.predict).act(rows), of_object)
+    learned.policy.double()
+    with pytest.raises(
+        PolicyError, match=r"numbers of type torch.float64: should have torch.float"
+    ):
+        policies.of(learned)
+
+    # Without its code it would be another network, of which stable-baselines3 only warns.
+    del own_code.Activation
+    with pytest.raises(PolicyError, match=r"its policy_kwargs cannot be restored here \(Attribute"):
+        policies.from_sb3(tmp_path / "model.zip", trust_code=True)
+    (tmp_path / "own_code.py").unlink()
+    monkeypatch.delitem(sys.modules, "own_code")
+    importlib.invalidate_caches()
+    with pytest.raises(
+        PolicyError, match="needs own_code, which it was saved with: install it, or"
+    ):
+        policies.from_sb3(tmp_path / "model.zip", trust_code=True)
+
+
+def test_actions_of_another_environment_are_refused(tmp_path: Path) -> None:
+    from gymnasium.spaces import Box, Discrete
+    from stable_baselines3 import PPO
+
+    env = SwarmVecEnv(n_worlds=1, n_robots=2)
+    learned = PPO("MlpPolicy", env, n_steps=8, batch_size=8, device="cpu")
+    for space in (Discrete(5), Box(-1.0, 1.0, (3,))):
+        learned.policy.action_space = space
+        with pytest.raises(PolicyError, match=r"maps observations \(141,\) to .*: should map"):
+            policies.of(learned)
+
+
+def test_statistics_that_normalize_no_rows_leave_them(model: Path, tmp_path: Path) -> None:
+    """As saved with norm_obs=False, or switched off later."""
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    rows = np.random.default_rng(0).normal(size=(4, N_COLUMNS)).astype(np.float32)
+    plain = policies.from_sb3(model, trust_code=True).act(rows)
+    made = VecNormalize(SwarmVecEnv(n_worlds=1, n_robots=2), norm_obs=False)
+    switched = VecNormalize(SwarmVecEnv(n_worlds=1, n_robots=2))
+    switched.obs_rms.mean += 1.0
+    switched.norm_obs = False
+    for number, env in enumerate((made, switched)):
+        file = tmp_path / f"{number}.pkl"
+        env.save(str(file))
+        for normalize in (file, env):
+            read = policies.from_sb3(model, trust_code=True, normalize=normalize)
+            np.testing.assert_array_equal(read.act(rows), plain)
+    with pytest.raises(PolicyError, match=r"cannot read .*none.pkl: No such file"):
+        policies.from_sb3(model, trust_code=True, normalize=tmp_path / "none.pkl")
