@@ -200,9 +200,12 @@ class Study:
                     after_look(self._results(store))
                 return missing
 
-            if missing := self._missing(all_runs, store, tried, in_stages=True):
+            missing = self._missing(all_runs, store, tried, in_stages=True)
+            # An object may have learned since it was planned, also where no run is missing.
+            objects = [case for case in plan.cases if case.policy.made is not None]
+            refuse_changed_policies([*objects, *(run.case for run in missing)])
+            if missing:
                 tried.update(run.key for run in missing)
-                refuse_changed_policies(missing)
                 errors, left = play(
                     missing,
                     engine,

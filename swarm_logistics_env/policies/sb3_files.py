@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import json
 import pickle
@@ -62,12 +61,8 @@ def from_sb3(
     if wrap is not None:
         return within(model, wrap, normalize=normalize)
     _check_spaces(path, model, frame)
-    prepare, normalizer = normalizer_of(normalize)
-    parts = {
-        "sha256": _digest_of(path), "frame": frame, "listens": listens, "normalize": normalizer,
-    }  # fmt: skip
-    decide, _ = decider_of(model)
-    return ModelPolicy(decide, prepare, parts, about=path.name, frame=frame, listens=listens)
+    decide, prepare = decider_of(model), normalizer_of(normalize)
+    return ModelPolicy(decide, prepare, about=path.name, frame=frame, listens=listens)
 
 
 class StableBaselinesModel:
@@ -83,8 +78,7 @@ class StableBaselinesModel:
     """
 
     def __init__(self, path: Path) -> None:
-        self._decide, _ = decider_of(read_model(path))
-        self.parameters = {"sha256": _digest_of(path)}
+        self._decide = decider_of(read_model(path))
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode; nothing here is random."""
@@ -167,14 +161,6 @@ def _check_spaces(path: Path, model: Any, frame: bool) -> None:
             f"to (4,), or through MotionFrame ({len(INPUTS)},) to ({len(OUTPUTS)},); wrappers in "
             "which it learned are named by --env, or policies.within"
         )
-
-
-def _digest_of(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        reason = error.strerror or error
-        raise PolicyError(f"cannot read {path}: {reason}") from error
 
 
 def _unpickled(path: Path) -> Any:

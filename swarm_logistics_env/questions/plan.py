@@ -180,10 +180,9 @@ def make_plan(
     return Plan(specification, comparisons, code or task.code(), identities, nulls)
 
 
-def refuse_changed_policies(runs: Iterable[Run]) -> None:
-    """Raise PolicyError if the policy of a run is not the one any more that was planned."""
-    cases = {(run.case.policy, run.case.identity): run.case for run in runs}
-    for case in cases.values():
+def refuse_changed_policies(cases: Iterable[Case]) -> None:
+    """Raise PolicyError if the policy of a case is not the one any more that was planned."""
+    for case in {(case.policy, case.identity): case for case in cases}.values():
         case.policy.refuse_other(case.identity, case.task.policies)
 
 
