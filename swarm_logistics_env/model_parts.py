@@ -33,7 +33,7 @@ _NOT_PREDICTED_WITH = {"optimizer", "action_dist"}
 # Of a module of torch.fx: what its code was made from.
 _NOT_OF_GRAPH = {
     "_create_node_hooks", "_deepcopy_hooks", "_erase_node_hooks", "_graph", "_replace_hooks",
-    "_tracer_cls", "_tracer_extras", "meta",
+    "_tracer_cls", "_tracer_extras", "eval", "meta", "train",
 }  # fmt: skip
 
 
@@ -216,6 +216,7 @@ _KINDS: dict[str, Callable[[Any], Parts | None]] = {
     "stable_baselines3.common.policies.BaseModel": _network_parts,
     "builtins.function": _function_parts,
     "torch._dynamo.eval_frame.OptimizedModule": _compiled_module_parts,
+    "torch.export._unlift.GuardsFn": lambda _: (),  # checks the shapes of what is given
     "torch.fx.graph_module.GraphModule": _graph_parts,
     "torch.jit.torch.jit.ScriptFunction": _script_parts,
     "torch.jit._script.ScriptModule": _script_parts,
