@@ -266,7 +266,8 @@ def _reduced(value: Any) -> tuple[Any, ...]:
     parts = value.__reduce_ex__(4) if reduce is None else reduce(value)
     if isinstance(parts, tuple):
         return parts
-    module = getattr(value, "__module__", None) or pickle.whichmodule(value, parts)
+    module = getattr(value, "__module__", None)
+    module = module or pickle.whichmodule(value, parts)  # type: ignore[attr-defined]
     if not isinstance(parts, str) or getattr(sys.modules.get(module), parts, None) is not value:
         raise TypeError(f"{value!r} is not {module}.{parts}")
     return (module, parts)

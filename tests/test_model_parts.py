@@ -78,7 +78,8 @@ def pruned(share: float) -> Any:
     from torch.nn.utils import prune
 
     layer = linear()
-    prune.l1_unstructured(layer, "weight", share)
+    prune_weights: Any = prune.l1_unstructured
+    prune_weights(layer, "weight", share)
     return layer
 
 
@@ -153,6 +154,7 @@ CASES: dict[str, tuple[Callable[[Any], Any], Any, Any]] = {
 }  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore:`torch.jit.trace` is deprecated")
 @pytest.mark.parametrize("name", CASES)
 def test_what_computes_otherwise_is_another_network(name: str) -> None:
     make, one, other = CASES[name]

@@ -24,7 +24,7 @@ def changed(value: Any) -> Any:
     return not value if isinstance(value, bool) else 1.25 * value + 0.01
 
 
-def script_of(name: str) -> type[Scripted]:
+def script_of(name: str) -> Any:
     make: Any = SCRIPTED[name]
     kind = make.func if isinstance(make, functools.partial) else make
     assert isinstance(kind, type)
@@ -43,12 +43,12 @@ def test_every_argument_of_a_script_changes_its_identity_and_its_repr(name: str)
     met = {identity(default)}
     for field, value in defaults.items():
         # Upwards, so that `near` stays below `far`.
-        fields = {"near": 0.9} if field == "near" else {field: changed(value)}
+        fields: dict[str, Any] = {"near": 0.9} if field == "near" else {field: changed(value)}
         policy = kind(**fields)
         assert repr(policy) == f"{kind.__name__}({field}={fields[field]!r})"
         assert identity(policy) not in met
         met.add(identity(policy))
-        if kind is SCRIPTED[name]:  # the text with the same parameters is the same policy
+        if SCRIPTED[name] is kind:  # the text with the same parameters is the same policy
             assert PolicySpec(name=name, parameters=fields).identity() == identity(policy)
 
 
@@ -83,7 +83,7 @@ def backward(rows: Any) -> Any:
 
 def test_every_argument_of_a_policy_of_a_network_changes_its_identity() -> None:
     numbers = np.zeros(141), np.ones(141)
-    made = [
+    made: list[Any] = [
         policies.of(forward),
         policies.of(backward),
         policies.of(forward, frame=True),
