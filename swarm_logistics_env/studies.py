@@ -201,9 +201,7 @@ class Study:
                 return missing
 
             missing = self._missing(all_runs, store, tried, in_stages=True)
-            # An object may have learned since it was planned, also where no run is missing.
-            objects = [case for case in plan.cases if case.policy.made is not None]
-            refuse_changed_policies([*objects, *(run.case for run in missing)])
+            refuse_changed_policies(plan, missing)
             if missing:
                 tried.update(run.key for run in missing)
                 errors, left = play(
