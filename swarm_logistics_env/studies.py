@@ -200,9 +200,10 @@ class Study:
                     after_look(self._results(store))
                 return missing
 
-            if missing := self._missing(all_runs, store, tried, in_stages=True):
+            missing = self._missing(all_runs, store, tried, in_stages=True)
+            refuse_changed_policies(plan, missing)
+            if missing:
                 tried.update(run.key for run in missing)
-                refuse_changed_policies(missing)
                 errors, left = play(
                     missing,
                     engine,

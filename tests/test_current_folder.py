@@ -41,7 +41,10 @@ faults = [{ modes = ["FM1"], robots = [1] }]
 n_robots = 3
 duration = 5.0
 """
-TRIALS = "robots;fault;faulty;boxes\n8;none;;12\n8;none;;11\n8;none;;13\n8;wheel;1;10\n8;wheel;1;9\n8;wheel;1;11"
+TRIALS = (
+    "robots;fault;faulty;boxes\n8;none;;12\n8;none;;11\n8;none;;13\n"
+    "8;wheel;1;10\n8;wheel;1;9\n8;wheel;1;11"
+)
 
 
 def run_in(folder: Path, *commands: str) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.policies.crowd import at_most_1, commands_of, drift, share_items
 from swarm_logistics_env.policies.planned_ground import ground_of
-from swarm_logistics_env.policies.policy import Described
+from swarm_logistics_env.policies.policy import Scripted
 from swarm_logistics_env.policies.routes import (
     CELL,
     cell_at,
@@ -36,7 +36,7 @@ STEP = 0.2  # [s] without its item
 DISTRUST = 30.0  # [s]
 
 
-class Central(Described):
+class Central(Scripted):
     """One controller that sees the whole warehouse, for comparison with swarms; needs the state.
 
     Example:
@@ -47,10 +47,6 @@ class Central(Described):
 
     needs_state = True
     laden_wait = True  # whether robots that carry an item wait as well
-
-    def __init__(self) -> None:
-        self.configure(Scenario())
-        self.reset(0, 0)
 
     def configure(self, scenario: Scenario) -> None:
         """Take the sizes of the warehouse and of the robots, and the floor plan."""

@@ -25,7 +25,7 @@ from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import MotionView, command_own_frames
 from swarm_logistics_env.motion.memory import length_of, set_velocity
 from swarm_logistics_env.motion.network_inputs import random_heading, turn_frames
-from swarm_logistics_env.policies.policy import Described
+from swarm_logistics_env.policies.policy import Scripted
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
@@ -233,7 +233,7 @@ def freest_direction(
     return best_x, best_y
 
 
-class Homing(Described):
+class Homing(Scripted):
     """Every robot remembers for some ten seconds where it last entered the delivery area.
 
     Example:
@@ -242,10 +242,6 @@ class Homing(Described):
         >>> policy.act(np.zeros((3, row.N_COLUMNS), np.float32)).shape
         (3, 4)
     """
-
-    def __init__(self) -> None:
-        self.configure(Scenario())
-        self.reset(0, 0)
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: the control period."""

@@ -25,6 +25,7 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PositiveFloat, ValidationInfo, field_validator
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
@@ -52,6 +53,7 @@ from swarm_logistics_env.policies.homing import (
     requested_item,
     search_direction,
 )
+from swarm_logistics_env.records import Record
 
 # Lengths in m; distances from the delivery area are as a robot reckons them.
 ROLE_TIME = 40.0  # [s]
@@ -308,12 +310,31 @@ def item_to_stock(
     return -1
 
 
+class HomingStockParameters(Record):
+    """The distances of `HomingStock`, both fitted, see above."""
+
+    error_type = PolicyError
+
+    near: PositiveFloat = Field(
+        0.8, description="robots put items down nearer to the area than this [m]; fitted"
+    )
+    far: PositiveFloat = Field(
+        1.2, description="robots that stock lift items farther from it than this [m]; fitted"
+    )
+
+    @field_validator("far")
+    @classmethod
+    def _check_far(cls, far: float, about: ValidationInfo) -> float:
+        near = about.data.get("near", far)
+        if far < near:
+            raise ValueError(f"should be at least near = {near:g} [m]")
+        return far
+
+
 class HomingStock(Homing):
     """Homing that carries stock to the delivery area before anybody asks for it.
 
-    Args:
-        near: robots put items down nearer to the area than this [m].
-        far: robots that stock lift items that lie farther from the area than this [m].
+    Its keyword arguments are the fields of `HomingStockParameters`.
 
     Raises:
         PolicyError: it is not 0 < near <= far.
@@ -325,15 +346,12 @@ class HomingStock(Homing):
         (3, 4)
     """
 
-    def __init__(self, near: float = 0.8, far: float = 1.2) -> None:
-        if not 0.0 < near <= far < math.inf:
-            raise PolicyError(f"near = {near}, far = {far}: should be 0 < near <= far [m]")
-        self._near, self._far = near, far
-        super().__init__()
+    parameters_type = HomingStockParameters
+    parameters: HomingStockParameters
 
     def _fill(self, observations: NDArray[np.float32], commands: NDArray[np.float64]) -> None:
-        frame = self._frame
+        frame, parameters = self._frame, self.parameters
         act_homing_stock(
             observations, frame.memory, frame.keys, frame.counts, frame.turned, self._period,
-            self._near, self._far, commands,
+            parameters.near, parameters.far, commands,
         )  # fmt: skip

@@ -137,6 +137,18 @@ class PolicyCard(_Part):
     scored_with: dict[str, str] = Field(default_factory=dict)
 
 
+class LearnedParameters(_Part):
+    """What a trained policy's behaviour depends on.
+
+    Args:
+        network: of its card, whose other fields only tell of it.
+        weights: the digest of its numbers.
+    """
+
+    network: Network
+    weights: str
+
+
 STREAM = "trained policy"
 
 
@@ -168,10 +180,7 @@ class LearnedPolicy(Described):
         )
         self._decides_every, self._listens = network.decides_every, network.listens
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
-        self.parameters = {
-            "network": network.model_dump(mode="json"),
-            "weights": digest(tensors),
-        }
+        self.parameters = LearnedParameters(network=network, weights=digest(tensors))
         self.configure(Scenario())
 
     def __repr__(self) -> str:

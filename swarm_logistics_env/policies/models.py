@@ -7,17 +7,17 @@ the model, by the same code, so that it plays as it learned.
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import functools
-import hashlib
 from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.fingerprint import fingerprint, package_code
+from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError
+from swarm_logistics_env.fingerprint import deep_copy, fingerprint, joined, package_code
 from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
 from swarm_logistics_env.motion.frame import MotionView
 from swarm_logistics_env.observations import N_COLUMNS, N_NEIGHBOURS
@@ -38,8 +38,7 @@ from swarm_logistics_env.policies.networks import (
     tried,
 )
 from swarm_logistics_env.policies.normalizers import normalizer_of
-from swarm_logistics_env.policies.policy import Described, Policy, check_policy, identity
-from swarm_logistics_env.records import canonical_json
+from swarm_logistics_env.policies.policy import Holding, Policy, check_policy, identity_parts
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 from swarm_logistics_env.warehouse import Warehouse
@@ -84,11 +83,9 @@ def of(
         >>> policy.act(np.zeros((2, 141), np.float32)).shape
         (2, 4)
     """
-    decide, content = decider_of(network)
-    prepare, normalizer = normalizer_of(normalize)
-    parts = {"network": content, "frame": frame, "listens": listens, "normalize": normalizer}
+    decide, prepare = decider_of(network), normalizer_of(normalize)
     about = type(network).__name__
-    return ModelPolicy(decide, prepare, parts, about=about, frame=frame, listens=listens)
+    return ModelPolicy(decide, prepare, about=about, frame=frame, listens=listens)
 
 
 def within(model: Any, wrap: Callable[[Any], Any], *, normalize: Any = None) -> Within:
@@ -122,16 +119,28 @@ def within(model: Any, wrap: Callable[[Any], Any], *, normalize: Any = None) -> 
     return Within(_BareModel(model, normalize), wrap)
 
 
-class _BareModel(Described):
+class _Model(Holding):
+    """What turns rows into outputs, and what prepares rows for it."""
+
+    _decide: Decide
+    _prepare: Decide
+
+    def identity_parts(self) -> dict[str, Any]:
+        """Return what identifies it: both of them as they are now, and the code of this module."""
+        content = fingerprint((self._decide, self._prepare))
+        return {"class": type(self).__name__, "code": package_code(*_CODE), **content}
+
+
+class _BareModel(_Model):
     """A network whose outputs are actions as they are."""
 
     def __init__(self, network: Any, normalize: Any) -> None:
-        self._decide, content = decider_of(network)
-        self._prepare, normalizer = normalizer_of(normalize)
+        self._decide, self._prepare = decider_of(network), normalizer_of(normalize)
         self._about = type(network).__name__
         self._tried = None if isinstance(self._decide, _OF_LIBRARIES) else self._decide
-        parts = {"network": content, "normalize": normalizer, "code": package_code(*_CODE)}
-        self.identity = canonical_json(parts)
+
+    def __repr__(self) -> str:
+        return self._about
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode; nothing here is random."""
@@ -143,22 +152,27 @@ class _BareModel(Described):
         return outputs_of(self._tried, self._prepare, observations, self._about)
 
 
-class Within(Described):
+class Within(Holding):
     """A policy and the wrappers that it plays in; made by `within`.
 
     Attributes:
         wrap: as given.
-        identity: text that changes with the policy, or with the code of the wrappers.
+        identity: text that changes with the policy as it is now, or with the code of the wrappers.
     """
 
     def __init__(self, policy: Policy, wrap: Callable[[Any], Any]) -> None:
         self._policy, self.wrap = policy, wrap
         self.needs_state = getattr(policy, "needs_state", False)
-        parts = {"policy": identity(policy), "wrap": fingerprint(wrap)}
-        self.identity = canonical_json(parts)
 
     def __repr__(self) -> str:
         return f"policies.within({self._policy!r}, {self.wrap!r})"
+
+    def identity_parts(self) -> dict[str, Any]:
+        """Return what identifies it: the policy, and the wrappers."""
+        inner = identity_parts(self._policy)
+        prints = joined([inner, fingerprint(self.wrap)])
+        policy = {name: part for name, part in inner.items() if name not in prints}
+        return {"class": "Within", "policy": policy, **prints}
 
     def configure(self, scenario: Scenario) -> None:
         """Let the policy take what a robot's maker knows."""
@@ -180,25 +194,25 @@ def _rows_of_a_swarm() -> Rows:
     return Warehouse(Scenario(n_robots=5)).reset(seed=0)
 
 
-class ModelPolicy(Described):
+class ModelPolicy(_Model):
     """A model between what a robot senses and its command; made by `of` and `from_sb3`.
 
     Args:
         decide: turns rows (N, D) into outputs.
         prepare: turns rows into what the model learned to read.
-        parts: what its behaviour depends on, for its identity.
         about: what people call the model.
         frame, listens: as `of`.
 
     Attributes:
-        identity: text that changes with the model, its form, or the code of this module.
+        identity: text that changes with the model as it is now, its form, or the code of this
+            module: weights, buffers, attributes, layers and their code. What cannot be compared is
+            another one each time, so that it is played again.
     """
 
     def __init__(
         self,
         decide: Decide,
         prepare: Decide,
-        parts: dict[str, Any],
         *,
         about: str,
         frame: bool,
@@ -206,7 +220,6 @@ class ModelPolicy(Described):
     ) -> None:
         self._decide, self._prepare = decide, prepare
         self._has_frame, self._listens, self._about = frame, listens, about
-        self.identity = canonical_json({"model": parts, "code": package_code(*_CODE)})
         if hasattr(decide, "policy") and hasattr(decide.policy, "observation_space"):
             check_spaces(about, decide.policy, frame)
         check_width(about, width_of(decide), frame)
@@ -219,10 +232,17 @@ class ModelPolicy(Described):
     def __repr__(self) -> str:
         return f"policies.of({self._about}, frame={self._has_frame})"
 
+    def identity_parts(self) -> dict[str, Any]:
+        """Return what identifies it: the model as it is now, and its form."""
+        form = {"frame": self._has_frame, "listens": self._listens}
+        return {**super().identity_parts(), **form}
+
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        # Each run has a memory of its own; the model has none.
+        # Each run has a memory of its own; a model should have none, but may note what it did.
         other = copy.copy(self)
         other._view = copy.deepcopy(self._view, memo)
+        with contextlib.suppress(*RAISED_BY_OTHERS):
+            other._decide, other._prepare = deep_copy((self._decide, self._prepare))
         return other
 
     def configure(self, scenario: Scenario) -> None:
@@ -295,35 +315,25 @@ class ModelPolicy(Described):
         return outputs
 
 
-def decider_of(network: Any) -> tuple[Decide, str]:
-    """Return what turns rows into outputs, and text that changes with it.
+def decider_of(network: Any) -> Decide:
+    """Return what turns rows into outputs.
 
     Raises:
         PolicyError: `network` is none, or one that cannot be played.
     """
     predictor = predictor_in(network)
     if predictor is not None:
-        has_weights = hasattr(predictor, "state_dict")
-        content = _content_of(predictor) if has_weights else canonical_json(fingerprint(network))
-        return PredictingPolicy(predictor), content
+        return PredictingPolicy(predictor)
     if hasattr(network, "module") and hasattr(network, "graph_signature"):
         network = network.module()  # of a program that torch exported
     if hasattr(network, "state_dict") and callable(network):
-        return TorchNetwork(network), _content_of(network)
+        return TorchNetwork(network)
     if hasattr(network, "run") and hasattr(network, "get_inputs"):
-        return OnnxNetwork(network), fingerprint(network)["value"]
+        return OnnxNetwork(network)
     if not callable(network) or isinstance(network, type):
         raise PolicyError(
             f"network = {network!r}: should be a function of rows, a torch module, a model of "
             "stable-baselines3 or an InferenceSession of onnxruntime"
         )
-    return network, canonical_json(fingerprint(network))
-
-
-def _content_of(module: Any) -> str:
-    """Return text that changes with a torch module's class and numbers."""
-    digest = hashlib.sha256()
-    for name, tensor in sorted(module.state_dict().items()):
-        numbers = tensor.cpu().float() if "bfloat16" in str(tensor.dtype) else tensor.cpu()
-        digest.update(name.encode() + np.ascontiguousarray(numbers.numpy()).tobytes())
-    return canonical_json([repr(module), digest.hexdigest(), fingerprint(type(module))])
+    decide: Decide = network
+    return decide

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -11,24 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.fingerprint import fingerprint
 
 Rows = NDArray[np.float32]
 
 
-def normalizer_of(normalize: Any) -> tuple[Callable[[Rows], Any], Any]:
-    """Return what prepares rows, and what identifies it.
+def normalizer_of(normalize: Any) -> Callable[[Rows], Any]:
+    """Return what prepares rows.
 
     Raises:
         PolicyError: `normalize` is nothing that `policies.of` takes, or its numbers cannot be.
     """
     if normalize is None:
-        return _unchanged, None
+        return _unchanged
     normalize = _vec_normalize_in(normalize)
     # Not by getattr: a VecNormalize from a file asks an environment that it does not have.
     attributes = getattr(normalize, "__dict__", {})
     if not attributes.get("norm_obs", True):
-        return _unchanged, None
+        return _unchanged
     statistics = attributes.get("obs_rms", normalize)
     if isinstance(statistics, dict):
         raise PolicyError(
@@ -42,13 +40,14 @@ def normalizer_of(normalize: Any) -> tuple[Callable[[Rows], Any], Any]:
         mean, deviation = normalize
         scaled = Scaled(_Fixed(mean, deviation), np.inf)
     elif callable(normalize) and not isinstance(normalize, type):
-        return normalize, fingerprint(normalize)
+        prepare: Callable[[Rows], Any] = normalize
+        return prepare
     else:
         raise PolicyError(
             f"normalize = {normalize!r}: should be None, a function of rows, a pair (mean, "
             "standard deviation) or a VecNormalize of stable-baselines3"
         )
-    return scaled, scaled.digest()
+    return scaled
 
 
 def _vec_normalize_in(normalize: Any) -> Any:
@@ -141,9 +140,3 @@ class Scaled:
         mean, deviation = self._numbers()
         scaled = np.clip((rows - mean) / deviation, -self._limit, self._limit)
         return np.where(rows.any(axis=1, keepdims=True), scaled, 0.0).astype(np.float32)
-
-    def digest(self) -> str:
-        """Return text that changes with its numbers."""
-        mean, deviation = self._numbers()
-        numbers = (mean.tobytes(), deviation.tobytes(), str(self._limit).encode())
-        return hashlib.sha256(b"|".join(numbers)).hexdigest()

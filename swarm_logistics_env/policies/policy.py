@@ -7,14 +7,14 @@ import html
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.code_files import PACKAGE
 from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.fingerprint import fingerprint
+from swarm_logistics_env.fingerprint import fingerprint, joined
 from swarm_logistics_env.policies.evaluation_mode import in_evaluation
 from swarm_logistics_env.records import Record, canonical_json
 from swarm_logistics_env.scenario import Scenario
@@ -65,16 +65,65 @@ def check_policy(policy: object) -> None:
 class Described:
     """A policy that says in a line what it is: in a session, and with a sentence in a notebook."""
 
-    def __repr__(self) -> str:
-        parameters: Any = getattr(self, "parameters", {})
-        if isinstance(parameters, Record):
-            parameters = parameters.model_dump(exclude_defaults=True)
-        listed = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
-        return f"{type(self).__name__}({listed})"
-
     def _repr_html_(self) -> str:
         about = (type(self).__doc__ or "").partition("\n\n")[0]
         return f"<b>{html.escape(repr(self))}</b><br>{html.escape(' '.join(about.split()))}"
+
+
+class NoParameters(Record):
+    """The parameters of a policy that has none."""
+
+    error_type = PolicyError
+
+
+class Scripted(Described):
+    """A script of this package. What it was made with are its `parameters`, and nothing else.
+
+    Its keyword arguments are the fields of `parameters_type`.
+
+    Attributes:
+        parameters: which its repr and its identity read, as its decisions do.
+
+    Raises:
+        PolicyError: a parameter is unknown or out of range.
+    """
+
+    parameters_type: ClassVar[type[Record]] = NoParameters
+    parameters: Any  # of that type, as subclasses declare
+
+    def __init__(self, **parameters: Any) -> None:
+        self.parameters = self.parameters_type(**parameters)
+        self.configure(Scenario())
+        self.reset(0, 0)
+
+    def __repr__(self) -> str:
+        changed = self.parameters.model_dump(exclude_defaults=True)
+        listed = ", ".join(f"{name}={value!r}" for name, value in changed.items())
+        return f"{type(self).__name__}({listed})"
+
+    def configure(self, scenario: Scenario) -> None:
+        """Take what a robot's maker knows."""
+        raise NotImplementedError
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode of `n_robots` rows."""
+        raise NotImplementedError
+
+
+class Holding(Described):
+    """A policy of this package around something of a user's: a network, or another policy.
+
+    Attributes:
+        identity: text that changes with what it holds, as that is now, or with the code around it.
+    """
+
+    def identity_parts(self) -> dict[str, Any]:
+        """Return what identifies it, by name, with a `fingerprint` of what it holds."""
+        raise NotImplementedError
+
+    @property
+    def identity(self) -> str:
+        return canonical_json(self.identity_parts())
 
 
 @contextlib.contextmanager
@@ -165,19 +214,23 @@ def identity(policy: Policy) -> str:
 def identity_parts(policy: Policy, files: Iterable[Path] = ()) -> dict[str, Any]:
     """Return what identifies a policy, by name.
 
-    Of a policy of this package that is its class and its `parameters`, as a task's code version
-    tells the rest; of any other one its class and its `fingerprint`.
+    Of a policy of this package that is its class and its `parameters`, a record, as a task's code
+    version tells the rest; of any other one its class and its `fingerprint`.
 
     Args:
         files: Python files that it was loaded from.
     """
+    if isinstance(policy, Holding):
+        parts = policy.identity_parts()
+        return parts | joined([parts, fingerprint(None, files)]) if files else parts
     stated = getattr(policy, "identity", None)
     if stated is not None:
         return {"identity": str(stated)}
     kind = type(policy)
     if kind.__module__.partition(".")[0] != PACKAGE.name:
         return {"class": kind.__qualname__, **fingerprint(policy, files)}
-    parameters: Any = getattr(policy, "parameters", {})
+    name = f"{kind.__module__}:{kind.__qualname__}"
+    parameters = getattr(policy, "parameters", None)
     if isinstance(parameters, Record):
-        parameters = parameters.model_dump(mode="json")
-    return {"class": f"{kind.__module__}:{kind.__qualname__}", "parameters": parameters}
+        return {"class": name, "parameters": parameters.model_dump(mode="json")}
+    return {"class": name, **fingerprint(policy)}

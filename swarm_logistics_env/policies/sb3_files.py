@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import importlib
 import json
 import pickle
@@ -53,12 +52,9 @@ def from_sb3(
         normalize = _unpickled(Path(normalize))
     if wrap is not None:
         return within(model, wrap, normalize=normalize)
-    prepare, normalizer = normalizer_of(normalize)
-    parts = {
-        "sha256": _digest_of(path), "frame": frame, "listens": listens, "normalize": normalizer,
-    }  # fmt: skip
-    decide, _ = decider_of(model)
-    return ModelPolicy(decide, prepare, parts, about=path.name, frame=frame, listens=listens)
+    decide = decider_of(model)
+    prepare = normalizer_of(normalize)
+    return ModelPolicy(decide, prepare, about=path.name, frame=frame, listens=listens)
 
 
 class StableBaselinesModel:
@@ -74,9 +70,8 @@ class StableBaselinesModel:
     """
 
     def __init__(self, path: Path) -> None:
-        self._decide, _ = decider_of(read_model(path))
+        self._decide = decider_of(read_model(path))
         self._about = path.name
-        self.parameters = {"sha256": _digest_of(path)}
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode; nothing here is random."""
@@ -177,14 +172,6 @@ def refuse_untrusted(path: Path, trust_code: bool) -> None:
             f"{path} is a file of stable-baselines3: reading it executes the code in it; if you "
             "trust its maker, say so: policies.load(.., trust_code=True) or --trust-code"
         )
-
-
-def _digest_of(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        reason = error.strerror or error
-        raise PolicyError(f"cannot read {path}: {reason}") from error
 
 
 def _unpickled(path: Path) -> Any:

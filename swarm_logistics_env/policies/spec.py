@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import inspect
-import json
 import re
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -23,7 +21,7 @@ from swarm_logistics_env.errors import (
     SwarmLogisticsError,
     suggest,
 )
-from swarm_logistics_env.fingerprint import UNSTABLE, changed_files, changes
+from swarm_logistics_env.fingerprint import UNSTABLE, changed_files, changes, deep_copy
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
 from swarm_logistics_env.policies.files import (
@@ -232,7 +230,7 @@ class PolicySpec(Record):
             return self._make(makers)
         policy = self._make(makers) if planned is None else self._make_planned(makers, planned)
         try:
-            return copy.deepcopy(policy)
+            return cast("Policy", deep_copy(policy))
         except RAISED_BY_OTHERS as error:  # of code that is not ours
             raise PolicyError(
                 f"policy {self.name!r} cannot be copied ({type(error).__name__}): should keep "
@@ -294,24 +292,33 @@ class PolicySpec(Record):
         if self.trainings:
             identities = [(spec.name, spec.identity(makers)) for spec in self.trainings]
             return canonical_json(identities)
-        text = self._identity_of(self._make(makers))
-        if self.made is None and text != (second := self._identity_of(self._make(makers))):
+        parts = self._parts_of(self._make(makers))
+        if parts != (again := self._parts_of(self._make(makers))):
             # What is another one each time cannot be compared with what was played before.
-            return canonical_json(json.loads(second) | {"value": UNSTABLE + uuid.uuid4().hex})
-        return text
+            return canonical_json(again | {"value": UNSTABLE + uuid.uuid4().hex})
+        return _as_text(parts)
 
     def _identity_of(self, policy: Policy) -> str:
+        return _as_text(self._parts_of(policy))
+
+    def _parts_of(self, policy: Policy) -> dict[str, Any]:
+        """Return what identifies the policy that it stands for, by name."""
         file = file_of_name(self.name) if self.made is None else None
         parts = identity_parts(policy, [file] if file else ())
         # Two functions may make objects of one class; a class need not keep its parameters.
         if self.made is None and ":" in self.name:
             parts["made by"] = self.name.rpartition(":")[2]
-        if self.parameters:
+        if self.parameters and "parameters" not in parts:
             parts["given"] = self.parameters
-        if parts.keys() != {"identity"}:
-            return canonical_json(parts)
-        # A lone half of a sign cannot be written into a file.
-        return str(parts["identity"]).encode(errors="backslashreplace").decode()
+        return parts
+
+
+def _as_text(parts: dict[str, Any]) -> str:
+    """Return the identity with these parts."""
+    if parts.keys() != {"identity"}:
+        return canonical_json(parts)
+    # A lone half of a sign cannot be written into a file.
+    return str(parts["identity"]).encode(errors="backslashreplace").decode()
 
 
 # By text, parameters and identity: policies that are what was planned, whatever changes later.

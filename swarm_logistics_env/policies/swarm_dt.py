@@ -12,7 +12,7 @@ timer, moves towards the one that tells the lowest.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from pydantic import Field, NonNegativeFloat
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
-from swarm_logistics_env.policies.policy import Described
+from swarm_logistics_env.policies.policy import Scripted
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -110,7 +110,7 @@ class StepConstants(NamedTuple):
     widest_step: float
 
 
-class SwarmDT(Described):
+class SwarmDT(Scripted):
     """Swarm Diffusion-Taxis: a robot with the requested item follows the lowest timer it hears.
 
     Its keyword arguments are the fields of `SwarmDTParameters`.
@@ -125,10 +125,8 @@ class SwarmDT(Described):
         (3, 4)
     """
 
-    def __init__(self, **parameters: Any) -> None:
-        self.parameters = SwarmDTParameters(**parameters)
-        self.configure(Scenario())
-        self.reset(0, 0)
+    parameters_type = SwarmDTParameters
+    parameters: SwarmDTParameters
 
     def configure(self, scenario: Scenario) -> None:
         """Take what the maker of a robot knows: its control period and its drive."""

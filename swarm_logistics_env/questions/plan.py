@@ -184,10 +184,15 @@ def make_plan(
     return Plan(specification, comparisons, code or task.code(), identities, nulls)
 
 
-def refuse_changed_policies(runs: Iterable[Run]) -> None:
-    """Raise PolicyError if the policy of a run is not the one any more that was planned."""
-    cases = {(run.case.policy, run.case.identity): run.case for run in runs}
-    for case in cases.values():
+def refuse_changed_policies(plan: Plan, runs: Iterable[Run]) -> None:
+    """Raise PolicyError if a policy is not the one any more that was planned.
+
+    Args:
+        runs: that will be played. An object may have learned also where none is missing.
+    """
+    cases = [case for case in plan.cases if case.policy.made is not None]
+    cases += [run.case for run in runs]
+    for case in {(case.policy, case.identity): case for case in cases}.values():
         case.policy.refuse_other(case.identity, case.task.policies)
 
 

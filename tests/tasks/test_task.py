@@ -67,7 +67,7 @@ def test_covers_all_that_an_episode_loads() -> None:
     # These hold messages, validation and names only.
     assert loaded - covered <= {
         "errors.py", "records.py", "code_files.py", "current_folder.py", "fingerprint.py",
-        "environment/registration.py", "policies/__init__.py",
+        "model_parts.py", "environment/registration.py", "policies/__init__.py",
     }  # fmt: skip
     assert {"warehouse/physics.py", "policies/homing.py", "kernels.py"} <= covered
 

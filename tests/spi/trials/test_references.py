@@ -9,11 +9,11 @@ import pytest
 from swarm_logistics_env import spi
 
 LAB = [
-    "8,,,2,12",
-    "8,,,2,11",
-    "8,,,2,13",
-    "8,,,1.5,9",
-    "8,,,1.5,10",
+    "8,none,0,2,12",
+    "8,none,0,2,11",
+    "8,none,0,2,13",
+    "8,none,0,1.5,9",
+    "8,none,0,1.5,10",
     "8,jam,1,1.5,5",
     "8,jam,1,1.5,4",
 ]
@@ -33,7 +33,8 @@ def test_most_trials_without_a_fault_or_a_person_settle_the_reference(tmp_path: 
         # Two of each: a person has to say.
         assert read(tmp_path, rows[:2] + rows[2:][::-1], width=2.0).references[0][2] == 2.0
     assert read(tmp_path, LAB[1:]).references == ()
-    both = ["4,,,2,5", "4,,,2,6", "4,,,2,7", *LAB]  # as many of 4 robots, of the same width
+    four = [f"4,none,0,2,{p}" for p in (5, 6, 7)]  # as many of 4 robots, of the same width
+    both = [*four, *LAB]
     assert read(tmp_path, both).references == (("", "width", 2.0),)
 
 

@@ -1,0 +1,132 @@
+"""What identifies a policy: everything that it was made with, and nothing else."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import policies
+from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.policies.homing import Homing
+from swarm_logistics_env.policies.homing_stock import HomingStock
+from swarm_logistics_env.policies.learned import LearnedPolicy, Network
+from swarm_logistics_env.policies.policy import Scripted, identity
+from swarm_logistics_env.policies.spec import SCRIPTED, PolicySpec
+from swarm_logistics_env.studies import Study
+
+
+def changed(value: Any) -> Any:
+    """Return another value of a parameter that is allowed, too."""
+    return not value if isinstance(value, bool) else 1.25 * value + 0.01
+
+
+def script_of(name: str) -> Any:
+    make: Any = SCRIPTED[name]
+    kind = make.func if isinstance(make, functools.partial) else make
+    assert isinstance(kind, type)
+    assert issubclass(kind, Scripted)
+    return kind
+
+
+@pytest.mark.parametrize("name", SCRIPTED)
+def test_every_argument_of_a_script_changes_its_identity_and_its_repr(name: str) -> None:
+    kind = script_of(name)
+    assert kind.__init__ is Scripted.__init__, "its arguments are the fields of its record"
+    defaults = kind.parameters_type().model_dump()
+    default = kind()
+    assert identity(default) == identity(kind(**defaults))
+    assert repr(default) == f"{kind.__name__}()"
+    met = {identity(default)}
+    for field, value in defaults.items():
+        # Upwards, so that `near` stays below `far`.
+        fields: dict[str, Any] = {"near": 0.9} if field == "near" else {field: changed(value)}
+        policy = kind(**fields)
+        assert repr(policy) == f"{kind.__name__}({field}={fields[field]!r})"
+        assert identity(policy) not in met
+        met.add(identity(policy))
+        if SCRIPTED[name] is kind:  # the text with the same parameters is the same policy
+            assert PolicySpec(name=name, parameters=fields).identity() == identity(policy)
+
+
+def test_every_argument_of_a_trained_policy_changes_its_identity() -> None:
+    trained: Any = policies.load("ppo-delivery")
+    met = {identity(trained)}
+    for field, value in {"listens": False, "decides_every": 7, "exploration": 0.3}.items():
+        network = trained.card.network.replace(**{field: value})
+        met.add(identity(LearnedPolicy(trained.card.replace(network=network), trained.tensors)))
+    narrow = Network(hidden=(8,))
+    tensors = {
+        "layers.0.weight": trained.tensors["layers.0.weight"][:8],
+        "layers.0.bias": trained.tensors["layers.0.bias"][:8],
+        "layers.1.weight": trained.tensors["layers.2.weight"][:, :8],
+        "layers.1.bias": trained.tensors["layers.2.bias"],
+        "deviations": trained.tensors["deviations"],
+    }
+    met.add(identity(LearnedPolicy(trained.card.replace(network=narrow), tensors)))
+    for name, tensor in tensors.items():
+        others = {**tensors, name: tensor + np.float32(0.1)}
+        met.add(identity(LearnedPolicy(trained.card.replace(network=narrow), others)))
+    assert len(met) == 5 + len(tensors)
+
+
+def forward(rows: Any) -> Any:
+    return rows[:, :4]
+
+
+def backward(rows: Any) -> Any:
+    return -rows[:, :4]
+
+
+def test_every_argument_of_a_policy_of_a_network_changes_its_identity() -> None:
+    numbers = np.zeros(141), np.ones(141)
+    made: list[Any] = [
+        policies.of(forward),
+        policies.of(backward),
+        policies.of(forward, frame=True),
+        policies.of(forward, listens=False),
+        policies.of(forward, normalize=numbers),
+        policies.of(forward, normalize=(numbers[0], 2.0 * numbers[1])),
+        policies.of(forward, normalize=backward),
+        policies.within(forward, backward),
+        policies.within(backward, backward),
+        policies.within(forward, forward),
+        policies.within(forward, backward, normalize=numbers),
+        policies.within(Homing(), backward),
+        policies.within(HomingStock(), backward),
+        policies.within(HomingStock(near=0.9), backward),
+    ]
+    identities = [identity(policy) for policy in made]
+    assert len(set(identities)) == len(made)
+    assert identities == [identity(policy) for policy in made]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: HomingStock(near=-1.0), r"near = -1\.0: should be greater than 0"),
+        (lambda: HomingStock(near=2.0), r"far = 1\.2: should be at least near = 2 \[m\]"),
+        (lambda: HomingStock(far=float("nan")), "far = nan: should be"),
+        (lambda: HomingStock(nearer=1.0), "no field 'nearer'; did you mean 'near'"),
+        (lambda: Homing(near=1.0), "no field 'near'"),
+        (lambda: policies.load("central", near=1.0), "no field 'near'"),
+    ],
+)
+def test_parameters_that_cannot_be_are_refused_by_name(make: Any, message: str) -> None:
+    with pytest.raises(PolicyError, match=message):
+        make()
+
+
+def test_a_policy_with_other_parameters_is_played_in_the_same_directory(tmp_path: Path) -> None:
+    scenario = {"n_robots": 2, "n_items": 4, "duration": 1.0}
+    tallies = []
+    for policy in (HomingStock(), HomingStock(near=1.2, far=1.6), HomingStock(far=1.2)):
+        study = Study(
+            out=tmp_path, policies=[policy], seeds=1, scenario=scenario, sizes=[{"values": [2, 3]}]
+        )
+        tally = study.run()
+        tallies.append((tally.played, tally.kept))
+    assert tallies == [(2, 0), (2, 0), (0, 2)]
