@@ -242,6 +242,11 @@ def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
             "proportion to the seeds, so that an interval has the level of its look, which stands "
             f"with it, and those of all looks together hold the true value with {level}."
         )
+    if any(len(arm.case.trainings) > 1 for _, _, arm in plan.cells):
+        stops += (
+            " An interval over trainings holds for trainings like those played; that more collapse "
+            "is part of the verdict alone."
+        )
     return (
         f"We measured performance P in {trials}. We report {join_names(names)}, each a ratio of "
         f"mean performances, with {interval} that inverts {test}.{stops} An indicator is called "
