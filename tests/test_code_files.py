@@ -77,6 +77,7 @@ def test_a_neighbour_that_is_imported_by_a_call_is_that_of_the_folder(
     tmp_path: Path, imports: str
 ) -> None:
     policies = []
+    modules = {name: sys.modules.get(name) for name in ("gains", "late")}
     for number in (1, 2):
         path = write(tmp_path / str(number), number)
         path.write_text(
@@ -88,7 +89,7 @@ def test_a_neighbour_that_is_imported_by_a_call_is_that_of_the_folder(
     for number, policy in enumerate(policies, start=1):
         assert policy.gain == number  # type: ignore[attr-defined]
         assert policy.act(None) == (number, number)  # type: ignore[arg-type]
-    assert not {"gains", "late"} & sys.modules.keys()
+    assert {name: sys.modules.get(name) for name in modules} == modules
 
 
 def test_packages_of_another_environment_are_no_code_of_the_users(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.drawing import PAGE_STYLE, SERIF, FigureStyle
 from swarm_logistics_env.report.section import NOTHING, bracketed, percent, slug
+from swarm_logistics_env.report.templates import UNTESTABLE
 from swarm_logistics_env.runs.engines import Engine, Shard, Tally, engine_named
 from swarm_logistics_env.runs.notes import merge
 from swarm_logistics_env.runs.store import Runs, export
@@ -305,7 +306,8 @@ def _show_answers(
             levels = {estimate.confidence}
             verdict = f"above {estimate.threshold:g}: {answer.verdict}"
             if estimate.untestable:
-                verdict = f"untestable: cannot be below {estimate.threshold:g}"
+                reason = UNTESTABLE[estimate.flags[0]].format(threshold=estimate.threshold)
+                verdict = f"untestable: {reason}"
         rows.append((answer.name, value, verdict))
     columns = ("", f"value [{percent(*levels)}]", "verdict under Holm")
     show_table(title, columns, rows, *left_out)

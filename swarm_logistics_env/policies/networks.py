@@ -140,7 +140,10 @@ class OnnxNetwork:
         shape = getattr(inputs[0], "shape", [None, None])
         self._takes_one_row, self.width = _rows_of_shape("the ONNX network", shape)
         if type(session).__module__.startswith("onnxruntime."):
-            copyreg.pickle(type(session), _taken_apart)  # which it does not offer itself
+            # Neither of which it offers itself. A copy is the same one: it has no memory, and its
+            # file may be another one by now.
+            copyreg.pickle(type(session), _taken_apart)
+            type(session).__deepcopy__ = lambda session, _: session
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         return self  # it has no memory

@@ -240,7 +240,7 @@ class PolicySpec(Record):
     def _make_planned(self, makers: Makers, planned: str) -> Policy:
         if self.made is not None:
             # Its class may have come to this process by its content; files of it are read here.
-            if files := changed_files(planned, self._identity_of(self.made)):
+            if files := changed_files(planned, _as_text(self._parts_of(self.made))):
                 raise self._change_error(f"{', '.join(files)} changed")
             return self._make(makers)
         key = (self.name, canonical_json(self.parameters), planned)
@@ -255,7 +255,7 @@ class PolicySpec(Record):
             PolicyError: it cannot be found or built, or has another identity than `planned`.
         """
         policy = self._make(makers)
-        if change := changes(planned, self._identity_of(policy)):
+        if change := changes(planned, _as_text(self._parts_of(policy))):
             raise self._change_error(change)
         return policy
 
@@ -297,9 +297,6 @@ class PolicySpec(Record):
             # What is another one each time cannot be compared with what was played before.
             return canonical_json(again | {"value": UNSTABLE + uuid.uuid4().hex})
         return _as_text(parts)
-
-    def _identity_of(self, policy: Policy) -> str:
-        return _as_text(self._parts_of(policy))
 
     def _parts_of(self, policy: Policy) -> dict[str, Any]:
         """Return what identifies the policy that it stands for, by name."""

@@ -253,7 +253,6 @@ def estimate_ratio(
     if identical:  # the same runs leave nothing to test
         value = untested.value
         return replace(untested, low=value, high=value, flags=("identical",))
-    estimate = untested
     if n_seeds == 1:
         estimate = replace(untested, flags=("single_seed",))
     else:

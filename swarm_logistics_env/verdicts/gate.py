@@ -227,7 +227,7 @@ def answers(gate: Gate, old: StudyResults, new: StudyResults) -> tuple[GateAnswe
             gate_answers.append(GateAnswer(name, gate.holds_for(value), exact=value))
         else:
             verdict = next(verdicts)
-            is_impossible = gate.below and value.untestable
+            is_impossible = gate.below and "cannot_fail" in value.flags
             gate_answers.append(
                 GateAnswer(name, gate.fails_on(verdict) and not is_impossible, value, verdict)
             )

@@ -18,7 +18,7 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.cli.output import prepare_output
 
 TRIALS = "robots,width,delivered\n" + "".join(
-    f"10,{width},{20 + width + k}\n" for width in (1, 2) for k in range(3)
+    f"10,{width},{20 + width + k}\n" for width in (1, 2) for k in range(5 - width)
 )
 ENCODINGS = ["ascii", "cp1252", "cp437", "latin-1", "koi8-r", "shift_jis", "utf-8", "utf-16"]
 COMMAND = [sys.executable, "-c", "from swarm_logistics_env.cli import app; app()"]

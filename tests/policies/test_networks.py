@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -167,6 +168,12 @@ def test_an_exported_network_plays_row_by_row_if_it_takes_one() -> None:
         np.testing.assert_allclose(policy.act(ROWS), in_use(network), atol=1e-6)
 
 
+def traced(network: Any) -> Any:
+    with warnings.catch_warnings():  # it warns that the number of rows is checked once
+        warnings.simplefilter("ignore")
+        return torch.jit.trace(network, torch.as_tensor(ROWS), check_trace=False)
+
+
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
@@ -179,7 +186,7 @@ def test_an_exported_network_plays_row_by_row_if_it_takes_one() -> None:
             "other outputs beside other rows, as one that was exported in training mode",
         ),
         (
-            lambda: torch.jit.trace(module(), torch.as_tensor(ROWS), check_trace=False),
+            lambda: traced(module()),
             "gave other outputs for the same rows: should be exported after network.eval()",
         ),
         (lambda: exported(module(), 3), r"input of shape \(3, 141\): should take rows, of any num"),

@@ -14,4 +14,5 @@ def test_ways_are_short(tmp_path: Path) -> None:
     assert len(episode.hops) <= 13
     assert len(episode.containers) <= 5
     assert {"spec.PolicySpec.of", "spec.PolicySpec.load"} <= policy.hops.keys()
-    assert len(policy.hops) <= 11  # it is compared with what was planned, where it is played
+    # It is compared with what was planned, where it is played, and copied with shared sessions.
+    assert len(policy.hops) <= 12
