@@ -186,11 +186,11 @@ def _session_parts(session: Any) -> Parts | None:
         digests = [_digest(file.read_bytes()) for file in files]
     rng = np.random.default_rng(0)
     rows = {}
-    for given in session.get_inputs():
-        if given.type != "tensor(float)":
-            raise TypeError(f"input {given.name} of {given.type}: cannot be drawn")
-        shape = [size if isinstance(size, int) else 8 for size in given.shape]
-        rows[given.name] = rng.normal(size=shape).astype(np.float32)
+    for argument in session.get_inputs():
+        if argument.type != "tensor(float)":
+            raise TypeError(f"input {argument.name} of {argument.type}: cannot be drawn")
+        shape = [size if isinstance(size, int) else 8 for size in argument.shape]
+        rows[argument.name] = rng.normal(size=shape).astype(np.float32)
     outputs = [
         [np.asarray(output).tobytes() for output in session.run(None, rows)] for _ in range(2)
     ]

@@ -89,16 +89,16 @@ def _read_head(lines: Iterable[tuple[int, str]]) -> tuple[int, int, int]:
 
 
 def refuse_unknown_signs(
-    lines: Iterable[tuple[int, str]], known: Collection[str], remedy: str
+    lines: Iterable[tuple[int, str]], signs: Collection[str], remedy: str
 ) -> None:
     """Raise ValueError at the first sign that is none of a plan or a map.
 
     Args:
         lines: of the file, with their numbers.
-        known: the signs that are.
+        signs: those that are known.
         remedy: ends the message.
     """
     for number, row in lines:
         for column, sign in enumerate(row, start=1):
-            if sign not in known:
+            if sign not in signs:
                 raise ValueError(f"line {number}, column {column}: {sign!r} is no cell: {remedy}")

@@ -204,10 +204,10 @@ def _explain_end(training: Training, out: Path, learner: Any, log: TrainingLog) 
     except TrainingError:  # of the disk
         raise
     except (FloatingPointError, SwarmLogisticsError) as error:
-        kept = "no policy is kept, as none was measured"
+        policy_kept = "no policy is kept, as none was measured"
         if log.curve:
             steps = log.best["agent_steps"]
-            kept = f"kept is {BEST}, with P = {log.best['P']:.4g} at {steps:,} agent-steps"
+            policy_kept = f"kept is {BEST}, with P = {log.best['P']:.4g} at {steps:,} agent-steps"
         remedy = "mend that, and the same command goes on from the last checkpoint"
         if isinstance(error, FloatingPointError):
             remedy = (
@@ -216,7 +216,7 @@ def _explain_end(training: Training, out: Path, learner: Any, log: TrainingLog) 
             )
         raise TrainingError(
             f"the training in {out} ended at {learner.num_timesteps:,} of "
-            f"{training.agent_steps:,} agent-steps ({error}): {kept}; {remedy}"
+            f"{training.agent_steps:,} agent-steps ({error}): {policy_kept}; {remedy}"
         ) from error
 
 

@@ -146,6 +146,7 @@ class WatchServer:
         self._noted_at = 0.0
         self._silent_since: dict[asyncio.Transport, float] = {}
         self._listening: socket.socket | None = None
+        self._is_ending = False
         app = web.Application(middlewares=[self._answer_once, self._guard])
         app.router.add_get("/{token}/live", self._live)
         app.router.add_get("/{token}/recording.html", self._save)
@@ -181,7 +182,11 @@ class WatchServer:
         self.address = f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
     async def _accept(self, listening: socket.socket, new_protocol: Callable[[], Any]) -> None:
-        """Accept connections while there is room; the requests of others wait to be read."""
+        """Accept connections while there is room; the requests of others wait to be read.
+
+        It ends at the first connection after `_is_ending`, and is not to be cancelled: asyncio
+        would lose a connection that comes in the same moment, and leave it open.
+        """
         loop = asyncio.get_running_loop()
 
         def new_connection() -> Any:
@@ -190,10 +195,13 @@ class WatchServer:
         while True:
             try:
                 accepted, _ = await loop.sock_accept(listening)
+                if self._is_ending:
+                    accepted.close()
+                    return
                 await loop.connect_accepted_socket(new_connection, accepted)
             except OSError:  # it has gone again, or no more files can be open
                 await asyncio.sleep(_FRAME_PERIOD)
-            while len(self._silent_since) >= _MOST_CONNECTIONS:
+            while len(self._silent_since) >= _MOST_CONNECTIONS and not self._is_ending:
                 self._drop_silent(_SHORTEST_SILENCE)
                 await asyncio.sleep(_FRAME_PERIOD)
 
@@ -224,7 +232,9 @@ class WatchServer:
                     for page in self._pages:
                         page.tell(current_frame)
         finally:
-            accepting.cancel()
+            self._is_ending = True
+            with contextlib.suppress(OSError), socket.create_connection((LOOPBACK, self.port), 5.0):
+                await accepting
             self._listening.close()
             await self._runner.cleanup()
 

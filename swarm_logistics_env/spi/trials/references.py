@@ -60,8 +60,8 @@ def notes_on_references(
     """Yield which reference is taken where nobody names it."""
     for table, name, value in references:
         if name not in named:
-            place = f"{table}: " if table else ""
+            prefix = f"{table}: " if table else ""
             yield (
-                f"{place}A is relative to {name} = {value:g}, as most trials without a fault have "
+                f"{prefix}A is relative to {name} = {value:g}, as most trials without a fault have "
                 "it; --reference names another."
             )
