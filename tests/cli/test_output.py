@@ -39,7 +39,7 @@ def test_every_text_is_written_in_every_encoding(text: str, encoding: str) -> No
         assert shown[: len(text)] == text
 
 
-# The other charmaps are written as cp1252 is.
+# The other charmaps are written as cp1252 is; the test above takes all of them.
 @pytest.mark.parametrize(
     ("encoding", "is_terminal"),
     [("ascii", False), ("cp1252", True), ("utf-16", False), ("utf-8", False), ("utf-8", True)],
