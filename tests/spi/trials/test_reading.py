@@ -43,21 +43,6 @@ def test_a_file_with_decimal_commas_is_read(tmp_path: Path) -> None:
         trials.performance(fault="wheal")
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "n_robots\tfailure\tfailed\tP\n8\tnone\t0\t10.5\n8\tstuck wheel\t2\t7\n",
-        "\ufeffRobots;Fault;Faulty;Items [box]\r\n8;None;0;10.5\r\n8;stuck wheel;2;7\r\n",
-        "\nN;mode;m;p\n8;;0;10.5\n8;stuck wheel;2;7\n",
-        'N,mode,m,p\n8,none,0,"10.5"\n\n8,stuck wheel,2,7\n,,,\n',
-    ],
-)
-def test_spellings_of_one_file_read_alike(tmp_path: Path, text: str) -> None:
-    rows = read(tmp_path, text).rows
-    found = [(row.n_robots, row.fault, row.faulty, row.performance) for row in rows]
-    assert found == [(8, "none", 0, 10.5), (8, "stuck wheel", 2, 7.0)]
-
-
 def test_a_mode_is_one_mode_however_it_is_typed(tmp_path: Path) -> None:
     trials = read(tmp_path, "robots,fault,faulty,p\n4,none,0,9\n4,Fm1,1,7\n4,FM1,1,6\n4,fm1,1,5\n")
     assert [row.fault for row in trials.rows] == ["none", "FM1", "FM1", "FM1"]
@@ -116,14 +101,11 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         ("robots,fualt,p\n4,none,1\n", "has a column 'fualt'; did you mean 'fault'?"),
         (HEAD + GOOD + "2,8,none,,ten\n", "line 3, column 'delivered': 'ten': should be a number"),
         (HEAD + "1,8,none,,12,5\n", "line 2: has 6 values, more values than the 5 columns"),
-        # Either would swallow the rows below it.
-        (HEAD + GOOD + '"2,8,none,,7\n' + GOOD, "line 3: opens a quote that is never closed"),
-        (HEAD + '1,8,"no"ne,,7\n', "line 2: opens a quote that is closed within a cell"),
-        (HEAD + GOOD + '2,8,"none,,7\n3,8,"x",,1\n', "line 3: opens a quote that is closed within"),
-        (
-            HEAD + '1,8,none,,"7\n2,8,none,,8\n3,8,none,,"\n',
-            "line 2: opens a quote that holds whole",
-        ),
+        # Each would swallow what is below it, or lose a sign.
+        (HEAD + GOOD + '"2,8,none,,7\n' + GOOD, "line 3: opens a quote that is not closed at its"),
+        (HEAD + '1,8,"no"ne,,7\n', "line 2: opens a quote that is not closed at its cell's end"),
+        (HEAD + GOOD + '2,8,"none,,7\n3,8,"x",,1\n', "line 3: opens a quote that is not closed"),
+        (HEAD + '1,8,none,,"7\n2,8,none,,8\n3,8,none,,"\n', "line 2: opens a quote that holds who"),
         # 1200 or 1.2?
         (
             "robots;p\n4;980\n4;1.200\n",
@@ -234,7 +216,8 @@ def test_who_delivered_is_left_out_of_an_event_log(tmp_path: Path) -> None:
 
 
 def test_a_column_that_is_left_out_is_not_read(tmp_path: Path) -> None:
-    text = "robots,p,seed,fault\n4,1,3,jam\n4,2,3,jam\n"
+    trajectory = "x" * 200_000  # longer than the csv module takes by itself
+    text = f"robots,p,seed,fault\n4,1,3,jam\n4,2,3,{trajectory}\n"
     rows = read(tmp_path, text, ignore=["seed", "fault"]).rows
     assert [(row.seed, row.fault) for row in rows] == [(None, "none")] * 2
 
@@ -375,12 +358,6 @@ def test_what_differs_in_every_row_tells_no_conditions_apart(tmp_path: Path) -> 
 def test_words_for_no_fault(tmp_path: Path, word: str) -> None:
     rows = read(tmp_path, f"robots,fault,faulty,p\n8,{word},0,9\n8,jam,1,7\n").rows
     assert [row.fault for row in rows] == ["none", "jam"]
-
-
-def test_a_file_in_utf_16_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "trials.csv"
-    path.write_text("robots\tfault\tfaulty\tp\n8\tnone\t0\t9\n8\tRäder\t1\t7\n", encoding="utf-16")
-    assert [row.fault for row in spi.read_trials(path).rows] == ["none", "Räder"]
 
 
 def test_a_time_to_finish_gives_a_rate(tmp_path: Path) -> None:

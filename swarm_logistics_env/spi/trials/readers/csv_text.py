@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import codecs
+import csv
+import io
 import re
 import unicodedata
 from collections.abc import Iterator
@@ -77,8 +79,6 @@ def _text(path: Path, content: bytes) -> tuple[str, list[str]]:
 
 def _cells(path: Path, text: str) -> tuple[list[str], dict[int, list[str]]]:
     """Return the columns' names, and the cells of every row with any, by line."""
-    if not text.strip():
-        raise NoTrialsError(f"{path} is empty: should have a row of column names, then the trials")
     excel = _EXCEL.match(text)
     start = excel.end() if excel else len(text) - len(text.lstrip(" \r\n"))
     if excel:
@@ -95,10 +95,12 @@ def _cells(path: Path, text: str) -> tuple[list[str], dict[int, list[str]]]:
     n_columns = len(header)
     for line, cells in rows.items():
         if len(cells) > n_columns and any(cells[n_columns:]):
-            comma = ": if decimals have a comma, put ; between the columns" * (delimiter == ",")
+            hint = ""
+            if delimiter == ",":
+                hint = ": if decimals have a comma, put ; between the columns"
             raise IndicatorError(
                 f"{path}, line {line}: has {len(cells)} values, more values than the "
-                f"{n_columns} columns{comma}"
+                f"{n_columns} columns{hint}"
             )
         cells[n_columns:] = []
         cells += [""] * (n_columns - len(cells))
@@ -108,49 +110,34 @@ def _cells(path: Path, text: str) -> tuple[list[str], dict[int, list[str]]]:
 def _rows(path: Path, text: str, start: int, delimiter: str) -> Iterator[tuple[int, list[str]]]:
     """Yield the line that each row begins in, and its cells, of which one may hold several lines.
 
-    `csv.reader` does not tell where a quote opens that is never closed.
+    By the csv module, as pandas tells no lines and reads "no"ne as none.
     """
-    if '"' not in text:  # which is faster by far
-        first_line = len(_LINE_END.findall(text, 0, start)) + 1
-        for line, row_text in enumerate(_LINE_END.split(text[start:]), first_line):
-            yield line, [*map(_read, row_text.split(delimiter))]
-        return
-    cell_pattern = re.compile(rf" *({_QUOTED}) *|[^{re.escape(delimiter)}\r\n]*")
-    position, line = start, len(_LINE_END.findall(text, 0, start)) + 1
-    first, row, n_columns = line, list[str](), 0
-    while True:
-        match = cell_pattern.match(text, position)
-        assert match is not None  # it matches nothing, too
-        quoted, position = match[1], match.end()
-        after = text[position : position + 1]
-        if quoted is None and match[0].lstrip().startswith('"'):
-            raise IndicatorError(
-                f"{path}, line {line}: opens a quote that is never closed, and what follows would "
-                'be one cell: close it by ", or take it out'
-            )
-        if quoted is not None and after not in (delimiter, "\r", "\n", ""):
-            raise IndicatorError(
-                f"{path}, line {line}: opens a quote that is closed within a cell: should be "
-                'closed at its end; a " within is written ""'
-            )
-        lines = _LINE_END.split(quoted or "")
-        if n_columns > 1 and any(part.count(delimiter) >= n_columns - 1 for part in lines[1:]):
-            raise IndicatorError(
-                f"{path}, line {line}: opens a quote that holds whole rows: should be closed in "
-                "the row that it opens in"
-            )
-        row.append(_read(quoted[1:-1].replace('""', '"') if quoted else match[0]))
-        line += len(lines) - 1
-        if after == delimiter:
-            position += 1
-            continue
-        yield first, row
-        n_columns = n_columns or len(row) * any(row)
-        if not after:
-            return
-        position += 2 if text.startswith("\r\n", position) else 1
-        line += 1
-        first, row = line, []
+    # Blanks may stand around quotes: the module skips those before.
+    body = re.sub(rf'(?<!")" +(?=[{re.escape(delimiter)}\r\n]|\Z)', '"', text[start:])
+    csv.field_size_limit(max(csv.field_size_limit(), len(body)))  # a cell may hold a trajectory
+    reader = csv.reader(
+        io.StringIO(body, newline=""), delimiter=delimiter, skipinitialspace=True, strict=True
+    )
+    first_line = len(_LINE_END.findall(text, 0, start)) + 1
+    line = first_line
+    n_columns = 0
+    try:
+        for row in reader:
+            lines_below = [part for cell in row for part in cell.splitlines()[1:]]
+            most_signs = max((part.count(delimiter) for part in lines_below), default=0)
+            if most_signs >= n_columns - 1 > 0:
+                raise IndicatorError(
+                    f"{path}, line {line}: opens a quote that holds whole rows: should be closed "
+                    "in the row that it opens in"
+                )
+            n_columns = n_columns or len(row)
+            yield line, [*map(_read, row)]
+            line = first_line + reader.line_num
+    except csv.Error as error:
+        raise IndicatorError(
+            f"{path}, line {line}: opens a quote that is not closed at its cell's end ({error}): "
+            'close it there by ", or take it out; a " within is written ""'
+        ) from None
 
 
 @lru_cache(100_000)  # most cells are some of a few texts
