@@ -76,7 +76,10 @@ def torch_modules_of(values: Iterable[object]) -> list[Any]:
 
 
 def _parts_of(value: Any) -> Iterator[object]:
-    """Yield what a value holds, without calling code of its own."""
+    """Yield what a value holds, without calling code of its own.
+
+    The walk of `fingerprint` calls such code, and ends at what it cannot compare.
+    """
     kind: Any = type(value)
     if value is None or kind in (bool, int, float, complex, str, bytes):
         return

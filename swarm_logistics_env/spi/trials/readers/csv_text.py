@@ -86,6 +86,7 @@ def _cells(path: Path, text: str) -> tuple[list[str], dict[int, list[str]]]:
     else:
         while comment := _COMMENT.match(text, start):
             start = comment.end()
+        # By its names alone: csv.Sniffer refuses a table of one column.
         head = next(_HEADER.finditer(text, start))[0]
         delimiter = max(";\t,|", key=re.sub(_QUOTED, "", head).count)
     rows = {line: cells for line, cells in _rows(path, text, start, delimiter) if any(cells)}

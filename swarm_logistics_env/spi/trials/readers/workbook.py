@@ -62,7 +62,7 @@ def _workbook(path: Path, content: bytes, digest: str) -> Table:
     """Return the table in the first visible sheet with content.
 
     Of the cells, openpyxl reads either the values or the formulas. What is merged or hidden it
-    tells with the formulas.
+    tells with the formulas. `pandas.read_excel` tells none of them but the values.
     """
     from openpyxl import load_workbook
 
