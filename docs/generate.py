@@ -1,4 +1,4 @@
-"""Writes what three pages tell of the code, between their markers: `python docs/generate.py`."""
+"""Writes what three pages tell of the code, between their markers: `python -m docs.generate`."""
 
 import csv
 import inspect
@@ -9,9 +9,9 @@ from typing import Any, get_args, get_origin
 
 import numpy as np
 from pydantic_core import PydanticUndefined
-from python_reference import python_names
-from tables import ROOT, table, with_blocks
 
+from docs.python_reference import python_names
+from research.tables import ROOT, table, with_blocks
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
 from swarm_logistics_env.cli.app import command_line
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv

@@ -1,17 +1,16 @@
 """Play what the paper's FM4, "cannot deliver", may mean, and print what single runs of each give.
 
-docs/play_paper_fit.py plays it, for the old constants and for the fit, on seeds from 5,394,000 on.
+`play_paper_fit` plays it, for the old constants and for the fit, on seeds from 5,394,000 on.
 """
 
-import csv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from fit_paper import Constants, policy_of
-from tables import table
 
+from research.fit_paper import Constants, policy_of
+from research.tables import read_rows, table
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies.policy import start
@@ -95,20 +94,8 @@ def runs(sets: Mapping[str, Constants], n_seeds: int) -> Iterator[Played]:
 
 def read_runs(path: Path) -> list[Played]:
     """Return the runs in a file."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return [
-            Played(line[0], line[1], *map(int, line[2:])) for line in list(csv.reader(file))[1:]
-        ]
-
-
-def write_runs(path: Path, played: Iterator[Played]) -> None:
-    """Write each run to a file at once."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(Played._fields)
-        for run in played:
-            writer.writerow(run)
-            file.flush()
+    rows = (list(row.values()) for row in read_rows(path))
+    return [Played(constants, reading, *map(int, numbers)) for constants, reading, *numbers in rows]
 
 
 def fm4_table(played: Sequence[Played]) -> str:
@@ -116,14 +103,14 @@ def fm4_table(played: Sequence[Played]) -> str:
     rows = []
     for name in dict.fromkeys(run.constants for run in played):
         for reading in READINGS:
-            of = [run for run in played if run[:2] == (name, reading.words)]
-            by_m = {m: np.array([run.p for run in of if run.m == m]) for m in PAPER}
+            of_reading = [run for run in played if run[:2] == (name, reading.words)]
+            by_m = {m: np.array([run.p for run in of_reading if run.m == m]) for m in PAPER}
             texts = [
                 f"{p.mean():.1f} ({np.quantile(p, 0.05):.0f} to {np.quantile(p, 0.95):.0f})"
                 for p in by_m.values()
             ]
             reached = [f"{(p >= PAPER[m]).mean():.0%}" for m, p in by_m.items()]
-            share = _share(of) if reading.change is as_it_is else ""
+            share = _share(of_reading) if reading.change is as_it_is else ""
             rows.append((name, reading.words, *texts, ", ".join(reached), share))
     papers = (f"m = {m} (paper: {p})" for m, p in PAPER.items())
     head = ("constants", "a failed robot", *papers, "runs at or above it", "requests taken")
