@@ -16,7 +16,7 @@ import shlex
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -88,7 +88,7 @@ def normalise(text: str) -> str:
     )
 
 
-def commands(text: str, languages: Sequence[str] = ("console", "sh")) -> list[list[str]]:
+def commands(text: str, languages: Container[str] = ("console", "sh")) -> list[list[str]]:
     """Return the arguments of every `swarm-logistics` command in blocks of these languages."""
     code = "\n".join(b.code for b in blocks(text) if b.language in languages)
     calls = re.findall(r"^(?:\$ )?swarm-logistics (.*)$", code.replace("\\\n", " "), re.MULTILINE)

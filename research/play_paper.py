@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
 from more_itertools import map_reduce
 
 from research.tables import percent_change, side, signed_percent, table
@@ -131,9 +132,10 @@ def _nearness(paper: Agreement) -> tuple[str, str, str]:
 def _change(drift: Cells, exact: Cells) -> str:
     """Return the relative change of P without drift, over the cells and seeds of both."""
     settings = [setting for setting in exact if setting in drift]
-    totals = [
-        sum(cells[setting].by_seed[:SEEDS] for setting in settings) for cells in (drift, exact)
-    ]
+    totals = (
+        np.sum([cells[setting].by_seed[:SEEDS] for setting in settings], axis=0)
+        for cells in (drift, exact)
+    )
     change = percent_change(*totals)
     text = signed_percent(change, 1)
     return text if side(change) else f"{text}: no clear effect"

@@ -37,5 +37,5 @@ def test_no_two_modules_have_one_name() -> None:
 
 def test_no_file_of_the_package_is_too_long_to_be_read() -> None:
     files = [*PACKAGE.rglob("*.py"), *RESEARCH]
-    lengths = {path.name: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
     assert {name: n for name, n in lengths.items() if n > 400} == {}

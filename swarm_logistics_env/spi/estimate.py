@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .hidden import Collapsed, Hidden, collapsed_trainings, hidden_of
+from .hidden import Collapsed, Hidden, collapsed, hidden_of
 from .inputs import (
     IndicatorError,
     between_0_and_1,
@@ -345,7 +345,6 @@ def _tested(
         "unbounded": math.isinf(test.low) and not degenerate,
         "few_trainings": few,
     }
-    trainings = collapsed_trainings(terms[0].sample, terms[-1].sample) if is_of_one_recipe else None
     return replace(
         untested,
         value=test.value,
@@ -361,7 +360,7 @@ def _tested(
             hidden_of_side(terms, hidden, null, 1),
             hidden_of_side(terms, hidden, null, -1),
         ),
-        collapsed=trainings,
+        collapsed=collapsed(terms[0].sample, terms[-1].sample) if is_of_one_recipe else None,
         degrees_of_freedom=test.degrees_of_freedom,
         flags=tuple(flag for flag, holds in flags.items() if holds),
     )

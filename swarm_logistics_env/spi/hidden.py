@@ -119,7 +119,7 @@ def _collapses(sample: Numbers, reference: Numbers) -> Hidden:
     return Hidden(seen.astype(np.float64), changed.shape[-1], 1.0)
 
 
-def collapsed_trainings(changed: Numbers, reference: Numbers) -> Collapsed:
+def collapsed(changed: Numbers, reference: Numbers) -> Collapsed:
     """Return the trainings that collapsed under a change with the limit of their share.
 
     Args:

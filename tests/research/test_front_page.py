@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from research import front_page
+from research.tables import ROOT
 
 README = front_page.README.read_text(encoding="utf-8")
-RESULTS = (front_page.ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+RESULTS = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
 
 
 def test_readme_says_of_results_what_their_page_says() -> None:

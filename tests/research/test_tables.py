@@ -14,6 +14,7 @@ from research import (
     front_page,
     play_bodies,
     play_floors,
+    play_paper,
     play_paper_fit,
     play_published,
     play_questions,
@@ -140,7 +141,7 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
 def test_seeds_are_clear_of_those_that_anything_was_fitted_on() -> None:
     out = Path("a")
     studies = [
-        *play_tables.paper_studies(out, play_tables.FIRST_SEED),
+        *play_paper.paper_studies(out, play_tables.FIRST_SEED),
         *(tables.example(out, name) for name in play_tables.EXAMPLES),
     ]
     for study in (*studies, *map(Study.from_file, QUESTIONS)):

@@ -12,7 +12,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.questions.specification import looks_up_to
 from swarm_logistics_env.spi.hidden import (
     STALL_SHARE,
-    collapsed_trainings,
+    collapsed,
     hidden_of,
     remainder_and_chance,
     stalls,
@@ -82,10 +82,10 @@ def test_studies_until_clear_hold_their_level_though_some_runs_stall(stalled: st
 
 @pytest.mark.parametrize(("k", "n", "upper"), [(0, 3, 0.63), (0, 5, 0.45), (0, 10, 0.26)])
 def test_the_share_that_collapses_has_an_exact_limit(k: int, n: int, upper: float) -> None:
-    found = collapsed_trainings(np.full((n, 2), 40.0), np.full((n, 2), 40.0))
+    found = collapsed(np.full((n, 2), 40.0), np.full((n, 2), 40.0))
     assert found[:2] == (k, n)
     assert found.upper == pytest.approx(upper, abs=0.005)
-    some = collapsed_trainings(np.array([[1.0]] + [[40.0]] * 9), np.full((10, 1), 40.0))
+    some = collapsed(np.array([[1.0]] + [[40.0]] * 9), np.full((10, 1), 40.0))
     assert some.upper == pytest.approx(beta.ppf(0.95, 2, 9))
 
 
