@@ -7,6 +7,7 @@ is written from what `make benchmark` left, if it did.
 """
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -181,12 +182,16 @@ def shares_of_script(results: StudyResults, script: str) -> dict[str, Interval]:
     shares = {}
     for verdict in results.verdicts:
         if verdict.after.name == script and verdict.interval is not None:
-            value, low, high = (
-                None if change is None else 1.0 / (1.0 + change) for change in verdict.interval
-            )
-            assert value is not None
-            shares[verdict.compared.policy] = Interval(value, high, low)
+            change = verdict.interval
+            low = None if change.high is None else _factor(change.high)
+            high = None if change.low is None else _factor(change.low)
+            shares[verdict.compared.policy] = Interval(_factor(change.value), low, high)
     return shares
+
+
+def _factor(change: float) -> float:
+    """Return by which factor P was larger before a relative change; infinite: nothing is left."""
+    return 1.0 / (1.0 + change) if change > -1.0 else math.inf
 
 
 def leans_cells(results: StudyResults) -> dict[str, dict[str, Cell]]:
