@@ -69,7 +69,7 @@ def values(estimates: Sequence[Mapping[str, str]], study: str) -> Rows:
     return rows
 
 
-_INTERVAL = re.compile(r"-?[\d.]+ \[[^]]+\](?: \(\d+ of \d+ collapsed, at most \d+ %\))?")
+_INTERVAL = re.compile(r"[-\d.∞]+ \[[^]]+\](?: \(\d+ of \d+ collapsed, at most \d+ %\))?")
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?: %)?")
 _COST = re.compile(r"[\d,]+ µs on one core of .*(?=\.$)")
 
@@ -98,31 +98,27 @@ def with_numbers(
 # tables.
 def intervals() -> dict[str, list[str]]:
     """Return the intervals of each finding of the README, by the words that it begins with."""
+
+    def texts(row: Mapping[str, Value], *policies: str) -> list[str]:
+        return [row[policy].text for policy in policies]
+
     estimates = read("estimates")
     policies = values(estimates, "policies")
     realistic = values(estimates, "realistic")
     p = realistic["P"]
-    contacts = realistic["contacts"]
-    fm4 = policies["R, FM4, m = 2"]
-    s = policies["S, N 25 -> 100"]
     times = values(estimates, "clearing")["no fault"]
-    findings = {
+    fm4 = policies["R, FM4, m = 2"]
+    return {
         "* **Robots that could exist**": [
-            p["ppo-robust"],
-            realistic[SHARE]["ppo-robust"],
-            contacts["ppo-robust"],
-            contacts["homing-stock"],
-            p["central-stock"],
+            *texts(p, "ppo-robust"),
+            *texts(realistic[SHARE], "ppo-robust"),
+            *texts(realistic["contacts"], "ppo-robust", "homing-stock"),
+            *texts(p, "central-stock"),
         ],
-        "* **Broken robots there**": [fm4["ppo-delivery"], fm4["ppo-robust"], fm4["homing-stock"]],
-        "* **More robots there**": [s["homing-stock"], s["ppo-robust"]],
-        "* **The paper's warehouse**": [
-            times["ppo-robust"],
-            times["homing-stock"],
-            times["swarm-dt"],
-        ],
+        "* **Broken robots there**": texts(fm4, "ppo-delivery", "ppo-robust", "homing-stock"),
+        "* **More robots there**": texts(policies["S, N 25 -> 100"], "homing-stock", "ppo-robust"),
+        "* **The paper's warehouse**": texts(times, "ppo-robust", "homing-stock", "swarm-dt"),
     }
-    return {words: [value.text for value in numbers] for words, numbers in findings.items()}
 
 
 def counts() -> dict[str, list[str]]:

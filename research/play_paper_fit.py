@@ -39,7 +39,7 @@ from research.fit_paper import (
     read_tried,
     search,
 )
-from research.play_fm4 import Played, fm4_table, read_runs, runs
+from research.play_fm4 import Played, fm4_table, runs
 from research.tables import ROOT, rewrite, table, write_rows
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
 from swarm_logistics_env.questions.comparison import NO_FAULT, Question, Setting
@@ -316,7 +316,7 @@ def blocks(folder: Path) -> dict[str, str]:
         "near": near,
         "cells": cells,
         "claims": table(("claim of the paper", "holds under", ""), words),
-        "fm4": fm4_table(read_runs(folder / "fm4.csv")),
+        "fm4": fm4_table(folder / "fm4.csv"),
     }
 
 
