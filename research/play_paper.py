@@ -66,7 +66,8 @@ def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
 
 def paper_block(parts: Sequence[StudyResults]) -> str:
     """Return the paper's table: P of the paper beside ours, and how well they agree."""
-    with_drift, exact = _published_cells(parts[:3]), _published_cells(parts[3:])
+    with_drift = _published_cells(parts[:3])
+    exact = _published_cells(parts[3:])
     as_shipped = _agreement(with_drift)
     rows = list(_rows(with_drift.values(), as_shipped.misses))
     rows += [

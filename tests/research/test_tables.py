@@ -120,7 +120,8 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     n_supported = sum(claim["verdict"] == "supported" for claim in front_page.read("claims"))
     assert f"this re-implementation supports\n{n_supported} and contradicts" in first
     page.write_text(first.replace("N = 5", "N = 6"))
-    played, run = [], Study.run
+    played = []
+    run = Study.run
 
     def counting_run(self: Study, *args: Any, **fields: Any) -> Any:
         tally = run(self, *args, **fields)
