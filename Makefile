@@ -71,11 +71,11 @@ paper: $(STUDY)/installed
 
 # Of one core, twice. It goes on from what lies in results/paper_fit.
 paper-fit: $(FIT)/installed
-	$(FIT)/bin/python docs/fit_paper.py --minutes $(MINUTES)
-	$(FIT)/bin/python docs/play_paper_fit.py --minutes $(MINUTES)
+	$(FIT)/bin/python -m research.fit_paper --minutes $(MINUTES)
+	$(FIT)/bin/python -m research.play_paper_fit --minutes $(MINUTES)
 
 tables: $(STUDY)/installed
-	$(STUDY)/bin/python docs/play_tables.py
+	$(STUDY)/bin/python -m research.play_tables
 
 # Kernels of steps and of networks are compiled beside mypy: two workers that begin with tests would compile each of them twice.
 test: lint
@@ -156,7 +156,7 @@ tasks: $(TASKS)/installed
 	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py
 
 bodies: $(DEV)/installed
-	$(DEV)/bin/python docs/play_bodies.py
+	$(DEV)/bin/python -m research.play_bodies
 
 dotbots: $(DOTBOTS)/installed
 	$(DOTBOTS)/bin/python -m pytest tests/bodies/test_pose_guard.py tests/bodies/test_dotbots_bodies.py
@@ -164,7 +164,7 @@ dotbots: $(DOTBOTS)/installed
 
 # study: autodoc reads the package. -W: a warning is an error.
 docs: $(DOCS)/installed
-	$(DOCS)/bin/python docs/generate.py
+	$(DOCS)/bin/python -m docs.generate
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
 
 # A recorded run to look at: no page needs it.
@@ -173,7 +173,7 @@ docs/media/run.html: $(DEV)/installed
 
 # What the pages print is held by `make test`; this runs what they do not show.
 docs-check: $(DEV)/installed
-	$(DEV)/bin/python docs/blocks.py --small
+	$(DEV)/bin/python -m docs.blocks --small
 
 # Each distribution is installed in an environment of its own and plays an episode, away from this tree.
 dist: $(DEV)/installed
@@ -189,7 +189,7 @@ dist: $(DEV)/installed
 # For the page on the package index; it changes README.md and pyproject.toml, so only a release calls it, which knows the address.
 absolute-links: $(DEV)/installed
 	sed -i 's|^\[project.urls\]$$|&\nRepository = "$(REPOSITORY)"|' pyproject.toml
-	$(DEV)/bin/python docs/front_page.py
+	$(DEV)/bin/python -m research.front_page
 
 format: $(DEV)/installed
 	$(DEV)/bin/ruff check --fix .

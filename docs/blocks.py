@@ -1,4 +1,4 @@
-"""Runs the code of the pages and records what it prints: `python docs/blocks.py [PAGE ...]`.
+"""Runs the code of the pages and records what it prints: `python -m docs.blocks [PAGE ...]`.
 
 The blocks of a page are run in their order, in one folder and one Python namespace:
 
@@ -6,7 +6,7 @@ The blocks of a page are run in their order, in one folder and one Python namesp
     toml      becomes the file that its first line names, `# name.toml`
     console   each `$ swarm-logistics ...`, `| head -N`, `| tail -N` and `|| echo WORDS` included
     text      directly below one of them: what it prints; recorded, and held by the tests
-    sh        is not recorded; `python docs/blocks.py --small` runs it with few seeds and steps
+    sh        is not recorded; `python -m docs.blocks --small` runs it with few seeds and steps
 """
 
 import contextlib
@@ -16,7 +16,7 @@ import shlex
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -88,7 +88,7 @@ def normalise(text: str) -> str:
     )
 
 
-def commands(text: str, languages: Sequence[str] = ("console", "sh")) -> list[list[str]]:
+def commands(text: str, languages: Container[str] = ("console", "sh")) -> list[list[str]]:
     """Return the arguments of every `swarm-logistics` command in blocks of these languages."""
     code = "\n".join(b.code for b in blocks(text) if b.language in languages)
     calls = re.findall(r"^(?:\$ )?swarm-logistics (.*)$", code.replace("\\\n", " "), re.MULTILINE)

@@ -1,4 +1,4 @@
-"""Writes what three pages tell of the code, between their markers: `python docs/generate.py`."""
+"""Writes what three pages tell of the code, between their markers: `python -m docs.generate`."""
 
 import csv
 import inspect
@@ -9,9 +9,9 @@ from typing import Any, get_args, get_origin
 
 import numpy as np
 from pydantic_core import PydanticUndefined
-from python_reference import python_names
-from tables import ROOT, table, with_blocks
 
+from docs.python_reference import python_names
+from research.tables import ROOT, table, with_blocks
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
 from swarm_logistics_env.cli.app import command_line
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
@@ -43,10 +43,11 @@ def environment() -> dict[str, str]:
         for name, term in REWARD_TERMS.items()
     ]
     head = ("field", "default", "meaning; where the default comes from")
-    conditions = [
-        (f"`{name}`{' *' if name in CHANGES_DURING_RUN else ''}", f"`{value!r}`", field.description)
-        for (name, field), (_, value) in zip(Scenario.model_fields.items(), scenario)
-    ]
+    conditions = []
+    for name, value in scenario:
+        mark = " *" if name in CHANGES_DURING_RUN else ""
+        meaning = Scenario.model_fields[name].description
+        conditions.append((f"`{name}`{mark}", f"`{value!r}`", meaning))
     modes = [(f"`{name}`", mode.description) for name, mode in FAILURE_MODES.items()]
     wrapped = [(f"`{name}`", summary(getattr(wrappers, name).__doc__)) for name in wrappers.__all__]
     sources = ", ".join(f"[{name}]({address})" for name, address in SOURCES.items())

@@ -161,7 +161,8 @@ def _signature(function: Any) -> str:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
         return "(...)"
-    texts, is_keyword_only = [], False
+    texts = []
+    is_keyword_only = False
     for parameter in parameters:
         if parameter.name in ("self", "cls"):
             continue

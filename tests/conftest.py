@@ -9,7 +9,7 @@ import os
 import pkgutil
 import sys
 import threading
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -111,13 +111,6 @@ SMALL: dict[str, Any] = {
     "parameters": [{"name": "delivery_width", "values": [1.0, 0.5]}],
     "ablations": [{"policy": "random-walk"}],
 }
-
-
-@pytest.fixture
-def script(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Any]:
-    """Imports a script of docs/ by its name."""
-    monkeypatch.syspath_prepend(ROOT / "docs")
-    return importlib.import_module
 
 
 @pytest.fixture

@@ -5,14 +5,13 @@ from __future__ import annotations
 import ast
 import importlib.util
 import re
-import runpy
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from docs import blocks, generate, python_reference
 from swarm_logistics_env import Scenario, run_episode
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.questions.specification import read_study_file
@@ -20,22 +19,20 @@ from swarm_logistics_env.train.training import load_training
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-BLOCKS = runpy.run_path(str(DOCS / "blocks.py"))
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("*.md"))}
 EACH = pytest.mark.parametrize("name", ["../README.md", *PAGES])
 
 
-def test_generated_tables_are_current(script: Callable[[str], Any]) -> None:
-    generate = script("generate")
+def test_generated_tables_are_current() -> None:
     for page in generate.PAGES:
-        assert PAGES[f"{page}.md"] == generate.page_text(page), "run `python docs/generate.py`"
+        assert PAGES[f"{page}.md"] == generate.page_text(page), "run `python -m docs.generate`"
 
 
-def test_what_examples_import_is_in_the_list_of_stable_names(script: Callable[[str], Any]) -> None:
-    reference = script("python_reference")
-    names = [name for names in reference.STABLE.values() for name in names] + [*reference.VALUES]
+def test_what_examples_import_is_in_the_list_of_stable_names() -> None:
+    names = [name for names in python_reference.STABLE.values() for name in names]
+    names += python_reference.VALUES
     stable = {f"swarm_logistics_env.{name}" for name in names}
     for path in sorted((ROOT / "examples").glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -46,32 +43,32 @@ def test_what_examples_import_is_in_the_list_of_stable_names(script: Callable[[s
                     assert imported in stable or is_module, f"{path.name}: {imported}"
 
 
-@pytest.mark.parametrize("page", BLOCKS["pages"](), ids=lambda page: page.name)
+@pytest.mark.parametrize("page", blocks.pages(), ids=lambda page: page.name)
 def test_page_runs_and_prints_what_it_shows(page: Path) -> None:
     text = PAGES[page.name]
     for module in re.findall(r"<!-- needs: (\w+) -->", text):
         if importlib.util.find_spec(module) is None:
             pytest.skip(f"{module} is not installed")
-    recorded, normalise = BLOCKS["record"](text), BLOCKS["normalise"]
-    assert normalise(recorded) == normalise(text), f"stale: run `python docs/blocks.py {page}`"
+    recorded, normalise = blocks.record(text), blocks.normalise
+    assert normalise(recorded) == normalise(text), f"stale: run `python -m docs.blocks {page}`"
 
 
 def test_changed_output_is_noticed() -> None:
     page = "```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n"
-    assert BLOCKS["record"](page) == page.replace("3", "2")
+    assert blocks.record(page) == page.replace("3", "2")
 
 
 @EACH
 def test_what_a_page_names_exists_and_its_files_can_be_read(name: str, tmp_path: Path) -> None:
     text, file = (DOCS / name).read_text(encoding="utf-8"), tmp_path / "block.toml"
-    for block in (block for block in BLOCKS["blocks"](text) if block.language == "toml"):
+    for block in (block for block in blocks.blocks(text) if block.language == "toml"):
         file.write_text(block.code, encoding="utf-8")
         fields = tomllib.loads(block.code)
         if {"worlds", "ppo", "base"} & fields.keys():
             load_training(str(file))
         elif "seeds" in fields and "task" not in fields:  # a page's own task is run with it
             read_study_file(file, trust_code=True)
-    for arguments in BLOCKS["commands"](text, BLOCKS["LANGUAGES"]):
+    for arguments in blocks.commands(text, blocks.LANGUAGES):
         assert app.run([*arguments, "--help"]) == 0, arguments
     for target in re.findall(r"(?:^|`)make ([\w-]+)", text, flags=re.MULTILINE):
         assert re.search(rf"^[\w -]*\b{target}\b[\w -]*:(?!=)", MAKEFILE, flags=re.MULTILINE)
@@ -117,25 +114,3 @@ def test_readme_runs_as_written() -> None:
     assert example.partition("\n\n")[2] in PAGES["quickstart.md"]
     wanderer = run(example)["Wanderer"]
     assert run_episode(Scenario(), wanderer(), seed=0).delivered > 3
-
-
-def test_readme_says_of_results_what_their_page_says_and_its_links_can_have_an_address(
-    script: Callable[[str], Any], tmp_path: Path
-) -> None:
-    front = script("front_page")
-    assert front.readme_text() == README, "stale: run `python docs/front_page.py`"
-    results = PAGES["results.md"]
-    intervals = re.findall(r"-?[\d.]+ \[-?[\d.]+, -?[\d.]+\]", front.findings())
-    assert len(intervals) >= 6
-    assert all(interval in results for interval in intervals)
-    for study in ("policies", "clearing", "leans"):
-        rows = front.values(front.read("estimates"), study).values()
-        assert all(value.text in results for row in rows for value in row.values())
-    page = front.with_address(README, "https://forge.example/swarm")
-    for link in ("raw/main/docs/media/fm4.gif", "blob/main/docs/training.md"):
-        assert f"https://forge.example/swarm/{link}" in page
-    assert not re.search(r'(?:\]\(|src=")(?!https://)', page)
-    assert "A package index does not show them" not in page
-    pytest.importorskip("matplotlib", reason="needs the extra study")
-    front.draw(front.values(front.read("estimates"), "policies"), tmp_path / "anew.svg")
-    assert (tmp_path / "anew.svg").stat().st_size > 10_000

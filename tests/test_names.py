@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("swarm_logistics_env", "docs", "examples")
+FOLDERS = ("swarm_logistics_env", "docs", "examples", "research")
 MOST = 0.05
 WORDS = {
     "one", "found", "each", "asked", "told", "said", "here", "there", "known", "given", "own",

@@ -115,7 +115,6 @@ KERNEL_RECIPES = ("A scenario parameter", "An observation column")
 
 # The interpreter runs the kernels, as compiling takes longer.
 INTERPRETED = """
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -182,8 +181,7 @@ np.testing.assert_allclose(sensed["speed"], speeds, rtol=1e-6)
 space = swarm_logistics_v0.parallel_env(n_robots=2).observation_space("robot_0")
 assert (space.low[-1], space.high[-1], *space.shape) == (0.0, 2.0, observations.N_COLUMNS)
 
-sys.path.append(sys.argv[1])
-import generate
+from docs import generate
 
 page = generate.page_text("environment")
 assert "| `odometry_scale` | `1.0` | factor of velocities; off |" in page
@@ -204,7 +202,7 @@ def run(folder: Path, recipes: Iterable[str], script: str) -> str:
         place.write_text(f"{before}\n{lines}{found[1:]}{after}", encoding="utf-8")
     paths = {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
     settings = {**os.environ, **paths, "PYTHONWARNINGS": "error", "NUMBA_DISABLE_JIT": "1"}
-    command = [sys.executable, "-c", INTERPRETED + script, str(ROOT / "docs")]
+    command = [sys.executable, "-c", INTERPRETED + script]
     done = subprocess.run(
         command, cwd=folder, env=settings, capture_output=True, text=True, check=False
     )

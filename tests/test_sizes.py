@@ -11,11 +11,12 @@ import swarm_logistics_env
 
 MOST_LINES, MOST_PARAMETERS = 80, 12
 PACKAGE = Path(swarm_logistics_env.__file__).parent
+RESEARCH = sorted((Path(__file__).parents[1] / "research").glob("*.py"))
 # A command's parameters are the options of its command line.
-FILES = sorted(path for path in PACKAGE.rglob("*.py") if path.parent.name != "cli")
+FILES = [*sorted(path for path in PACKAGE.rglob("*.py") if path.parent.name != "cli"), *RESEARCH]
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+@pytest.mark.parametrize("path", FILES, ids=lambda path: "/".join(path.parts[-2:]))
 def test_functions_are_short_and_take_few_parameters(path: Path) -> None:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
@@ -35,6 +36,6 @@ def test_no_two_modules_have_one_name() -> None:
 
 
 def test_no_file_of_the_package_is_too_long_to_be_read() -> None:
-    files = PACKAGE.rglob("*.py")
-    lengths = {path.name: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
+    files = [*PACKAGE.rglob("*.py"), *RESEARCH]
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in files}
     assert {name: n for name, n in lengths.items() if n > 400} == {}

@@ -32,7 +32,7 @@ from .section import (
 from .tables import CONTACTS_HEADING, contacts_text
 
 STUDY = "benchmark"
-# P of the local scripts in each world, and scores of policies; `docs/play_tables.py` writes it.
+# P of the local scripts in each world, and scores of policies; `research/play_tables.py` writes it.
 ENTRIES = Path(__file__).parent / "benchmark_entries.json"
 HELD_OUT = "Held out"  # how the titles of its tables begin that give the score
 RESAMPLES = 2_000

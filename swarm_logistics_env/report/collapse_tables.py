@@ -66,7 +66,7 @@ def edge_sections(cells: Sequence[Cell]) -> Iterator[Section]:
     """Yield how near each policy is to the size at which half of its runs collapse."""
     for edge in edges(cells):
         first = edge.cells[0]
-        columns = "N", f"collapsed, {P_LEVEL}", "S of all runs", "S of the runs that did not"
+        columns = "N", f"runs collapsed, {P_LEVEL}", "S of all runs", "S of the runs that did not"
         line = (
             f"{critical_size_in_words(edge)} (logistic in log N, quasi-likelihood). Two phases "
             "are named where a test with 5 % of error over the sizes says so; the other sizes are "

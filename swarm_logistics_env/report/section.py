@@ -267,19 +267,25 @@ def plural(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def time_to_clear(cell: Cell) -> str:
-    """Return the median time until all items were delivered [s], and how many runs were late.
+def interval_to_clear(cell: Cell) -> spi.Interval:
+    """Return the median time until all items were delivered, with its interval [s].
 
     Of several trainings the mean over trainings and seeds; an interval needs all runs in time.
     """
     times = [outcome.time_to_clear for outcome in cell.outcomes]
-    n_late = sum(map(math.isinf, times))
     n_trainings = len(cell.arm.case.trainings)
-    if n_trainings > 1 and not (n_late or cell.problem):
+    if n_trainings > 1 and all(map(math.isfinite, times)) and not cell.problem:
         by_training = np.reshape(times, (n_trainings, -1))
-        return bracketed(spi.mean_interval(by_training, CONFIDENCE), 0)
-    median = bracketed(spi.median_interval(times, CONFIDENCE), 0)
-    return f"{median} ({n_late} of {len(times)})" if n_late else median
+        return spi.mean_interval(by_training, CONFIDENCE)
+    return spi.median_interval(times, CONFIDENCE)
+
+
+def time_to_clear(cell: Cell) -> str:
+    """Return `interval_to_clear` in words, and how many runs were late."""
+    times = [outcome.time_to_clear for outcome in cell.outcomes]
+    n_late = sum(map(math.isinf, times))
+    text = bracketed(interval_to_clear(cell), 0)
+    return f"{text} ({n_late} of {len(times)})" if n_late else text
 
 
 def sentence(results: StudyResults, verdict: Verdict) -> Sentence:

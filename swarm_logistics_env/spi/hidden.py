@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .inputs import Numbers, performance
 
 # Half the median is a bad run; below a quarter lies no run of a condition that never stalls (the
-# least of 2,000 Poisson counts of mean 30 is about 13). Counts that stop at random, as under FM4,
+# least of 2,000 Poisson counts of mean 30 is about 13). Counts that end at random, as under FM4,
 # have 17 % of their runs there: they did stall, and their spread tells it.
 SHARE_OF_MEDIAN = 0.25
 # The assumption of verdicts over seeds: at most so many runs of a condition stall, if fewer do in

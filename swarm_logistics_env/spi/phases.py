@@ -1,7 +1,8 @@
 """Two phases: how near a swarm is to its critical size, at which some runs collapse.
 
 Above a critical density a swarm does not get worse by and by: some of its runs jam, and the others
-go on (Kuckling et al. 2024, arXiv 2310.11843). A mean over both says nothing of either.
+go on (Kuckling et al. 2024, arXiv 2310.11843). A mean over both says nothing of either. What it is
+that a training collapses, `hidden` says.
 """
 
 from __future__ import annotations

@@ -5,17 +5,16 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from more_itertools import map_reduce
 from numpy.typing import NDArray
-from tables import by_policy, seeds_from, table
 
+from research.tables import by_policy, percent_change, seeds_from, table
 from swarm_logistics_env import spi
-from swarm_logistics_env.questions.comparison import Question
+from swarm_logistics_env.questions.comparison import Arm, Question
 from swarm_logistics_env.report import section
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
-
-Counts = NDArray[np.float64]  # of every seed, or of every training and seed
 
 
 def with_verdict(test: Verdict) -> str:
@@ -27,11 +26,9 @@ def _seeds(results: StudyResults) -> str:
     return f"{seeds_from(results, 'paired seeds')}. [95 %]."
 
 
-def _change(before: Counts, after: Counts) -> str:
+def _change(before: Numbers, after: Numbers) -> str:
     """Return the relative change of P in percent."""
-    change = spi.relative_change(before, after)
-    limits = (None if x is None else 100 * x for x in (change.low, change.high))
-    return section.bracketed(Interval(100 * change.value, *limits), 1)
+    return section.bracketed(percent_change(before, after), 1)
 
 
 def difference(results: StudyResults, upper: Verdict, lower: Verdict) -> Interval:
@@ -132,20 +129,17 @@ def after_repairs(results: StudyResults) -> str:
     body = []
     for policy, mode, tests in repaired_tests(results):
         arms = tests[0].compared.original, *(test.compared.changed for test in tests)
-        sound, *faulty = (
-            np.array(
-                [
-                    np.count_nonzero(outcome.delivery_times > REPAIRED_AT)
-                    for outcome in results.timed_outcomes[arm]
-                ]
-            )
-            * 1.0
-            for arm in arms
-        )
-        equivalent = spi.equivalence(sound, faulty[1], margin=margin).verdict
-        body.append((policy, mode, *(_change(sound, counts) for counts in faulty), equivalent))
+        sound, broken, repaired = (_delivered_after_repair(results, arm) for arm in arms)
+        equivalent = spi.equivalence(sound, repaired, margin=margin).verdict
+        body.append((policy, mode, _change(sound, broken), _change(sound, repaired), equivalent))
     head = ("policy", "mode", "not repaired [%]", "repaired [%]", "all back")
     return table(head, body, _seeds(results))
+
+
+def _delivered_after_repair(results: StudyResults, arm: Arm) -> Numbers:
+    """Return how many items each run delivers after the repair."""
+    times = (outcome.delivery_times for outcome in results.timed_outcomes[arm])
+    return np.array([np.count_nonzero(of_run > REPAIRED_AT) for of_run in times], np.float64)
 
 
 def wear(results: StudyResults) -> str:

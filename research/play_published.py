@@ -1,4 +1,4 @@
-"""The indicators of published swarms: `python docs/play_published.py NAME=PATH ...`.
+"""The indicators of published swarms: `python -m research.play_published NAME=PATH ...`.
 
 Judges the results that others published, each a file or folder that is read unedited, and writes
 the tables of docs/published.md. NAME is one of `SETS`; sets that are not given keep their rows.
@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from more_itertools import map_reduce
-from tables import ROOT, rewrite, table
 
+from research.tables import ROOT, rewrite, table
 from swarm_logistics_env import judge
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.report.collapse_tables import critical_size_in_words, share_in_words
-from swarm_logistics_env.report.section import fixed
+from swarm_logistics_env.report.section import NOTHING, bracketed, fixed
 from swarm_logistics_env.verdicts.collapses import collapses, edges
 from swarm_logistics_env.verdicts.results import StudyResults
 
@@ -75,27 +76,21 @@ def scalability_rows(results: StudyResults) -> Iterator[list[str]]:
         ]
         if policy in critical:
             words.append(critical_size_in_words(critical[policy]))
-        values = " ".join("–" if v.value is None else fixed(v.value, 2) for v in verdicts)
-        counts = map_reduce(verdicts, lambda verdict: verdict.on_property.adjusted)
-        verdict_words = ", ".join(f"{len(some)} {word}" for word, some in counts.items())
+        values = " ".join(NOTHING if v.value is None else fixed(v.value, 2) for v in verdicts)
+        counts = Counter(verdict.on_property.adjusted for verdict in verdicts)
+        verdict_words = ", ".join(f"{count} {word}" for word, count in counts.items())
         chain = " → ".join(map(str, sizes))
-        yield [policy, chain, values, verdict_words, "; ".join(words) or "–"]
+        yield [policy, chain, values, verdict_words, "; ".join(words) or NOTHING]
 
 
 def other_rows(results: StudyResults) -> Iterator[list[str]]:
     """Yield a row for each question that is none of scalability."""
     for verdict in results.verdicts:
-        interval = verdict.interval
-        if verdict.compared.indicator != "S" and interval is not None:
-            low, high = ("–" if end is None else fixed(end, 2) for end in interval[1:])
-            question = f"{verdict.compared.indicator} {verdict.after}"
-            words = verdict.on_property.adjusted
-            yield [
-                verdict.compared.policy,
-                question,
-                f"{interval.value:.2f} [{low}, {high}]",
-                words,
-            ]
+        comparison = verdict.compared
+        if comparison.indicator != "S" and verdict.interval is not None:
+            question = f"{comparison.indicator} {verdict.after}"
+            value = bracketed(verdict.interval, 2)
+            yield [comparison.policy, question, value, verdict.on_property.adjusted]
 
 
 def judged(name: str, path: str) -> dict[str, Any]:
@@ -108,33 +103,34 @@ def judged(name: str, path: str) -> dict[str, Any]:
     return {**rows, "runs": len(results.outcomes)}
 
 
+def blocks(rows: Mapping[str, Any]) -> dict[str, str]:
+    """Return the tables of the page, from the rows of each set."""
+    sets = {name: rows[name] for name in SETS if name in rows}
+    sources = [
+        [name, SETS[name].source, SETS[name].licence, f"`{SETS[name].command}`", _outcome(of_set)]
+        for name, of_set in sets.items()
+    ]
+    scaling = [[name, *row] for name in sets for row in sets[name].get("scalability", [])]
+    questions = [[name, *row] for name in sets for row in sets[name].get("others", [])]
+    head = ("set", "policy", "N", "S from each to the next", "S > 0", "runs that collapse")
+    return {
+        "published sources": table(("set", "source", "licence", "command", "read"), sources),
+        "published s": table(head, scaling),
+        "published others": table(("set", "policy", "question", "value", "> 0"), questions),
+    }
+
+
+def _outcome(of_set: Mapping[str, Any]) -> str:
+    return f"refused: {of_set['refused']}" if "refused" in of_set else f"{of_set['runs']:,} runs"
+
+
 def main() -> None:
     """Judge the sets that are given, and write the page's tables."""
-    rows: dict[str, Any] = json.loads(ROWS.read_text("utf-8")) if ROWS.exists() else {}
+    rows: dict[str, Any] = json.loads(ROWS.read_text(encoding="utf-8"))
     for name, _, path in (argument.partition("=") for argument in sys.argv[1:]):
         rows[name] = judged(name, path)
     ROWS.write_text(json.dumps(rows, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    rows_of_sets = {name: rows[name] for name in SETS if name in rows}
-    sources = [
-        [name, SETS[name].source, SETS[name].licence, f"`{SETS[name].command}`", _outcome(of_set)]
-        for name, of_set in rows_of_sets.items()
-    ]
-    columns = ["set", "policy", "N", "S from each to the next", "S > 0", "runs that collapse"]
-    sets = rows_of_sets.items()
-    scaling = [[name, *row] for name, of_set in sets for row in of_set.get("scalability", [])]
-    other_questions = [[name, *row] for name, of_set in sets for row in of_set.get("others", [])]
-    heads = ["set", "source", "licence", "command", "read"]
-    questions = ["set", "policy", "question", "value", "> 0"]
-    blocks = {
-        "published sources": table(heads, sources),
-        "published s": table(columns, scaling),
-        "published others": table(questions, other_questions),
-    }
-    rewrite(PAGE, blocks)
-
-
-def _outcome(of_set: dict[str, Any]) -> str:
-    return f"refused: {of_set['refused']}" if "refused" in of_set else f"{of_set['runs']:,} runs"
+    rewrite(PAGE, blocks(rows))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Confirm the fits of fit_paper.py on other seeds, and count the sets under which claims hold.
+"""Confirm the fits of `fit_paper` on other seeds, and count the sets under which claims hold.
 
-    python docs/play_paper_fit.py --minutes 20  # plays; a second call goes on
-    python docs/play_paper_fit.py --minutes 0   # tables and picture of what was played alone
+    python -m research.play_paper_fit --minutes 20  # plays; a second call goes on
+    python -m research.play_paper_fit --minutes 0   # tables and picture of what was played alone
 
 Declared before the first run: what ships as `swarm-dt` is the fit without any failed robot, if it
 predicts R and FT as well as the fit `all`, i.e. if the 95 % interval of its mean distance from the
@@ -21,7 +21,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
-from fit_paper import (
+from numpy.typing import NDArray
+
+from research.fit_paper import (
     CONSTANTS,
     FAULTY,
     FITS,
@@ -37,10 +39,8 @@ from fit_paper import (
     read_tried,
     search,
 )
-from numpy.typing import NDArray
-from play_fm4 import fm4_table, read_runs, runs, write_runs
-from tables import ROOT, table, with_blocks
-
+from research.play_fm4 import Played, fm4_table, runs
+from research.tables import ROOT, rewrite, table, write_rows
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
 from swarm_logistics_env.questions.comparison import NO_FAULT, Question, Setting
 from swarm_logistics_env.scenario import Scenario
@@ -52,7 +52,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FIRST_SEED = 5_390_000  # of the confirmation; fit_paper.py uses those from 5,300,000 on
-SEEDS, SEEDS_OF_FAULTS, SEEDS_OF_FM4 = 6, 20, 30  # a cell; faults, as FT and R hang on few
+SEEDS = 6  # a cell
+SEEDS_OF_FAULTS = 20  # as FT and R hang on few deliveries
+SEEDS_OF_FM4 = 30
 SEEDS_OF_SETS = 3
 SMALL = tuple(setting for setting in SOUND if setting not in LARGE)
 OF_FAULTS = (*(s for s in SOUND if s.kind == "fault"), *FAULTY)
@@ -114,8 +116,14 @@ def means(rows: Sequence[Tried]) -> dict[str, float]:
 
 def fits(rows: Sequence[Tried]) -> bool:
     """Return whether a set fits the sound cells within the noise of one run a cell."""
-    n_seeds = tuple(len(samples(rows)[cell_name(setting)]) for setting in SOUND)
+    p = samples(rows)
+    n_seeds = tuple(len(p[cell_name(setting)]) for setting in SOUND)
     return log_error(means(rows), SOUND) <= largest_error(n_seeds)
+
+
+def sets_that_fit(tried: Sequence[Tried]) -> list[list[Tried]]:
+    """Return what was played of each set of constants that fits."""
+    return [rows for rows in by_set(tried).values() if fits(rows)]
 
 
 def play_sets(folder: Path, is_over: Callable[[], bool]) -> None:
@@ -138,7 +146,8 @@ def published(setting: Setting) -> float:
 def indicator(question: Question, p: Callable[[Setting], float]) -> float:
     """Return an indicator's value by P of each setting."""
     definition = DEFINITIONS[question.indicator]
-    before, after = question.original, question.changed
+    before = question.original
+    after = question.changed
     settings = [before, after, Setting("fault", "removed", after.value)]
     performances = {name: [p(s)] for name, s in zip(definition.performances, settings)}
     n = int(before.value) if before.kind == "size" else Scenario().n_robots
@@ -164,9 +173,11 @@ def questions() -> list[Question]:
 def claim_text(question: Question) -> str:
     """Return a claim as the results print it."""
     sign = ">" if PAPER.claims[question] else "≤"
-    before, after = question.original, question.changed
-    of = str(after) if question.indicator in ("FT", "R") else f"{before} -> {after.value:g}"
-    return f"{of}: {question.indicator} {sign} {question.threshold:g}"
+    before = question.original
+    after = question.changed
+    is_of_fault = question.indicator in ("FT", "R")
+    condition = str(after) if is_of_fault else f"{before} -> {after.value:g}"
+    return f"{condition}: {question.indicator} {sign} {question.threshold:g}"
 
 
 def holds(question: Question, cells: Means) -> bool:
@@ -182,10 +193,12 @@ def word(n_holding: int, n: int) -> str:
     return "contradicted" if n - n_holding >= DECIDED * n else "open"
 
 
-def claim_rows(folder: Path) -> list[tuple[str, int, int]]:
-    """Return each claim, under how many of the sets that fit it holds, and of how many."""
-    sets = [rows for rows in by_set(read_tried(folder / "tried.csv")).values() if fits(rows)]
-    cells = [means(rows) for rows in sets]
+def claim_rows(cells: Sequence[Means]) -> list[tuple[str, int, int]]:
+    """Return each claim, under how many of the sets it holds, and of how many.
+
+    Args:
+        cells: P of each set that fits.
+    """
     return [
         (claim_text(question), sum(holds(question, p) for p in cells), len(cells))
         for question in questions()
@@ -217,7 +230,8 @@ def draw_claims(rows: Sequence[tuple[str, int, int]]) -> None:
 
 def r_and_ft(setting: Setting, p: Callable[[Setting], Any]) -> NDArray[np.float64]:
     """Return R and FT of a fault cell by P of each setting, shape (2, ...)."""
-    p_o, p_f = p(NO_FAULT), p(setting)
+    p_o = p(NO_FAULT)
+    p_f = p(setting)
     p_s = p(Setting("fault", "removed", setting.value))
     share = setting.value / Scenario().n_robots
     return np.array([p_f / p_o - 1.0 + share, (p_f - p_s) / p_o])
@@ -269,8 +283,9 @@ def nearness(cells: Means) -> tuple[str, ...]:
 def blocks(folder: Path) -> dict[str, str]:
     """Return the tables of the page, and draw its picture."""
     tried = read_tried(folder / "tried.csv")
-    sets = by_set(tried)
-    fitting_sets = [rows for rows in sets.values() if fits(rows)]
+    n_sets = len(by_set(tried))
+    fitting_sets = sets_that_fit(tried)
+    fitting_means = [means(rows) for rows in fitting_sets]
     confirmed: dict[str, list[Tried]] = {}
     for row in read_tried(folder / "confirmed.csv"):
         confirmed.setdefault(row.fit, []).append(row)
@@ -282,54 +297,53 @@ def blocks(folder: Path) -> dict[str, str]:
         ],
     )
     groups = ("all", "sound", "fault", "fault without FM4", "FM1", "FM2", "FM3", "FM4")
+    rules = "; ".join(_rule_text(confirmed, fit) for fit in ("sound", "shipped"))
     near = table(
         ("mean |ln(ours / paper's)| over the cells", *groups),
         [(name, *nearness(means(rows))) for name, rows in confirmed.items()],
+        f"Mean distance from the paper's R and FT: {rules}.",
     )
     cells = table(
         ("cell", "paper", *confirmed, "sets that fit, 5 to 95 %"),
-        [_cell_row(setting, confirmed, fitting_sets) for setting in PAPER.cells],
+        [_cell_row(setting, confirmed, fitting_means) for setting in PAPER.cells],
     )
-    rules = "; ".join(
-        "`{}` less `all` {:+.3f} [{:.3f}, {:.3f}]".format(fit, *rule(confirmed, fit))
-        for fit in ("sound", "shipped")
-    )
-    claims = claim_rows(folder)
+    claims = claim_rows(fitting_means)
     draw_claims(claims)
     words = [(text, f"{held} of {n}", word(held, n)) for text, held, n in claims]
     return {
-        "constants": f"{len(sets)} sets were played in all cells, {len(fitting_sets)} of them "
+        "constants": f"{n_sets} sets were played in all cells, {len(fitting_sets)} of them "
         f"fit.\n\n{constants}",
-        "near": f"{near}\n\nMean distance from the paper's R and FT: {rules}.",
+        "near": near,
         "cells": cells,
         "claims": table(("claim of the paper", "holds under", ""), words),
-        "fm4": fm4_table(read_runs(folder / "fm4.csv")),
+        "fm4": fm4_table(folder / "fm4.csv"),
     }
 
 
+def _rule_text(confirmed: Mapping[str, Sequence[Tried]], fit: str) -> str:
+    value, low, high = rule(confirmed, fit)
+    return f"`{fit}` less `all` {value:+.3f} [{low:.3f}, {high:.3f}]"
+
+
 def _spreads(fitting_sets: Sequence[Sequence[Tried]]) -> list[tuple[str, str]]:
-    return [
-        (
-            name,
-            "{:.2g} to {:.2g}".format(
-                *np.quantile([rows[0].constants[name] for rows in fitting_sets], ENDS)
-            ),
-        )
-        for name in CONSTANTS
-    ]
+    spreads = []
+    for name in CONSTANTS:
+        low, high = np.quantile([rows[0].constants[name] for rows in fitting_sets], ENDS)
+        spreads.append((name, f"{low:.2g} to {high:.2g}"))
+    return spreads
 
 
 def _cell_row(
     setting: Setting,
     confirmed: Mapping[str, Sequence[Tried]],
-    fitting_sets: Sequence[Sequence[Tried]],
+    fitting_means: Sequence[Means],
 ) -> tuple[str, ...]:
     name = cell_name(setting)
     texts = []
     for rows in confirmed.values():
         p = samples(rows)[name]
         texts.append(f"{p.mean():.1f} ± {p.std(ddof=1) / len(p) ** 0.5:.1f} ({len(p)})")
-    low, high = np.quantile([means(rows)[name] for rows in fitting_sets], ENDS)
+    low, high = np.quantile([p[name] for p in fitting_means], ENDS)
     return str(setting), f"{published(setting):g}", *texts, f"{low:.1f} to {high:.1f}"
 
 
@@ -345,10 +359,9 @@ def main(minutes: float = 20.0, out: Path = Path("results/paper_fit")) -> None:
         sets = sets_to_confirm(out / "tried.csv")
         if not (out / "fm4.csv").exists():
             shown = {name: sets[name] for name in ("2026", "sound")}
-            write_runs(out / "fm4.csv", runs(shown, SEEDS_OF_FM4))
+            write_rows(out / "fm4.csv", Played._fields, list(runs(shown, SEEDS_OF_FM4)))
         play_sets(out, is_over)
-    text = with_blocks(PAGE.read_text(encoding="utf-8"), blocks(out))
-    PAGE.write_text(text, encoding="utf-8")
+    rewrite(PAGE, blocks(out))
 
 
 if __name__ == "__main__":

@@ -1,31 +1,30 @@
-"""How swarms scale in racks, and how they bear narrower aisles: `python docs/play_floors.py`.
+"""How swarms scale in racks, and how they bear narrower aisles: `python -m research.play_floors`.
 
 Plays scripts and networks with 10 to 150 robots on the open floor and on the shipped plans, and
 with 10 and 25 in halls that differ in the width of their aisles; writes the tables of
 docs/floors.md and the picture of P over the number of robots. What is played stays in
 results/floors, and the same command goes on after an interruption.
 
-Declared before the first run: a run collapses if it delivers less than half of what the same policy
-delivers on the same floor at the best of the smaller sizes, on average. Of two policies the order
-turns if the 95 % intervals of their difference (Welch's) lie on different sides of 0.
+Declared before the first run: a run falls back (there it was called a collapse) if it delivers less
+than half of what the same policy delivers on the same floor at the best of the smaller sizes, on
+average. Of two policies the order turns if the 95 % intervals of their difference (Welch's) lie on
+different sides of 0.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, pairwise, product
 from typing import TYPE_CHECKING
 
-import numpy as np
 from more_itertools import map_reduce
-from numpy.typing import NDArray
 from scipy.stats import binomtest, ttest_ind
-from tables import ROOT, rewrite, seeds_from, table
 
+from research.tables import ROOT, play, rewrite, seeds_from, side, table
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
@@ -42,9 +41,8 @@ COMPARED_AT = (25, 100)
 # Aisles between racks of 0.5 m in a hall of 10 m x 10 m; the shipped plan has 1 m.
 WIDTHS = (1.0, 0.75, 1.5, 2.0)  # [m], the reference first
 SIZES_IN_WIDTHS = (10, 25)
-COLLAPSED_BELOW = 0.5  # of P of the best smaller size: a run below it has collapsed
+FALLEN_BACK_BELOW = 0.5  # of P of the best smaller size
 Results = Mapping[str, StudyResults]  # by floor
-Numbers = NDArray[np.float64]
 
 
 def study(name: str, scenario: Scenario, sizes: Sequence[int] = SIZES) -> Study:
@@ -68,7 +66,10 @@ def scenario_on(floor: str | None, cell_size: float = 0.5) -> Scenario:
 def hall(width: float) -> Scenario:
     """Return the world of the plan `aisles` with other aisles: as many racks as its storage has."""
     cell = 0.25  # [m]
-    aisle, rack, free, dock = ":" * round(width / cell), "=" * 2, "." * 8, "A" * 8
+    aisle = ":" * round(width / cell)
+    rack = "=" * 2
+    free = "." * 8
+    dock = "A" * 8
     n_racks = 24 // len(aisle + rack)
     between = ":" * 24 + free + dock
     through = (n_racks * (aisle + rack)).ljust(24, ":") + free + dock
@@ -110,10 +111,10 @@ def scalability_block(results: Results) -> str:
     )
 
 
-def collapses_block(results: Results) -> str:
-    """Return how many runs of each size collapse, with the interval of their share."""
+def fallen_back_block(results: Results) -> str:
+    """Return how many runs of each size fall back, with the interval of their share."""
     rows = [
-        (floor, f"`{policy}`", *collapses(cells_of(of_floor), policy))
+        (floor, f"`{policy}`", *fallen_back(cells_of(of_floor), policy))
         for floor, of_floor in results.items()
         for policy in of_floor.policies
     ]
@@ -125,15 +126,15 @@ def collapses_block(results: Results) -> str:
     )
 
 
-def collapses(cells: Mapping[tuple[str, int], Cell], policy: str) -> Iterator[str]:
-    """Yield how many runs of each size but the first collapsed, with the interval of the share."""
+def fallen_back(cells: Mapping[tuple[str, int], Cell], policy: str) -> Iterator[str]:
+    """Yield how many runs of each size but the first fell back, with the interval of the share."""
     best = 0.0
     for n, larger in pairwise(SIZES):
         best = max(best, cells[policy, n].mean.value)
         p = cells[policy, larger].by_seed.ravel()
-        n_collapsed = int((p < COLLAPSED_BELOW * best).sum())
-        low, high = binomtest(n_collapsed, len(p)).proportion_ci()
-        yield f"{n_collapsed} of {len(p)} [{100 * low:.0f}, {100 * high:.0f}] %"
+        n_runs = int((p < FALLEN_BACK_BELOW * best).sum())
+        low, high = binomtest(n_runs, len(p)).proportion_ci()
+        yield f"{n_runs} of {len(p)} [{100 * low:.0f}, {100 * high:.0f}] %"
 
 
 def samples(cell: Cell) -> Numbers:
@@ -141,13 +142,11 @@ def samples(cell: Cell) -> Numbers:
     return cell.by_seed.mean(axis=1) if cell.by_seed.ndim == 2 else cell.by_seed
 
 
-def difference(
-    cells: Mapping[tuple[str, int], Cell], pair: Sequence[str], n: int
-) -> tuple[float, float]:
-    """Return the 95 % interval of P of the first policy less that of the second."""
+def difference(cells: Mapping[tuple[str, int], Cell], pair: Sequence[str], n: int) -> spi.Interval:
+    """Return P of the first policy less that of the second, with its 95 % interval."""
     first, second = (samples(cells[policy, n]) for policy in pair)
     low, high = ttest_ind(first, second, equal_var=False).confidence_interval(0.95)
-    return float(low), float(high)
+    return spi.Interval(float(first.mean() - second.mean()), float(low), float(high))
 
 
 def turns_block(results: Results) -> str:
@@ -159,7 +158,7 @@ def turns_block(results: Results) -> str:
             intervals = {floor: difference(cells[floor], pair, n) for floor in FLOORS}
             signs = {floor: side(interval) for floor, interval in intervals.items()}
             if any(signs[floor] * signs["open"] < 0 for floor in FLOORS):
-                texts = (f"[{low:.0f}, {high:.0f}]" for low, high in intervals.values())
+                texts = (section.limits(interval, 0) for interval in intervals.values())
                 rows.append((f"`{pair[0]}` less `{pair[1]}`", n, *texts))
     n_compared = len(COMPARED_AT) * len(list(combinations(results["open"].policies, 2)))
     line = f"{len(rows)} of {n_compared} comparisons turn; no correction for their number."
@@ -172,7 +171,8 @@ def adaptability_block(results: Mapping[float, StudyResults]) -> str:
     reference, *others = WIDTHS
     rows: list[tuple[str, ...]] = []
     for n, policy in product(SIZES_IN_WIDTHS, results[reference].policies):
-        p_o, p_new = cells[reference][policy, n], {x: cells[x][policy, n] for x in others}
+        p_o = cells[reference][policy, n]
+        p_new = {x: cells[x][policy, n] for x in others}
         estimates = (
             spi.adaptability(p_o.by_seed, p_new[x].by_seed, x_o=reference, x_new=x) for x in others
         )
@@ -184,12 +184,6 @@ def adaptability_block(results: Mapping[float, StudyResults]) -> str:
         f"Mean P in 200 s, and A from aisles of {reference:g} m to others, with 95 % intervals; "
         f"{seeds_from(results[reference])}, of each training; restock.",
     )
-
-
-def side(interval: tuple[float, float]) -> int:
-    """Return on which side of 0 an interval lies; 0: on both."""
-    low, high = interval
-    return int(low > 0.0) - int(high < 0.0)
 
 
 def draw(results: Results) -> None:
@@ -212,24 +206,17 @@ def draw(results: Results) -> None:
     figure.savefig(PICTURE, dpi=130)
 
 
-def played(of_floor: Study) -> StudyResults:
-    """Play what is missing of a study; return what its runs say."""
-    of_floor.run(processes=len(os.sched_getaffinity(0)))
-    return of_floor.findings()
-
-
 def main() -> None:
     """Play what is missing, then write tables and picture."""
-    results = {name: played(study(name, scenario_on(floor))) for name, floor in FLOORS.items()}
+    on_floors = [study(name, scenario_on(floor)) for name, floor in FLOORS.items()]
+    results = dict(zip(FLOORS, play(on_floors)))
     draw(results)
-    in_widths = {
-        width: played(study(f"aisles-{width:g}-m", hall(width), SIZES_IN_WIDTHS))
-        for width in WIDTHS
-    }
+    in_halls = [study(f"aisles-{x:g}-m", hall(x), SIZES_IN_WIDTHS) for x in WIDTHS]
+    in_widths = dict(zip(WIDTHS, play(in_halls)))
     blocks = {
         "floors p": p_block,
         "floors s": scalability_block,
-        "floors collapses": collapses_block,
+        "floors fallen back": fallen_back_block,
         "floors turns": turns_block,
     }
     tables = {name: block(results) for name, block in blocks.items()}

@@ -1,7 +1,9 @@
-"""Plays the studies that answer the field's questions: `python docs/play_questions.py [NAME ...]`.
+"""Plays the studies that answer the field's questions.
+
+    python -m research.play_questions [NAME ...]
 
 Of each study in examples/questions this writes the tables into one page, and a figure. What is
-played is kept, as by `play_tables.py`.
+played is kept, as by `play_tables`.
 """
 
 import sys
@@ -10,11 +12,11 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-import question_tables as tables
 from more_itertools import map_reduce
-from play_tables import OUT, play
-from tables import ROOT, example, rewrite
 
+from research import question_tables
+from research.play_tables import OUT
+from research.tables import ROOT, example, play, rewrite
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.drawing import Draw, Panel, Point
@@ -34,14 +36,14 @@ def policies_compared(results: StudyResults) -> Answer:
     """Answer with all policies side by side, and the report's figure of R."""
     figures = document(results).figures
     figure = next(figure for figure in figures if figure.name.startswith("R-Two-robots"))
-    return {"answer": tables.side_by_side(results)}, figure.draw, figure.height
+    return {"answer": question_tables.side_by_side(results)}, figure.draw, figure.height
 
 
 def larger_swarms(results: StudyResults) -> Answer:
     """Answer with P and R against N."""
     blocks = {
-        "performance": tables.performances_by_size(results),
-        "robustness": tables.by_size(results),
+        "performance": question_tables.performances_by_size(results),
+        "robustness": question_tables.by_size(results),
     }
     robustness = [test for test in results.verdicts if test.compared.indicator == "R"]
     panels = []
@@ -66,17 +68,17 @@ def larger_swarms(results: StudyResults) -> Answer:
 def on_one_scale(canvas: "Canvas", panels: Sequence[Panel]) -> None:
     """Draw values with their intervals, one panel below the other, all on one scale."""
     drawing.intervals(canvas, panels)
-    lows, highs = zip(*(axes.get_ylim() for axes in canvas.axes))
+    ends = [end for axes in canvas.axes for end in axes.get_ylim()]
     for axes in canvas.axes:
-        axes.set_ylim(min(lows), max(highs))
+        axes.set_ylim(min(ends), max(ends))
 
 
 def wear_and_repair(results: StudyResults) -> Answer:
     """Answer with what wear costs and what a repair brings, drawn over time for FM4."""
     blocks = {
-        "wear": tables.wear(results),
-        "repair": tables.repairs(results),
-        "after": tables.after_repairs(results),
+        "wear": question_tables.wear(results),
+        "repair": question_tables.repairs(results),
+        "after": question_tables.after_repairs(results),
     }
     panels: dict[str, dict[str, RateCurve]] = {}
     for test in results.verdicts:
@@ -98,7 +100,7 @@ def realistic_robots(results: StudyResults) -> Answer:
     blocks, draw, height = policies_compared(results)
     seeds = len(results.plan.seeds)
     (ideal,) = play([example(OUT, "questions/central_or_swarm", seeds=seeds)])
-    return {**blocks, "lost": tables.losses_between_worlds(results, ideal)}, draw, height
+    return {**blocks, "lost": question_tables.losses_between_worlds(results, ideal)}, draw, height
 
 
 QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {

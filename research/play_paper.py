@@ -1,6 +1,6 @@
 """The paper's experiments in docs/results.md: its table, its figures and its sentences.
 
-`make tables` plays and writes all of it with docs/play_tables.py.
+`make tables` plays and writes all of it with `play_tables`.
 """
 
 import math
@@ -9,15 +9,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
 from more_itertools import map_reduce
-from tables import table
 
+from research.tables import percent_change, side, signed_percent, table
 from swarm_logistics_env.questions.comparison import Setting
 from swarm_logistics_env.report import section
 from swarm_logistics_env.report.drawing import svg_image
 from swarm_logistics_env.report.figures import indicator_figures
 from swarm_logistics_env.report.tables import claims, sentences
-from swarm_logistics_env.spi import relative_change
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.agreement import Agreement, agreement
 from swarm_logistics_env.verdicts.cell import Cell
@@ -25,7 +25,8 @@ from swarm_logistics_env.verdicts.reference import PAPER
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import UNDEFINED, Verdict
 
-SEEDS, SEEDS_WHERE_SKEWED = 20, 100
+SEEDS = 20
+SEEDS_WHERE_SKEWED = 100
 NO_DRIFT = {"heading_drift": 0.0}
 KINDS = ("size", "fault", "parameter")
 FAULTS = {
@@ -65,7 +66,8 @@ def paper_studies(out: Path, first_seed: int) -> tuple[Study, ...]:
 
 def paper_block(parts: Sequence[StudyResults]) -> str:
     """Return the paper's table: P of the paper beside ours, and how well they agree."""
-    with_drift, exact = _published_cells(parts[:3]), _published_cells(parts[3:])
+    with_drift = _published_cells(parts[:3])
+    exact = _published_cells(parts[3:])
     as_shipped = _agreement(with_drift)
     rows = list(_rows(with_drift.values(), as_shipped.misses))
     rows += [
@@ -131,14 +133,13 @@ def _nearness(paper: Agreement) -> tuple[str, str, str]:
 def _change(drift: Cells, exact: Cells) -> str:
     """Return the relative change of P without drift, over the cells and seeds of both."""
     settings = [setting for setting in exact if setting in drift]
-    totals = [
-        sum(cells[setting].by_seed[:SEEDS] for setting in settings) for cells in (drift, exact)
-    ]
-    change = relative_change(*totals)
-    low = change.low or 0.0
-    high = change.high or 0.0
-    text = f"{100 * change.value:+.1f} % [{100 * low:.1f}, {100 * high:.1f}]"
-    return f"{text}: no clear effect" if low <= 0.0 <= high else text
+    totals = (
+        np.sum([cells[setting].by_seed[:SEEDS] for setting in settings], axis=0)
+        for cells in (drift, exact)
+    )
+    change = percent_change(*totals)
+    text = signed_percent(change, 1)
+    return text if side(change) else f"{text}: no clear effect"
 
 
 def _rows(cells: Iterable[Cell], missed: Sequence[Cell]) -> Iterator[tuple[str, ...]]:
@@ -155,12 +156,14 @@ def _rows(cells: Iterable[Cell], missed: Sequence[Cell]) -> Iterator[tuple[str, 
 
 
 def _label(row: Sequence[Cell]) -> str:
-    (kind, name, level, _), scenario = row[0].arm.setting, row[0].arm.case.scenario
+    kind, name, level, _ = row[0].arm.setting
     values = ", ".join(f"{cell.arm.setting.value:g}" for cell in row)
     if kind == "size":
-        return f"N = {values} ({scenario.model_dump()['n_items']} items)"
+        n_items = row[0].arm.case.scenario.model_dump()["n_items"]
+        return f"N = {values} ({n_items} items)"
     if kind == "parameter":
-        return f"{name} = {values}" + (" m" if name.endswith("_width") else "")
+        unit = " m" if name.endswith("_width") else ""
+        return f"{name} = {values}{unit}"
     return f"{FAULTS[name]}, m = {values}" if level else "no fault"
 
 

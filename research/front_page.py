@@ -1,9 +1,9 @@
 """Writes the README's numbers from the CSV files in docs/results, and draws their picture.
 
-`python docs/front_page.py`; `make tables`, which writes these files, calls it. Nothing is played.
+`python -m research.front_page`; `make tables`, which writes these files, calls it. Nothing is
+played. The sentences stand in the README alone; here are the numbers of each in their order.
 """
 
-import csv
 import math
 import re
 import tomllib
@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from play_paper_fit import claim_rows, word
-from tables import ROOT, table, with_blocks
-
+from research.fit_paper import read_tried
+from research.play_paper_fit import claim_rows, means, sets_that_fit, word
+from research.tables import ROOT, read_rows, table, with_blocks
 from swarm_logistics_env.report import drawing, section
 from swarm_logistics_env.spi.summaries import Interval
 
@@ -51,8 +51,7 @@ Rows = Mapping[str, Mapping[str, Value]]  # by the row's label, then by policy
 
 def read(name: str) -> list[dict[str, str]]:
     """Return the rows of a file of docs/results."""
-    with (RESULTS / f"{name}.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    return read_rows(RESULTS / f"{name}.csv")
 
 
 def values(estimates: Sequence[Mapping[str, str]], study: str) -> Rows:
@@ -70,53 +69,75 @@ def values(estimates: Sequence[Mapping[str, str]], study: str) -> Rows:
     return rows
 
 
-# Which policies and which mode are told is decided here: after a change, look at the tables.
-FINDINGS = """\
-* **Robots that could exist** (preset `realistic`; N = 25, 500 s): `ppo-robust` delivers \
-{realistic[ppo-robust].text}, {share[ppo-robust].text} times as much{undecided} as \
-`homing-stock`, the best script that senses locally, at {contacts[ppo-robust].text} contacts a \
-robot-minute ({contacts[homing-stock].text}); `central-stock`, which sees everything, \
-{realistic[central-stock].text}.
-* **Broken robots there**: with two that deliver nothing (FM4) R is {fm4[ppo-delivery].text} of \
-`ppo-delivery`, {fm4[ppo-robust].text} of `ppo-robust`, {fm4[homing-stock].text} of `homing-stock`.
-* **More robots there**: from 25 to 100 S is {s[homing-stock].text} of `homing-stock`, \
-{s[ppo-robust].text} of `ppo-robust`.
-* **The paper's warehouse**, where lifting takes no time: `ppo-robust` clears it in \
-{times[ppo-robust].text} s, `homing-stock` in {times[homing-stock].text} s, Swarm D-T in \
-{times[swarm-dt].text} s.
-* **Of {n_claims} claims of the paper's text** {sets[supported]} hold ({n_untestable} cannot \
-fail), {sets[contradicted]} fail and {sets[open]} are open under nine in ten of [{n_sets} sets of \
-constants](docs/research/paper_fit.md) that fit its cells without faults.
-
-95 % intervals: {seeds[realistic]} seeds ({seeds[policies]} for R and S), of networks over their \
-trainings too; if one training in ten collapses, such an interval over seven holds R in \
-{coverage} of studies. Collapsed: a training keeps less than half of its P."""
+_INTERVAL = re.compile(r"[-\d.∞]+ \[[^]]+\](?: \(\d+ of \d+ collapsed, at most \d+ %\))?")
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?: %)?")
+_COST = re.compile(r"[\d,]+ µs on one core of .*(?=\.$)")
 
 
-def findings() -> str:
-    """Return what the tables show, as a list: the numbers stand beside their intervals."""
+def with_numbers(
+    text: str, beginning: str, pattern: re.Pattern[str], numbers: Sequence[str]
+) -> str:
+    """Return a page with these numbers, in their order, in the line that begins so.
+
+    Args:
+        pattern: of a number; what it matches in the line are its numbers.
+    """
+    lines = [line for line in text.splitlines() if line.startswith(beginning)]
+    n_matches = [len(pattern.findall(line)) for line in lines]
+    if n_matches != [len(numbers)]:
+        raise SystemExit(
+            f"README.md should have one line that begins with {beginning!r}, with {len(numbers)} "
+            f"numbers: it has {len(lines)}, with {n_matches}"
+        )
+    (line,) = lines
+    remaining = iter(numbers)
+    return text.replace(line, pattern.sub(lambda _: next(remaining), line))
+
+
+# Which policies and which mode are told, the README's sentences decide: after a change, look at the
+# tables.
+def intervals() -> dict[str, list[str]]:
+    """Return the intervals of each finding of the README, by the words that it begins with."""
+
+    def texts(row: Mapping[str, Value], *policies: str) -> list[str]:
+        return [row[policy].text for policy in policies]
+
     estimates = read("estimates")
     policies = values(estimates, "policies")
     realistic = values(estimates, "realistic")
+    p = realistic["P"]
+    times = values(estimates, "clearing")["no fault"]
+    fm4 = policies["R, FM4, m = 2"]
+    return {
+        "* **Robots that could exist**": [
+            *texts(p, "ppo-robust"),
+            *texts(realistic[SHARE], "ppo-robust"),
+            *texts(realistic["contacts"], "ppo-robust", "homing-stock"),
+            *texts(p, "central-stock"),
+        ],
+        "* **Broken robots there**": texts(fm4, "ppo-delivery", "ppo-robust", "homing-stock"),
+        "* **More robots there**": texts(policies["S, N 25 -> 100"], "homing-stock", "ppo-robust"),
+        "* **The paper's warehouse**": texts(times, "ppo-robust", "homing-stock", "swarm-dt"),
+    }
+
+
+def counts() -> dict[str, list[str]]:
+    """Return the counts below the findings of the README, by the words that each begins with."""
     claims = read("claims")
-    of_sets = claim_rows(RESULTS / "paper_fit")
-    low, high = realistic[SHARE]["ppo-robust"].interval[1:]
-    is_open = low is not None and high is not None and low < 1.0 < high
-    return FINDINGS.format(
-        realistic=realistic["P"],
-        undecided=" (undecided)" if is_open else "",
-        share=realistic[SHARE],
-        contacts=realistic["contacts"],
-        fm4=policies["R, FM4, m = 2"],
-        s=policies["S, N 25 -> 100"],
-        times=values(estimates, "clearing")["no fault"],
-        n_claims=len(claims),
-        n_untestable=sum(claim["verdict"] == "untestable" for claim in claims),
-        n_sets=of_sets[0][2],
-        sets=Counter(word(n_holding, n_sets) for _, n_holding, n_sets in of_sets),
-        seeds={line["study"]: line["seeds"] for line in estimates},
-        coverage=section.percent(_coverage_over_trainings()),
-    )
+    n_untestable = sum(claim["verdict"] == "untestable" for claim in claims)
+    tried = read_tried(RESULTS / "paper_fit" / "tried.csv")
+    of_sets = claim_rows([means(rows) for rows in sets_that_fit(tried)])
+    words = Counter(word(n_holding, n_sets) for _, n_holding, n_sets in of_sets)
+    n_sets = of_sets[0][2]
+    of_text = (
+        len(claims), words["supported"], n_untestable, words["contradicted"], words["open"], n_sets,
+    )  # fmt: skip
+    seeds = {line["study"]: line["seeds"] for line in read("estimates")}
+    coverage = section.percent(_coverage_over_trainings())
+    return {
+        "* **Of ": list(map(str, of_text)),
+        "95 % intervals": [section.P_LEVEL, seeds["realistic"], seeds["policies"], coverage],
+    }
 
 
 def _coverage_over_trainings() -> float:
@@ -156,11 +177,11 @@ def broken() -> str:
     return table(("items in 500 s", *_CONDITIONS.values()), rows)
 
 
-def speed() -> str:
-    """Return the sentence on speed."""
-    (cost,) = read("cost")
-    microseconds = f"{float(cost['microseconds_per_step']):,.0f}"
-    return f"A step of 25 robots takes {microseconds} µs on one core of {cost['processor']}."
+def cost() -> str:
+    """Return what a step takes, and where."""
+    (measured,) = read("cost")
+    microseconds = float(measured["microseconds_per_step"])
+    return f"{microseconds:,.0f} µs on one core of {measured['processor']}"
 
 
 def draw(rows: Rows, path: Path) -> None:
@@ -210,8 +231,12 @@ def readme_text() -> str:
     """Return the README as the tables have it, with links to the repository of [project.urls]."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     address = project.get("urls", {}).get("Repository")
-    readme = README.read_text(encoding="utf-8")
-    text = with_blocks(readme, {"broken": broken(), "findings": findings(), "speed": speed()})
+    text = with_blocks(README.read_text(encoding="utf-8"), {"broken": broken()})
+    for beginning, numbers in intervals().items():
+        text = with_numbers(text, beginning, _INTERVAL, numbers)
+    for beginning, numbers in counts().items():
+        text = with_numbers(text, beginning, _NUMBER, numbers)
+    text = with_numbers(text, "A step of", _COST, [cost()])
     return with_address(text, address.rstrip("/")) if address else text
 
 

@@ -1,17 +1,16 @@
 """Play what the paper's FM4, "cannot deliver", may mean, and print what single runs of each give.
 
-docs/play_paper_fit.py plays it, for the old constants and for the fit, on seeds from 5,394,000 on.
+`play_paper_fit` plays it, for the old constants and for the fit, on seeds from 5,394,000 on.
 """
 
-import csv
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from fit_paper import Constants, policy_of
-from tables import table
 
+from research.fit_paper import Constants, policy_of
+from research.tables import table
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies.policy import start
@@ -93,45 +92,27 @@ def runs(sets: Mapping[str, Constants], n_seeds: int) -> Iterator[Played]:
                     yield play(name, constants, reading, m, FIRST_SEED + number)
 
 
-def read_runs(path: Path) -> list[Played]:
-    """Return the runs in a file."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return [
-            Played(line[0], line[1], *map(int, line[2:])) for line in list(csv.reader(file))[1:]
-        ]
+def fm4_table(path: Path) -> str:
+    """Return the table of the runs in a file: means, single runs, and who takes what is requested.
 
+    Of the first reading, in which a failed robot keeps the requested item, the last column has the
+    share of requests that a failed robot takes, per failed robot.
+    """
+    import pandas as pd
 
-def write_runs(path: Path, played: Iterator[Played]) -> None:
-    """Write each run to a file at once."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(Played._fields)
-        for run in played:
-            writer.writerow(run)
-            file.flush()
-
-
-def fm4_table(played: Sequence[Played]) -> str:
-    """Return the table of all readings: means, single runs, and who takes the requested item."""
     rows = []
-    for name in dict.fromkeys(run.constants for run in played):
-        for reading in READINGS:
-            of = [run for run in played if run[:2] == (name, reading.words)]
-            by_m = {m: np.array([run.p for run in of if run.m == m]) for m in PAPER}
-            texts = [
-                f"{p.mean():.1f} ({np.quantile(p, 0.05):.0f} to {np.quantile(p, 0.95):.0f})"
-                for p in by_m.values()
-            ]
-            reached = [f"{(p >= PAPER[m]).mean():.0%}" for m, p in by_m.items()]
-            share = _share(of) if reading.change is as_it_is else ""
-            rows.append((name, reading.words, *texts, ", ".join(reached), share))
+    played = pd.read_csv(path)
+    for (name, words), of_reading in played.groupby(["constants", "reading"], sort=False):
+        p_of = {m: of_reading["p"][of_reading["m"] == m] for m in PAPER}
+        texts = [
+            f"{p.mean():.1f} ({p.quantile(0.05):.0f} to {p.quantile(0.95):.0f})"
+            for p in p_of.values()
+        ]
+        reached = [f"{(p >= PAPER[m]).mean():.0%}" for m, p in p_of.items()]
+        requests = of_reading["m"] * (of_reading["p"] + of_reading["is_stuck"])
+        share = of_reading["is_stuck"].sum() / requests.sum()
+        taken = f"{share:.1%}" if words == READINGS[0].words else ""
+        rows.append((name, words, *texts, ", ".join(reached), taken))
     papers = (f"m = {m} (paper: {p})" for m, p in PAPER.items())
     head = ("constants", "a failed robot", *papers, "runs at or above it", "requests taken")
     return table(head, rows)
-
-
-def _share(played: Sequence[Played]) -> str:
-    """Return the share of requests that a failed robot takes, per failed robot."""
-    stuck = sum(run.is_stuck for run in played)
-    requests = sum(run.m * (run.p + run.is_stuck) for run in played)
-    return f"{stuck / requests:.1%}" if requests else ""

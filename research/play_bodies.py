@@ -10,15 +10,13 @@ difference over seeds lie on different sides of 0.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
-from play_benchmark import STOCK
-from play_tables import shares_of_script
-from tables import ROOT, rewrite, table
-
+from research.play_benchmark import STOCK
+from research.play_tables import shares_of_script
+from research.tables import ROOT, percent_change, play, rewrite, side, signed_percent, table
 from swarm_logistics_env import spi
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.questions.comparison import NO_FAULT
@@ -94,11 +92,7 @@ class Results(NamedTuple):
 
 def played(world: World) -> Results:
     """Play what is missing of a world; return what its runs say."""
-    studies = [world.study(bodies) for bodies in (CHIPMUNK, world.engine)]
-    for study in studies:
-        study.run(processes=len(os.sched_getaffinity(0)))
-    in_chipmunk, in_other = (study.findings() for study in studies)
-    return Results(world, in_chipmunk, in_other)
+    return Results(world, *play(world.study(bodies) for bodies in (CHIPMUNK, world.engine)))
 
 
 def p_rows(results: Results) -> Iterator[tuple[str, ...]]:
@@ -106,18 +100,17 @@ def p_rows(results: Results) -> Iterator[tuple[str, ...]]:
     in_chipmunk, in_other = (cells_of(study) for study in (results.chipmunk, results.other))
     for policy, setting in in_chipmunk:
         cells = in_chipmunk[policy, setting], in_other[policy, setting]
-        p, contacts = map(section.mean_p, cells), map(contacts_text, cells)
+        p = map(section.mean_p, cells)
+        contacts = map(contacts_text, cells)
         yield results.world.name, f"`{policy}`", setting, *p, change_of_p(*cells), *contacts
 
 
 def change_of_p(in_chipmunk: Cell, in_other: Cell) -> str:
     """Return by how much P changes from one engine to the other, e.g. "-20 % [-31, -8]"."""
     try:
-        change = spi.relative_change(in_chipmunk.by_seed, in_other.by_seed)
+        return signed_percent(percent_change(in_chipmunk.by_seed, in_other.by_seed), 0)
     except spi.IndicatorError:
         return section.NOTHING  # nothing was delivered in the package's own engine
-    value, low, high = (100 * (number or 0.0) for number in (change.value, change.low, change.high))
-    return f"{value:+.0f} % [{low:.0f}, {high:.0f}]"
 
 
 def cells_of(results: StudyResults) -> dict[tuple[str, str], Cell]:
@@ -153,14 +146,13 @@ def order_rows(results: Results) -> Iterator[tuple[str, ...]]:
     """Yield the difference of each two policies' P without a fault in both engines."""
     in_chipmunk, in_other = (cells_of(study) for study in (results.chipmunk, results.other))
     for first, second in combinations(results.chipmunk.policies, 2):
-        texts, sides = [], []
+        texts = []
+        sides = []
         for cells in (in_chipmunk, in_other):
             p, of_second = (cells[policy, str(NO_FAULT)].by_seed for policy in (first, second))
             interval = t_interval(p - of_second)
-            assert interval.low is not None
-            assert interval.high is not None
             texts.append(section.bracketed(interval, 0))
-            sides.append(int(interval.low > 0.0) - int(interval.high < 0.0))
+            sides.append(side(interval))
         words = {1: "holds", -1: "turns", 0: "open"}
         yield results.world.name, f"`{first}` less `{second}`", *texts, words[sides[0] * sides[1]]
 

@@ -7,7 +7,7 @@ Table II), so that it predicts R and FT; `all` sees the cells of the failure mod
 is as `sound`, with the radio's range of the default scenario. Every set
 that is tried is played at one seed a cell, the same for all sets of a generation and for no other
 generation, and goes into tried.csv at once; a second call goes on from there. Robots always drive
-at full speed, as in the simulator of the paper's author. docs/play_paper_fit.py confirms the fits.
+at full speed, as in the simulator of the paper's author. `play_paper_fit` confirms the fits.
 
 Declared before the first run: a set fits if the mean of |ln(P / paper's P)| over the sound cells is
 at most what Poisson counts of these means leave in 19 of 20 draws, where the paper's P are single
@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import typer
 
+from research.tables import read_rows
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.questions.comparison import Setting
@@ -112,14 +113,8 @@ def play(settings: Iterable[Setting], constants: Constants, seed: int) -> Perfor
 def log_error(performance: Mapping[str, float], settings: Sequence[Setting]) -> float:
     """Return the mean of |ln(P / paper's P)| over those of these cells that were played."""
     played = [setting for setting in settings if cell_name(setting) in performance]
-    return float(
-        np.mean(
-            [
-                abs(math.log(max(performance[cell_name(s)], 0.5) / PAPER.performance[s]))
-                for s in played
-            ]
-        )
-    )
+    ratios = [max(performance[cell_name(s)], 0.5) / PAPER.performance[s] for s in played]
+    return float(np.mean([abs(math.log(ratio)) for ratio in ratios]))
 
 
 @functools.cache
@@ -171,8 +166,7 @@ def read_tried(path: Path) -> list[Tried]:
     if not path.exists():
         return []
     cells = list(map(cell_name, PAPER.cells))
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row[cells[-1]] is not None]
+    rows = [row for row in read_rows(path) if row[cells[-1]] is not None]
     return [
         Tried(
             row["fit"],
@@ -219,7 +213,8 @@ def search(fit: str, path: Path, is_over: Callable[[], bool] = lambda: True) -> 
     cma: Any = importlib.import_module("cma")  # in this script's environment alone
 
     settings = PAPER.cells if fit == "all" else SOUND
-    start, fixed, width = point_of(START), [], 0.1
+    start = point_of(START)
+    fixed: list[float] = []
     if fit == "shipped":  # the radio's range is the last constant
         *start, default_range = point_of({**START, "radio_range": Scenario().radio_range})
         fixed = [default_range]
@@ -229,15 +224,16 @@ def search(fit: str, path: Path, is_over: Callable[[], bool] = lambda: True) -> 
         rows_before = itertools.takewhile(lambda t: t.fit != "all", rows)
         remaining_sets = [tried for tried in rows_before if tried.fit == "sound" and is_full(tried)]
         remaining_sets.sort(key=lambda t: log_error(t.performance, PAPER.cells))
-        start, width = np.mean([point_of(t.constants) for t in remaining_sets[:10]], axis=0), 0.1
+        start = np.mean([point_of(t.constants) for t in remaining_sets[:10]], axis=0).tolist()
     options = {"bounds": [0.0, 1.0], "seed": 1, "verbose": -9}
-    strategy = cma.CMAEvolutionStrategy(start, width, options)
+    strategy = cma.CMAEvolutionStrategy(start, 0.1, options)
     generation = 0
     while not is_over() or any(tried.generation >= generation for tried in before):
         points = strategy.ask()
         constants = [constants_at([*point, *fixed]) for point in points]
         # A call that goes on asks for the same points, as the seed is the same.
-        sets, before = before[: len(points)], before[len(points) :]
+        sets = before[: len(points)]
+        before = before[len(points) :]
         untried = constants[len(sets) :]
         if untried and is_over():
             break

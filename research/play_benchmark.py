@@ -1,10 +1,9 @@
 """The tables of the benchmark, which `play_tables.py` writes, and the entries that `judge` has."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from tables import ROOT, seeds_from, table
-
+from research.tables import ROOT, seeds_from, table
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.report import benchmark, section
 from swarm_logistics_env.report.tables import CONTACTS_HEADING, contacts_text
@@ -65,7 +64,8 @@ def benchmark_blocks(studies: Sequence[StudyResults], n_local: int = len(LOCAL))
 def _leaderboard(studies: Sequence[StudyResults], scores: Mapping[str, Numbers]) -> str:
     """Return the entries by score, with every entrant's contacts and worst cell."""
     board = benchmark.leaderboard(scores)
-    worst_cells, contacts = {}, {}
+    worst_cells = {}
+    contacts = {}
     for results in studies:
         test, share = benchmark.worst(results)
         worst_cells[results.policies[0]] = f"{test.compared.table}, {test.after}: {share:.0%}"
@@ -82,23 +82,15 @@ def _leaderboard(studies: Sequence[StudyResults], scores: Mapping[str, Numbers])
 
 def _cells(shown: StudyResults, scripts: Sequence[StudyResults]) -> str:
     """Return P of one policy in every condition, beside that of the best local script there."""
-    cells, of_scripts = _by_condition(shown), [_by_condition(results) for results in scripts]
+    cells = _by_condition(shown)
+    of_scripts = [_by_condition(results) for results in scripts]
     rows: list[tuple[object, ...]] = []
-    for (title, condition), cell in cells.items():
-        best = max(
-            (script[title, condition] for script in of_scripts),
-            key=lambda script: script.mean.value,
-        )
-        share = cell.mean.value / best.mean.value
-        rows.append(
-            (
-                f"{title}, {condition}",
-                section.mean_p(cell),
-                f"{section.mean_p(best)} `{best.policy}`",
-                f"{share:.2f}",
-                contacts_text(cell),
-            )
-        )
+    for condition, cell in cells.items():
+        best = max((script[condition] for script in of_scripts), key=lambda c: c.mean.value)
+        best_p = f"{section.mean_p(best)} `{best.policy}`"
+        share = f"{cell.mean.value / best.mean.value:.2f}"
+        name = ", ".join(condition)
+        rows.append((name, section.mean_p(cell), best_p, share, contacts_text(cell)))
     return table(
         (
             "condition",
@@ -114,14 +106,12 @@ def _cells(shown: StudyResults, scripts: Sequence[StudyResults]) -> str:
 
 def _by_condition(results: StudyResults) -> Cells:
     """Return the cells of a study by title and condition, the sound swarm of a title once."""
-    return dict(_conditions(results))
-
-
-def _conditions(results: StudyResults) -> Iterator[tuple[tuple[str, str], Cell]]:
+    by_condition: Cells = {}
     shown = set()
     for verdict in results.verdicts:
         comparison = verdict.compared
         for arm, cell in results.cells_of(comparison).items():
             if arm is not comparison.removed and arm.case.key not in shown:
                 shown.add(arm.case.key)
-                yield (comparison.table, str(arm.setting)), cell
+                by_condition[comparison.table, str(arm.setting)] = cell
+    return by_condition

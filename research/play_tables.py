@@ -1,4 +1,4 @@
-"""Plays the studies behind docs/results.md and writes its tables: `python docs/play_tables.py`.
+"""Plays the studies behind docs/results.md and writes its tables: `python -m research.play_tables`.
 
 The CSV files in docs/results, from which the README's numbers and picture follow, are written with
 them, and the scores that `judge` ranks beside. What is played is kept, so that a second call plays
@@ -8,23 +8,34 @@ is written from what `make benchmark` left, if it did.
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import front_page
-import numpy as np
 from more_itertools import map_reduce
-from play_benchmark import benchmark_blocks, benchmark_studies
-from play_paper import claim_rows, draw_figures, paper_block, paper_studies, sentences_block
-from tables import ROOT, answer, by_policy, example, rewrite, seeds_from, table, write_rows
 
-from swarm_logistics_env import spi
+from research import front_page
+from research.play_benchmark import benchmark_blocks, benchmark_studies
+from research.play_paper import (
+    claim_rows,
+    draw_figures,
+    paper_block,
+    paper_studies,
+    sentences_block,
+)
+from research.tables import (
+    ROOT,
+    by_policy,
+    example,
+    play,
+    rewrite,
+    seeds_from,
+    table,
+    write_rows,
+)
 from swarm_logistics_env.report import drawing, section
 from swarm_logistics_env.report.tables import contacts_text
-from swarm_logistics_env.runs.engines import usable_cores
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import Verdict
@@ -40,7 +51,6 @@ BENCHMARK = ROOT / "results" / "benchmark" / "benchmark.json"
 # Nothing was fitted, tuned or chosen on the seeds of these tables: defaults were fitted on those
 # from 0 on; recipes and medians were chosen on some from 700,000 and from 1,000,000 on.
 FIRST_SEED = 20_000
-PROCESSES = usable_cores()
 # Studies in examples/ that are tables of the page.
 EXAMPLES = (
     "clearing", "ladder", "ladder_restocked", "ladder_realistic", "leans", "shipped_policies",
@@ -50,17 +60,6 @@ ESTIMATES = (
     "study", "row", "policy", "value", "low", "high", "threshold", "digits", "seeds", "collapsed",
 )  # fmt: skip
 COSTS = ("microseconds_per_step", "processor")
-
-
-def play(studies: Iterable[Study]) -> list[StudyResults]:
-    """Play what is missing of each study; return what the runs say, or exit if one failed."""
-    results: list[StudyResults] = []
-    for study in studies:
-        tally = study.run(processes=PROCESSES)
-        if tally.failed:
-            raise SystemExit(f"{tally.failed} runs failed: {tally.error}")
-        results.append(study.findings())
-    return results
 
 
 def policies_block(results: StudyResults) -> str:
@@ -90,7 +89,8 @@ def robust_block(results: StudyResults) -> str:
         for symbol in ("R", "FT"):
             test = by_symbol[symbol]
             row.append(f"{section.ratio(test)}, {section.conclusion_text(test)}")
-            by_answer.setdefault(answer(test), []).append(f"{symbol} under {label}")
+            answer = test.on_property.adjusted
+            by_answer.setdefault(answer, []).append(f"{symbol} under {label}")
         rows.append(row)
     summary = "; ".join(f"{word}: {section.join_names(tests)}" for word, tests in by_answer.items())
     return table(
@@ -182,12 +182,16 @@ def shares_of_script(results: StudyResults, script: str) -> dict[str, Interval]:
     shares = {}
     for verdict in results.verdicts:
         if verdict.after.name == script and verdict.interval is not None:
-            value, low, high = (
-                None if change is None else 1.0 / (1.0 + change) for change in verdict.interval
-            )
-            assert value is not None
-            shares[verdict.compared.policy] = Interval(value, high, low)
+            change = verdict.interval
+            low = None if change.high is None else _factor(change.high)
+            high = None if change.low is None else _factor(change.low)
+            shares[verdict.compared.policy] = Interval(_factor(change.value), low, high)
     return shares
+
+
+def _factor(change: float) -> float:
+    """Return by which factor P was larger before a relative change; infinite: nothing is left."""
+    return 1.0 / (1.0 + change) if change > -1.0 else math.inf
 
 
 def leans_cells(results: StudyResults) -> dict[str, dict[str, Cell]]:
@@ -217,9 +221,8 @@ def leans_block(results: StudyResults) -> str:
 
 
 def _p_and_stalls(cell: Cell) -> str:
-    stalled = spi.share_stalled(cell.by_seed.ravel())
     p = section.mean_p(cell)
-    return f"{p}; {stalled:.0%} stalled" if stalled else p
+    return f"{p}; {cell.stalled:.0%} stalled" if cell.stalled else p
 
 
 def draw_ladder(restocked: StudyResults, path: Path) -> None:
@@ -257,7 +260,8 @@ def costs_block(costs: Mapping[str, Any]) -> str:
         )
         for row in costs["contestants"]
     ]
-    machine, seconds = costs["machine"], costs["seconds"]
+    machine = costs["machine"]
+    seconds = costs["seconds"]
     return table(
         ("", "agent-steps per s", "us per step", "cost per agent-step"),
         rows,
@@ -285,10 +289,10 @@ def estimate_rows(
         interval: Interval,
         digits: int,
         threshold: object = "",
-        collapsed: object = "",
+        trainings: object = "",
     ) -> tuple[object, ...]:
         name = policy.partition(", ")[0]  # without how many trainings it stands for
-        return study, label, name, *interval, threshold, digits, n_seeds, collapsed
+        return study, label, name, *interval, threshold, digits, n_seeds, trainings
 
     n_seeds = len(policies.plan.seeds)
     for cell in varied_cells(policies):
@@ -297,13 +301,15 @@ def estimate_rows(
     for test in policies.verdicts:
         if test.interval:
             label = f"{test.compared.indicator}, {test.compared.label}"
-            policy, threshold = test.compared.policy, test.compared.threshold
-            collapsed = (test.estimate and test.estimate.collapsed) or ""
-            yield row("policies", label, policy, test.interval, 3, threshold, collapsed)
+            policy = test.compared.policy
+            threshold = test.compared.threshold
+            trainings = (test.estimate and test.estimate.collapsed) or ""
+            yield row("policies", label, policy, test.interval, 3, threshold, trainings)
     n_seeds = len(clearing.plan.seeds)
     for cell in clearing.cells:
         if cell.n_seeds:
-            yield row("clearing", str(cell.arm.setting), cell.policy, clearing_interval(cell), 0)
+            interval = section.interval_to_clear(cell)
+            yield row("clearing", str(cell.arm.setting), cell.policy, interval, 0)
     n_seeds = len(realistic.plan.seeds)
     (cells,) = ablation_cells(realistic).values()
     for policy, cell in cells.items():
@@ -321,15 +327,6 @@ def estimate_rows(
         digits = section.digits_of(cell.mean.value)
         yield row("broken", str(cell.arm.setting), cell.policy, cell.mean, digits)
         yield row("broken", f"contacts, {cell.arm.setting}", cell.policy, cell.contacts, 1)
-
-
-def clearing_interval(cell: Cell) -> Interval:
-    """Return what `section.time_to_clear` prints, as numbers."""
-    times = [outcome.time_to_clear for outcome in cell.outcomes]
-    n_trainings = len(cell.arm.case.trainings)
-    if n_trainings > 1 and all(map(math.isfinite, times)):
-        return spi.mean_interval(np.reshape(times, (n_trainings, -1)))
-    return spi.median_interval(times)
 
 
 def main() -> None:

@@ -1,13 +1,16 @@
-"""What the scripts share: blocks of a page between markers, tables to put there, and CSV files."""
+"""What the scripts share: studies to play, blocks of a page between markers, tables, CSV files."""
 
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from swarm_logistics_env import spi
 from swarm_logistics_env.report import section
 from swarm_logistics_env.report.tables import contacts_text
 from swarm_logistics_env.report.write import section_markdown
+from swarm_logistics_env.runs.engines import usable_cores
+from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
@@ -40,6 +43,12 @@ def table(head: Sequence[object], rows: Iterable[Sequence[object]], *lines: str)
     """Return a Markdown table as the report has it, and lines of text below."""
     texts = tuple(tuple(map(str, row)) for row in rows)
     return section_markdown(section.Section("", tuple(map(str, head)), texts, lines)).strip()
+
+
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV file; the cells that a row which was cut short lacks are None."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def write_rows(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -76,9 +85,29 @@ def by_policy(
     return table(("", *(f"`{policy}`" for policy in policies)), body, *lines)
 
 
-def answer(test: Verdict) -> str:
-    """Return the answer to what is asked, under Holm, in a word."""
-    return test.on_property.adjusted
+def percent_change(before: Numbers, after: Numbers) -> spi.Interval:
+    """Return the relative change of P in percent, paired by seed.
+
+    Raises:
+        IndicatorError: nothing was delivered before.
+    """
+    change = spi.relative_change(before, after)
+    limits = (None if limit is None else 100.0 * limit for limit in (change.low, change.high))
+    return spi.Interval(100.0 * change.value, *limits)
+
+
+def signed_percent(change: spi.Interval, digits: int) -> str:
+    """Return a change with its sign and its interval, e.g. "+1.2 % [0.3, 2.1]"."""
+    return f"{change.value:+.{digits}f} % {section.limits(change, digits)}".rstrip()
+
+
+def side(interval: spi.Interval) -> int:
+    """Return on which side of 0 an interval lies, 1 or -1; 0: on both."""
+    if interval.low is not None and interval.low > 0.0:
+        return 1
+    if interval.high is not None and interval.high < 0.0:
+        return -1
+    return 0
 
 
 def seeds_from(results: StudyResults, noun: str = "seeds") -> str:
@@ -90,3 +119,14 @@ def seeds_from(results: StudyResults, noun: str = "seeds") -> str:
 def example(out: Path, name: str, **changed: Any) -> Study:
     """Return the study of a file in examples/, which keeps its runs in a folder of `out`."""
     return Study.from_file(ROOT / "examples" / f"{name}.toml", out=out / name, **changed)
+
+
+def play(studies: Iterable[Study]) -> list[StudyResults]:
+    """Play what is missing of each study; return what the runs say, or exit if one failed."""
+    results: list[StudyResults] = []
+    for study in studies:
+        tally = study.run(processes=usable_cores())
+        if tally.failed:
+            raise SystemExit(f"{tally.failed} runs failed: {tally.error}")
+        results.append(study.findings())
+    return results

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from research import fit_paper as fit
+from research import play_paper_fit as confirmed
+from research import tables
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.questions.presets import load_preset
 from swarm_logistics_env.verdicts.reference import PAPER
 
-ROOT = Path(__file__).parents[1]
-PLAYED = ROOT / "docs" / "results" / "paper_fit"
-
-
-@pytest.fixture
-def fit(script: Callable[[str], Any]) -> Any:
-    return script("fit_paper")
-
-
-@pytest.fixture
-def confirmed(script: Callable[[str], Any]) -> Any:
-    return script("play_paper_fit")
+PLAYED = tables.ROOT / "docs" / "results" / "paper_fit"
 
 
 def exact(cells: Any, factor: float = 1.0) -> dict[str, float]:
@@ -32,7 +23,7 @@ def exact(cells: Any, factor: float = 1.0) -> dict[str, float]:
     return {f"{s.name} = {s.value:g}": factor * PAPER.performance[s] for s in cells}
 
 
-def test_the_sound_cells_hold_no_failed_robot_and_all_cells_are_the_papers(fit: Any) -> None:
+def test_the_sound_cells_hold_no_failed_robot_and_all_cells_are_the_papers() -> None:
     assert len(fit.SOUND) + len(fit.FAULTY) == len(PAPER.cells) == 33
     for setting in fit.SOUND:
         _, faults = fit.conditions(setting, 4.0)
@@ -40,7 +31,7 @@ def test_the_sound_cells_hold_no_failed_robot_and_all_cells_are_the_papers(fit: 
     assert {setting.name for setting in fit.FAULTY} == {"FM1", "FM2", "FM3", "FM4"}
 
 
-def test_a_cell_is_the_run_of_its_scenario_with_these_constants(fit: Any) -> None:
+def test_a_cell_is_the_run_of_its_scenario_with_these_constants() -> None:
     constants = fit.constants_at([0.5] * len(fit.RANGES))
     cell = next(s for s in fit.FAULTY if (s.name, s.value) == ("FM2", 2))
     scenario, _ = fit.conditions(cell, constants["radio_range"])
@@ -50,7 +41,7 @@ def test_a_cell_is_the_run_of_its_scenario_with_these_constants(fit: Any) -> Non
     assert fit.play([cell], constants, 7) == {"FM2 = 2": episode.delivered}
 
 
-def test_points_of_the_cube_are_constants_within_their_ranges(fit: Any) -> None:
+def test_points_of_the_cube_are_constants_within_their_ranges() -> None:
     for share in (0.0, 0.3, 1.0):
         constants = fit.constants_at([share] * len(fit.RANGES))
         assert fit.point_of(constants) == pytest.approx([share] * len(fit.RANGES), abs=1e-3)
@@ -58,15 +49,16 @@ def test_points_of_the_cube_are_constants_within_their_ranges(fit: Any) -> None:
     assert all(beyond[name] == high for name, (_, high) in fit.RANGES.items())
 
 
-def test_a_set_fits_up_to_the_noise_of_one_run_a_cell(fit: Any, confirmed: Any) -> None:
+def test_a_set_fits_up_to_the_noise_of_one_run_a_cell() -> None:
     assert fit.largest_error(1) > fit.largest_error(2) > fit.largest_error(100) > 0.15
     for factor, does_fit in ((1.0, True), (1.2, True), (2.0, False)):
-        row = fit.Tried("sound", 0, 0, {}, exact(PAPER.cells, factor))
+        performance: Any = exact(PAPER.cells, factor)  # no whole numbers
+        row = fit.Tried("sound", 0, 0, {}, performance)
         assert confirmed.fits([row]) == does_fit
 
 
 def test_what_was_tried_is_read_again_but_for_a_line_that_was_cut_short(
-    fit: Any, tmp_path: Path
+    tmp_path: Path,
 ) -> None:
     path = tmp_path / "tried.csv"
     constants = fit.constants_at([0.4] * len(fit.RANGES))
@@ -82,7 +74,7 @@ def test_what_was_tried_is_read_again_but_for_a_line_that_was_cut_short(
     assert [fit.is_full(row) for row in rows] == [False, True]
 
 
-def test_every_claim_holds_for_the_papers_own_values(confirmed: Any) -> None:
+def test_every_claim_holds_for_the_papers_own_values() -> None:
     cells = exact(PAPER.cells)
     for question in confirmed.questions():
         # A is relative to values that the paper prints for its base scenario under other names.
@@ -107,17 +99,17 @@ def test_swarm_dt_is_as_deadlocked_by_fm4_as_by_fm4_jam() -> None:
     [(18, "supported"), (17, "open"), (3, "open"),
      (2, "contradicted")],
 )  # fmt: skip
-def test_a_claim_is_decided_only_by_nine_sets_in_ten(confirmed: Any, held: int, word: str) -> None:
+def test_a_claim_is_decided_only_by_nine_sets_in_ten(held: int, word: str) -> None:
     assert confirmed.word(held, 20) == word
 
 
-def test_the_page_shows_what_was_played(confirmed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(confirmed, "draw_claims", lambda rows: None)
+def test_the_page_shows_what_was_played(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(confirmed, "draw_claims", lambda _: None)
     page = confirmed.PAGE.read_text(encoding="utf-8")
-    assert confirmed.with_blocks(page, confirmed.blocks(PLAYED)) == page
+    assert tables.with_blocks(page, confirmed.blocks(PLAYED)) == page
 
 
-def test_the_preset_plays_the_fit_without_failed_robots(fit: Any) -> None:
+def test_the_preset_plays_the_fit_without_failed_robots() -> None:
     rows = fit.read_tried(PLAYED / "confirmed.csv")
     constants = next(row.constants for row in rows if row.fit == "sound")
     preset = load_preset("paper-fit")

@@ -1,20 +1,22 @@
 """Play each reading of the paper's FM1 and FM3, and print what comes near its table, and its price.
 
-    python docs/play_readings.py 40  # seeds a cell
+    python -m research.play_readings 40  # seeds a cell
 
-A reading that changes what sound robots do changes all other cells, too.
+The table goes into docs/research/readings_and_tries.md by hand. A reading that changes what sound
+robots do changes all other cells, too.
 """
 
 import cmath
 import math
-import sys
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import typer
 
+from research.tables import table
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies import load
@@ -62,14 +64,14 @@ def choose(pick: Callable[[Any], Any]) -> Change:
 class Reading(NamedTuple):
     """What a failure mode may mean."""
 
-    of: str
+    failure: str
     words: str
     mode: str
     change: Change | None = None
     relay: Literal["none", "gossip"] = "none"
 
 
-FAILURE_MODES["there"] = FailureMode("tells 0, and hears nobody", honest=False, hears=False)
+THERE = FailureMode("tells 0, and hears nobody", honest=False, hears=False)
 READINGS = (
     Reading("FM1", "tells 0; of equals the nearest is followed (shipped)", "FM1"),
     Reading("FM1", "all pass on the lowest timer, aged", "FM1", None, "gossip"),
@@ -87,6 +89,7 @@ READINGS = (
 def delivered(number: int, n: int, n_items: int, m: int, seed: int) -> int:
     """Return how many items a swarm delivers of which `m` robots have failed."""
     _, _, mode, change, relay = READINGS[number]
+    FAILURE_MODES.setdefault("there", THERE)
     world = Warehouse(Scenario(n_robots=n, n_items=n_items, relay=relay))
     policy = load("swarm-dt-2026")
     rows = world.reset(seed, [Fault(mode, m)] if m else [])
@@ -98,22 +101,31 @@ def delivered(number: int, n: int, n_items: int, m: int, seed: int) -> int:
     return world.state.delivered
 
 
+def row_of(number: int, n_seeds: int, pool: ProcessPoolExecutor) -> tuple[str, ...]:
+    """Return the row of a reading: P in each cell beside the paper's, and how far they are."""
+    failure, words, _, change, relay = READINGS[number]
+    is_for_all = number == 0 or relay == "gossip" or change not in (None, lets_go)
+    cells = [(25, 60, m, p, n_seeds) for m, p in enumerate(PAPER[failure], 1)]
+    if is_for_all:
+        n_seeds_of_others = math.ceil(n_seeds / 4)
+        cells += [(n, n_items, 0, p, n_seeds_of_others) for n, n_items, p in OTHERS]
+    means = []
+    errors = []
+    for n, n_items, m, paper, count in cells:
+        play = partial(delivered, number, n, n_items, m)
+        mean = np.mean([*pool.map(play, range(FIRST_SEED, FIRST_SEED + count))])
+        means.append(f"{mean:.1f} ({paper})")
+        errors.append(abs(math.log(mean / paper)))
+    price = f"{np.mean(errors[3:]):.2f}" if is_for_all else "as shipped"
+    return failure, words, *means[:3], f"{np.mean(errors[:3]):.2f}", price
+
+
+def main(n_seeds: int) -> None:
+    """Play each reading over so many seeds a cell, and print the table."""
+    with ProcessPoolExecutor(2) as pool:
+        rows = [row_of(number, n_seeds, pool) for number in range(len(READINGS))]
+    print(table(("mode", "reading", "m = 1", "m = 2", "m = 3", "mean |ln|", "other cells"), rows))
+
+
 if __name__ == "__main__":
-    n_seeds = int(sys.argv[1])
-    print("| mode | reading | m = 1 | m = 2 | m = 3 | mean abs ln | other cells |")
-    print("|---" * 7 + "|")
-    for number, (of, words, _, change, relay) in enumerate(READINGS):
-        is_for_all = number == 0 or relay == "gossip" or change not in (None, lets_go)
-        cells = [(25, 60, m + 1, p, n_seeds) for m, p in enumerate(PAPER[of])]
-        cells += [(*cell[:2], 0, cell[2], -(-n_seeds // 4)) for cell in OTHERS if is_for_all]
-        means = []
-        errors = []
-        with ProcessPoolExecutor(2) as pool:
-            for n, n_items, m, paper, count in cells:
-                play = partial(delivered, number, n, n_items, m)
-                mean = np.mean([*pool.map(play, range(FIRST_SEED, FIRST_SEED + count))])
-                means.append(f"{mean:.1f} ({paper})")
-                errors.append(abs(math.log(mean / paper)))
-        price = f"{np.mean(errors[3:]):.2f}" if is_for_all else "as shipped"
-        columns = [of, words, *means[:3], f"{np.mean(errors[:3]):.2f}", price]
-        print(f"| {' | '.join(columns)} |", flush=True)
+    typer.run(main)

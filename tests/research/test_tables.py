@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from research import (
+    front_page,
+    play_bodies,
+    play_floors,
+    play_paper,
+    play_paper_fit,
+    play_published,
+    play_questions,
+    play_tables,
+    question_tables,
+    tables,
+)
 from swarm_logistics_env import spi
 from swarm_logistics_env.report import benchmark, section
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"<!-- tables: (\w+) -->\n(.*?)\n<!-- end of tables -->", re.DOTALL)
@@ -27,12 +38,7 @@ EACH = pytest.mark.parametrize("question", QUESTIONS, ids=lambda file: file.stem
 
 
 @pytest.fixture
-def tables(script: Callable[[str], Any]) -> Any:
-    return script("play_tables")
-
-
-@pytest.fixture
-def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A page of markers, and studies of seconds instead of minutes."""
     page = tmp_path / "page.md"
     names = (
@@ -84,33 +90,28 @@ def page(tables: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return [study(out / f"{name}{i}", fields) for i, fields in enumerate(studies_fields[name])]
 
     for name in studies_fields:
-        monkeypatch.setattr(tables, f"{name}_studies", lambda out, *_, n=name: studies(n, out))
-    monkeypatch.setattr(tables, "example", lambda out, name: study(out / name, examples[name]))
+        monkeypatch.setattr(play_tables, f"{name}_studies", lambda out, *_, n=name: studies(n, out))
+    monkeypatch.setattr(play_tables, "example", lambda out, name: study(out / name, examples[name]))
     for name in ("OUT", "BENCHMARK"):
-        monkeypatch.setattr(tables, name, tmp_path / name)
+        monkeypatch.setattr(play_tables, name, tmp_path / name)
     monkeypatch.setattr(benchmark, "ENTRIES", tmp_path / "entries")
-    for name, value in {
-        "PAGE": page,
-        "RESULTS": tmp_path / "csv",
-        "MEDIA": tmp_path,
-        "PROCESSES": 1,
-    }.items():
-        monkeypatch.setattr(tables, name, value)
-    monkeypatch.setattr(tables.front_page, "main", lambda: None)
+    for name, value in {"PAGE": page, "RESULTS": tmp_path / "csv", "MEDIA": tmp_path}.items():
+        monkeypatch.setattr(play_tables, name, value)
+    monkeypatch.setattr(tables, "usable_cores", lambda: 1)
+    monkeypatch.setattr(front_page, "main", lambda: None)
     return page
 
 
 def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
-    tables: Any, page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tables.main()
+    play_tables.main()
     first = page.read_text()
     assert first.startswith("Before.\n\n<!-- tables: paper -->\n\nOf ")
     assert first.endswith("\n\n<!-- end of tables -->\nAfter.\n")
     assert first.count("Between.\n") == 8
     assert "\nold\n" not in first
     assert {path.name.split("-")[1] for path in tmp_path.glob("paper-*.svg")} == {"S", "FT", "A"}
-    front_page = tables.front_page
     monkeypatch.setattr(front_page, "RESULTS", tmp_path / "csv")
     for study in ("policies", "clearing", "realistic", "leans"):
         rows = front_page.values(front_page.read("estimates"), study)
@@ -119,7 +120,8 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     n_supported = sum(claim["verdict"] == "supported" for claim in front_page.read("claims"))
     assert f"this re-implementation supports\n{n_supported} and contradicts" in first
     page.write_text(first.replace("N = 5", "N = 6"))
-    played, run = [], Study.run
+    played = []
+    run = Study.run
 
     def counting_run(self: Study, *args: Any, **fields: Any) -> Any:
         tally = run(self, *args, **fields)
@@ -127,21 +129,21 @@ def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
         return tally
 
     monkeypatch.setattr(Study, "run", counting_run)
-    tables.main()
+    play_tables.main()
     assert page.read_text() == first
     assert played == [0] * 14
     # Nor does what is played anew change a digit.
-    monkeypatch.setattr(tables, "OUT", tmp_path / "anew")
-    tables.main()
+    monkeypatch.setattr(play_tables, "OUT", tmp_path / "anew")
+    play_tables.main()
     assert page.read_text() == first
     assert sum(played) > 20
 
 
-def test_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> None:
+def test_seeds_are_clear_of_those_that_anything_was_fitted_on() -> None:
     out = Path("a")
     studies = [
-        *tables.paper_studies(out, tables.FIRST_SEED),
-        *(tables.example(out, name) for name in tables.EXAMPLES),
+        *play_paper.paper_studies(out, play_tables.FIRST_SEED),
+        *(tables.example(out, name) for name in play_tables.EXAMPLES),
     ]
     for study in (*studies, *map(Study.from_file, QUESTIONS)):
         seeds = study.plan().seeds
@@ -151,34 +153,39 @@ def test_seeds_are_clear_of_those_that_anything_was_fitted_on(tables: Any) -> No
         assert study.plan().cases
 
 
+def test_every_page_names_the_command_that_writes_its_tables() -> None:
+    for module in (play_bodies, play_floors, play_paper_fit, play_published, play_tables):
+        assert f"python -m {module.__name__}" in module.PAGE.read_text(encoding="utf-8")
+    readings = ANSWERS.parent / "readings_and_tries.md"
+    assert "python -m research.play_readings 40" in readings.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("page", [PAGE, README], ids=["results.md", "README.md"])
 def test_no_table_is_typed_by_hand(page: str) -> None:
     prose = BLOCK.sub("", re.sub(r"```.*?```", "", page, flags=re.DOTALL))
     assert not [line for line in prose.splitlines() if line.startswith("|")]
 
 
-def test_every_question_has_its_command_and_figure_and_its_intervals_stand_in_a_table(
-    script: Callable[[str], Any],
-) -> None:
-    assert sorted(script("play_questions").QUESTIONS) == [file.stem for file in QUESTIONS]
+def test_every_question_has_its_command_and_figure_and_its_intervals_stand_in_a_table() -> None:
+    assert sorted(play_questions.QUESTIONS) == [file.stem for file in QUESTIONS]
     for file in QUESTIONS:
-        assert f"`python docs/play_questions.py {file.stem}`" in TEXT
+        assert f"`python -m research.play_questions {file.stem}`" in TEXT
         assert f"](../media/{file.stem}.svg)" in TEXT
     values = re.findall(r"-?[\d.]*\d \[[^]]+\]", " ".join(BLOCK.sub("", TEXT).split()))
     assert len(values) > 30
     assert [value for value in values if f"| {value} " not in TEXT] == []
 
 
-def test_jackknife_of_a_mean_is_its_t_interval(script: Callable[[str], Any]) -> None:
+def test_jackknife_of_a_mean_is_its_t_interval() -> None:
     sample = np.array([3.0, 5.0, 4.0, 9.0])
-    jackknife = script("question_tables").jackknife_interval
+    jackknife = question_tables.jackknife_interval
     interval = jackknife(4, lambda seeds: float(sample[seeds].mean()))
     assert interval == pytest.approx(spi.mean_interval(sample))
 
 
 @EACH
 def test_page_quotes_what_was_played(
-    question: Path, tables: Any, script: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    question: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same questions over two seeds of a short run, of policies that soon deliver."""
     pytest.importorskip("matplotlib", reason="needs the extra study")
@@ -203,11 +210,10 @@ def test_page_quotes_what_was_played(
     for folder in ("media", ANSWERS.parent.name):
         (tmp_path / folder).mkdir()
     page = Path(shutil.copy(ANSWERS, tmp_path / ANSWERS.parent.name))
-    questions = script("play_questions")
-    monkeypatch.setattr(questions, "DOCS", tmp_path)
-    monkeypatch.setattr(questions, "example", lambda *_, **__: study)
-    monkeypatch.setattr(tables, "PROCESSES", 1)
-    questions.main([name])
+    monkeypatch.setattr(play_questions, "DOCS", tmp_path)
+    monkeypatch.setattr(play_questions, "example", lambda *_, **__: study)
+    monkeypatch.setattr(tables, "usable_cores", lambda: 1)
+    play_questions.main([name])
     text = page.read_text(encoding="utf-8")
     results = study.findings()
     for test in results.verdicts:

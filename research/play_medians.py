@@ -1,4 +1,4 @@
-"""Which of several trainings is the median one: `python docs/play_medians.py FILE ...`.
+"""Which of several trainings is the median one: `python -m research.play_medians FILE ...`.
 
 Declared before the trainings: each is played in all conditions of the development tables of the
 benchmark, over 4 seeds of its own. In each condition P is set beside the mean of all trainings, so
@@ -42,10 +42,15 @@ def shares(files: list[str]) -> dict[str, float]:
     return dict(zip(files, np.mean(p / p.mean(axis=0), axis=1).tolist()))
 
 
-if __name__ == "__main__":
-    share_of_file = shares(sys.argv[1:])
+def main(files: list[str]) -> None:
+    """Print the share of each file, ascending, and which is the median."""
+    share_of_file = shares(files)
     ascending = sorted(share_of_file, key=share_of_file.__getitem__)
     for file in ascending:
         seed = read_card(Path(file)).seed
         print(f"{file}: training seed {seed}, mean share {share_of_file[file]:.3f}")
     print(f"Median: {ascending[(len(ascending) - 1) // 2]}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
