@@ -96,10 +96,13 @@ def command_line(names: Iterable[str] = COMMANDS) -> Any:
     )
     application.callback()(_options)
     for name in names:
-        module, attribute = COMMANDS[name]
-        command = getattr(import_module(f"{__package__}.{module}"), attribute)
+        module_name, attribute = COMMANDS[name]
+        module = import_module(f"{__package__}.{module_name}")
+        command = getattr(module, attribute)
         if isinstance(command, typer.Typer):
             application.add_typer(command)
+        elif name == "judge":
+            application.command(name, cls=module.JudgeCommand)(command)
         else:
             application.command(name)(command)
     return typer.main.get_command(application)
