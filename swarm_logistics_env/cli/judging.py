@@ -23,10 +23,10 @@ TRIALS = "a file of trials"
 
 
 class JudgeCommand(TyperCommand):
-    """Takes the options of both commands, and hands all words to the one that is meant.
+    """Has the options of two commands, and gives what was typed to the one that judges it.
 
     Attributes:
-        halves: the two commands, by what they judge.
+        halves: the two commands, by the kind of what they judge.
     """
 
     def __init__(self, name: str, **settings: Any) -> None:
@@ -43,7 +43,7 @@ class JudgeCommand(TyperCommand):
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> Any:
-        """Return the context of the command that is meant; without an argument that of the help.
+        """Return the context of the command for what is judged; of this one if nothing is named.
 
         Raises:
             StudyError: an option is typed that only the other command has.
@@ -89,7 +89,7 @@ def _names(command: TyperCommand) -> set[str]:
     return {parameter.name for parameter in command.params}
 
 
-# It is never called: its argument and its text are those of the help.
+# Nobody calls it: `judge --help` shows its argument and its text.
 def judge_command(
     policy_or_trials: Annotated[
         str,
@@ -103,8 +103,8 @@ def judge_command(
 ) -> None:
     """Judge a policy until its verdicts are clear, or recorded trials.
 
-    What the argument is says which, and `judge POLICY --help` or `judge TRIALS --help` tells of it
-    alone.
+    A file or folder of trials is read, a policy is played. `judge TRIALS --help` and `judge POLICY
+    --help` show the options of one alone.
     """
 
 
