@@ -23,7 +23,7 @@ from swarm_logistics_env.wrappers import MotionFrame
 
 
 class SwarmLogisticsClass(TaskClass):  # type: ignore[misc]  # BenchMARL is not in the gate
-    """Worlds of one group, "robots", with 94 inputs and 3 outputs within -1 and 1 each.
+    """Worlds of one group, "robots", with 95 inputs and 3 outputs within -1 and 1 each.
 
     The configuration has the fields of `Scenario`, `rewards` (term to weight) and, where robots are
     to fail, `faults`, each as text ("FM4:3") or a dict.

@@ -76,7 +76,7 @@ SETTINGS = Settings()
 
 
 def make_env(scenario: Scenario) -> MotionFrame:
-    """Return a world to learn in: rows of 94 inputs, 3 outputs within -1 and 1, shaped rewards."""
+    """Return a world to learn in: rows of 95 inputs, 3 outputs within -1 and 1, shaped rewards."""
     return MotionFrame(swarm_logistics_v0.parallel_env(scenario, rewards=REWARDS))
 
 

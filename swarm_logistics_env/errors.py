@@ -1,6 +1,7 @@
-"""Every error the package raises on purpose: one family, all of them `ValueError`.
+"""Every error the package raises of bad input: one family, all of them `ValueError`.
 
-A message names the field, the value that was given and what would be right.
+`spi.IndicatorError` belongs to it. A message names the field, the value that was given and what
+would be right.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from swarm_logistics_env.model_parts import copy_of_part, model_parts
 # "!" excludes those that name and read policies: a policy's identity tells what was read.
 EPISODE_CODE = (
     "episode.py", "fast_kernels.py", "kernels.py", "numba_fence.py", "observations.py",
-    "scenario.py", "scenario_checks.py", "streams.py", "bodies/*.py",
+    "streams.py", "bodies/*.py", "scenario/*.py",
     "floor/*.py", "floor/plans/*.txt", "motion/*.py", "policies/*.py", "!policies/__init__.py",
     "!policies/spec.py", "!policies/files.py", "!policies/models.py", "!policies/model_spaces.py",
     "!policies/networks.py", "!policies/normalizers.py", "!policies/sb3_files.py",

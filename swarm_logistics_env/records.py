@@ -26,6 +26,7 @@ from pydantic import (
     model_validator,
 )
 
+from swarm_logistics_env.csv_cells import inert
 from swarm_logistics_env.errors import SwarmLogisticsError, suggest
 
 if sys.platform != "win32":
@@ -108,8 +109,6 @@ def write_csv(path: Path, table: pd.DataFrame, error_type: type[SwarmLogisticsEr
     Raises:
         The `error_type`: the file cannot be written.
     """
-    from swarm_logistics_env.spi.trials.readers.csv_text import inert
-
     texts = table.select_dtypes(exclude="number")
     harmless = texts.map(
         lambda cell: inert("\n".join(re.split(r"\r\n?", cell))) if isinstance(cell, str) else cell

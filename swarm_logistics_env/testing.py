@@ -12,7 +12,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Iterator
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -22,7 +22,6 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import Policy, decide, start
 from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.spi import refuse
 
 Moment = dict[str, Any]  # what each agent got at one moment
 
@@ -151,9 +150,3 @@ def _compare(first: list[Any], second: list[Any], situation: str) -> None:
             raise CheckError(
                 f"the same seed gives another episode {situation}: they part at {step}"
             )
-
-
-if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> object:
-        refuse(__name__, name)

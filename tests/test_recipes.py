@@ -89,7 +89,7 @@ from tests.tasks.lane import LANE
 @ tasks/task.py @    "clearing":
     "lane": "swarm_logistics_env.tasks.lane_task:LANE",
 ### A scenario parameter READER=warehouse/sensing
-@ scenario.py @    item_radius:
+@ scenario/fields.py @    item_radius:
     odometry_scale: Positive = Field(1.0, description="factor of velocities; off")
 @ warehouse/structs.py @    n_substeps:
     odometry_scale: float

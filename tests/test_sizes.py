@@ -12,8 +12,7 @@ import swarm_logistics_env
 MOST_LINES, MOST_PARAMETERS = 80, 12
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 RESEARCH = sorted((Path(__file__).parents[1] / "research").glob("*.py"))
-# A command's parameters are the options of its command line.
-FILES = [*sorted(path for path in PACKAGE.rglob("*.py") if path.parent.name != "cli"), *RESEARCH]
+FILES = [*sorted(PACKAGE.rglob("*.py")), *RESEARCH]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: "/".join(path.parts[-2:]))
@@ -25,6 +24,8 @@ def test_functions_are_short_and_take_few_parameters(path: Path) -> None:
         given = function.args
         n_parameters = len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs)
         n_lines = (function.end_lineno or function.lineno) - function.lineno + 1
+        if path.parent.name == "cli" and function.name.endswith("_command"):
+            n_parameters = 0  # they are the options of a command line
         if n_parameters > MOST_PARAMETERS or n_lines > MOST_LINES:
             too_big.append(f"{function.name}: {n_parameters} parameters, {n_lines} lines")
     assert too_big == []

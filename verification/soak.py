@@ -25,7 +25,7 @@ from swarm_logistics_env import Fault, Scenario, Warehouse, policies
 from swarm_logistics_env.errors import ScenarioError
 from swarm_logistics_env.floor import PLAN_SIZES
 from swarm_logistics_env.policies.policy import decide, start
-from swarm_logistics_env.scenario_checks import LONGEST_STRIDE
+from swarm_logistics_env.scenario.checks import LONGEST_STRIDE
 from swarm_logistics_env.warehouse import FAILURE_MODES
 from verification.invariants import BrokenPromiseError, Watch
 

@@ -49,8 +49,8 @@ class Worlds:
         world_of: (R,) the world of each row.
         is_over: of each world, whether its episode is.
         present: (R,) which rows of the latest observations are a robot's.
-        told: the worlds whose latest step had more to tell than observations; rewards and ends of
-            all others are zeros.
+        reported: the worlds whose latest step had more to tell than observations; rewards and ends
+            of all others are zeros.
         observation_space, command_space: of every row.
 
     Raises:

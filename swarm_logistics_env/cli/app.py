@@ -96,10 +96,13 @@ def command_line(names: Iterable[str] = COMMANDS) -> Any:
     )
     application.callback()(_options)
     for name in names:
-        module, attribute = COMMANDS[name]
-        command = getattr(import_module(f"{__package__}.{module}"), attribute)
+        module_name, attribute = COMMANDS[name]
+        module = import_module(f"{__package__}.{module_name}")
+        command = getattr(module, attribute)
         if isinstance(command, typer.Typer):
             application.add_typer(command)
+        elif name == "judge":
+            application.command(name, cls=module.JudgeCommand)(command)
         else:
             application.command(name)(command)
     return typer.main.get_command(application)
@@ -123,8 +126,6 @@ def _options(
 
 def _sentence(error: Exception) -> str | None:
     """Return what to tell the user, or None for a bug, whose traceback should be seen."""
-    from swarm_logistics_env.spi import IndicatorError
-
     # These are Typer's own errors of usage, whichever click they come from.
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
@@ -135,7 +136,7 @@ def _sentence(error: Exception) -> str | None:
         end = "" if sentence.endswith((".", "?")) else "."
         return f"{sentence}{end} Help: {context.command_path} --help"
     # The operating system refuses for reasons of its own: a disk that is full, a name too long.
-    if isinstance(error, SwarmLogisticsError | IndicatorError | OSError):
+    if isinstance(error, SwarmLogisticsError | OSError):
         return str(error)
     return None
 

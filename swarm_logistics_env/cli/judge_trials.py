@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from typer import echo
+from typer import Argument, Option, echo
 
 from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.plan import Origin
@@ -19,11 +19,97 @@ from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.spi.trials import NO_FAULT_WORD, Column, Trial, Trials
 from swarm_logistics_env.studies import Study
 
+from .study_commands import FullOption, JudgedOption
 from .terminal import show_report, show_table
 from .world_choice import Repeated
 
 _LONGEST_VALUE = 12  # characters that show what a column holds
 _MOST_ROWS = 20  # of conditions that are shown before the answer
+
+TrialsArgument = Annotated[
+    str,
+    Argument(
+        metavar="TRIALS",
+        help="File of trials, one trial or delivery a row (CSV, .xlsx, .parquet, JSON of POGEMA or "
+        "marl-eval, a Monitor's CSV), or a folder of them.",
+    ),
+]
+
+
+def judge_trials_command(
+    trials: TrialsArgument,
+    out: JudgedOption = None,
+    columns: Annotated[
+        Repeated,
+        Option(
+            "--column",
+            metavar="WHAT=NAME",
+            help="What a column of another name is, e.g. performance=boxes; may be repeated.",
+        ),
+    ] = None,
+    ignore: Annotated[
+        Repeated, Option(metavar="NAME", help="Column to leave out; may be repeated.")
+    ] = None,
+    duration: Annotated[
+        float | None, Option(help="Length of every trial in seconds, where no column says it.")
+    ] = None,
+    values: Annotated[
+        Repeated,
+        Option(
+            "--value",
+            metavar="COLUMN:CELL=NEW",
+            help="A cell read as another, e.g. fault:kein=none; may be repeated.",
+        ),
+    ] = None,
+    references: Annotated[
+        Repeated,
+        Option(
+            "--reference",
+            metavar="NAME=NUMBER",
+            help="Value of a parameter that A is relative to; may be repeated.",
+        ),
+    ] = None,
+    sum_over: Annotated[
+        str | None,
+        Option(
+            metavar="NAME", help="Column that tells a trial's robots apart: one row of their sum."
+        ),
+    ] = None,
+    decimal: Annotated[
+        str | None, Option(metavar=".|,", help="Sign before decimals; as the cells show.")
+    ] = None,
+    thousands: Annotated[
+        str | None, Option(metavar=".|,", help="Sign between thousands; none if not given.")
+    ] = None,
+    check: Annotated[
+        bool, Option("--check", help="Show how the trials are read, and judge nothing.")
+    ] = False,
+    setup: Annotated[
+        Repeated,
+        Option(
+            metavar="NAME=VALUE",
+            help="A condition for the report to state; may be repeated.",
+        ),
+    ] = None,
+    full: FullOption = False,
+) -> None:
+    """Judge recorded trials, of real robots or of another simulator.
+
+    Their columns are robots, fault, faulty and delivered (or performance); where they apply seed,
+    policy, onset and any parameter; or time, with a delivery a row. Without seeds the study is
+    unpaired.
+    """
+    reading = {
+        "columns": pairs("--column", columns),
+        "ignore": ignore or (),
+        "values": values or (),
+        "reference": numbers("--reference", references),
+        "sum_over": sum_over,
+        "duration": duration,
+        "decimal": decimal,
+        "thousands": thousands,
+    }
+    judge_trials(trials, out, reading, setup=pairs("--setup", setup), only_check=check, full=full)
 
 
 def judge_trials(

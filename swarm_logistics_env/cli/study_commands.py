@@ -49,6 +49,15 @@ DirectoryArgument = Annotated[Path, Argument(help="Directory of a study.")]
 SeedsOption = Annotated[
     int | None, Option(min=1, help="Number of seeds of every condition; the study's if not given.")
 ]
+SeedsOrMostOption = Annotated[
+    int | None,
+    Option(
+        "--seeds",
+        "--most",
+        min=1,
+        help="Number of seeds of every condition; with --until-clear the most (200).",
+    ),
+]
 FirstSeedOption = Annotated[
     int | None, Option(min=0, help="Smallest seed, the others follow it; the study's if not given.")
 ]
@@ -64,6 +73,12 @@ LimitOption = Annotated[
         metavar="SECONDS",
         help="Time after which a run has failed; an hour if not given. It needs --processes 2 "
         "or more.",
+    ),
+]
+JudgedOption = Annotated[
+    Path | None,
+    Option(
+        "--out", help="Directory of the study and its report; results/judged/NAME if not given."
     ),
 ]
 FullOption = Annotated[bool, Option("--full", help="Print every table, not the answer alone.")]
@@ -84,15 +99,7 @@ def run_command(
         Path | None, Option(help="Directory of its store and report; results/NAME if not given.")
     ] = None,
     policies: PolicyOption = None,
-    seeds: Annotated[
-        int | None,
-        Option(
-            "--seeds",
-            "--most",
-            min=1,
-            help="Number of seeds of every condition; with --until-clear the most (200).",
-        ),
-    ] = None,
+    seeds: SeedsOrMostOption = None,
     until_clear: Annotated[
         bool,
         Option(

@@ -31,7 +31,7 @@ ITEM_COLUMNS = ("stored", "carried", "x", "y", "requested")
 def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.float32]:
     """Return the state of `world` as one float32 vector.
 
-    First `ROBOT_FEATURES` for each of `n_robots` rows, then `ITEM_FEATURES` for each of `n_items`
+    First `ROBOT_FEATURES` for each of `n_robots` rows, then `ITEM_COLUMNS` for each of `n_items`
     rows, then the time. Positions [m] and velocities [m/s] in the warehouse's frame, timers [s]
     (the limit when silent), the way to the nearest dock [m], 0 inside, and time [s]; rows of what
     is absent or delivered are zeros.

@@ -181,7 +181,7 @@ class LearnedPolicy(Described):
         self._decides_every, self._listens = network.decides_every, network.listens
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = LearnedParameters(network=network, weights=digest(tensors))
-        self.configure(Scenario())
+        self.configure(Scenario.preset("paper"))
 
     def __repr__(self) -> str:
         steps = f"{self.card.agent_steps:,} agent-steps"

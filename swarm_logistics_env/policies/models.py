@@ -224,7 +224,7 @@ class ModelPolicy(_Model):
             check_spaces(about, decide.policy, frame)
         check_width(about, width_of(decide), frame)
         check_statistics(width_of(prepare), width_of(decide), frame)
-        self.configure(Scenario())
+        self.configure(Scenario.preset("paper"))
         if isinstance(decide, _OF_LIBRARIES):
             self._try_out()
         self.reset(0, 0)

@@ -93,7 +93,7 @@ class Scripted(Described):
 
     def __init__(self, **parameters: Any) -> None:
         self.parameters = self.parameters_type(**parameters)
-        self.configure(Scenario())
+        self.configure(Scenario.preset("paper"))
         self.reset(0, 0)
 
     def __repr__(self) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
-
 from .definitions import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .equivalence import Equivalence, equivalence
 from .estimate import DecisionWord, Estimate, Options
@@ -89,39 +87,3 @@ __all__ = [
     "two_phases",
     "worst_decile",
 ]
-
-# Public names that went with 0.3.0, and where to look instead.
-_TWO_CHECKS = "use check_policy, or check_wrapper"
-REMOVED = {
-    "spi.ScalingFit": "fit a law to P over N with scipy.optimize.curve_fit",
-    "spi.SelfRepair": "use spi.repair_times with spi.kaplan_meier",
-    "spi.Verdict": "use spi.DecisionWord",
-    "spi.Simulation": "judge the real runs alone",
-    "spi.compare_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
-    "spi.fit_scaling": "fit a law to P over N with scipy.optimize.curve_fit",
-    "spi.karp_flatt": "use spi.scalability: S = 1 where nothing is serial",
-    "spi.mean_with_simulation": "use spi.mean_interval of the real runs alone",
-    "spi.self_repair": "use spi.repair_times with spi.kaplan_meier",
-    "testing.check_conservation": f"{_TWO_CHECKS}; verification/invariants.py counts items",
-    "testing.check_determinism": _TWO_CHECKS,
-    "testing.check_faults": f"{_TWO_CHECKS}; verification/invariants.py watches faults",
-    "testing.check_overlap": f"{_TWO_CHECKS}; verification/invariants.py measures overlaps",
-    "testing.check_spaces": "use check_wrapper",
-}
-
-
-def refuse(module: str, name: str) -> NoReturn:
-    """Raise AttributeError, with what to use instead where the name was removed.
-
-    No other error: `hasattr` and `getattr(module, name, None)` ask about any name.
-    """
-    public_name = f"{module.partition('.')[2]}.{name}"
-    if public_name in REMOVED:
-        raise AttributeError(f"{public_name} was removed in 0.3.0: {REMOVED[public_name]}")
-    raise AttributeError(f"module {module!r} has no attribute {name!r}")
-
-
-if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> object:
-        refuse(__name__, name)

@@ -10,7 +10,13 @@ from typing import SupportsIndex, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.errors import SwarmLogisticsError
+
 Numbers: TypeAlias = NDArray[np.float64]
+
+
+class IndicatorError(SwarmLogisticsError):
+    """Input from which an indicator is undefined; the message names the field and the value."""
 
 
 # Beyond these the squares of squares, which intervals are made of, are no numbers any more.
@@ -145,7 +151,3 @@ def _number(name: str, value: float) -> float:
     except (TypeError, OverflowError):
         raise IndicatorError(f"{name} = {value!r}: should be a number") from None
     return float(value)
-
-
-class IndicatorError(ValueError):
-    """Input from which an indicator is undefined; the message names the field and the value."""

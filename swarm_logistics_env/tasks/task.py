@@ -321,7 +321,7 @@ TASKS = {
 
 
 def task_of(source: object) -> Task:
-    """Return the task of a name of `NAMES` or of "package.module:OBJECT"; a task as it is.
+    """Return the task of a name of `TASKS` or of "package.module:OBJECT"; a task as it is.
 
     Raises:
         StudyError: there is none.

@@ -58,7 +58,7 @@ class Warehouse:
 
     def __init__(self, scenario: Scenario | None = None) -> None:
         self.lock = threading.RLock()
-        self.scenario = _scenario(scenario, Scenario())
+        self.scenario = _scenario(scenario, Scenario.preset("paper"))
         self.state = WarehouseState(self.scenario)
         self._occurrences: list[Occurrence] = []
         self.is_eventful = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -118,6 +119,9 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
         ("lab.csv --seeds 5", "--seeds is not for a file of trials, and 'lab.csv' is one"),
         ("model.zip", "executes the code"),
         ("homing --column N=robots", "--column is not for a policy, and 'homing' is one"),
+        ("--check homing --seeds 3", "--check is not for a policy, and 'homing' is one"),
+        ("lab.csv --all-seeds", "--until-clear/--all-seeds is not for a file of trials, and"),
+        ("lab.csv --first-seed 0", "--first-seed is not for a file of trials, and"),
         ("homing --seeds 2", "--seeds"),
         ("homing --benchmark --seeds 5", "same conditions for everybody"),
         ("homing --benchmark --first-seed 0", "--first-seed: the benchmark has the same"),
@@ -132,6 +136,20 @@ def test_what_cannot_be_judged_ends_in_one_sentence_before_anything_is_written(
         "judged_policy.py",
         "__pycache__",
     }
+
+
+def test_help_shows_the_options_of_what_is_judged(command: Command) -> None:
+    both = command("judge --help")
+    shared, of_a_policy, of_trials = re.split("Options for .*:\n", both.partition("Options:")[2])
+    assert re.findall(r"^  (--[\w-]+)", shared, re.MULTILINE) == ["--out", "--full", "--help"]
+    assert "--seeds" in of_a_policy
+    assert "--column" not in of_a_policy
+    assert "--column" in of_trials
+    assert "--seeds" not in of_trials
+    for target, options in (("homing", of_a_policy), ("lab.csv", of_trials)):
+        names = re.findall(r"^  (--[\w-]+)", command(f"judge {target} --help"), re.MULTILINE)
+        mine = re.findall(r"^  (--[\w-]+)", options, re.MULTILINE)
+        assert {*names} == {*mine, "--out", "--full", "--help"}
 
 
 def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Command) -> None:

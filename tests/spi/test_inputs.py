@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.errors import SwarmLogisticsError
 
 MASKED = np.ma.masked_equal([20.0, 21.0, 22.0, 9999.0], 9999.0)
 REFUSED: list[tuple[Any, str]] = [
@@ -31,8 +32,9 @@ REFUSED: list[tuple[Any, str]] = [
 @pytest.mark.parametrize(("values", "words"), REFUSED)
 def test_what_is_no_real_number_is_refused_by_its_place_or_kind(values: Any, words: str) -> None:
     for ask in (spi.mean_interval, spi.worst_decile, spi.share_stalled):
-        with pytest.raises(spi.IndicatorError, match=words):
+        with pytest.raises(spi.IndicatorError, match=words) as refused:
             ask(values)
+        assert isinstance(refused.value, SwarmLogisticsError)
 
 
 def test_what_has_a_mask_or_another_type_of_number_is_read_as_its_numbers() -> None:

@@ -26,7 +26,7 @@ from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.runs.notes import NOTE, merge
 from swarm_logistics_env.runs.recorded import import_results
 from swarm_logistics_env.runs.store import FILE_NAME, Runs, export
-from swarm_logistics_env.spi import IndicatorError, read_trials
+from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.cell import Cell
 from tests.made_up import alter, made_old
@@ -92,7 +92,7 @@ def refused_or_done(call: Callable[[], object]) -> None:
     said = None
     try:
         call()
-    except (SwarmLogisticsError, IndicatorError) as error:
+    except SwarmLogisticsError as error:
         said = str(error)
     assert said is None or (len(said) > 15 and len(said.splitlines()) == 1), said
 

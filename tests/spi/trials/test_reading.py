@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.trials.readers.csv_text import inert
+from swarm_logistics_env.csv_cells import inert
 
 
 def read(tmp_path: Path, text: str, **asked: Any) -> spi.Trials:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
+from swarm_logistics_env.csv_cells import text_of_inert
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.spi.trials.table import Formula, NoTrialsError, Table
 
@@ -20,9 +21,6 @@ _QUOTED = r'"(?:[^"]|"")*+"'
 _HEADER = re.compile(rf'(?:{_QUOTED}|[^\r\n"])*+')
 _EXCEL = re.compile(r'\s*"?sep=(\t|[^\w\s"\'])"?[;,\t ]*(?:\r\n|\r|\n)', re.IGNORECASE)
 _COMMENT = re.compile(r"#[^\r\n]*(?:\r\n|\r|\n)\s*")  # before the names of the columns
-# What a spreadsheet computes; an apostrophe before it makes it a text there.
-_FORMULA = re.compile(r"[\s']*[=+\-@\t\r\n]")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 # What files of other kinds begin with.
 _OTHER_KINDS = {
     b"PK\x03\x04": "a workbook or an archive: should end in .xlsx, or be unpacked",
@@ -45,11 +43,6 @@ def read(path: Path, content: bytes, digest: str) -> Table:
     text, notes = _text(path, content)
     header, rows = _cells(path, text)
     return Table(str(path), digest, header, list(rows.values()), list(rows), notes=tuple(notes))
-
-
-def inert(text: str) -> str:
-    """Return a text as a cell that no spreadsheet computes; `read` reads the text itself."""
-    return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
 
 
 def _text(path: Path, content: bytes) -> tuple[str, list[str]]:
@@ -145,8 +138,6 @@ def _rows(path: Path, text: str, start: int, delimiter: str) -> Iterator[tuple[i
 def _read(cell: str) -> str:
     """Return a cell in one line, and without what `inert` put before it."""
     cell = cell.lstrip(" ")
-    if cell.startswith("'") and _FORMULA.match(cell):
-        cell = cell[1:]
-    elif cell.startswith("=") and not cell.startswith('="'):  # which stands before a text
+    if cell.startswith("=") and not cell.startswith('="'):  # which stands before a text
         return Formula(cell)
-    return re.sub(rf"[{_LINE_SIGNS}]+", " ", cell.strip())
+    return re.sub(rf"[{_LINE_SIGNS}]+", " ", text_of_inert(cell).strip())

@@ -1,13 +1,13 @@
 """Whether a scenario can be built: what its fields must be beside each other.
 
-Each check raises a ValueError that names the field, its value and what would be right. It takes a
-`Scenario`, whose module imports this one.
+Each check raises a ValueError that names the field, its value and what would be right.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+
+from .fields import ScenarioFields
 
 # Discs may cover this part of the floor; random sequential addition ends at 0.547.
 DENSEST_COVER = 0.4
@@ -19,7 +19,7 @@ LONGEST_PHYSICS_PERIOD = 0.02
 MOST_SUBSTEPS = 1000
 
 
-def check(scenario: Any) -> None:
+def check(scenario: ScenarioFields) -> None:
     """Check everything."""
     check_periods(scenario)
     check_storage(scenario)
@@ -27,7 +27,7 @@ def check(scenario: Any) -> None:
     check_room(scenario)
 
 
-def check_periods(scenario: Any) -> None:
+def check_periods(scenario: ScenarioFields) -> None:
     """Check the lengths of steps and of the episode."""
     if scenario.physics_period > LONGEST_PHYSICS_PERIOD:
         raise ValueError(
@@ -59,7 +59,7 @@ def check_periods(scenario: Any) -> None:
         )
 
 
-def check_storage(scenario: Any) -> None:
+def check_storage(scenario: ScenarioFields) -> None:
     """Check that what stands in the open room has width for it."""
     if scenario.floor is not None:
         return  # the plan was checked
@@ -84,7 +84,7 @@ def check_storage(scenario: Any) -> None:
             )
 
 
-def check_requests(scenario: Any) -> None:
+def check_requests(scenario: ScenarioFields) -> None:
     """Check requests, docks and the item count against each other."""
     if scenario.n_requests > scenario.n_items:
         raise ValueError(
@@ -100,14 +100,17 @@ def check_requests(scenario: Any) -> None:
         )
 
 
-def check_room(scenario: Any) -> None:
+def check_room(scenario: ScenarioFields) -> None:
     """Check that robots, items and obstacles fit into the cells or the room that they have."""
     plan = scenario.plan
-    storage = starts = scenario.storage_width * scenario.warehouse_height
-    room = f"a storage of {scenario.storage_width:g} x {scenario.warehouse_height:g} m"
-    start_room = room
-    if plan is not None:
-        storage, starts = plan.storage_area, plan.start_area
+    if plan is None:
+        storage = scenario.storage_width * scenario.warehouse_height
+        starts = storage
+        room = f"a storage of {scenario.storage_width:g} x {scenario.warehouse_height:g} m"
+        start_room = room
+    else:
+        storage = plan.storage_area
+        starts = plan.start_area
         room = 'the storage cells (":") of the plan'
         start_room = f"the {plan.start_name} of the plan"
     obstacle_cover = scenario.n_obstacles * scenario.obstacle_radius**2
