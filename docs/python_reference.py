@@ -104,6 +104,7 @@ STABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "tasks.FailingRobots": (),
         "tasks.RobotFault": (),
         "tasks.Task": (),
+        "tasks.TaskWorld": (),
     },
     "Tests of your code": {
         "testing.check_policy": (),

@@ -20,10 +20,9 @@ from research.tables import ROOT, example, play, rewrite
 from swarm_logistics_env.report import drawing
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.drawing import Draw, Panel, Point
-from swarm_logistics_env.report.section import DECIDED
 from swarm_logistics_env.verdicts.mid_run_faults import RateCurve, rate_curves
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.verdicts.verdict import DECIDED, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.runs.recorded import RecordedStudy
 from swarm_logistics_env.spi import read_trials
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.verdicts import results
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,11 +43,9 @@ def judge(
         >>> results.verdicts[0].compared.indicator
         'S'
     """
-    recorded = read_trials(trials, **reading)
+    from swarm_logistics_env.report.findings import Findings
+
+    study = RecordedStudy.of(read_trials(trials, **reading), setup)
     if out is not None:
-        import_results(recorded, Path(out), setup)
-        return Study.stored(out).findings()
-    with tempfile.TemporaryDirectory() as folder:
-        directory = Path(folder, "study")
-        import_results(recorded, directory, setup)
-        return Study.stored(directory).findings()
+        study.keep(Path(out))
+    return Findings.of(results.judge(study.plan, study.outcomes))

@@ -25,7 +25,7 @@ from swarm_logistics_env.questions.plan import Plan
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
 from swarm_logistics_env.runs.notes import note
-from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.runs.recorded import RecordedStudy
 from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
@@ -265,7 +265,7 @@ def test_another_specification_makes_another_plan(tmp_path: Path) -> None:
     study.specification = study.specification.replace(seeds=3)
     assert (len(before.seeds), len(study.plan().seeds)) == (2, 3)
     (tmp_path / "t.csv").write_text("robots,p\n4,1\n8,2\n")
-    import_results(read_trials(tmp_path / "t.csv"), tmp_path / "out")
+    RecordedStudy.of(read_trials(tmp_path / "t.csv")).keep(tmp_path / "out")
     imported = Study.stored(tmp_path / "out")
     with pytest.raises(StudyError, match="asks what its trials vary"):
         imported.specification = study.specification

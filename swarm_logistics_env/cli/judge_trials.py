@@ -10,14 +10,13 @@ from typing import Annotated, Any
 from typer import Argument, Option, echo
 
 from swarm_logistics_env.errors import StudyError
-from swarm_logistics_env.questions.plan import Origin
 from swarm_logistics_env.report.section import Texts
 from swarm_logistics_env.runs.notes import StoredStudy
-from swarm_logistics_env.runs.recorded import import_results, origin_of
+from swarm_logistics_env.runs.recorded import RecordedStudy, notes_on
 from swarm_logistics_env.runs.store import FILE_NAME
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.spi.trials import NO_FAULT_WORD, Column, Trial, Trials
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.verdicts.results import judge
 
 from .study_commands import FullOption, JudgedOption
 from .terminal import show_report, show_table
@@ -121,7 +120,7 @@ def judge_trials(
     only_check: bool,
     full: bool,
 ) -> None:
-    """Import the trials of a file or folder as a study, print the answer and write the report.
+    """Judge the trials of a file or folder, keep them as a study, print the answer and report it.
 
     Args:
         out: directory of the study; None: results/judged/NAME, with a number where that holds
@@ -132,19 +131,19 @@ def judge_trials(
     """
     trials = read_trials(source, **reading)
     _show_how_read(trials, source)
-    origin = origin_of(trials, setup)
-    for note in origin.notes:
+    for note in notes_on(trials):
         echo(note)
     echo()
     if only_check:
         return
+    study = RecordedStudy.of(trials, setup)
     usual_directory = Path("results", "judged", Path(source).stem)
-    directory = out or _free(usual_directory, origin)
-    if not _holds(directory, origin):
-        import_results(trials, directory, setup)
+    directory = out or _free(usual_directory, study)
+    if not _holds(directory, study):
+        study.keep(directory)
     if directory not in (out, usual_directory):
         echo(f"{usual_directory} holds an earlier judgement, so this one is in {directory}")
-    show_report(Study.stored(directory).findings(), directory, full=full)
+    show_report(judge(study.plan, study.outcomes), directory, full=full)
 
 
 def _show_how_read(trials: Trials, source: str) -> None:
@@ -190,19 +189,19 @@ def _labels(trial: Trial) -> Texts:
     return policy, fault + onset, parameters
 
 
-def _holds(directory: Path, origin: Origin) -> bool:
-    """Return whether a directory holds the study of these trials already."""
+def _holds(directory: Path, study: RecordedStudy) -> bool:
+    """Return whether a directory holds this study already."""
     try:
-        return StoredStudy.existing(directory).imported == origin
+        return StoredStudy.existing(directory).imported == study.plan.origin
     except StudyError:  # none, or none that reads
         return False
 
 
-def _free(directory: Path, origin: Origin) -> Path:
+def _free(directory: Path, study: RecordedStudy) -> Path:
     """Return a directory that holds no other study: that one, or one with a number."""
     number = 1
     free = directory
-    while (free / FILE_NAME).exists() and not _holds(free, origin):
+    while (free / FILE_NAME).exists() and not _holds(free, study):
         number += 1
         free = directory.with_name(f"{directory.name}-{number}")
     return free

@@ -15,7 +15,6 @@ from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.records import plain
 from swarm_logistics_env.report.drawing import PAGE_STYLE, SERIF, FigureStyle
 from swarm_logistics_env.report.section import NOTHING, bracketed, percent, slug
-from swarm_logistics_env.report.templates import UNTESTABLE
 from swarm_logistics_env.runs.engines import Engine, Shard, Tally, engine_named
 from swarm_logistics_env.runs.notes import merge
 from swarm_logistics_env.runs.store import Runs, export
@@ -23,6 +22,7 @@ from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Run
 from swarm_logistics_env.verdicts.gate import SUBJECTS, Gate, GateAnswer, answers, match
 from swarm_logistics_env.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
+from swarm_logistics_env.verdicts.verdict import why_untestable
 
 from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption, policies_of
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
@@ -313,8 +313,7 @@ def _show_answers(
             levels = {estimate.confidence}
             verdict = f"above {estimate.threshold:g}: {answer.verdict}"
             if estimate.untestable:
-                reason = UNTESTABLE[estimate.flags[0]].format(threshold=estimate.threshold)
-                verdict = f"untestable: {reason}"
+                verdict = f"untestable: {why_untestable(estimate)}"
         rows.append((answer.name, value, verdict))
     columns = ("", f"value [{percent(*levels)}]", "verdict under Holm")
     show_table(title, columns, rows, *left_out)

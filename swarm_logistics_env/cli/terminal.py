@@ -101,7 +101,7 @@ def show_report(
     if names_modes and "FM1" in results.plan.specification.played.failure_modes:
         echo("Failure modes: swarm-logistics list faults")
     if is_finished and any(verdict.estimate for verdict in results.verdicts):
-        say(f"For a paper: {plain(in_a_sentence(results))}")
+        say(f"For a paper: {plain(in_a_sentence(results, report.answer))}")
 
 
 class AnswerSoFar:

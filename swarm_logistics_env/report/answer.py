@@ -14,10 +14,11 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.questions.plan import Plan
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.tasks.task import DEFAULT
+from swarm_logistics_env.tasks.task_world import world_of
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import (
+    DECIDED,
     POWER,
     UNAFFECTED,
     UNDEFINED,
@@ -27,7 +28,7 @@ from swarm_logistics_env.verdicts.verdict import (
 )
 
 from . import section, templates
-from .answer_notes import notes, reason_of
+from .answer_notes import notes
 from .section import Section
 from .templates import Slots, fill
 
@@ -121,7 +122,7 @@ class Line(NamedTuple):
             return "unaffected", {"words": words}
         if estimate.untestable:
             return "untestable", {"words": words, "reason": self.reason}
-        if "unbounded" in first.flags and first.on_property.adjusted in section.DECIDED:
+        if "unbounded" in first.flags and first.on_property.adjusted in DECIDED:
             return "unbounded", {"words": words}
         if self.reason:
             return "with_reason", {"words": words, "reason": self.reason}
@@ -140,9 +141,9 @@ class Line(NamedTuple):
     def reason(self) -> str:
         """Why what is untestable is so, or its one verdict open; empty: there is no reason."""
         if len(self.verdicts) == 1:
-            return reason_of(self.verdicts[0])
-        untestable = [verdict for verdict in self.verdicts if verdict.conclusion == UNTESTABLE]
-        return ", ".join(dict.fromkeys(map(reason_of, untestable)))
+            return self.verdicts[0].reason
+        reasons = [verdict.reason for verdict in self.verdicts if verdict.conclusion == UNTESTABLE]
+        return ", ".join(dict.fromkeys(reasons))
 
     @property
     def needs_runs(self) -> bool:
@@ -225,7 +226,7 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     lines.sort(key=lambda line: (policies.index(line.policy), indicators.index(line.indicator)))
     needs_runs = any(line.needs_runs for line in lines)
     notes_text = notes(results, needs_runs, {line.reason for line in lines})
-    return Answer(_scope(results), performance_of(results), tuple(lines), notes_text)
+    return Answer(_scope(results), _performance(results), tuple(lines), notes_text)
 
 
 def _part_of_title(table: str) -> str:
@@ -302,7 +303,7 @@ def _scope(results: StudyResults) -> str:
     )
 
 
-def performance_of(results: StudyResults) -> str:
+def _performance(results: StudyResults) -> str:
     """Return P of every policy where the swarm is as it should be, in a sentence."""
     played = [cell for cell in results.cells if cell.n_seeds]
     if not played:
@@ -319,17 +320,22 @@ def performance_of(results: StudyResults) -> str:
         table = played[0].table
         chosen = [(cell.arm.setting.name, cell) for cell in played if cell.table == table]
         where = f", {table}"
-    # The first cell of each policy, the policy with the last one first.
-    by_policy = dict(reversed(dict(reversed(chosen)).items()))
+    by_policy: dict[str, Cell] = {}
+    for policy, cell in chosen:
+        # Its first cell counts; a policy that others are compared with stands behind them.
+        first_cell = by_policy.pop(policy, cell)
+        by_policy[policy] = first_cell
     case = next(iter(by_policy.values())).arm.case
     means = [_mean(cell) for cell in by_policy.values()]
     if len(by_policy) > 1 or len(results.policies) > 1:
         means = [f"{policy} {mean}" for policy, mean in zip(by_policy, means)]
-    template = "items" if case.task.name == DEFAULT else "other_task"
+    counted = world_of(case.task).counted
+    template = "count" if counted else "no_count"
     if any(cell.mean.low is not None for cell in by_policy.values()):
         template += "_with_interval"
     return templates.PERFORMANCE[template].format(
         level=section.P_LEVEL,
+        counted=counted,
         duration=case.scenario.duration,
         condition=f"N = {case.scenario.n_robots}{where}",
         means=", ".join(means),

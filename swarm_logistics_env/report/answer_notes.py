@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.tasks.task import DEFAULT
-from swarm_logistics_env.verdicts.collapses import collapses, untestable
+from swarm_logistics_env.tasks.task_world import world_of
+from swarm_logistics_env.verdicts.collapses import untestable
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import UNTESTABLE, Verdict
+from swarm_logistics_env.verdicts.verdict import Verdict
 
 from . import section, templates
 from .collapse_tables import collapsed_in_words, untestable_in_words
@@ -63,8 +63,8 @@ def _notes_that_apply(
         yield "collapsed", {"collapsed": max(trainings, key=lambda collapsed: collapsed.number)}
     if any(verdict.saturated for verdict in verdicts):
         yield "capped", {"mark": section.SATURATED}
-    if named := collapses(results.cells):
-        words = collapsed_in_words(named, names_policies=len(results.policies) > 1)
+    if results.collapses:
+        words = collapsed_in_words(results.collapses, names_policies=len(results.policies) > 1)
         yield "collapsed_runs", {"conditions": words}
     if by_reason := untestable(results.cells):
         words = untestable_in_words(by_reason, names_policies=len(results.policies) > 1)
@@ -96,28 +96,12 @@ def reasons_in_words(reasons: Collection[str]) -> str:
 
 
 def _delivers_little(results: StudyResults) -> bool:
-    """Return whether swarms in a warehouse that are as they should be deliver hardly anything."""
+    """Return whether swarms that are as they should be, and count, deliver hardly anything."""
     originals = [results.cells_of(v.compared)[v.compared.original] for v in results.verdicts]
     return any(
-        cell.n_seeds and cell.arm.case.task.name == DEFAULT and cell.mean.value < _FEW_ITEMS
+        cell.n_seeds and world_of(cell.arm.case.task).counted and cell.mean.value < _FEW_ITEMS
         for cell in originals
     )
-
-
-def reason_of(verdict: Verdict) -> str:
-    """Return why a verdict is untestable, or open with its interval on one side of the threshold.
-
-    Returns:
-        The reason in words, or a name in `REASONS_TO_BE_OPEN`; empty: there is none.
-    """
-    if verdict.conclusion == UNTESTABLE:
-        return templates.UNTESTABLE[verdict.flags[0]].format(threshold=verdict.compared.threshold)
-    if verdict.conclusion != "open" or verdict.lies_above is None:
-        return ""
-    for flag, reason in templates.REASON_OF_FLAG.items():
-        if flag in verdict.flags:
-            return reason
-    return "Holm" if verdict.on_threshold.plain in section.DECIDED else ""
 
 
 def _claims(verdicts: Sequence[Verdict]) -> Slots:

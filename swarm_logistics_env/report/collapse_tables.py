@@ -11,7 +11,7 @@ import numpy as np
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.collapses import Collapse, Edge, edges
+from swarm_logistics_env.verdicts.collapses import Collapse, Edge
 
 from .section import NOTHING, P_LEVEL, Section, bracketed, fixed, plural
 
@@ -62,9 +62,9 @@ def share_in_words(share: spi.Interval) -> str:
     return f"{100.0 * share.value:.0f} % [{low:.0f}, {high:.0f}]"
 
 
-def edge_sections(cells: Sequence[Cell]) -> Iterator[Section]:
+def edge_sections(edges: Sequence[Edge]) -> Iterator[Section]:
     """Yield how near each policy is to the size at which half of its runs collapse."""
-    for edge in edges(cells):
+    for edge in edges:
         first = edge.cells[0]
         columns = "N", f"runs collapsed, {P_LEVEL}", "S of all runs", "S of the runs that did not"
         line = (

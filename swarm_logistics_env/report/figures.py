@@ -15,12 +15,12 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorK
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.mid_run_faults import RateCurve, Resilience, window_of
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.verdicts.verdict import DECIDED, Verdict
 
 from . import drawing
 from .answer import Answer
 from .drawing import Panel, Point
-from .section import DECIDED, P_LEVEL, Figure, join_names, levels, slug
+from .section import P_LEVEL, Figure, join_names, levels, slug
 
 if TYPE_CHECKING:
     import pandas as pd

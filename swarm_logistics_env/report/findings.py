@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from html import escape
 from typing import Self
 
@@ -21,13 +22,16 @@ class Findings(StudyResults):
         """Return the same results."""
         return cls(**{field.name: getattr(results, field.name) for field in fields(results)})
 
+    @cached_property
+    def _answer(self) -> Section:
+        return answer(self).section
+
     def __repr__(self) -> str:
-        section = answer(self).section
-        lines = ["  ".join(row) for row in section.rows]
+        lines = ["  ".join(row) for row in self._answer.rows]
         return "\n".join([f"Results of the study {self.plan.specification.name!r}", *lines])
 
     def _repr_html_(self) -> str:
-        return html_table(answer(self).section)
+        return html_table(self._answer)
 
 
 def html_table(section: Section) -> str:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from swarm_logistics_env.questions.comparison import CONFIDENCE
+from swarm_logistics_env.tasks.task_world import world_of
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import UNTESTABLE, Verdict, level_of
 
 from . import section, templates
-from .answer import Line, answer, line_of, performance_of
-from .answer_notes import reason_of
+from .answer import Answer, Line, line_of
 from .templates import Slots, fill
 
 
-def in_a_sentence(results: StudyResults) -> str:
+def in_a_sentence(results: StudyResults, answer: Answer) -> str:
     """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
     verdicts = results.verdicts
     tested = [v for v in verdicts if v.conclusion != UNTESTABLE]
@@ -25,14 +23,13 @@ def in_a_sentence(results: StudyResults) -> str:
     line = line_of([(0, lowest)])
     words = section.conclusion_text(*verdicts)
     lowest_text = _question_with_value(line, level_of([lowest]))
-    reason = reason_of(lowest)
-    reason = templates.REASONS_TO_BE_OPEN.get(reason, reason)
+    reason = templates.REASONS_TO_BE_OPEN.get(lowest.reason, lowest.reason)
     world = world_in_words(results)
     slots: dict[str, Slots] = {
         "performance": {
             "policies": ", ".join(results.policies),
             "world": f", {world}" if results.plan.origin else f" in {world}",
-            "performance": performance_of(results)[:-1],
+            "performance": answer.performance[:-1],
             "seeds": results.seeds_text,
         }
     }
@@ -47,7 +44,7 @@ def in_a_sentence(results: StudyResults) -> str:
             verdict_slots["words"] = f"{len(verdicts)} {words}"
         slots["several_questions"] = {"n_questions": len(verdicts), **verdict_slots}
         if any(verdict.conclusion == "open" for verdict in verdicts):
-            slots["not_decided"] = {"questions": _undecided(results)}
+            slots["not_decided"] = {"questions": _undecided(answer)}
         if candidates:
             word = lowest.on_property.adjusted
             slots["lowest"] = {
@@ -69,11 +66,12 @@ def _question_with_value(line: Line, level: float) -> str:
     )
 
 
-def _undecided(results: StudyResults) -> str:
+def _undecided(answer: Answer) -> str:
     """Return what is open of each indicator, e.g. "FT of FM4 (m = 1, 2) and S of N 4→10"."""
     verdicts: dict[str, dict[str, list[Verdict]]] = {}
-    for line in answer(results).lines:
-        policy = f"{line.policy}'s " if len(results.policies) > 1 else ""
+    names_policies = len({line.policy for line in answer.lines}) > 1
+    for line in answer.lines:
+        policy = f"{line.policy}'s " if names_policies else ""
         name = line.question.removeprefix(f"{line.indicator} ").partition(",")[0]
         by_name = verdicts.setdefault(policy + line.indicator, {})
         by_name.setdefault(name, []).extend(line.verdicts)
@@ -96,16 +94,6 @@ def world_in_words(results: StudyResults) -> str:
     if plan.origin is not None:
         stated = "".join(f", {name} {value}" for name, value in plan.origin.setup)
         return templates.WORLD["trials"].format(file=plan.origin.file, setup=stated)
-    scenario: Any = plan.specification.scenario
-    if not hasattr(scenario, "warehouse_width"):
-        return templates.WORLD["task"].format(task=plan.specification.played.name)
-    return templates.WORLD["warehouse"].format(
-        width=scenario.warehouse_width,
-        height=scenario.warehouse_height,
-        floor=f" (floor {scenario.floor})" if scenario.floor else "",
-        n_items=scenario.n_items,
-        restock=" that come back" if scenario.restock else "",
-        speed=scenario.max_speed,
-        drive="" if scenario.drive == "holonomic" else f" and {scenario.drive} drive",
-        handling=f" that lift in {scenario.handling_time:g} s" if scenario.handling_time else "",
-    )
+    task = plan.specification.played
+    words = world_of(task).world_in_words(plan.specification.scenario)
+    return words or templates.WORLD["task"].format(task=task.name)

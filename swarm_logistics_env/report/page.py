@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib.resources import files
@@ -18,10 +17,10 @@ from pydantic import JsonValue
 
 from swarm_logistics_env.questions.comparison import Arm, Comparison
 from swarm_logistics_env.spi import Interval
-from swarm_logistics_env.tasks.task import DEFAULT, Case, Outcome
+from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.tasks.task_world import world_of
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.warehouse.faults import Fault, text_of
 
 from . import drawing
 from .answer import name_of_p
@@ -259,7 +258,7 @@ def _conditions(results: StudyResults, runs: Runs) -> Iterator[Json]:
                 else _steps(outcome.delivery_times)
                 for outcome in outcomes[:n_curves]
             ],
-            "command": watch_command(first_training),
+            "command": world_of(first_training.task).watch_command(first_training),
         }
 
 
@@ -271,27 +270,6 @@ def _mean_p(outcomes: Sequence[Outcome | None]) -> float | None:
 
 def _steps(times: ArrayLike) -> list[JsonValue]:
     return [*np.diff(np.rint(times).astype(int), prepend=0).tolist()]
-
-
-def watch_command(case: Case) -> str | None:
-    """Return the command that plays a condition but for its seed; None: there is none."""
-    if case.task.name != DEFAULT or case.behaviour or not case.policy.is_text:
-        return None
-    words = ["swarm-logistics", "watch", "--policy", case.policy.name]
-    # A class that is typed is trusted by that; the code in a file is not.
-    if case.policy.runs_code and ":" not in case.policy.name:
-        words.append("--trust-code")
-    default = case.task.default.model_dump(mode="json")
-    for name, value in case.scenario.model_dump(mode="json").items():
-        if value != default[name]:
-            text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
-            words += ["--set", f"{name}={text}"]
-    for fault in case.faults:
-        text_of_fault = text_of(fault) if isinstance(fault, Fault) else None
-        if text_of_fault is None:
-            return None
-        words += ["--fault", text_of_fault]
-    return shlex.join(words)
 
 
 def _question(comparison: Comparison, words: Sentence, indices: Mapping[str, int]) -> Json:

@@ -16,7 +16,7 @@ from swarm_logistics_env.questions.comparison import CONFIDENCE
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.verdicts.cell import Cell
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.verdicts.verdict import DECIDED, Verdict
 
 from . import templates
 from .templates import Slots, fill
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 SATURATED = "†"
 _SAME = 1e-9  # a value so near a threshold differs from it by rounding alone
 NOTHING = "–"
-DECIDED = ("supported", "refuted", "equivalent")
 # The words of decisions, in the order in which they are counted.
 WORDS = (*DECIDED, "open", "unaffected", "untestable", "undefined")
 _NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"

@@ -13,7 +13,6 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.verdicts.agreement import Agreement
 from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.collapses import collapses
 from swarm_logistics_env.verdicts.mid_run_faults import (
     RUNS_ARE_MISSING,
     RepairCurve,
@@ -25,7 +24,6 @@ from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict, level_of
 
 from . import section
-from .answer_notes import reason_of
 from .collapse_tables import collapsed_in_words, edge_sections
 from .figures import rate_figures
 from .section import NOTHING, Section, Sentence, Texts
@@ -82,13 +80,13 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
     yield from map(_agreement, results.agreements)
     yield from _text_sections(results)
     yield from _times_to_clear(results.cells)
-    yield from edge_sections(results.cells)
+    yield from edge_sections(results.edges)
 
 
 def _holm(verdict: Verdict) -> str:
     """Return Holm's verdict, and why it is untestable, or open beside an interval on one side."""
-    reason = reason_of(verdict)
-    return f"{verdict.on_property.adjusted} ({reason})" if reason else verdict.on_property.adjusted
+    word = verdict.on_property.adjusted
+    return f"{word} ({verdict.reason})" if verdict.reason else word
 
 
 def _layouts(
@@ -288,8 +286,10 @@ def warnings(results: StudyResults) -> Iterator[str]:
             "least one run, and the indicators that rest on it. A verdict that a larger P could "
             "turn is open."
         )
-    if named := collapses(results.cells):
-        words = collapsed_in_words(named, names_policies=len(results.policies) > 1, most=None)
+    if results.collapses:
+        words = collapsed_in_words(
+            results.collapses, names_policies=len(results.policies) > 1, most=None
+        )
         yield (
             f"Runs are of two phases, a good one and one that has collapsed: {words}. A mean P is "
             "of both."

@@ -33,10 +33,10 @@ SCOPE = {
 # The second line of the answer: P where the swarm is as it should be.
 PERFORMANCE = {
     "nothing": "P: no run has succeeded.",
-    "items": "P, items in {duration:g} s, at {condition}: {means}.",
-    "items_with_interval": "P [{level}], items in {duration:g} s, at {condition}: {means}.",
-    "other_task": "{p} at {condition}: {means}.",
-    "other_task_with_interval": "{p} [{level}] at {condition}: {means}.",
+    "count": "P, {counted} in {duration:g} s, at {condition}: {means}.",
+    "count_with_interval": "P [{level}], {counted} in {duration:g} s, at {condition}: {means}.",
+    "no_count": "{p} at {condition}: {means}.",
+    "no_count_with_interval": "{p} [{level}] at {condition}: {means}.",
 }
 
 # Mean P of one policy: the cases that apply, one after the other.
@@ -72,13 +72,6 @@ LINE = {
     "more_runs": "open; {n_more} more to tell {effect:g} from {threshold:g}",
 }
 
-# Why there is nothing to test, by the flag of the estimate.
-UNTESTABLE = {
-    "cannot_fail": "it cannot be below {threshold:g}",
-    "few_pairs_differ": "equal P",
-    "reference_near_0": "P_o near 0",
-}
-
 # How to read the answer, and what limits it: the cases that apply, with "; " between them.
 NOTES = {
     "indicators": "{indicators}: supported above 0 (good), refuted below",
@@ -103,16 +96,11 @@ NOTES = {
     "claims_beside_the_text": "of {claims} beside it {counts}",
     "claims_without_text": "of {claims} {counts}",
 }
-# Why a verdict is open although its interval lies on one side, and the flags that say so.
+# Why a verdict is open although its interval lies on one side, by `Verdict.reason`.
 REASONS_TO_BE_OPEN = {
     "stalls": "so few runs may hide stalled ones",
     "trainings": "so few trainings may hide collapses",
     "Holm": "decided alone, not among all questions on the indicator",
-}
-REASON_OF_FLAG = {
-    "hidden_stalls": "stalls",
-    "hidden_collapses": "trainings",
-    "few_trainings": "trainings",
 }
 
 EXPLORATORY = "exploratory: over other seeds than were declared before the first run"
@@ -129,8 +117,6 @@ FOR_A_PAPER = {
 }
 METHOD = "Holm's method, {error} error"
 WORLD = {
-    "warehouse": "a warehouse of {width:g} m x {height:g} m{floor} with {n_items} items"
-    "{restock}, robots of {speed:g} m/s{drive}{handling}",
     "task": "the task {task}",
     "trials": "trials of {file}{setup}",
 }

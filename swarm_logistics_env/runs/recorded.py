@@ -1,12 +1,13 @@
-"""Importing: trials recorded elsewhere (real robots, another lab, a paper) made a study."""
+"""Trials recorded elsewhere (real robots, another lab, a paper) made a study."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from shlex import quote
+from typing import Self
 
 import numpy as np
 from more_itertools import map_reduce
@@ -20,61 +21,74 @@ from swarm_logistics_env.questions.plan import Origin, Plan
 from swarm_logistics_env.questions.specification import Specification
 from swarm_logistics_env.records import file_name
 from swarm_logistics_env.spi.trials import NO_FAULT_WORD, REPEATED, Trial, Trials
-from swarm_logistics_env.tasks.task import Case, Outcome, Run
+from swarm_logistics_env.tasks.task import Case, Outcome, Outcomes, Run
 from swarm_logistics_env.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 
 from .notes import note
 from .store import Runs
 
 
-def import_results(trials: Trials, out: Path, setup: Mapping[str, str] | None = None) -> int:
-    """Make a study of the trials in a file (`spi.read_trials`); return how many runs it holds.
+@dataclass(frozen=True)
+class RecordedStudy:
+    """A study of trials that somebody else recorded.
 
-    Swarm sizes without fault, failure modes and the values of each parameter become a table each;
-    the values of everything else that the file varies make tables of their own. A parameter's x_o
-    is the one that `Trials.references` names. With seeds the study is paired, else it is not. The
-    order of the file's rows decides nothing.
-
-    Args:
-        trials: of the file.
-        out: directory of the study; it may not hold another.
-        setup: name and value of what the report is to say of the conditions.
-
-    Raises:
-        StudyError: a trial stands alone, nothing that it can be relative to is there, or nothing
-            settles which value of a parameter A is relative to.
+    Attributes:
+        plan: what can be compared in them; there is nothing to play.
+        outcomes: of the trials, by the key of the case and the seed.
     """
-    conditions, origin = _conditions(trials), origin_of(trials, setup)
-    specification = Specification(
-        name=file_name(Path(trials.file).stem),
-        task=RECORDED.name,
-        policies=tuple(
-            PolicySpec(name=name) for name in dict.fromkeys(row.policy for row in origin.trials)
-        ),
-        seeds=max(map(len, conditions.values())),
-    )
-    try:
-        plan = imported_plan(specification, origin)
-        _refuse_unused(origin, plan)
-    except StudyError as error:
-        raise StudyError(f"{trials.file}, {error}") from None
-    with Runs.new(out, "import") as runs:
-        runs.add(_runs(conditions.values(), origin, plan.code))
-        note(runs, plan, Declaration.model_validate(specification))
-    return len(trials.rows)
 
+    plan: Plan
+    outcomes: Outcomes
 
-def _runs(
-    conditions: Collection[Sequence[Trial]], origin: Origin, code: str
-) -> Iterator[tuple[Run, Outcome]]:
-    """Yield the run and the outcome of each trial, and show how many are imported."""
-    n_done, total = 0, sum(map(len, conditions))
-    with ProgressBar("import", total, "trials") as progress:
-        for trials in conditions:
-            case = _case(origin, trials[0])
-            for number, trial in enumerate(trials):
-                yield Run(case, code, number if trial.seed is None else trial.seed), _outcome(trial)
-                n_done += 1
+    @classmethod
+    def of(cls, trials: Trials, setup: Mapping[str, str] | None = None) -> Self:
+        """Return the study of the trials in a file (`spi.read_trials`).
+
+        Swarm sizes without fault, failure modes and the values of each parameter become a table
+        each; the values of everything else that the file varies make tables of their own. A
+        parameter's x_o is the one that `Trials.references` names. With seeds the study is paired,
+        else it is not. The order of the file's rows decides nothing.
+
+        Args:
+            setup: name and value of what the report is to say of the conditions.
+
+        Raises:
+            StudyError: a trial stands alone, nothing that it can be relative to is there, or
+                nothing settles which value of a parameter A is relative to.
+        """
+        conditions = _conditions(trials)
+        origin = _origin(trials, conditions, setup)
+        specification = Specification(
+            name=file_name(Path(trials.file).stem),
+            task=RECORDED.name,
+            policies=tuple(
+                PolicySpec(name=name) for name in dict.fromkeys(row.policy for row in origin.trials)
+            ),
+            seeds=max(map(len, conditions)),
+        )
+        try:
+            plan = imported_plan(specification, origin)
+            _refuse_unused(origin, plan)
+        except StudyError as error:
+            raise StudyError(f"{trials.file}, {error}") from None
+        return cls(plan, _outcomes(conditions, origin))
+
+    def keep(self, directory: Path) -> None:
+        """Write the study into a directory, for `Study.stored`.
+
+        Raises:
+            StudyError: it holds another study, or cannot be written.
+        """
+        with Runs.new(directory, "import") as runs:
+            runs.add(self._runs())
+            note(runs, self.plan, Declaration.model_validate(self.plan.specification))
+
+    def _runs(self) -> Iterator[tuple[Run, Outcome]]:
+        """Yield the run and the outcome of each trial, and show how many are written."""
+        cases = {case.key: case for case in self.plan.cases}
+        with ProgressBar("import", len(self.outcomes), "trials") as progress:
+            for n_done, ((key, seed), outcome) in enumerate(self.outcomes.items(), start=1):
+                yield Run(cases[key], self.plan.code, seed), outcome
                 if n_done % _PROGRESS_EVERY == 0:
                     progress.reach(n_done)
 
@@ -82,7 +96,20 @@ def _runs(
 _PROGRESS_EVERY = 10_000  # trials
 
 
-def origin_of(trials: Trials, setup: Mapping[str, str] | None = None) -> Origin:
+def _outcomes(conditions: Iterable[Sequence[Trial]], origin: Origin) -> Outcomes:
+    """Return the outcome of each trial by the key of its case and its seed, or else its number."""
+    outcomes = {}
+    for trials in conditions:
+        key = _case(origin, trials[0]).key
+        for number, trial in enumerate(trials):
+            seed = number if trial.seed is None else trial.seed
+            outcomes[key, seed] = _outcome(trial)
+    return outcomes
+
+
+def _origin(
+    trials: Trials, conditions: Iterable[Sequence[Trial]], setup: Mapping[str, str] | None
+) -> Origin:
     """Return what a study of trials notes of their source: equal ones are the same study."""
     return Origin(
         file=trials.file,
@@ -90,17 +117,25 @@ def origin_of(trials: Trials, setup: Mapping[str, str] | None = None) -> Origin:
         paired=trials.paired,
         seeds=tuple(sorted({row.seed for row in trials.rows if row.seed is not None})),
         setup=tuple((setup or {}).items()),
-        trials=tuple(_named(rows) for rows in _conditions(trials).values()),
-        notes=(*trials.notes, *_without_removed(trials)),
+        trials=tuple(map(_named, conditions)),
+        notes=notes_on(trials),
         performance=trials.performance_name,
         references=trials.references,
         blocks=trials.blocks,
     )
 
 
-def _conditions(trials: Trials) -> dict[tuple[object, ...], list[Trial]]:
+def notes_on(trials: Trials) -> tuple[str, ...]:
+    """Return sentences on how trials were read, and on what is not asked of them."""
+    return (*trials.notes, *_without_removed(trials))
+
+
+def _conditions(trials: Trials) -> list[list[Trial]]:
     """Return the trials of each condition, both in an order that is not the file's."""
-    return map_reduce(sorted(trials.rows, key=_order), lambda row: row.condition)
+    by_condition: dict[tuple[object, ...], list[Trial]] = map_reduce(
+        sorted(trials.rows, key=_order), lambda row: row.condition
+    )
+    return [*by_condition.values()]
 
 
 def _order(row: Trial) -> tuple[object, ...]:

@@ -6,6 +6,7 @@ from .parallel_policies import RandomActions, SumOfInfos, SumOfRewards
 from .parallel_task import ParallelTask
 from .parallel_wrappers import ChangingAgents, FailingRobots, PaddedAgents, RobotFault
 from .task import Case, Outcome, Run, Task
+from .task_world import TaskWorld
 
 __all__ = [
     "Case",
@@ -21,4 +22,5 @@ __all__ = [
     "SumOfInfos",
     "SumOfRewards",
     "Task",
+    "TaskWorld",
 ]

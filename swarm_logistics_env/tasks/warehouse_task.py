@@ -6,6 +6,9 @@ that were met elsewhere, and cannot be played again.
 
 from __future__ import annotations
 
+import json
+import math
+import shlex
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -17,16 +20,24 @@ from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.records import Record
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.warehouse import FAILURE_MODES, Fault
+from swarm_logistics_env.warehouse.faults import text_of
 
 from .task import Case, Fields, Outcome, TaskScenario
+from .task_world import TaskWorld
+
+_WORLD = (
+    "a warehouse of {width:g} m x {height:g} m{floor} with {n_items} items{restock}, robots of "
+    "{speed:g} m/s{drive}{handling}"
+)
 
 
-class WarehouseTask:
-    """Episodes of `run_episode`; see `Task` for its attributes."""
+class WarehouseTask(TaskWorld):
+    """Episodes of `run_episode`; see `Task` and `TaskWorld` for its attributes."""
 
     name = "warehouse"
     removed: str | None = "removed"
     performance = "the number of items delivered in the order requested"
+    counted = "items"
     default = Scenario()
     policies = NO_MAKERS
 
@@ -86,6 +97,47 @@ class WarehouseTask:
             **episode.contacts._asdict(),
         )
 
+    def world_in_words(self, scenario: TaskScenario) -> str:
+        """Return size, items and robots of the warehouse."""
+        assert isinstance(scenario, Scenario)
+        drive = "" if scenario.drive == "holonomic" else f" and {scenario.drive} drive"
+        handling = f" that lift in {scenario.handling_time:g} s" if scenario.handling_time else ""
+        return _WORLD.format(
+            width=scenario.warehouse_width,
+            height=scenario.warehouse_height,
+            floor=f" (floor {scenario.floor})" if scenario.floor else "",
+            n_items=scenario.n_items,
+            restock=" that come back" if scenario.restock else "",
+            speed=scenario.max_speed,
+            drive=drive,
+            handling=handling,
+        )
+
+    def largest_performance(self, scenario: TaskScenario) -> float:
+        """Return the number of items; infinite where delivered ones come back."""
+        assert isinstance(scenario, Scenario)
+        return math.inf if scenario.restock else scenario.n_items
+
+    def watch_command(self, case: Case) -> str | None:
+        """Return the `swarm-logistics watch` of a case; None: a text says no policy or fault so."""
+        if case.behaviour or not case.policy.is_text:
+            return None
+        words = ["swarm-logistics", "watch", "--policy", case.policy.name]
+        # A class that is typed is trusted by that; the code in a file is not.
+        if case.policy.runs_code and ":" not in case.policy.name:
+            words.append("--trust-code")
+        default = self.default.model_dump(mode="json")
+        for name, value in case.scenario.model_dump(mode="json").items():
+            if value != default[name]:
+                text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
+                words += ["--set", f"{name}={text}"]
+        for fault in case.faults:
+            text_of_fault = text_of(fault) if isinstance(fault, Fault) else None
+            if text_of_fault is None:
+                return None
+            words += ["--fault", text_of_fault]
+        return shlex.join(words)
+
 
 class ClearingTask(WarehouseTask):
     """Episodes until every item is delivered: P is the rate, which no number of items caps.
@@ -96,6 +148,7 @@ class ClearingTask(WarehouseTask):
 
     name = "clearing"
     performance = "the items delivered per minute until all are delivered, or until the time is up"
+    counted = ""
     default = Scenario(duration=3_000.0)
 
     def vary(self, base: TaskScenario, fields: Fields) -> Scenario:
@@ -118,6 +171,13 @@ class ClearingTask(WarehouseTask):
         """Play one episode; see `Task.play`."""
         outcome = super().play(case, seed, policy_seed)
         return replace(outcome, untimed=60.0 * len(outcome.delivery_times) / outcome.ended_at)
+
+    def largest_performance(self, scenario: TaskScenario) -> float:
+        """Return infinity: it is a rate."""
+        return math.inf
+
+    def watch_command(self, case: Case) -> None:
+        """Return None: `watch` shows runs of the warehouse's own task."""
 
 
 class RecordedScenario(Record):

@@ -15,6 +15,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.questions.comparison import CONFIDENCE, Arm
 from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.tasks.task import Outcome
+from swarm_logistics_env.tasks.task_world import world_of
 
 from .reference import Reference
 
@@ -141,12 +142,17 @@ class Cell:
         return _mean([outcome.p95_acceleration for outcome in self.outcomes])
 
     def _possible(self, interval: Interval) -> Interval:
-        """Return an interval that ends at the number of items where none comes back."""
-        scenario = self.arm.case.scenario
-        if interval.high is None or getattr(scenario, "restock", True):
+        """Return an interval that ends at the largest P possible."""
+        if interval.high is None:
             return interval
-        most: float = getattr(scenario, "n_items", math.inf)
-        return interval._replace(high=min(interval.high, most))
+        case = self.arm.case
+        largest = world_of(case.task).largest_performance(case.scenario)
+        return interval._replace(high=min(interval.high, largest))
+
+    @cached_property
+    def phases(self) -> spi.Phases:
+        """Whether its runs are of two phases, at any level; without a run they are of one."""
+        return spi.two_phases(self.by_seed.ravel(), 1.0) if self.n_seeds else spi.Phases(1.0, None)
 
     @property
     def stalled(self) -> float:

@@ -18,7 +18,6 @@ from swarm_logistics_env.spi.phases import (
     LEVEL,
     collapsed_runs,
     critical_size,
-    two_phases,
 )
 from swarm_logistics_env.tasks.task import Outcome
 
@@ -64,26 +63,20 @@ class Edge:
     size: spi.Interval
 
 
-def collapses(cells: Sequence[Cell]) -> list[Collapse]:
+def collapses(cells: Sequence[Cell]) -> tuple[Collapse, ...]:
     """Return the conditions whose runs are of two phases, by Holm's procedure over a policy's."""
     unique = {(cell.policy, cell.arm.case.key): cell for cell in cells if cell.n_seeds}
     named = []
     for of_policy in map_reduce(unique.values(), lambda cell: cell.policy).values():
-        tests = [(two_phases(cell.by_seed.ravel(), 1.0), cell) for cell in of_policy]
-        tests.sort(key=lambda test: test[0].p_value)
-        for rank, (phases, cell) in enumerate(tests):
-            if phases.boundary is None or phases.p_value > LEVEL / (len(tests) - rank):
+        for rank, cell in enumerate(sorted(of_policy, key=lambda cell: cell.phases.p_value)):
+            phases = cell.phases
+            if phases.boundary is None or phases.p_value > LEVEL / (len(of_policy) - rank):
                 break
             has_collapsed = cell.by_seed.ravel() < phases.boundary
             n_collapsed = int(has_collapsed.sum())
             share = _share(n_collapsed, len(has_collapsed))
             named.append(Collapse(cell, share, n_collapsed, _breaks(cell.outcomes, has_collapsed)))
-    return named
-
-
-def why_untestable(cell: Cell) -> str:
-    """Return why the runs of a condition were not tested for two phases; empty: they were."""
-    return two_phases(cell.by_seed.ravel(), 1.0).untestable if cell.n_seeds else ""
+    return tuple(named)
 
 
 def untestable(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
@@ -91,7 +84,7 @@ def untestable(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
     unique = {(cell.policy, cell.arm.case.key): cell for cell in cells}
     # The largest P is left out of the test.
     with_runs = [cell for cell in unique.values() if cell.n_seeds > FEWEST_RUNS]
-    by_reason: dict[str, list[Cell]] = map_reduce(with_runs, why_untestable)
+    by_reason: dict[str, list[Cell]] = map_reduce(with_runs, lambda cell: cell.phases.untestable)
     by_reason.pop("", None)
     return by_reason
 
@@ -143,7 +136,8 @@ def edges(cells: Sequence[Cell]) -> Iterator[Edge]:
     for of_table in map_reduce(sized, lambda cell: (cell.policy, cell.table)).values():
         by_size = {int(cell.arm.setting.value): cell for cell in of_table}
         runs = {size: by_size[size].by_seed.ravel() for size in sorted(by_size)}
-        counts = collapsed_runs(runs) if len(runs) > 1 else None
+        phases = {size: cell.phases for size, cell in by_size.items()}
+        counts = collapsed_runs(runs, phases=phases) if len(runs) > 1 else None
         if counts is None:
             continue
         totals = [len(sample) for sample in runs.values()]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 from swarm_logistics_env.spi import Equivalence, Estimate
 
 from .cell import Cell
-from .collapses import why_untestable
 from .verdict import Verdict
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ CELL_COLUMNS: Columns[Cell] = {
     ),
     "phases_untestable": (
         str,
-        lambda cell: why_untestable(cell) or None,
+        lambda cell: cell.phases.untestable or None,
         "why the runs were not tested for two phases; missing: they were",
     ),
     "contacts": (

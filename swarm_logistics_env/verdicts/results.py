@@ -15,6 +15,7 @@ from swarm_logistics_env.tasks.task import Outcome, Outcomes
 
 from .agreement import Agreement, agreements
 from .cell import Cell
+from .collapses import Collapse, Edge, collapses, edges
 from .columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from .reference import PAPER, Reference
 from .until_clear import LatestLook, latest_look
@@ -104,6 +105,16 @@ class StudyResults:
     def agreements(self) -> tuple[Agreement, ...]:
         """How near each policy comes to the reference; none without one."""
         return agreements(self.cells)
+
+    @cached_property
+    def collapses(self) -> tuple[Collapse, ...]:
+        """The conditions whose runs are of two phases."""
+        return collapses(self.cells)
+
+    @cached_property
+    def edges(self) -> tuple[Edge, ...]:
+        """How near each policy is to its critical size, where one can be told."""
+        return tuple(edges(self.cells))
 
     @property
     def level(self) -> float:

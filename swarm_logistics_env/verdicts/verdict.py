@@ -22,7 +22,20 @@ UNAFFECTED: Literal["unaffected"] = "unaffected"
 UNTESTABLE: Literal["untestable"] = "untestable"
 UNDEFINED: Literal["undefined"] = "undefined"
 Word: TypeAlias = spi.DecisionWord | Literal["unaffected", "untestable", "undefined"]
+DECIDED: tuple[Word, ...] = ("supported", "refuted", "equivalent")
 _OPPOSITE: dict[Word, Word] = {"supported": "refuted", "refuted": "supported"}
+# Why there is nothing to test, by the flag of the estimate.
+_WHY_UNTESTABLE = {
+    "cannot_fail": "it cannot be below {threshold:g}",
+    "few_pairs_differ": "equal P",
+    "reference_near_0": "P_o near 0",
+}
+# Why a verdict is open although its interval lies on one side, by the flag that says so.
+_WHY_OPEN = {
+    "hidden_stalls": "stalls",
+    "hidden_collapses": "trainings",
+    "few_trainings": "trainings",
+}
 
 
 class Decision(NamedTuple):
@@ -162,6 +175,22 @@ class Verdict:
         return "equivalent" if word == "open" and is_unchanged else word
 
     @property
+    def reason(self) -> str:
+        """Why it is untestable, or open with its interval on one side of the threshold.
+
+        In words; or "stalls", "trainings" or "Holm", for which a report has a sentence; empty:
+        there is no reason.
+        """
+        if self.estimate is not None and self.conclusion == UNTESTABLE:
+            return why_untestable(self.estimate)
+        if self.conclusion != "open" or self.lies_above is None:
+            return ""
+        for flag, reason in _WHY_OPEN.items():
+            if flag in self.flags:
+                return reason
+        return "Holm" if self.on_threshold.plain in DECIDED else ""
+
+    @property
     def equivalence_name(self) -> str | None:
         """What is tested for equivalence, e.g. "P_F within 10 % of P_o"; None: nothing."""
         return self.compared.definition.unchanged(self.margin)
@@ -177,6 +206,11 @@ class Verdict:
     def detectable(self) -> float | None:
         """Distance from the threshold that these seeds find with 80 % power."""
         return spi.minimum_detectable_effect(self.estimate, POWER) if self.estimate else None
+
+
+def why_untestable(estimate: Estimate) -> str:
+    """Return why an estimate that is untestable is so, e.g. "P_o near 0"."""
+    return _WHY_UNTESTABLE[estimate.flags[0]].format(threshold=estimate.threshold)
 
 
 def level_of(verdicts: Iterable[Verdict]) -> float:

@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import re
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from types import CodeType, FrameType
+from typing import Any
 
 import numpy as np
 import pytest
 
+from swarm_logistics_env import judge
 from swarm_logistics_env.cli import judge_trials
 from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.report import benchmark
+from swarm_logistics_env.report.answer import answer
+from swarm_logistics_env.runs.recorded import RecordedStudy
+from swarm_logistics_env.runs.store import Runs
 from swarm_logistics_env.scenario import Scenario
+from swarm_logistics_env.spi.phases import two_phases
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.verdicts import results
+from swarm_logistics_env.verdicts.collapses import collapses, edges
 from tests.cli.conftest import Command
 
 LAB = """robots;fault;faulty;boxes
@@ -80,6 +93,38 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     assert "so this one is in results/judged/lab-2" in command(TRIALS)
     assert Path("results", "judged", "lab-2", "report.md").is_file()
     assert "holds a study already" in command(f"{TRIALS} --out {out}", code=2)
+
+
+def calls_of(*functions: Callable[..., Any], during: Callable[[], object]) -> list[int]:
+    """Return how often each function is called, whatever name it is imported by."""
+    counts: Counter[CodeType] = Counter()
+
+    def count(frame: FrameType, event: str, _: object) -> None:
+        counts[frame.f_code] += event == "call"
+
+    sys.setprofile(count)
+    try:
+        during()
+    finally:
+        sys.setprofile(None)
+    return [counts[function.__code__] for function in functions]
+
+
+def test_one_judgement_computes_everything_once_and_hands_it_on(command: Command) -> None:
+    once = RecordedStudy.of.__func__, results.judge, collapses, edges, answer, Runs.__init__  # type: ignore[attr-defined]
+    *counts, n_tests = calls_of(*once, two_phases, during=lambda: command(TRIALS))
+    assert counts == [1] * len(once)
+    assert n_tests == 2  # a condition each
+
+
+def test_trials_are_judged_from_python_without_a_file(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(folder / "missing"))
+    before = {*folder.rglob("*")}
+    columns = {"performance": "boxes"}
+    assert calls_of(Runs.__init__, during=lambda: judge("lab.csv", columns=columns)) == [0]
+    assert {*folder.rglob("*")} == before
 
 
 @pytest.mark.parametrize("place", ["", "--out mine"])

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env.questions.comparison import Setting
+from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.report.latex import latex_tables
@@ -112,12 +113,12 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     (row,) = rows_of(latex, "tab:homing-indicators")
     assert row.endswith("open (stalls) \\\\")
     assert f"open: undecided. Open (stalls): {reason}. Verdicts are" in latex
-    assert in_a_sentence(few).endswith(f"open ({reason}; Holm's method, 5 % error).")
-    assert "xploratory" not in latex + in_a_sentence(few)
+    assert in_a_sentence(few, answer(few)).endswith(f"open ({reason}; Holm's method, 5 % error).")
+    assert "xploratory" not in latex + in_a_sentence(few, answer(few))
     undeclared = replace(few, exploratory=True)
     words = "xploratory: over other seeds than were declared before the first run."
     assert latex_tables(undeclared, document(undeclared)).count(f" E{words} ") == 2
-    assert in_a_sentence(undeclared).endswith(f"; e{words}")
+    assert in_a_sentence(undeclared, answer(undeclared)).endswith(f"; e{words}")
 
 
 @pytest.mark.parametrize("page", ["article", "[twocolumn]{article}"])

@@ -21,8 +21,9 @@ import pytest
 from swarm_logistics_env.cli import app
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
-from swarm_logistics_env.report.page import marked_up, watch_command
+from swarm_logistics_env.report.page import marked_up
 from swarm_logistics_env.studies import Study
+from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.verdicts.results import StudyResults
 from swarm_logistics_env.watch import Session, messages
 from swarm_logistics_env.watch.messages import recorded_page
@@ -183,7 +184,7 @@ def test_command_of_a_run_plays_the_stored_one(
 ) -> None:
     arms = {(policy, str(arm.setting)): arm for policy, _, arm in made.found.plan.cells}
     faulty = arms["swarm-dt", "FM4, m = 2"]
-    command = str(watch_command(faulty.case))
+    command = str(WAREHOUSE.watch_command(faulty.case))
     assert command in {condition["command"] for condition in made.data["conditions"]}
     # `run` takes what `watch` takes, and ends.
     assert app.run(["run", *shlex.split(command)[2:], "--seed", "1"]) == 0
@@ -225,7 +226,7 @@ def test_command_of_a_run_plays_it_in_run_and_watch_whatever_its_faults(
     found = study.findings()
     for _, _, arm in found.plan.cells:
         outcome = found.outcomes[arm.case.key, 1]
-        words = [*shlex.split(str(watch_command(arm.case)))[1:], "--seed", "1"]
+        words = [*shlex.split(str(WAREHOUSE.watch_command(arm.case)))[1:], "--seed", "1"]
         assert app.run(["run", *words[1:]]) == 0
         assert f"P = {outcome.delivered} items" in capsys.readouterr().out
         assert app.run([*words, "--save", "page.html"]) == 0
@@ -244,17 +245,17 @@ def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word()
     mid_run = {"modes": ["FM4"], "robots": [1], "onsets": [100.0], "duration": 50.0}
     breaks = {"modes": ["FM1"], "robots": [1], "intermittent": [5.0, 5.0]}
     plan = Study(scenario=scenario, faults=[mid_run, breaks]).plan()
-    commands = {arm.setting.name: watch_command(arm.case) for _, _, arm in plan.cells}
+    commands = {arm.setting.name: WAREHOUSE.watch_command(arm.case) for _, _, arm in plan.cells}
     assert shlex.split(str(commands["FM4"]))[4:] == [
         *("--set", "restock=true", "--set", "speed_mix=[1.0,0.5]", "--fault", "FM4:1@100+50")
     ]
     assert commands["FM1"] is None
     arm = plan.cells[0][2]
     model = replace(arm, case=replace(arm.case, policy=PolicySpec(name="model.zip")))
-    assert "--policy model.zip --trust-code" in str(watch_command(model.case))
+    assert "--policy model.zip --trust-code" in str(WAREHOUSE.watch_command(model.case))
     given = {"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}}
     own = Study(policies=[SwarmDT(), given], sizes=[{"values": [2, 3]}]).plan()
-    assert {watch_command(arm.case) for _, _, arm in own.cells} == {None}
+    assert {WAREHOUSE.watch_command(arm.case) for _, _, arm in own.cells} == {None}
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="runs a line of the page's script")

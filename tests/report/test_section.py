@@ -105,7 +105,7 @@ def test_every_surface_names_the_level_that_it_prints(
         "report": markdown(whole),
         "page": page.split("<script", maxsplit=1)[0],
         "tables": latex_tables(stopped, whole).replace("\\,\\%", " %"),
-        "sentence": in_a_sentence(stopped),
+        "sentence": in_a_sentence(stopped, answer(stopped)),
         "captions": " ".join(figure.caption for figure in whole.figures),
     }
     for name, text in surfaces.items():
@@ -150,14 +150,14 @@ def test_what_is_asked_is_answered_before_what_else_is_known() -> None:
     text = markdown(document(found))
     assert not re.search(r"\| equivalent|\d equivalent", text)
     counts = Counter(test.compared.indicator for test in same)
-    sentence = in_a_sentence(found)
+    sentence = in_a_sentence(found, answer(found))
     for symbol, words in told.items():
         assert f"{words.removeprefix('open')} in {counts[symbol]}" in sentence
 
 
 def test_one_question_is_answered_in_a_sentence() -> None:
     results = looked_at(["FM2"])
-    sentence = in_a_sentence(results)
+    sentence = in_a_sentence(results, answer(results))
     question = r"; R FM2, 1 of 25 = 0\.01, 97\.84 % interval \[-0\.06, 0\.08\]; R > 0: "
     verdict = r"open; P changes by less than 10 % \(Holm's method, 5 % error\)\.$"
     assert re.search(question + verdict, sentence)
@@ -167,7 +167,7 @@ def test_one_question_is_answered_in_a_sentence() -> None:
 
 def test_a_paper_is_told_the_world_and_what_is_not_decided() -> None:
     results = looked_at(["FM2", "FM4"])
-    sentence = in_a_sentence(results)
+    sentence = in_a_sentence(results, answer(results))
     world = "a warehouse of 10 m x 10 m with 60 items, robots of 2 m/s"
     assert sentence.startswith(f"swarm-dt in {world}: P [95 %]")
     n_open = sum(verdict.conclusion == "open" for verdict in results.verdicts)

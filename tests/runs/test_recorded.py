@@ -14,7 +14,7 @@ from swarm_logistics_env.errors import StudyError
 from swarm_logistics_env.questions.comparison import OTHER_BEHAVIOUR
 from swarm_logistics_env.report.document import document
 from swarm_logistics_env.report.write import markdown
-from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.runs.recorded import RecordedStudy
 from swarm_logistics_env.runs.store import Runs
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.verdicts.mid_run_faults import resiliences
@@ -25,7 +25,7 @@ def imported(
 ) -> Study:
     (tmp_path / "table.csv").write_text(text)
     trials = spi.read_trials(tmp_path / "table.csv", reference=reference)
-    import_results(trials, tmp_path / "out", stated)
+    RecordedStudy.of(trials, stated).keep(tmp_path / "out")
     return Study.stored(tmp_path / "out")
 
 
@@ -58,6 +58,26 @@ def test_indicators_of_a_lab_file_are_those_of_spi_by_hand(tmp_path: Path) -> No
     report = markdown(document(study.findings()))
     assert "imported from table.csv. Unpaired" in report
     assert "| arena | 4 m x 4 m |" in report
+
+
+EVENTS = "robots;fault;faulty;onset;duration;seed;time\n" + "\n".join(
+    f"4;{condition};100;300;{seed};{time / 7 + seed}"
+    for condition in ("none;0", "jam;1")
+    for seed in range(3)
+    for time in range(7, 1800, 300 if condition == "jam;1" else 200)
+)
+
+
+@pytest.mark.parametrize("text", [LAB, EVENTS], ids=["table", "event log"])
+def test_trials_are_judged_as_their_store_is(tmp_path: Path, text: str) -> None:
+    stored = imported(tmp_path, text, {"width": 2.0} if text == LAB else None).findings()
+    judged = judge(tmp_path / "table.csv", reference={"width": 2.0} if text == LAB else None)
+    assert judged.plan.specification == stored.plan.specification
+    assert judged.plan.comparisons == stored.plan.comparisons
+    assert judged.verdict_table.equals(stored.verdict_table)
+    assert judged.cell_table.equals(stored.cell_table)
+    assert repr(judged.outcomes) == repr(stored.outcomes)
+    assert repr(judged) == repr(stored)
 
 
 def test_each_value_of_what_else_varies_has_a_table_of_its_own(tmp_path: Path) -> None:

@@ -79,6 +79,9 @@ def test_clearing_is_a_rate_that_no_number_of_items_caps() -> None:
     assert study.run().failed == 0
     for cell in study.findings().cells:
         assert not cell.saturated
+        assert cell.mean.high is not None
+        assert cell.mean.value > 6.0
+        assert cell.mean.high > cell.mean.value
         for p, outcome in zip(cell.by_seed, cell.outcomes):
             assert len(outcome.delivery_times) == 6
             assert outcome.time_to_clear == pytest.approx(outcome.delivery_times[-1])

@@ -8,7 +8,6 @@ import pandas as pd
 from swarm_logistics_env import judge
 from swarm_logistics_env.report.answer import answer
 from swarm_logistics_env.report.collapse_tables import collapsed_in_words
-from swarm_logistics_env.verdicts.collapses import collapses
 
 
 def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
@@ -22,7 +21,7 @@ def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
             times = np.sort(rng.uniform(0.0, end, rng.poisson(rate * end)))
             rows += [(robots, run, time, 500.0) for time in times]
     frame = pd.DataFrame(rows, columns=["robots", "run", "time", "duration"])
-    named = collapses(judge(frame).cells)
+    named = judge(frame).collapses
     assert [collapse.cell.words for collapse in named] == ["N = 4", "N = 8"]
     for collapse in named:
         assert collapse.n_collapsed == 5
@@ -34,7 +33,7 @@ def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
 def test_without_times_nothing_is_said_of_mid_run() -> None:
     p = np.repeat([*range(90, 110), 3, 4, 5, 6, 7], 2)
     frame = pd.DataFrame({"robots": [4, 8] * 25, "delivered": p})
-    collapse, _ = collapses(judge(frame).cells)
+    collapse, _ = judge(frame).collapses
     assert len(collapse.breaks) == 0
     assert "mid-run" not in collapsed_in_words([collapse], names_policies=False)
 
@@ -46,4 +45,4 @@ def test_counts_too_small_for_phases_are_untestable_in_answer_and_table() -> Non
     reason = "counts are too small: fewer than 5 steps from least to most"
     assert f"two phases untestable: N = 4 and 1 condition more ({reason})" in answer(results).notes
     assert {*results.cell_table["phases_untestable"]} == {reason}
-    assert collapses(results.cells) == []
+    assert results.collapses == ()

@@ -24,7 +24,7 @@ from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.runs.notes import NOTE, merge
-from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.runs.recorded import RecordedStudy
 from swarm_logistics_env.runs.store import FILE_NAME, Runs, export
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
@@ -138,7 +138,7 @@ def test_any_table_is_imported_or_refused(source: random.Random, table: str) -> 
     with tempfile.TemporaryDirectory() as folder:
         path, out = Path(folder) / "mine.csv", Path(folder) / "out"
         path.write_bytes(mangled(source, table.encode()))
-        refused_or_done(lambda: import_results(read_trials(path), out))
+        refused_or_done(lambda: RecordedStudy.of(read_trials(path)).keep(out))
         assert listing(folder) <= {"mine.csv", "out", f"out/{FILE_NAME}"}
         if out.exists():
             refused_or_done(lambda: Study.stored(out).findings())

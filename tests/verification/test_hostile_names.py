@@ -15,7 +15,7 @@ from swarm_logistics_env.cli import app
 from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
 from swarm_logistics_env.questions.specification import Specification
 from swarm_logistics_env.records import file_name, has_control_signs
-from swarm_logistics_env.runs.recorded import import_results
+from swarm_logistics_env.runs.recorded import RecordedStudy
 from swarm_logistics_env.spi import read_trials
 from swarm_logistics_env.studies import Study
 
@@ -110,7 +110,7 @@ def test_cells_of_trials_are_refused_or_reported(
     for number, name in enumerate(WRITTEN[:: 3 if column in ("header", "table") else 1]):
         file.write_text(table(column, [name]), encoding="utf-8", newline="")
         try:
-            import_results(read_trials(file), tmp_path / "tried" / str(number))
+            RecordedStudy.of(read_trials(file)).keep(tmp_path / "tried" / str(number))
         except SwarmLogisticsError:
             continue
         kept.append(name.strip())

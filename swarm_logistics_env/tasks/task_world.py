@@ -1,0 +1,36 @@
+"""What a task says of its world: in words, the largest P possible, and how to watch a run."""
+
+from __future__ import annotations
+
+import math
+
+from .task import Case, Task, TaskScenario
+
+
+class TaskWorld:
+    """What reports and verdicts ask a task about its world, and the answers of one that is silent.
+
+    A task inherits from it to say more; `Task` does not require it.
+
+    Attributes:
+        counted: what P counts, as "items"; empty: P is no count, or nobody says of what.
+    """
+
+    counted: str = ""
+
+    def world_in_words(self, scenario: TaskScenario) -> str:
+        """Return where runs are played, e.g. "a warehouse of 6 m x 5 m"; empty: by its name."""
+        return ""
+
+    def largest_performance(self, scenario: TaskScenario) -> float:
+        """Return the largest P that a run can have; infinite: none is."""
+        return math.inf
+
+    def watch_command(self, case: Case) -> str | None:
+        """Return the command that shows a run of a case, but for its seed; None: there is none."""
+        return None
+
+
+def world_of(task: Task) -> TaskWorld:
+    """Return what a task says of its world."""
+    return task if isinstance(task, TaskWorld) else TaskWorld()
