@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import html
 import sys
+from collections import namedtuple
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,10 +71,25 @@ class Described:
         return f"<b>{html.escape(repr(self))}</b><br>{html.escape(' '.join(about.split()))}"
 
 
-class NoParameters(Record):
-    """The parameters of a policy that has none."""
+class ScriptParameters(Record):
+    """The parameters of a script, each with its unit and its meaning. This one has none.
+
+    Compiled code takes no record, but a NamedTuple of the same fields. Its annotation is the
+    record, so that mypy knows the fields.
+    """
 
     error_type = PolicyError
+    _Fields: ClassVar[Any]
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        cls._Fields = namedtuple("_Fields", cls.model_fields, module=cls.__module__)
+        # Compiled code is kept on disk, with the types of its arguments by their full names.
+        cls._Fields.__qualname__ = f"{cls.__qualname__}._Fields"
+
+    def for_kernels(self) -> Self:
+        """Return the fields as a NamedTuple, which kernels read by the same names."""
+        return cast("Self", self._Fields(**dict(self)))
 
 
 class Scripted(Described):
@@ -88,7 +104,7 @@ class Scripted(Described):
         PolicyError: a parameter is unknown or out of range.
     """
 
-    parameters_type: ClassVar[type[Record]] = NoParameters
+    parameters_type: ClassVar[type[ScriptParameters]] = ScriptParameters
     parameters: Any  # of that type, as subclasses declare
 
     def __init__(self, **parameters: Any) -> None:
