@@ -9,7 +9,7 @@ failure of its own leaves requested items to others, and lets go inside the area
 What it leans on: the remembered direction is kept in the robot's own frame, which drifts, so the
 memory fades within ten seconds. Swarm D-T remembers no direction and does not need it. This policy
 commands no turn; a robot of the differential drive turns to where it wants to go, see
-`motion.memory.steer`.
+`motion.steering.steer`.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import MotionView, command_own_frames
-from swarm_logistics_env.motion.memory import length_of, set_velocity
+from swarm_logistics_env.motion.memory import MEMORY, has_failed, length_of
 from swarm_logistics_env.motion.network_inputs import random_heading, turn_frames
+from swarm_logistics_env.motion.steering import set_velocity
 from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -72,6 +72,9 @@ class HomingParameters(ScriptParameters):
     )
 
 
+Parameters = HomingParameters.for_kernels()
+
+
 @kernel
 def act_homing(
     rows: NDArray[np.float32],
@@ -80,16 +83,19 @@ def act_homing(
     counts: NDArray[np.int64],
     turned: NDArray[np.float64],
     period: float,
-    parameters: HomingParameters,
+    values: tuple[float, ...],
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4) of a step of `Homing`; memories and counts go on.
 
     One kernel a step, because each call of a kernel costs more than a microsecond.
+
+    Args:
+        values: of the fields of `HomingParameters`.
     """
     turn_frames(rows, period, memories, turned)
     counts += 1
-    decide_homing(rows, memories, keys, counts, period, parameters, commands)
+    decide_homing(rows, memories, keys, counts, period, Parameters(*values), commands)
     command_own_frames(commands, turned, rows, memories)
 
 
@@ -110,15 +116,15 @@ def decide_homing(
     for robot in range(rows.shape[0]):
         observation, memory = rows[robot], memories[robot]
         is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
-        x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+        x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
         push_x, push_y = avoid_neighbours(observation, parameters)
         speed, gripper = 1.0, LET_GO
         if observation[row.CARRYING_REQUESTED] > 0.5:
             # Inside it stands, and lets go only once it takes its delivery for broken.
-            if not is_inside or memory[column.FAILED] < 0.5:
+            if not is_inside or not has_failed(memory):
                 gripper = LIFT
             speed = 0.0 if is_inside and gripper == LIFT else 1.0
-            if memory[column.STUCK] > 0.0:
+            if memory[MEMORY.stuck] > 0.0:
                 angle = random_heading(keys[robot], counts[robot] - 1, period)
                 x, y = math.cos(angle), math.sin(angle)
             elif not is_inside:
@@ -151,7 +157,7 @@ def away_from_neighbours(
     push_x, push_y = 0.0, 0.0
     for neighbour in range(row.N_NEIGHBOURS):
         start = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * neighbour
-        x, y = observation[start + 1], observation[start + 2]
+        x, y = observation[start + row.NEIGHBOUR.x], observation[start + row.NEIGHBOUR.y]
         distance = length_of(x, y)
         if 0.0 < distance < reach:
             push_x -= (1.0 - distance / reach) * x / distance
@@ -167,12 +173,13 @@ def requested_item(
 
     Not one that a robot inside held itself a moment ago.
     """
-    if memory[column.FAILED] > 0.5:
+    if has_failed(memory):
         return -1
     for item in range(row.N_ITEMS_IN_VIEW):
         start = row.ITEMS + row.ITEM_WIDTH * item
-        is_present, is_requested = observation[start] > 0.5, observation[start + 3] > 0.5
-        was_held_inside = is_inside and observation[start + 4] > 0.5
+        is_present = observation[start + row.ITEM.present] > 0.5
+        is_requested = observation[start + row.ITEM.requested] > 0.5
+        was_held_inside = is_inside and observation[start + row.ITEM.recently_held] > 0.5
         if is_present and is_requested and not was_held_inside:
             return start
     return -1
@@ -188,7 +195,7 @@ def fetch(
     parameters: HomingParameters,
 ) -> tuple[float, float, float, float]:
     """Return the direction, speed and gripper of a robot on its way to the item in a column."""
-    x, y = observation[item + 1], observation[item + 2]
+    x, y = observation[item + row.ITEM.x], observation[item + row.ITEM.y]
     distance = max(length_of(x, y), 1e-6)
     speed = min(1.0, distance / (2.0 * period))
     gripper = LIFT if distance < parameters.grip_range else LET_GO
@@ -221,10 +228,10 @@ def search_direction(
     spread_x, spread_y = away_from_neighbours(observation, reach, gain)
     x += wall_x + spread_x
     y += wall_y + spread_y
-    home = length_of(memory[column.HOME_X], memory[column.HOME_Y])
+    home = length_of(memory[MEMORY.home_x], memory[MEMORY.home_y])
     if is_inside and home > KNOWN:
-        x -= memory[column.HOME_X] / home
-        y -= memory[column.HOME_Y] / home
+        x -= memory[MEMORY.home_x] / home
+        y -= memory[MEMORY.home_y] / home
     return x, y
 
 
@@ -237,15 +244,15 @@ def home_direction(
     parameters: HomingParameters,
 ) -> tuple[float, float]:
     """Return the direction in which a laden robot goes that drives in direction (x, y)."""
-    home = length_of(memory[column.HOME_X], memory[column.HOME_Y])
+    home = length_of(memory[MEMORY.home_x], memory[MEMORY.home_y])
     trust = 1.0
     if home > KNOWN:
         share = parameters.home_share
-        x = share * memory[column.HOME_X] / home + (1.0 - share) * x
-        y = share * memory[column.HOME_Y] / home + (1.0 - share) * y
+        x = share * memory[MEMORY.home_x] / home + (1.0 - share) * x
+        y = share * memory[MEMORY.home_y] / home + (1.0 - share) * y
         trust = 1.0 / home if home < parameters.sure else 0.0
     if observation[row.LOWEST_TIMER] > 0.5:
-        lead_x, lead_y = observation[row.LOWEST_TIMER + 1], observation[row.LOWEST_TIMER + 2]
+        lead_x, lead_y = observation[row.LOWEST_TIMER_X], observation[row.LOWEST_TIMER_Y]
         distance = length_of(lead_x, lead_y)
         if distance > 0.0:
             x += trust * lead_x / distance
@@ -269,13 +276,14 @@ def freest_direction(
         angle = 2.0 * math.pi * direction / N_DIRECTIONS
         go_x, go_y = math.cos(angle), math.sin(angle)
         worth = go_x * x + go_y * y
-        worth += 0.3 * (go_x * memory[column.HEADING_X] + go_y * memory[column.HEADING_Y])
+        worth += 0.3 * (go_x * memory[MEMORY.heading_x] + go_y * memory[MEMORY.heading_y])
         for item in range(row.N_ITEMS_IN_VIEW):
             start = row.ITEMS + row.ITEM_WIDTH * item
-            if observation[start] < 0.5:
+            if observation[start + row.ITEM.present] < 0.5:
                 break
-            along = observation[start + 1] * go_x + observation[start + 2] * go_y
-            aside = abs(observation[start + 1] * go_y - observation[start + 2] * go_x)
+            item_x, item_y = observation[start + row.ITEM.x], observation[start + row.ITEM.y]
+            along = item_x * go_x + item_y * go_y
+            aside = abs(item_x * go_y - item_y * go_x)
             if aside < parameters.clearance and 0.0 < along < parameters.obstacle_range + 0.25:
                 near = 1.0 - max(0.0, along - 0.25) / parameters.obstacle_range
                 worth -= 2.0 * near * min(1.0, (parameters.clearance - aside) / 0.05)
@@ -311,7 +319,7 @@ class Homing(Scripted):
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: the control period."""
-        self._parameters = self.parameters.for_kernels()
+        self._values = self.parameters.values()
         self._period = scenario.control_period
         self._frame = MotionView(scenario)
 
@@ -330,6 +338,6 @@ class Homing(Scripted):
         frame = self._frame
         self._fill_commands(
             observations, frame.memory, frame.keys, frame.counts, frame.turned, self._period,
-            self._parameters, commands,
+            self._values, commands,
         )  # fmt: skip
         return commands

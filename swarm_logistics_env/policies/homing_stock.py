@@ -29,15 +29,15 @@ from pydantic import Field, PositiveFloat, ValidationInfo, field_validator
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel, uniform
-from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import command_own_frames
-from swarm_logistics_env.motion.memory import length_of, set_velocity
+from swarm_logistics_env.motion.memory import MEMORY, has_failed, kept_home, length_of
 from swarm_logistics_env.motion.network_inputs import (
     RANDOM_HEADING_TIME,
     random_heading,
     random_heading_number,
     turn_frames,
 )
+from swarm_logistics_env.motion.steering import set_velocity
 from swarm_logistics_env.policies.homing import (
     HOLD,
     LET_GO,
@@ -64,6 +64,7 @@ SPREAD_GAIN, SPREAD_RANGE = 0.3, 1.5  # along the border, away from neighbours
 LOST = 0.8  # that a reckoned distance may be wrong
 LEAST_CERTAINTY = 0.3  # of a direction home that was taken once, after 72 s
 STUCK = 0.4  # a robot tries a random direction until the memory's 1 has fallen to this
+TRIES_AGAIN = 0.5  # of `cannot_deliver`: below it a robot holds items inside again
 PULL = 0.4  # home, beside a random direction of length 1
 
 
@@ -86,6 +87,7 @@ class HomingStockParameters(HomingParameters):
         return far
 
 
+Parameters = HomingStockParameters.for_kernels()
 Home: TypeAlias = tuple[float, float, float]  # the direction, and how often it was taken lately
 Push: TypeAlias = tuple[float, float]  # away from near neighbours
 Motion: TypeAlias = tuple[float, float, float, float]  # direction (x, y), speed, gripper
@@ -99,13 +101,13 @@ def act_homing_stock(
     counts: NDArray[np.int64],
     turned: NDArray[np.float64],
     period: float,
-    parameters: HomingStockParameters,
+    values: tuple[float, ...],
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4) of a step of `HomingStock`, see `act_homing`."""
     turn_frames(rows, period, memories, turned)
     counts += 1
-    decide_homing_stock(rows, memories, keys, counts, period, parameters, commands)
+    decide_homing_stock(rows, memories, keys, counts, period, Parameters(*values), commands)
     command_own_frames(commands, turned, rows, memories)
 
 
@@ -126,14 +128,14 @@ def decide_homing_stock(
         carries = observation[row.CARRYING] > 0.5
         carries_requested = observation[row.CARRYING_REQUESTED] > 0.5
         role = role_of(keys[robot], random_heading_number(counts[robot] - 1, period))
-        holds = role < HOLDERS and memory[column.CANNOT_DELIVER] < 0.5
+        holds = role < HOLDERS and memory[MEMORY.cannot_deliver] < TRIES_AGAIN
         forget_if_lost(memory, is_inside)
-        home = column.kept_home(memory)
+        home = kept_home(memory)
         if home[2] < LEAST_CERTAINTY:
             home = 0.0, 0.0, 0.0
         push = avoid_neighbours(observation, parameters)
         # A robot stands in the area to deliver: that is not to be stuck.
-        is_stuck = memory[column.STUCK] > STUCK and not (is_inside and carries_requested)
+        is_stuck = memory[MEMORY.stuck] > STUCK and not (is_inside and carries_requested)
         if carries and is_stuck:
             angle = random_heading(keys[robot], counts[robot] - 1, period)
             motion = break_free(observation, memory, home, push, angle, parameters)
@@ -190,9 +192,9 @@ def drive_home(
 ) -> Motion:
     """Return the motion of a robot with the requested item: home, and to a stand inside."""
     home_x, home_y, certainty = home
-    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
     # Inside it lets go only once it takes its delivery for broken.
-    lets_go = is_inside and memory[column.FAILED] >= 0.5
+    lets_go = is_inside and has_failed(memory)
     gripper = LET_GO if lets_go else LIFT
     speed = 0.0 if is_inside and not lets_go else 1.0
     if not is_inside and certainty > 0.0:
@@ -216,17 +218,17 @@ def carry_stock(
 ) -> Motion:
     """Return the motion of a robot with an item that nobody asks for: to hold or to stock it."""
     home_x, home_y, certainty = home
-    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
     item = requested_item(observation, memory, False)
     if item >= 0:  # it lets go outside, and lifts that one
-        return observation[item + 1], observation[item + 2], 1.0, LET_GO
+        return observation[item + row.ITEM.x], observation[item + row.ITEM.y], 1.0, LET_GO
     if certainty == 0.0:
         x, y = search_direction(observation, memory, x, y, is_inside, parameters)
         return x, y, 1.0, LET_GO
     if not holds and is_gap(observation, memory, is_inside, parameters):
         return x, y, 1.0, LET_GO
     if not holds and (is_inside or x * home_x + y * home_y < -0.3):
-        gripper = LET_GO if memory[column.AWAY] > CARRIED_OFF else HOLD
+        gripper = LET_GO if memory[MEMORY.away] > CARRIED_OFF else HOLD
         x, y = freest_direction(observation, memory, push[0] - home_x, push[1] - home_y, parameters)
         return x, y, 1.0, gripper
     x, y = hold_direction(observation, memory, home_x, home_y, is_inside, period)
@@ -255,13 +257,13 @@ def search_items(
     """
     home_x, home_y, certainty = home
     item = requested_item(observation, memory, False)
-    if item >= 0 and is_inside and observation[item + 4] > 0.5:
+    if item >= 0 and is_inside and observation[item + row.ITEM.recently_held] > 0.5:
         item = -1  # it could not deliver it
-    if item < 0 and stocks and certainty > 0.0 and memory[column.CANNOT_LIFT] <= 0.0:
+    if item < 0 and stocks and certainty > 0.0 and memory[MEMORY.cannot_lift] <= 0.0:
         item = item_to_stock(observation, memory, home_x, home_y, least)
     if item >= 0:
         return fetch(observation, item, push[0], push[1], period, parameters)
-    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
     if certainty == 0.0 and observation[row.LOWEST_TIMER] > 0.5:
         x, y = home_direction(observation, memory, x, y, parameters)
     x, y = search_direction(observation, memory, x, y, is_inside, parameters)
@@ -272,9 +274,9 @@ def search_items(
 @kernel
 def forget_if_lost(memory: NDArray[np.float64], is_inside: bool) -> None:
     """Forget the kept direction home if the distance reckoned with it cannot be."""
-    is_lost = memory[column.AWAY] > LOST if is_inside else memory[column.AWAY] < -LOST
+    is_lost = memory[MEMORY.away] > LOST if is_inside else memory[MEMORY.away] < -LOST
     if is_lost:
-        memory[column.KEPT_X], memory[column.KEPT_Y], memory[column.AWAY] = 0.0, 0.0, 0.0
+        memory[MEMORY.kept_x], memory[MEMORY.kept_y], memory[MEMORY.away] = 0.0, 0.0, 0.0
 
 
 @kernel
@@ -288,10 +290,10 @@ def is_gap(
 
     The nearest item comes first in a row.
     """
-    if is_inside or memory[column.AWAY] >= parameters.near:
+    if is_inside or memory[MEMORY.away] >= parameters.near:
         return False
-    x, y = observation[row.ITEMS + 1], observation[row.ITEMS + 2]
-    return bool(observation[row.ITEMS] < 0.5 or length_of(x, y) > ITEM_SPACING)
+    x, y = observation[row.ITEMS + row.ITEM.x], observation[row.ITEMS + row.ITEM.y]
+    return bool(observation[row.ITEMS + row.ITEM.present] < 0.5 or length_of(x, y) > ITEM_SPACING)
 
 
 @kernel
@@ -305,7 +307,7 @@ def hold_direction(
 ) -> tuple[float, float]:
     """Return the velocity, in top speeds, to where a robot holds its item inside the area."""
     least = -1.0 if is_inside else 0.5
-    deeper = max(least, min(1.0, (memory[column.AWAY] + DEPTH) / (2.0 * period)))
+    deeper = max(least, min(1.0, (memory[MEMORY.away] + DEPTH) / (2.0 * period)))
     far_x, far_y = away_from_neighbours(observation, SPREAD_RANGE, 1.0)
     aside = max(-0.7, min(0.7, SPREAD_GAIN * (home_x * far_y - home_y * far_x)))
     return deeper * home_x - aside * home_y, deeper * home_y + aside * home_x
@@ -322,11 +324,11 @@ def item_to_stock(
     """Return the column of the nearest item farther than `least` [m] from the area; -1: none."""
     for item in range(row.N_ITEMS_IN_VIEW):
         start = row.ITEMS + row.ITEM_WIDTH * item
-        if observation[start] < 0.5:
+        if observation[start + row.ITEM.present] < 0.5:
             break
-        x, y = observation[start + 1], observation[start + 2]
-        distance = memory[column.AWAY] - x * home_x - y * home_y
-        if observation[start + 4] < 0.5 and distance > least:
+        x, y = observation[start + row.ITEM.x], observation[start + row.ITEM.y]
+        distance = memory[MEMORY.away] - x * home_x - y * home_y
+        if observation[start + row.ITEM.recently_held] < 0.5 and distance > least:
             return start
     return -1
 

@@ -83,6 +83,9 @@ CONSTANTS_2026 = {
 }
 
 
+Parameters = SwarmDTParameters.for_kernels()
+
+
 class StepConstants(NamedTuple):
     """What follows from parameters and the robot's body for one control period.
 
@@ -125,7 +128,7 @@ class SwarmDT(Scripted):
             drop_probability=-math.expm1(-parameters.drop_rate * period),
             turn_of_body=scenario.max_turn_rate * period if is_differential else 0.0,
         )
-        self._parameters = parameters.for_kernels()
+        self._values = parameters.values()
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode with random stored headings."""
@@ -145,7 +148,7 @@ class SwarmDT(Scripted):
             observations,
             self._keys,
             self._step,
-            self._parameters,
+            self._values,
             self._constants,
             self._heading,
             commands,
@@ -159,12 +162,17 @@ def decide_swarm_dt(
     observations: NDArray[np.float32],
     keys: NDArray[np.uint64],
     step: int,
-    parameters: SwarmDTParameters,
+    values: tuple[float, ...],
     constants: StepConstants,
     heading: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading."""
+    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading.
+
+    Args:
+        values: of the fields of `SwarmDTParameters`.
+    """
+    parameters = Parameters(*values)
     for robot in range(observations.shape[0]):
         observation = observations[robot]
         carries = observation[row.CARRYING] > 0.5
@@ -197,7 +205,7 @@ def decide_swarm_dt(
             x += push_x
             y += push_y
         if delivers and observation[row.LOWEST_TIMER] > 0.5:
-            lead_x, lead_y = observation[row.LOWEST_TIMER + 1], observation[row.LOWEST_TIMER + 2]
+            lead_x, lead_y = observation[row.LOWEST_TIMER_X], observation[row.LOWEST_TIMER_Y]
             distance = math.sqrt(lead_x * lead_x + lead_y * lead_y)
             if distance > 0.0:
                 x += parameters.taxis_gain * lead_x / distance
@@ -234,10 +242,11 @@ def avoid(
     """Return the push away from the things in a block of (present, x, y, ..) columns."""
     push_x, push_y = 0.0, 0.0
     for number in range(count):
-        column = first + row.ITEM_WIDTH * number  # neighbours are as wide
-        if observation[column] < 0.5:
+        # A neighbour is as wide, and begins with the same columns.
+        column = first + row.ITEM_WIDTH * number
+        if observation[column + row.ITEM.present] < 0.5:
             break
-        x, y = observation[column + 1], observation[column + 2]
+        x, y = observation[column + row.ITEM.x], observation[column + row.ITEM.y]
         distance = math.sqrt(x * x + y * y)
         if distance >= reach:
             break
