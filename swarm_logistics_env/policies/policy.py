@@ -35,6 +35,8 @@ class Policy(Protocol):
       as its control period;
     * `wrap(env)`: returns wrappers around `env`, an environment: what the policy senses and how it
       commands, if not by rows and commands of the warehouse (see `policies.within`);
+    * `play_steps(world_address, rows, positions)`: plays many steps in one call, as
+      `LearnedPolicy.play_steps` does; None where `act` has to be called for each;
     * `identity`: text that names everything its behaviour depends on (see `identity`).
     """
 

@@ -14,6 +14,7 @@ from swarm_logistics_env.episode import Play
 from swarm_logistics_env.motion.memory import (
     MEMORY,
     N_COLUMNS,
+    OPEN,
     kept_home,
     note_command,
     remember_observation,
@@ -64,7 +65,7 @@ def test_a_robot_that_holds_the_requested_item_inside_takes_its_delivery_for_bro
     assert memory[0, MEMORY.cannot_deliver] == 0.0, "a reading may come late"
     hold(memory, LADEN_INSIDE, 4, gripper=0.0)
     assert memory[0, MEMORY.cannot_deliver] > 0.99
-    memory[0, MEMORY.held] = 0.0
+    memory[0, MEMORY.held] = OPEN
     go_on(memory, sensed(), 60.0)
     assert memory[0, MEMORY.cannot_deliver] == pytest.approx(0.5, abs=0.01)
     assert memory[0, MEMORY.failed] < 0.5
@@ -77,12 +78,12 @@ def test_a_robot_that_holds_on_in_vain_takes_its_gripper_for_broken_and_tries_ag
 ) -> None:
     for _ in range(20):  # evidence fades
         hold(memory, sensed(item_at=0.1), 1)
-        memory[0, MEMORY.held] = 0.0
+        memory[0, MEMORY.held] = OPEN
         go_on(memory, sensed(), 30.0)
     hold(memory, sensed(item_at=0.1), 7)
     assert memory[0, MEMORY.cannot_lift] == 0.0
     hold(memory, sensed(item_at=0.1), 4)
-    memory[0, MEMORY.held] = 0.0
+    memory[0, MEMORY.held] = OPEN
     go_on(memory, sensed(), 118.0)
     assert memory[0, MEMORY.cannot_lift] > 0.0
     go_on(memory, sensed(), 3.0)
