@@ -51,7 +51,8 @@ def _item_place(world: Warehouse, axis: int, most: float) -> NDArray[np.float64]
 
 
 def _carries_requested(world: Warehouse) -> NDArray[np.bool_]:
-    return (world.state.robot_item != NOBODY) & world.state.carries_requested
+    carries = world.state.robot_item != NOBODY
+    return np.logical_and(carries, world.state.carries_requested)
 
 
 def _timer(world: Warehouse) -> NDArray[np.float64]:
@@ -63,7 +64,7 @@ def _way_to_delivery(world: Warehouse) -> NDArray[np.float64]:
     return np.maximum(floor.edge - floor.along(world.state.robot_position), 0.0)
 
 
-ROBOT_FEATURES: Mapping[str, Feature] = {
+ROBOT_FEATURES = {
     "present": Feature(lambda world: world.state.robot_present),
     "x": Feature(
         lambda world: _robot_place(world, 0, world.scenario.warehouse_width), "warehouse_width"
@@ -80,7 +81,7 @@ ROBOT_FEATURES: Mapping[str, Feature] = {
     "timer": Feature(_timer, "timer_limit"),
     "to_delivery": Feature(_way_to_delivery, "longest_way"),
 }
-ITEM_COLUMNS: Mapping[str, Feature] = {
+ITEM_COLUMNS = {
     "stored": Feature(lambda world: world.state.item_status == STORED),
     "carried": Feature(lambda world: world.state.item_status == CARRIED),
     "x": Feature(

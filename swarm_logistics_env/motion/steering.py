@@ -103,4 +103,5 @@ def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
 @inlined_kernel
 def square_to(sensed: NDArray[np.float32], item: int) -> float:
     """Return the square of the distance to an item whose columns begin at `item` [m2]."""
-    return sensed[item + row.ITEM.x] ** 2 + sensed[item + row.ITEM.y] ** 2
+    square: float = sensed[item + row.ITEM.x] ** 2 + sensed[item + row.ITEM.y] ** 2
+    return square
