@@ -52,7 +52,7 @@ def _item_place(world: Warehouse, axis: int, most: float) -> NDArray[np.float64]
 
 def _carries_requested(world: Warehouse) -> NDArray[np.bool_]:
     carries = world.state.robot_item != NOBODY
-    return np.logical_and(carries, world.state.carries_requested)
+    return np.asarray(carries & world.state.carries_requested)
 
 
 def _timer(world: Warehouse) -> NDArray[np.float64]:
