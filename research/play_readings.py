@@ -38,7 +38,7 @@ def lets_go(world: Warehouse, rows: Any) -> None:
 def only_lower(_: Warehouse, rows: Any) -> None:
     """A robot follows only a timer that is lower than its own."""
     timer = np.where(rows[:, row.TIMER_RUNS] > 0.5, rows[:, row.TIMER], np.inf)
-    rows[rows[:, row.LOWEST_TIMER + 3] >= timer, row.LOWEST_TIMER] = 0.0
+    rows[rows[:, row.LOWEST_TIMER_TIME] >= timer, row.LOWEST_TIMER] = 0.0
 
 
 def choose(pick: Callable[[Any], Any]) -> Change:
@@ -56,7 +56,7 @@ def choose(pick: Callable[[Any], Any]) -> Change:
         ties = np.flatnonzero(timers == np.nanmin(timers))
         x, y = offsets[ties[pick(distance[ties])]]
         direction = complex(x, y) * cmath.exp(-1j * float(state.robot_heading[carrier]))
-        rows[carrier, row.LOWEST_TIMER + 1 : row.LOWEST_TIMER + 3] = direction.real, direction.imag
+        rows[carrier, [row.LOWEST_TIMER_X, row.LOWEST_TIMER_Y]] = direction.real, direction.imag
 
     return change
 

@@ -280,8 +280,8 @@ def _outputs_of(
     """Return outputs (N, 3) in the frame of motion that ask for the motion of commands (N, 4).
 
     The direction in which a differential robot wants to drive follows from its turn, as
-    `motion.memory.steer` made that. Where it turns as fast as it can, it is taken to want as high a
-    speed as goes with a direction at most a quarter off: beyond that it would drive backwards.
+    `motion.steering.steer` made that. Where it turns as fast as it can, it is taken to want as high
+    a speed as goes with a direction at most a quarter off: beyond that it would drive backwards.
     """
     forward, left, turn, gripper = commands[:, :4].T
     if scenario.drive == "differential":

@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.errors import CommandError, PolicyError
 from swarm_logistics_env.policies.evaluation_mode import in_evaluation
-from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.policy import Policy, decide_in_use, one_thread, start
 from swarm_logistics_env.scenario import CHIPMUNK, Scenario
 from swarm_logistics_env.warehouse import Warehouse
@@ -87,10 +86,10 @@ class Play:
             self._env, self._rows = _begun(wrap, scenario, seed, faults)
             self.world = self._env.warehouse
         start(policy, scenario, seed if policy_seed is None else policy_seed)
-        # Not if somebody's own `act` replaces that of the class.
-        is_learned = type(policy) is LearnedPolicy and "act" not in vars(policy)
-        plays_steps = is_learned and self._env is None and scenario.bodies == CHIPMUNK
-        self._learned = cast("LearnedPolicy", policy) if plays_steps else None
+        is_in_compiled_code = self._env is None and scenario.bodies == CHIPMUNK
+        # Of its class: a policy that passes attributes on to another one may act otherwise.
+        plays_steps = is_in_compiled_code and hasattr(type(policy), "play_steps")
+        self._play_steps = policy.play_steps if plays_steps else None  # type: ignore[attr-defined]
 
     @property
     def is_over(self) -> bool:
@@ -109,9 +108,9 @@ class Play:
             if self._env is None:
                 self._rows = self.world.observe()  # others, if the caller changed the world
             with one_thread(), in_evaluation(self._policy):
-                self.advance()
+                self._advance()
 
-    def advance(self) -> None:
+    def _advance(self) -> None:
         """Do as `step` within what it does, where nobody changed the world and it is not over."""
         world = self.world
         commands = decide_in_use(self._policy, self._rows, world.state)
@@ -124,7 +123,9 @@ class Play:
             raise self._error_about(error) from error
 
     def advance_to_event(self, positions: NDArray[np.float64]) -> int:
-        """Do as `advance` until something happens, in one call where the policy plays steps.
+        """Do as `step` until something happens, in one call where the policy plays many steps.
+
+        It is for who changes nothing in the world, and has seen that the episode is not over.
 
         Args:
             positions: (K, N, 2), filled with the robots' positions after each step [m].
@@ -132,12 +133,12 @@ class Play:
         Returns:
             The number of steps, K or fewer.
         """
-        if self._learned is None:
-            self.advance()
+        if self._play_steps is None:
+            self._advance()
             n_steps = 1
         else:
             world, rows = self.world, self._rows
-            n_steps, is_eventful = self._learned.play_steps(world.address, rows, positions)
+            n_steps, is_eventful = self._play_steps(world.address, rows, positions)
             try:
                 world.take(rows, is_eventful)
             except CommandError as error:
@@ -201,14 +202,12 @@ def run_episode(
     digest = hashlib.blake2b(digest_size=16)
     with one_thread():  # once for all steps, as each change takes a while
         play = Play(scenario, policy, seed, faults, policy_seed)
-        world, is_over = play.world, play.is_over
+        world = play.world
         positions = np.empty((_MOST_STEPS, *world.state.robot_position.shape))
         with in_evaluation(policy):
-            while not is_over:
+            while not play.is_over:
                 n_steps = play.advance_to_event(positions)
                 digest.update(positions[:n_steps].data)
-                # No end without an event, but for wrappers that end it sooner.
-                is_over = (world.is_eventful or play._env is not None) and play.is_over
     state = world.state
     delivery_times = np.array(state.delivery_times, dtype=np.float64)
     digest.update(delivery_times.tobytes())

@@ -8,6 +8,7 @@ and y left [m]; there is no place in the warehouse and no compass. Blocks of sev
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,34 @@ from swarm_logistics_env.scenario import Scenario
 N_BEAMS = 16
 N_ITEMS_IN_VIEW = 8
 N_NEIGHBOURS = 8
-ITEM_FEATURES = ("present", "x", "y", "requested", "recently_held")
-NEIGHBOUR_FEATURES = ("present", "x", "y", "timer_heard", "timer")
-ITEM_WIDTH, NEIGHBOUR_WIDTH = len(ITEM_FEATURES), len(NEIGHBOUR_FEATURES)
+
+
+class ItemColumns(NamedTuple):
+    """The columns of an item, counted from its first one; a neighbour's begin with the same."""
+
+    present: int
+    x: int
+    y: int
+    requested: int
+    recently_held: int
+
+
+class NeighbourColumns(NamedTuple):
+    """The columns of a neighbour, counted from its first one."""
+
+    present: int
+    x: int
+    y: int
+    timer_heard: int
+    timer: int
+
+
+ITEM_FEATURES = ItemColumns._fields
+ITEM_WIDTH = len(ITEM_FEATURES)
+ITEM = ItemColumns(*range(ITEM_WIDTH))
+NEIGHBOUR_FEATURES = NeighbourColumns._fields
+NEIGHBOUR_WIDTH = len(NEIGHBOUR_FEATURES)
+NEIGHBOUR = NeighbourColumns(*range(NEIGHBOUR_WIDTH))
 
 # First columns of the blocks; kernels and scripted policies index with these.
 RANGE_ROBOTS = 0
@@ -28,12 +54,17 @@ RANGE_ITEMS = RANGE_WALLS + N_BEAMS
 ITEMS = RANGE_ITEMS + N_BEAMS
 NEIGHBOURS = ITEMS + N_ITEMS_IN_VIEW * ITEM_WIDTH
 LOWEST_TIMER = NEIGHBOURS + N_NEIGHBOURS * NEIGHBOUR_WIDTH
+LOWEST_TIMER_X = LOWEST_TIMER + 1
+LOWEST_TIMER_Y = LOWEST_TIMER + 2
+LOWEST_TIMER_TIME = LOWEST_TIMER + 3
 CARRYING = LOWEST_TIMER + 4
 CARRYING_REQUESTED = CARRYING + 1
 IN_DELIVERY_AREA = CARRYING + 2
 TIMER_RUNS = CARRYING + 3
 TIMER = CARRYING + 4
 VELOCITY = CARRYING + 5
+VELOCITY_X = VELOCITY
+VELOCITY_Y = VELOCITY + 1
 CONTACT = CARRYING + 7
 TURN_RATE = CONTACT + 1
 N_COLUMNS = TURN_RATE + 1  # = 141; after them, per neighbour, the message it broadcasts
@@ -65,7 +96,6 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
     beam = "beam k looks k * 22.5 degrees left of forward; the full range where it meets nothing"
     items = _block(ITEMS, N_ITEMS_IN_VIEW, ITEM_FEATURES)
     neighbours = _block(NEIGHBOURS, N_NEIGHBOURS, NEIGHBOUR_FEATURES)
-    lowest = _block(LOWEST_TIMER, 1, ("present", "x", "y", "timer"))
     message = _run(MESSAGES, n_columns(scenario) - MESSAGES)
     messages = (
         Column("neighbour_message", "1", message, -1, 1, "the numbers that each broadcasts"),
@@ -88,10 +118,10 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
             "neighbour_timer_heard", "flag", neighbours["timer_heard"], 0, 1, "its timer is heard"
         ),
         Column("neighbour_timer", "s", neighbours["timer"], 0, limit, "its timer"),
-        Column("lowest_timer_present", "flag", lowest["present"], 0, 1, "a timer is heard"),
-        Column("lowest_timer_x", "m", lowest["x"], -far, far, "its sender, forward"),
-        Column("lowest_timer_y", "m", lowest["y"], -far, far, "its sender, left"),
-        Column("lowest_timer", "s", lowest["timer"], 0, limit, "the lowest timer heard"),
+        Column("lowest_timer_present", "flag", _run(LOWEST_TIMER, 1), 0, 1, "a timer is heard"),
+        Column("lowest_timer_x", "m", _run(LOWEST_TIMER_X, 1), -far, far, "its sender, forward"),
+        Column("lowest_timer_y", "m", _run(LOWEST_TIMER_Y, 1), -far, far, "its sender, left"),
+        Column("lowest_timer", "s", _run(LOWEST_TIMER_TIME, 1), 0, limit, "the lowest timer heard"),
         Column("carrying", "flag", _run(CARRYING, 1), 0, 1, "it carries an item"),
         Column("carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "a requested one"),
         Column("in_delivery_area", "flag", _run(IN_DELIVERY_AREA, 1), 0, 1, "its centre is there"),

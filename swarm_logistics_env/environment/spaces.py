@@ -5,8 +5,8 @@ play, the whole warehouse as one vector, and PettingZoo's dicts over the array m
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping, Sequence
-from typing import Any, NoReturn
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from gymnasium.spaces import Box, Space
@@ -21,11 +21,77 @@ from swarm_logistics_env.warehouse.state import CARRIED, NOBODY, STORED
 
 from .requests import gather_commands
 
-ROBOT_FEATURES = (
-    "present", "x", "y", "cos_heading", "sin_heading", "velocity_x", "velocity_y",
-    "carrying", "carrying_requested", "timer", "to_delivery",
-)  # fmt: skip
-ITEM_COLUMNS = ("stored", "carried", "x", "y", "requested")
+
+class Feature(NamedTuple):
+    """A column of the rows of the state that are about robots, or of those about items.
+
+    Attributes:
+        values: returns a number for each robot (N,), or for each item (M,).
+        most: field of the scenario that is the largest value; None: that is 1.
+        is_signed: whether the lowest value is the largest with a minus; else it is 0.
+    """
+
+    values: Callable[[Warehouse], NDArray[Any]]
+    most: str | None = None
+    is_signed: bool = False
+
+
+def _robot_place(world: Warehouse, axis: int, most: float) -> NDArray[np.float64]:
+    return np.clip(world.state.robot_position[:, axis], 0.0, most)
+
+
+def _robot_velocity(world: Warehouse, axis: int) -> NDArray[np.float64]:
+    limit = world.scenario.max_speed
+    return np.clip(world.state.robot_velocity[:, axis], -limit, limit)
+
+
+def _item_place(world: Warehouse, axis: int, most: float) -> NDArray[np.float64]:
+    is_there = np.isin(world.state.item_status, (STORED, CARRIED))
+    return np.clip(world.state.item_position[:, axis] * is_there, 0.0, most)
+
+
+def _carries_requested(world: Warehouse) -> NDArray[np.bool_]:
+    carries = world.state.robot_item != NOBODY
+    return np.asarray(carries & world.state.carries_requested)
+
+
+def _timer(world: Warehouse) -> NDArray[np.float64]:
+    return np.nan_to_num(world.state.robot_timer, nan=world.scenario.timer_limit)
+
+
+def _way_to_delivery(world: Warehouse) -> NDArray[np.float64]:
+    floor = world.floor
+    return np.maximum(floor.edge - floor.along(world.state.robot_position), 0.0)
+
+
+ROBOT_FEATURES = {
+    "present": Feature(lambda world: world.state.robot_present),
+    "x": Feature(
+        lambda world: _robot_place(world, 0, world.scenario.warehouse_width), "warehouse_width"
+    ),
+    "y": Feature(
+        lambda world: _robot_place(world, 1, world.scenario.warehouse_height), "warehouse_height"
+    ),
+    "cos_heading": Feature(lambda world: np.cos(world.state.robot_heading), is_signed=True),
+    "sin_heading": Feature(lambda world: np.sin(world.state.robot_heading), is_signed=True),
+    "velocity_x": Feature(lambda world: _robot_velocity(world, 0), "max_speed", is_signed=True),
+    "velocity_y": Feature(lambda world: _robot_velocity(world, 1), "max_speed", is_signed=True),
+    "carrying": Feature(lambda world: world.state.robot_item != NOBODY),
+    "carrying_requested": Feature(_carries_requested),
+    "timer": Feature(_timer, "timer_limit"),
+    "to_delivery": Feature(_way_to_delivery, "longest_way"),
+}
+ITEM_COLUMNS = {
+    "stored": Feature(lambda world: world.state.item_status == STORED),
+    "carried": Feature(lambda world: world.state.item_status == CARRIED),
+    "x": Feature(
+        lambda world: _item_place(world, 0, world.scenario.warehouse_width), "warehouse_width"
+    ),
+    "y": Feature(
+        lambda world: _item_place(world, 1, world.scenario.warehouse_height), "warehouse_height"
+    ),
+    "requested": Feature(lambda world: world.state.item_requested),
+}
 
 
 def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.float32]:
@@ -36,31 +102,19 @@ def global_state(world: Warehouse, n_robots: int, n_items: int) -> NDArray[np.fl
     (the limit when silent), the way to the nearest dock [m], 0 inside, and time [s]; rows of what
     is absent or delivered are zeros.
     """
-    state = world.state
-    robots = np.zeros((n_robots, len(ROBOT_FEATURES)), np.float32)
-    robot_rows = robots[: state.n_robots]
-    robot_rows[:, 0] = 1.0
-    robot_rows[:, 1:3] = state.robot_position
-    robot_rows[:, 3] = np.cos(state.robot_heading)
-    robot_rows[:, 4] = np.sin(state.robot_heading)
-    limit = world.scenario.max_speed
-    robot_rows[:, 5:7] = np.clip(state.robot_velocity, -limit, limit)
-    robot_rows[:, 7] = state.robot_item != NOBODY
-    robot_rows[:, 8] = robot_rows[:, 7] * state.carries_requested
-    robot_rows[:, 9] = np.nan_to_num(state.robot_timer, nan=world.scenario.timer_limit)
-    floor = world.floor
-    robot_rows[:, 10] = np.maximum(floor.edge - floor.along(state.robot_position), 0.0)
-    robot_rows[~state.robot_present] = 0.0
-    items = np.zeros((n_items, len(ITEM_COLUMNS)), np.float32)
-    item_rows = items[: len(state.item_status)]
-    item_rows[:, 0] = state.item_status == STORED
-    item_rows[:, 1] = state.item_status == CARRIED
-    item_rows[:, 2:4] = state.item_position * (item_rows[:, :1] + item_rows[:, 1:2])
-    item_rows[:, 4] = state.item_requested
-    width, height = world.scenario.warehouse_width, world.scenario.warehouse_height
-    for positions in (robot_rows[:, 1:3], item_rows[:, 2:4]):
-        np.clip(positions, 0.0, (width, height), out=positions)
-    return np.concatenate([robots.ravel(), items.ravel(), [np.float32(state.time)]])
+    robots = _rows(ROBOT_FEATURES, world, n_robots)
+    robots[np.flatnonzero(~world.state.robot_present)] = 0.0
+    items = _rows(ITEM_COLUMNS, world, n_items)
+    return np.concatenate([robots.ravel(), items.ravel(), [np.float32(world.state.time)]])
+
+
+def _rows(features: Mapping[str, Feature], world: Warehouse, n_rows: int) -> NDArray[np.float32]:
+    """Return a row for each robot or item, and rows of zeros behind them (n_rows, features)."""
+    rows = np.zeros((n_rows, len(features)), np.float32)
+    for column, feature in enumerate(features.values()):
+        values = feature.values(world)
+        rows[: len(values), column] = values
+    return rows
 
 
 # These fields bound the state: an episode may have at most the largest value declared.
@@ -112,12 +166,21 @@ class Spaces:
 
     def state(self, n_robots: int) -> Box:
         """Return the space of the state with rows for `n_robots` and the most items."""
-        n_items, width, height, speed, limit, duration, way = self.most.values()
-        robot_low = [0, 0, 0, -1, -1, -speed, -speed, 0, 0, 0, 0]
-        robot_high = [1, width, height, 1, 1, speed, speed, 1, 1, limit, way]
-        low = [*(robot_low * n_robots), *([0] * len(ITEM_COLUMNS) * n_items), 0]
-        high = [*(robot_high * n_robots), *([1, 1, width, height, 1] * n_items), duration + 1.0]
+        robot_low, robot_high = self._bounds(ROBOT_FEATURES)
+        item_low, item_high = self._bounds(ITEM_COLUMNS)
+        n_items = self.most["n_items"]
+        low = [*(robot_low * n_robots), *(item_low * n_items), 0]
+        high = [*(robot_high * n_robots), *(item_high * n_items), self.most["duration"] + 1.0]
         return Box(np.array(low, np.float32), np.array(high, np.float32))
+
+    def _bounds(self, features: Mapping[str, Feature]) -> tuple[list[float], list[float]]:
+        """Return the lowest and the highest values of a row with these features."""
+        low, high = [], []
+        for feature in features.values():
+            most = 1.0 if feature.most is None else self.most[feature.most]
+            low.append(-most if feature.is_signed else 0.0)
+            high.append(most)
+        return low, high
 
     def check(self, scenario: Scenario, n_possible: int) -> None:
         """Check that an episode in `scenario` stays within the spaces.

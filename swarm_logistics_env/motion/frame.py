@@ -10,8 +10,17 @@ from numpy.typing import NDArray
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import inlined_kernel, kernel
-from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.memory import length_of, to_frame
+from swarm_logistics_env.motion.memory import (
+    BODY,
+    N_COLUMNS,
+    body_of,
+    face_anywhere,
+    length_of,
+    note_command,
+    remember_observation,
+    to_frame,
+)
+from swarm_logistics_env.motion.steering import clear_the_way, steer
 from swarm_logistics_env.scenario import Scenario
 
 from .network_inputs import COSINES, INPUTS, SINES, TURNS, read_observations
@@ -38,7 +47,7 @@ class MotionView:
 
     def __init__(self, scenario: Scenario, listens: bool = True) -> None:
         self.period = scenario.control_period
-        self._body = column.body_of(scenario)
+        self._body = body_of(scenario)
         self._listens = listens
         self.begin(np.empty(0, np.uint64))
 
@@ -50,7 +59,7 @@ class MotionView:
         """
         n = len(keys)
         self.keys, self.counts = np.empty(n, np.uint64), np.empty(n, np.int64)
-        self.memory, self.turned = np.empty((n, column.N_COLUMNS)), np.zeros(n)
+        self.memory, self.turned = np.empty((n, N_COLUMNS)), np.zeros(n)
         self.begin_rows(np.arange(n), keys, bodies)
 
     def begin_rows(
@@ -61,9 +70,9 @@ class MotionView:
     ) -> None:
         """Begin an episode in these rows alone."""
         self.keys[rows], self.counts[rows] = keys, 0
-        fresh = np.zeros((len(rows), column.N_COLUMNS))
-        fresh[:, column.BODY] = self._body if bodies is None else bodies
-        column.face_anywhere(keys, fresh)
+        fresh = np.zeros((len(rows), N_COLUMNS))
+        fresh[:, BODY] = self._body if bodies is None else bodies
+        face_anywhere(keys, fresh)
         self.memory[rows] = fresh
 
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -135,7 +144,7 @@ def hold_rows(
     turned: NDArray[np.float64],
 ) -> None:
     """Take what rows (N, D) tell into the memories; count, and let frames stay as bodies turn."""
-    column.remember_observation(rows, period, memories)
+    remember_observation(rows, period, memories)
     for robot in range(rows.shape[0]):
         turned[robot] -= np.float32(period) * rows[robot, row.TURN_RATE]
         counts[robot] += 1
@@ -180,9 +189,9 @@ def finish_command(
     command: NDArray[np.float64],
 ) -> None:
     """Change a command (4,) where the robot is caged, and take note of it."""
-    column.clear_the_way(sensed, memory, command)
-    column.note_command(sensed, command, memory)
-    column.steer(memory, command)
+    clear_the_way(sensed, memory, command)
+    note_command(sensed, command, memory)
+    steer(memory, command)
 
 
 @kernel

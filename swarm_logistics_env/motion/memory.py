@@ -8,16 +8,12 @@ That tells how fast the gyro drifts, so that a direction is remembered for minut
 rooms with walls at right angles; where a robot sees no wall it reckons on with the drift it found.
 
 Its gyro tells how its body turned, so that its memory turns with it.
-
-And what commands make of it: how a differential robot drives where it wants to; and the way out for
-a robot that is caged by items with gaps narrower than it is. That one lets the requested item go,
-lifts one of those that stand around it, and carries it away. Then the way is open for whoever lifts
-the requested item next.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,30 +57,50 @@ def wall_angle(sensed: NDArray[np.float32]) -> float:
     return math.atan2(y, x) % QUARTER
 
 
-# Columns of the memories (N, N_COLUMNS) of N robots.
-(
-    HEADING_X, HEADING_Y,  # of its last motion, length 1
-    HOME_X, HOME_Y,  # fading sum of its directions into the delivery area, less those out
-    WAS_INSIDE,  # the delivery area
-    FAILED,  # 1: it just met its own failure; fades over FAILURE_TIME
-    STUCK,  # 1: it just stood still with the requested item; falls to 0 in STUCK_TIME
-    HELD,  # the last gripper command: 0 open, 1 hold, 2 hold the requested item it carries
-    STANDING,  # [s] that it stood still with the requested item, less those that it moved
-    CLEARING,  # [s] that are left to clear its way out of a cage of items; see `clear_the_way`
-    WALL,  # direction of a wall in its frame [rad], always the same one of the four
-    SIGHTINGS, WATCHED,  # number of times it saw how a wall stands, and for how long [s]
-    TURNED, DRIFT,  # of that direction since the first sighting [rad], and per second [rad/s]
-    KEPT_X, KEPT_Y,  # as HOME, from WALL on and fading in KEPT_TIME
-    AWAY,  # from the border of the delivery area as far as it reckons, negative inside [m]
-    CANNOT_DELIVER,  # 1: it takes its delivery for broken; falls to 0 in RETRY_TIME
-    CANNOT_LIFT,  # 1: it takes its gripper for broken; falls to 0 in RETRY_TIME
-    IN_VAIN,  # [s] that it held on to items in vain; fades in FADING_TIME, a lift clears it
-    DELIVERING,  # [s] that it held the requested item inside the area; fades as IN_VAIN
+class MemoryColumns(NamedTuple):
+    """The columns of memories (N, N_COLUMNS) of N robots."""
+
+    heading_x: int  # of its last motion, length 1
+    heading_y: int
+    home_x: int  # fading sum of its directions into the delivery area, less those out
+    home_y: int
+    was_inside: int  # the delivery area: OUTSIDE or INSIDE
+    failed: int  # 1: it just met its own failure; fades over FAILURE_TIME
+    stuck: int  # 1: it just stood still with the requested item; falls to 0 in STUCK_TIME
+    held: int  # the last gripper command: OPEN, HOLDING or HOLDING_REQUESTED
+    standing: int  # [s] that it stood still with the requested item, less those that it moved
+    clearing: int  # [s] that are left to clear its way out of a cage; see `clear_the_way`
+    wall: int  # direction of a wall in its frame [rad], always the same one of the four
+    sightings: int  # number of times it saw how a wall stands
+    watched: int  # [s] since the first of them
+    turned: int  # of that direction since then [rad]
+    drift: int  # of that direction [rad/s]
+    kept_x: int  # as `home_x`, from `wall` on and fading in KEPT_TIME
+    kept_y: int
+    away: int  # from the border of the delivery area as far as it reckons, negative inside [m]
+    cannot_deliver: int  # 1: it takes its delivery for broken; falls to 0 in RETRY_TIME
+    cannot_lift: int  # 1: it takes its gripper for broken; falls to 0 in RETRY_TIME
+    in_vain: int  # [s] that it held on to items in vain; fades in FADING_TIME, a lift clears it
+    delivering: int  # [s] that it held the requested item inside the area; fades as `in_vain`
     # What its maker knows of its body, see `body_of`; they stay for the whole episode.
-    TOP_SPEED, HANDLING_TIME, WIDEST_TURN, ACCELERATION,
-    N_COLUMNS,
-) = range(27)  # fmt: skip
-BODY = slice(TOP_SPEED, N_COLUMNS)
+    top_speed: int
+    handling_time: int
+    widest_turn: int
+    acceleration: int
+
+
+N_COLUMNS = len(MemoryColumns._fields)
+MEMORY = MemoryColumns(*range(N_COLUMNS))
+BODY = slice(MEMORY.top_speed, N_COLUMNS)
+
+# The last gripper command.
+OPEN = 0.0
+HOLDING = 1.0
+HOLDING_REQUESTED = 2.0  # the requested item, which it carried
+
+# Where it was.
+OUTSIDE = 0.0
+INSIDE = 1.0
 
 FAILURE_TIME = 60.0  # [s]
 RETRY_TIME = 120.0  # [s], after which it tries again: it may have been repaired
@@ -116,7 +132,8 @@ def face_anywhere(keys: NDArray[np.uint64], memories: NDArray[np.float64]) -> No
     """Fill the headings in memories (N, N_COLUMNS) with random ones."""
     for robot in range(memories.shape[0]):
         angle = 2.0 * math.pi * uniform(keys[robot], 0)
-        memories[robot, HEADING_X], memories[robot, HEADING_Y] = math.cos(angle), math.sin(angle)
+        memories[robot, MEMORY.heading_x] = math.cos(angle)
+        memories[robot, MEMORY.heading_y] = math.sin(angle)
 
 
 @kernel
@@ -143,7 +160,7 @@ def remember_row(
     memory: NDArray[np.float64],
 ) -> tuple[float, float, float]:
     """Take what one row (D,) tells into a memory, and return its `kept_home`."""
-    x, y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
+    x, y = sensed[row.VELOCITY_X], sensed[row.VELOCITY_Y]
     speed = length_of(x, y)
     is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
     delivers = sensed[row.CARRYING_REQUESTED] > 0.5
@@ -151,31 +168,35 @@ def remember_row(
     turn_back(sensed[row.TURN_RATE] * period, memory)
     diagnose(sensed, period, memory)
 
-    memory[STUCK] = max(0.0, memory[STUCK] - period / STUCK_TIME)
-    stands = delivers and memory[HELD] > 1.5 and speed < STANDS
+    memory[MEMORY.stuck] = max(0.0, memory[MEMORY.stuck] - period / STUCK_TIME)
+    stands = delivers and memory[MEMORY.held] == HOLDING_REQUESTED and speed < STANDS
     if stands:
-        memory[STUCK] = 1.0
-    memory[STANDING] = max(0.0, memory[STANDING] + (period if stands else -period))
-    memory[CLEARING] = max(0.0, memory[CLEARING] - period)
-    if memory[STANDING] > CAGED_TIME and not is_inside:
-        memory[STANDING], memory[CLEARING] = 0.0, CLEARING_TIME
+        memory[MEMORY.stuck] = 1.0
+    memory[MEMORY.standing] = max(0.0, memory[MEMORY.standing] + (period if stands else -period))
+    memory[MEMORY.clearing] = max(0.0, memory[MEMORY.clearing] - period)
+    if memory[MEMORY.standing] > CAGED_TIME and not is_inside:
+        memory[MEMORY.standing], memory[MEMORY.clearing] = 0.0, CLEARING_TIME
 
     watch_walls(sensed, period, memory)
-    for column, share in ((HOME_X, fades[0]), (KEPT_X, fades[1])):
-        memory[column] *= share
-        memory[column + 1] *= share
-    if is_inside != (memory[WAS_INSIDE] > 0.5) and speed > MOVES:
+    home_share, kept_share = fades
+    memory[MEMORY.home_x] *= home_share
+    memory[MEMORY.home_y] *= home_share
+    memory[MEMORY.kept_x] *= kept_share
+    memory[MEMORY.kept_y] *= kept_share
+    was_inside = memory[MEMORY.was_inside] == INSIDE
+    if is_inside != was_inside and speed > MOVES:
         inwards = 1.0 if is_inside else -1.0
-        memory[HOME_X] += inwards * x / speed
-        memory[HOME_Y] += inwards * y / speed
-        along, aside = to_frame((math.cos(memory[WALL]), math.sin(memory[WALL])), x, y)
-        memory[KEPT_X] += inwards / speed * along
-        memory[KEPT_Y] += inwards / speed * aside
-        memory[AWAY] = 0.0
+        memory[MEMORY.home_x] += inwards * x / speed
+        memory[MEMORY.home_y] += inwards * y / speed
+        wall = memory[MEMORY.wall]
+        along, aside = to_frame((math.cos(wall), math.sin(wall)), x, y)
+        memory[MEMORY.kept_x] += inwards / speed * along
+        memory[MEMORY.kept_y] += inwards / speed * aside
+        memory[MEMORY.away] = 0.0
     home_x, home_y, sure = kept_home(memory)
     if sure > 0.0:
-        memory[AWAY] -= period * (home_x * x + home_y * y)
-    memory[WAS_INSIDE] = 1.0 if is_inside else 0.0
+        memory[MEMORY.away] -= period * (home_x * x + home_y * y)
+    memory[MEMORY.was_inside] = INSIDE if is_inside else OUTSIDE
     return home_x, home_y, sure
 
 
@@ -201,25 +222,29 @@ def diagnose(sensed: NDArray[np.float32], period: float, memory: NDArray[np.floa
     """
     is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
     carries, delivers = sensed[row.CARRYING] > 0.5, sensed[row.CARRYING_REQUESTED] > 0.5
-    memory[FAILED] *= 1.0 - period / FAILURE_TIME
-    for column in (CANNOT_LIFT, CANNOT_DELIVER):
+    memory[MEMORY.failed] *= 1.0 - period / FAILURE_TIME
+    for column in (MEMORY.cannot_lift, MEMORY.cannot_deliver):
         memory[column] = max(0.0, memory[column] - period / RETRY_TIME)
-    for column in (IN_VAIN, DELIVERING):
+    for column in (MEMORY.in_vain, MEMORY.delivering):
         memory[column] *= 1.0 - period / FADING_TIME
     # What it brought inside and did not let go of was delivered.
-    if is_inside and not carries and memory[HELD] > 1.5:
-        memory[DELIVERING], memory[CANNOT_DELIVER], memory[FAILED] = 0.0, 0.0, 0.0
-    surely = memory[HANDLING_TIME] + SURELY_IN_VAIN - 0.5 * period
+    if is_inside and not carries and memory[MEMORY.held] == HOLDING_REQUESTED:
+        memory[MEMORY.delivering] = 0.0
+        memory[MEMORY.cannot_deliver] = 0.0
+        memory[MEMORY.failed] = 0.0
+    surely = memory[MEMORY.handling_time] + SURELY_IN_VAIN - 0.5 * period
     if carries:
-        memory[IN_VAIN], memory[CANNOT_LIFT] = 0.0, 0.0
-    elif memory[HELD] > 0.5 and memory[HELD] < 1.5 and item_in_reach(sensed):
-        memory[IN_VAIN] += period
-        if memory[IN_VAIN] > surely:
-            memory[IN_VAIN], memory[CANNOT_LIFT], memory[FAILED] = 0.0, 1.0, 1.0
+        memory[MEMORY.in_vain], memory[MEMORY.cannot_lift] = 0.0, 0.0
+    elif memory[MEMORY.held] == HOLDING and item_in_reach(sensed):
+        memory[MEMORY.in_vain] += period
+        if memory[MEMORY.in_vain] > surely:
+            memory[MEMORY.in_vain] = 0.0
+            memory[MEMORY.cannot_lift] = 1.0
+            memory[MEMORY.failed] = 1.0
     if is_inside and delivers:
-        memory[DELIVERING] += period
-        if memory[DELIVERING] > surely:
-            memory[CANNOT_DELIVER], memory[FAILED] = 1.0, 1.0
+        memory[MEMORY.delivering] += period
+        if memory[MEMORY.delivering] > surely:
+            memory[MEMORY.cannot_deliver], memory[MEMORY.failed] = 1.0, 1.0
 
 
 @kernel
@@ -231,30 +256,32 @@ def item_in_reach(sensed: NDArray[np.float32]) -> bool:
     is_in_reach = False
     for index in range(row.N_ITEMS_IN_VIEW):
         item = row.ITEMS + row.ITEM_WIDTH * index
-        away = length_of(sensed[item + 1], sensed[item + 2])
-        may_lift = sensed[item + 3] > 0.5 or sensed[item + 4] < 0.5
-        is_in_reach |= sensed[item] > 0.5 and away < SURELY_IN_REACH and may_lift
+        away = length_of(sensed[item + row.ITEM.x], sensed[item + row.ITEM.y])
+        is_present = sensed[item + row.ITEM.present] > 0.5
+        is_requested = sensed[item + row.ITEM.requested] > 0.5
+        may_lift = is_requested or sensed[item + row.ITEM.recently_held] < 0.5
+        is_in_reach |= is_present and away < SURELY_IN_REACH and may_lift
     return is_in_reach
 
 
 @kernel
 def watch_walls(sensed: NDArray[np.float32], period: float, memory: NDArray[np.float64]) -> None:
     """Take one robot's row into what its memory tells of a wall's direction."""
-    if memory[SIGHTINGS] > 0.0:
-        memory[WATCHED] += period
-        memory[TURNED] += memory[DRIFT] * period
-        memory[WALL] += memory[DRIFT] * period
+    if memory[MEMORY.sightings] > 0.0:
+        memory[MEMORY.watched] += period
+        memory[MEMORY.turned] += memory[MEMORY.drift] * period
+        memory[MEMORY.wall] += memory[MEMORY.drift] * period
     seen = wall_angle(sensed)
     if seen >= 0.0:
-        off = seen - memory[WALL]
+        off = seen - memory[MEMORY.wall]
         off -= QUARTER * round(off / QUARTER)
-        if memory[SIGHTINGS] > 0.0:
-            off *= max(1.0 / memory[SIGHTINGS], LEAST_GAIN)
-            memory[TURNED] += off
-        memory[SIGHTINGS] += 1.0
-        memory[WALL] += off
-        memory[DRIFT] = memory[TURNED] / (memory[WATCHED] + SETTLING_TIME)
-    memory[WALL] -= 2.0 * math.pi * round(memory[WALL] / (2.0 * math.pi))
+        if memory[MEMORY.sightings] > 0.0:
+            off *= max(1.0 / memory[MEMORY.sightings], LEAST_GAIN)
+            memory[MEMORY.turned] += off
+        memory[MEMORY.sightings] += 1.0
+        memory[MEMORY.wall] += off
+        memory[MEMORY.drift] = memory[MEMORY.turned] / (memory[MEMORY.watched] + SETTLING_TIME)
+    memory[MEMORY.wall] -= 2.0 * math.pi * round(memory[MEMORY.wall] / (2.0 * math.pi))
 
 
 @kernel
@@ -263,13 +290,13 @@ def kept_home(memory: NDArray[np.float64]) -> tuple[float, float, float]:
 
     The area has a straight border along a wall, so a robot that saw one goes at a right angle.
     """
-    sure = length_of(memory[KEPT_X], memory[KEPT_Y])
+    sure = length_of(memory[MEMORY.kept_x], memory[MEMORY.kept_y])
     if sure == 0.0:
         return 0.0, 0.0, 0.0
-    angle = math.atan2(memory[KEPT_Y], memory[KEPT_X])
-    if memory[SIGHTINGS] > 0.0:
+    angle = math.atan2(memory[MEMORY.kept_y], memory[MEMORY.kept_x])
+    if memory[MEMORY.sightings] > 0.0:
         angle = QUARTER * round(angle / QUARTER)
-    angle += memory[WALL]
+    angle += memory[MEMORY.wall]
     return math.cos(angle), math.sin(angle), sure
 
 
@@ -281,34 +308,16 @@ def note_command(
     x, y, grips = command[0], command[1], command[3]
     speed = length_of(x, y)
     if speed > 0.05:
-        memory[HEADING_X], memory[HEADING_Y] = x / speed, y / speed
-    memory[HELD] = 1.0 if grips > 0.5 else 0.0
+        memory[MEMORY.heading_x], memory[MEMORY.heading_y] = x / speed, y / speed
+    memory[MEMORY.held] = HOLDING if grips > 0.5 else OPEN
     if sensed[row.CARRYING_REQUESTED] > 0.5 and grips > -0.5:
-        memory[HELD] = 2.0
+        memory[MEMORY.held] = HOLDING_REQUESTED
 
 
-@kernel
-def steer(memory: NDArray[np.float64], command: NDArray[np.float64]) -> None:
-    """Turn a command (4,) to drive in a direction into a turn and motion ahead or back.
-
-    Of a robot that drives in every direction it stays as it is.
-
-    Args:
-        command: forward and left as if the drive were holonomic; left becomes 0.
-    """
-    widest, speed = memory[WIDEST_TURN], length_of(command[0], command[1])
-    if widest <= 0.0 or speed < 1e-6:
-        return
-    angle = math.atan2(command[1], command[0])
-    forwards = 1.0
-    if abs(angle) > 0.5 * math.pi:
-        # It drives as well backwards, so that it never turns by more than a quarter.
-        angle -= math.copysign(math.pi, angle)
-        forwards = -1.0
-    turn = min(max(angle, -widest), widest)
-    # It drives along its mean direction in the period, and slower the more that is off.
-    command[0] = forwards * speed * max(0.0, math.cos(angle - 0.5 * turn))
-    command[1], command[2] = 0.0, turn / widest
+@inlined_kernel
+def has_failed(memory: NDArray[np.float64]) -> bool:
+    """Return whether a robot met a failure of its own in the last 42 s, and no success since."""
+    return bool(memory[MEMORY.failed] >= 0.5)
 
 
 @kernel
@@ -317,67 +326,8 @@ def turn_back(turn: float, memory: NDArray[np.float64]) -> None:
     if turn == 0.0:
         return
     frame = math.cos(turn), math.sin(turn)
-    for column in (HEADING_X, HOME_X):
-        memory[column], memory[column + 1] = to_frame(frame, memory[column], memory[column + 1])
-    memory[WALL] -= turn
-
-
-# Ranges in m, beside the pick-up range of 0.25: hold lifts the requested item first if in reach.
-_IN_REACH, _OUT_OF_REACH = 0.2, 0.28
-_PUT_DOWN_TIME = 0.5  # [s] before the end, at which the item that was in the way is put down
-
-
-@kernel
-def clear_the_way(
-    sensed: NDArray[np.float32], memory: NDArray[np.float64], command: NDArray[np.float64]
-) -> None:
-    """Replace the command (4,) of a caged robot, which its memory tells."""
-    if memory[CLEARING] <= 0.0:
-        return
-    requested, other = nearest_items(sensed)
-    x, y, speed, gripper = 0.0, 0.0, 0.0, -1.0
-    if sensed[row.CARRYING_REQUESTED] < 0.5 and sensed[row.CARRYING] > 0.5:
-        x, y = memory[HEADING_X], memory[HEADING_Y]
-        if requested >= 0:
-            x, y = -sensed[requested + 1], -sensed[requested + 2]
-        speed = 1.0
-        gripper = 1.0 if memory[CLEARING] > _PUT_DOWN_TIME else -1.0
-    elif sensed[row.CARRYING] < 0.5 and other >= 0:
-        x, y = sensed[other + 1], sensed[other + 2]
-        away = length_of(x, y)
-        speed = min(1.0, 2.0 * away)
-        alone = requested < 0 or (
-            sensed[requested + 1] ** 2 + sensed[requested + 2] ** 2 > _OUT_OF_REACH**2
-        )
-        gripper = 1.0 if alone and away < _IN_REACH else -1.0
-    set_velocity(x, y, speed, gripper, command)
-
-
-@kernel
-def set_velocity(
-    x: float, y: float, speed: float, gripper: float, command: NDArray[np.float64]
-) -> None:
-    """Fill one robot's command (4,): `speed` in the direction (x, y), of any length; no turn."""
-    length = max(length_of(x, y), 1e-9)
-    command[0], command[1] = speed * x / length, speed * y / length
-    command[2], command[3] = 0.0, gripper
-
-
-@kernel
-def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
-    """Return the columns of the nearest requested item in view and of the nearest other; -1: none.
-
-    The nearest thing comes first in a row.
-    """
-    requested, other, nearest = -1, -1, math.inf
-    for index in range(row.N_ITEMS_IN_VIEW):
-        item = row.ITEMS + row.ITEM_WIDTH * index
-        if sensed[item] < 0.5:
-            continue
-        if sensed[item + 3] > 0.5:
-            requested = item if requested < 0 else requested
-        else:
-            away = sensed[item + 1] ** 2 + sensed[item + 2] ** 2
-            if away < nearest:
-                other, nearest = item, away
-    return requested, other
+    heading_x, heading_y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
+    home_x, home_y = memory[MEMORY.home_x], memory[MEMORY.home_y]
+    memory[MEMORY.heading_x], memory[MEMORY.heading_y] = to_frame(frame, heading_x, heading_y)
+    memory[MEMORY.home_x], memory[MEMORY.home_y] = to_frame(frame, home_x, home_y)
+    memory[MEMORY.wall] -= turn

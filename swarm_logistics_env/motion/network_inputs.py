@@ -15,8 +15,15 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import inlined_kernel, kernel, uniform
-from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.memory import length_of, to_frame
+from swarm_logistics_env.motion.memory import (
+    MEMORY,
+    SURELY_IN_VAIN,
+    fading,
+    length_of,
+    remember_observation,
+    remember_row,
+    to_frame,
+)
 
 N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
 WALL_REACH, FAR, NEAR = 0.7, 2.0, 0.5  # [m], where nearness 1 .. 0 ends
@@ -29,11 +36,12 @@ COSINES = np.array([math.cos(turn) for turn in TURNS])
 SINES = np.array([math.sin(turn) for turn in TURNS])
 
 _VECTOR = ("along", "aside")
+_OBSTACLE = ("present", *_VECTOR)
 INPUTS: tuple[str, ...] = (
     *(f"wall_{beam}" for beam in range(row.N_BEAMS)),
     *(f"neighbour_{n}_{part}" for n in range(N_FAR) for part in _VECTOR),
     *(f"near_neighbour_{n}_{part}" for n in range(N_NEAR) for part in _VECTOR),
-    *(f"obstacle_{n}_{part}" for n in range(N_OBSTACLES) for part in ("present", *_VECTOR)),
+    *(f"obstacle_{n}_{part}" for n in range(N_OBSTACLES) for part in _OBSTACLE),
     "requested_present", "requested_along", "requested_aside", "requested_distance",
     "requested_nearness", "requested_recently_held",
     "lead_present", "lead_along", "lead_aside", "lead_distance", "lead_timer",
@@ -53,7 +61,7 @@ LEAD = slice(INPUT.lead_present, INPUT.lead_timer + 1)
 @inlined_kernel
 def beams_turned(memory: NDArray[np.float64]) -> int:
     """Return by how many beams the frame of a robot's motion is turned from its body."""
-    heading = math.atan2(memory[column.HEADING_Y], memory[column.HEADING_X])
+    heading = math.atan2(memory[MEMORY.heading_y], memory[MEMORY.heading_x])
     return round(heading / (2.0 * math.pi / row.N_BEAMS)) % row.N_BEAMS
 
 
@@ -65,7 +73,7 @@ def turn_frames(
     turned: NDArray[np.float64],
 ) -> None:
     """Take what rows tell into the memories; fill how far each frame is turned (N,) [rad]."""
-    column.remember_observation(rows, period, memories)
+    remember_observation(rows, period, memories)
     for robot in range(rows.shape[0]):
         turned[robot] = TURNS[beams_turned(memories[robot])]
 
@@ -87,10 +95,10 @@ def read_observations(
         counts: the decisions of each row before this one (N,).
         listens: whether the lowest timer heard is read; zeros if not.
     """
-    fades = column.fading(period)
+    fades = fading(period)
     for robot in range(rows.shape[0]):
         sensed, memory, read = rows[robot], memories[robot], inputs[robot]
-        kept_home = column.remember_row(sensed, period, fades, memory)
+        kept_home = remember_row(sensed, period, fades, memory)
         beams = beams_turned(memory)
         turned[robot] = TURNS[beams]
         frame = COSINES[beams], SINES[beams]
@@ -100,7 +108,7 @@ def read_observations(
         read_neighbours(sensed, frame, read)
         read_items(sensed, frame, read)
         # The robot that tells the lowest timer may lie: it counts less the more this robot knows.
-        certainty = length_of(memory[column.HOME_X], memory[column.HOME_Y])
+        certainty = length_of(memory[MEMORY.home_x], memory[MEMORY.home_y])
         confidence = math.tanh(certainty)
         read_lead(sensed, frame, 1.0 - confidence, read)
         if not listens:
@@ -136,10 +144,11 @@ def read_neighbours(
         first = INPUT.neighbour_0_along if is_far else INPUT.near_neighbour_0_along
         rank = index if is_far else index - N_FAR
         neighbour = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * rank
-        x, y = float(sensed[neighbour + 1]), float(sensed[neighbour + 2])
+        x = float(sensed[neighbour + row.NEIGHBOUR.x])
+        y = float(sensed[neighbour + row.NEIGHBOUR.y])
         distance = length_of(x, y)
         nearness = max(0.0, 1.0 - distance / reach) / distance if distance > 0.0 else 0.0
-        put(read, first + 2 * rank, nearness, frame, x, y)
+        put(read, first + len(_VECTOR) * rank, nearness, frame, x, y)
 
 
 @kernel
@@ -150,14 +159,16 @@ def read_items(
     carries = sensed[row.CARRYING] > 0.5
     for index in range(N_OBSTACLES):
         item = row.ITEMS + row.ITEM_WIDTH * index
-        present = INPUT.obstacle_0_present + 3 * index
-        read[present] = 1.0 if carries and sensed[item] > 0.5 else 0.0
-        put(read, present + 1, read[present], frame, sensed[item + 1], sensed[item + 2])
+        present = INPUT.obstacle_0_present + len(_OBSTACLE) * index
+        read[present] = 1.0 if carries and sensed[item + row.ITEM.present] > 0.5 else 0.0
+        along = INPUT.obstacle_0_along + len(_OBSTACLE) * index
+        x, y = sensed[item + row.ITEM.x], sensed[item + row.ITEM.y]
+        put(read, along, read[present], frame, x, y)
     read[INPUT.requested_present : INPUT.requested_recently_held + 1] = 0.0
     for index in range(row.N_ITEMS_IN_VIEW):
         item = row.ITEMS + row.ITEM_WIDTH * index
-        if sensed[item] > 0.5 and sensed[item + 3] > 0.5:
-            x, y = float(sensed[item + 1]), float(sensed[item + 2])
+        if sensed[item + row.ITEM.present] > 0.5 and sensed[item + row.ITEM.requested] > 0.5:
+            x, y = float(sensed[item + row.ITEM.x]), float(sensed[item + row.ITEM.y])
             distance = max(length_of(x, y), 1e-9)
             along, aside = to_frame(frame, x, y)
             read[INPUT.requested_present] = 1.0
@@ -165,11 +176,12 @@ def read_items(
             read[INPUT.requested_aside] = aside / distance
             read[INPUT.requested_distance] = distance
             read[INPUT.requested_nearness] = max(0.0, 1.0 - distance / NEAR)
-            read[INPUT.requested_recently_held] = sensed[item + 4]
+            read[INPUT.requested_recently_held] = sensed[item + row.ITEM.recently_held]
             break  # the nearest one comes first
     n_in_view = 0.0
     for index in range(row.N_ITEMS_IN_VIEW):
-        n_in_view += sensed[row.ITEMS + row.ITEM_WIDTH * index]
+        item = row.ITEMS + row.ITEM_WIDTH * index
+        n_in_view += sensed[item + row.ITEM.present]
     read[INPUT.items_in_view] = n_in_view / row.N_ITEMS_IN_VIEW
 
 
@@ -179,13 +191,13 @@ def read_lead(
 ) -> None:
     """Fill the inputs of the lowest timer heard, times `trust`."""
     heard = sensed[row.LOWEST_TIMER] * trust
-    x, y = float(sensed[row.LOWEST_TIMER + 1]), float(sensed[row.LOWEST_TIMER + 2])
+    x, y = float(sensed[row.LOWEST_TIMER_X]), float(sensed[row.LOWEST_TIMER_Y])
     distance = length_of(x, y)
     unit = heard / distance if distance > 0.0 else 0.0
     read[INPUT.lead_present] = heard
     put(read, INPUT.lead_along, unit, frame, x, y)
     read[INPUT.lead_distance] = heard * distance / 4.0
-    read[INPUT.lead_timer] = heard * sensed[row.LOWEST_TIMER + 3] / 10.0
+    read[INPUT.lead_timer] = heard * sensed[row.LOWEST_TIMER_TIME] / 10.0
 
 
 @kernel
@@ -202,16 +214,16 @@ def read_robot(
     read[INPUT.timer_runs] = sensed[row.TIMER_RUNS]
     read[INPUT.timer] = sensed[row.TIMER] / 10.0
     read[INPUT.contact] = sensed[row.CONTACT]
-    velocity_x, velocity_y = sensed[row.VELOCITY], sensed[row.VELOCITY + 1]
+    velocity_x, velocity_y = sensed[row.VELOCITY_X], sensed[row.VELOCITY_Y]
     put(read, INPUT.velocity_along, 0.5, frame, velocity_x, velocity_y)
-    heading_x, heading_y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    heading_x, heading_y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
     put(read, INPUT.heading_along, 1.0, frame, heading_x, heading_y)
     # The heading is at most half a beam aside, so it is doubled to be as large as other inputs.
     read[INPUT.heading_aside] *= 2.0
-    read[INPUT.top_speed] = memory[column.TOP_SPEED] / 2.0
-    read[INPUT.handling_time] = memory[column.HANDLING_TIME] / 2.0
-    read[INPUT.turns_to_drive] = 1.0 if memory[column.WIDEST_TURN] > 0.0 else 0.0
-    read[INPUT.time_to_top_speed] = memory[column.TOP_SPEED] / memory[column.ACCELERATION]
+    read[INPUT.top_speed] = memory[MEMORY.top_speed] / 2.0
+    read[INPUT.handling_time] = memory[MEMORY.handling_time] / 2.0
+    read[INPUT.turns_to_drive] = 1.0 if memory[MEMORY.widest_turn] > 0.0 else 0.0
+    read[INPUT.time_to_top_speed] = memory[MEMORY.top_speed] / memory[MEMORY.acceleration]
 
 
 @kernel
@@ -230,18 +242,18 @@ def read_memory(
         kept_home: see `memory.kept_home`.
     """
     unit = confidence / certainty if certainty > 0.0 else 0.0
-    put(read, INPUT.home_along, unit, frame, memory[column.HOME_X], memory[column.HOME_Y])
+    put(read, INPUT.home_along, unit, frame, memory[MEMORY.home_x], memory[MEMORY.home_y])
     read[INPUT.home_certainty] = math.tanh(certainty / 3.0)
-    read[INPUT.failed], read[INPUT.stuck] = memory[column.FAILED], memory[column.STUCK]
+    read[INPUT.failed], read[INPUT.stuck] = memory[MEMORY.failed], memory[MEMORY.stuck]
     home_x, home_y, sure = kept_home
     kept_certainty = math.tanh(sure)
     put(read, INPUT.kept_home_along, kept_certainty, frame, home_x, home_y)
-    distance = min(max(memory[column.AWAY], -FARTHEST), FARTHEST)
+    distance = min(max(memory[MEMORY.away], -FARTHEST), FARTHEST)
     read[INPUT.kept_home_distance] = kept_certainty * distance / FARTHEST
-    read[INPUT.cannot_deliver] = memory[column.CANNOT_DELIVER]
-    read[INPUT.cannot_lift] = memory[column.CANNOT_LIFT]
-    longest = memory[column.HANDLING_TIME] + column.SURELY_IN_VAIN
-    read[INPUT.delivering_in_vain] = min(1.0, memory[column.DELIVERING] / longest)
+    read[INPUT.cannot_deliver] = memory[MEMORY.cannot_deliver]
+    read[INPUT.cannot_lift] = memory[MEMORY.cannot_lift]
+    longest = memory[MEMORY.handling_time] + SURELY_IN_VAIN
+    read[INPUT.delivering_in_vain] = min(1.0, memory[MEMORY.delivering] / longest)
 
 
 @kernel

@@ -9,36 +9,70 @@ failure of its own leaves requested items to others, and lets go inside the area
 What it leans on: the remembered direction is kept in the robot's own frame, which drifts, so the
 memory fades within ten seconds. Swarm D-T remembers no direction and does not need it. This policy
 commands no turn; a robot of the differential drive turns to where it wants to go, see
-`motion.memory.steer`.
+`motion.steering.steer`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import MotionView, command_own_frames
-from swarm_logistics_env.motion.memory import length_of, set_velocity
+from swarm_logistics_env.motion.memory import MEMORY, has_failed, length_of
 from swarm_logistics_env.motion.network_inputs import random_heading, turn_frames
-from swarm_logistics_env.policies.policy import Scripted
+from swarm_logistics_env.motion.steering import set_velocity
+from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
-# All values are fitted: they were tried for the most deliveries. Gains in top speeds, ranges in m.
-SPREAD_GAIN, SPREAD_RANGE = 0.8, 2.0  # away from neighbours, while searching
-AVOID_GAIN, AVOID_RANGE = 2.0, 0.5  # away from near neighbours, always
-WALL_GAIN, WALL_RANGE, MIRROR_RANGE = 1.5, 0.6, 0.2
-GRIP_RANGE = 0.4
-HOME_SHARE = 0.8  # of a laden robot's direction; the rest is its heading
-SURE = 3.0  # after this many entries, a robot no longer listens to timers
-CLEARANCE, OBSTACLE_RANGE = 0.28, 0.5
 N_DIRECTIONS = 32
+KNOWN = 0.5  # entries lately; with fewer a robot knows no direction home
 LIFT, HOLD, LET_GO = 1.0, 0.0, -1.0  # commands of the gripper
+
+
+class HomingParameters(ScriptParameters):
+    """The gains and ranges of `Homing`. All are fitted: they were tried for the most deliveries."""
+
+    spread_gain: NonNegativeFloat = Field(
+        0.8, description="away from each neighbour while it searches, in top speeds at distance 0"
+    )
+    spread_range: PositiveFloat = Field(2.0, description="where that push has fallen to 0 [m]")
+    avoid_gain: NonNegativeFloat = Field(
+        2.0, description="away from each near neighbour, always, in top speeds at distance 0"
+    )
+    avoid_range: PositiveFloat = Field(0.5, description="where that push has fallen to 0 [m]")
+    wall_gain: NonNegativeFloat = Field(
+        1.5, description="away from the nearest wall while it searches, in top speeds at distance 0"
+    )
+    wall_range: PositiveFloat = Field(0.6, description="where that push has fallen to 0 [m]")
+    mirror_range: NonNegativeFloat = Field(
+        0.2, description="reflects its direction at a wall nearer than this while it searches [m]"
+    )
+    grip_range: NonNegativeFloat = Field(
+        0.4, description="closes its gripper nearer than this to the item that it fetches [m]"
+    )
+    home_share: NonNegativeFloat = Field(
+        0.8, description="of the direction home in a laden robot's, the rest is its heading"
+    )
+    sure: NonNegativeFloat = Field(
+        3.0, description="entries lately, from which on it listens to no timer"
+    )
+    clearance: PositiveFloat = Field(
+        0.28, description="a laden robot's centre from an item that it passes [m]"
+    )
+    obstacle_range: PositiveFloat = Field(
+        0.5, description="how far it looks ahead for items when laden, beyond where they touch [m]"
+    )
+
+
+Parameters = HomingParameters.for_kernels()
 
 
 @kernel
@@ -49,15 +83,19 @@ def act_homing(
     counts: NDArray[np.int64],
     turned: NDArray[np.float64],
     period: float,
+    values: tuple[float, ...],
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4) of a step of `Homing`; memories and counts go on.
 
     One kernel a step, because each call of a kernel costs more than a microsecond.
+
+    Args:
+        values: of the fields of `HomingParameters`.
     """
     turn_frames(rows, period, memories, turned)
     counts += 1
-    decide_homing(rows, memories, keys, counts, period, commands)
+    decide_homing(rows, memories, keys, counts, period, Parameters(*values), commands)
     command_own_frames(commands, turned, rows, memories)
 
 
@@ -68,6 +106,7 @@ def decide_homing(
     keys: NDArray[np.uint64],
     counts: NDArray[np.int64],
     period: float,
+    parameters: HomingParameters,
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4), in the robots' own frames, from rows (N, D) and memories.
@@ -77,29 +116,37 @@ def decide_homing(
     for robot in range(rows.shape[0]):
         observation, memory = rows[robot], memories[robot]
         is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
-        x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
-        push_x, push_y = away_from_neighbours(observation, AVOID_RANGE, AVOID_GAIN)
+        x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
+        push_x, push_y = avoid_neighbours(observation, parameters)
         speed, gripper = 1.0, LET_GO
         if observation[row.CARRYING_REQUESTED] > 0.5:
             # Inside it stands, and lets go only once it takes its delivery for broken.
-            if not is_inside or memory[column.FAILED] < 0.5:
+            if not is_inside or not has_failed(memory):
                 gripper = LIFT
             speed = 0.0 if is_inside and gripper == LIFT else 1.0
-            if memory[column.STUCK] > 0.0:
+            if memory[MEMORY.stuck] > 0.0:
                 angle = random_heading(keys[robot], counts[robot] - 1, period)
                 x, y = math.cos(angle), math.sin(angle)
             elif not is_inside:
-                x, y = home_direction(observation, memory, x, y)
-            x, y = freest_direction(observation, memory, x + push_x, y + push_y)
+                x, y = home_direction(observation, memory, x, y, parameters)
+            x, y = freest_direction(observation, memory, x + push_x, y + push_y, parameters)
         else:
             item = requested_item(observation, memory, is_inside)
             if item >= 0 and observation[row.CARRYING] < 0.5:
-                x, y, speed, gripper = fetch(observation, item, push_x, push_y, period)
+                x, y, speed, gripper = fetch(observation, item, push_x, push_y, period, parameters)
             else:
-                x, y = search_direction(observation, memory, x, y, is_inside)
+                x, y = search_direction(observation, memory, x, y, is_inside, parameters)
                 x, y = x + push_x, y + push_y
                 speed = min(1.0, max(length_of(x, y), 0.3))
         set_velocity(x, y, speed, gripper, commands[robot])
+
+
+@kernel
+def avoid_neighbours(
+    observation: NDArray[np.float32], parameters: HomingParameters
+) -> tuple[float, float]:
+    """Return the push away from near neighbours."""
+    return away_from_neighbours(observation, parameters.avoid_range, parameters.avoid_gain)
 
 
 @kernel
@@ -110,7 +157,7 @@ def away_from_neighbours(
     push_x, push_y = 0.0, 0.0
     for neighbour in range(row.N_NEIGHBOURS):
         start = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * neighbour
-        x, y = observation[start + 1], observation[start + 2]
+        x, y = observation[start + row.NEIGHBOUR.x], observation[start + row.NEIGHBOUR.y]
         distance = length_of(x, y)
         if 0.0 < distance < reach:
             push_x -= (1.0 - distance / reach) * x / distance
@@ -126,12 +173,13 @@ def requested_item(
 
     Not one that a robot inside held itself a moment ago.
     """
-    if memory[column.FAILED] > 0.5:
+    if has_failed(memory):
         return -1
     for item in range(row.N_ITEMS_IN_VIEW):
         start = row.ITEMS + row.ITEM_WIDTH * item
-        is_present, is_requested = observation[start] > 0.5, observation[start + 3] > 0.5
-        was_held_inside = is_inside and observation[start + 4] > 0.5
+        is_present = observation[start + row.ITEM.present] > 0.5
+        is_requested = observation[start + row.ITEM.requested] > 0.5
+        was_held_inside = is_inside and observation[start + row.ITEM.recently_held] > 0.5
         if is_present and is_requested and not was_held_inside:
             return start
     return -1
@@ -139,13 +187,18 @@ def requested_item(
 
 @kernel
 def fetch(
-    observation: NDArray[np.float32], item: int, push_x: float, push_y: float, period: float
+    observation: NDArray[np.float32],
+    item: int,
+    push_x: float,
+    push_y: float,
+    period: float,
+    parameters: HomingParameters,
 ) -> tuple[float, float, float, float]:
     """Return the direction, speed and gripper of a robot on its way to the item in a column."""
-    x, y = observation[item + 1], observation[item + 2]
+    x, y = observation[item + row.ITEM.x], observation[item + row.ITEM.y]
     distance = max(length_of(x, y), 1e-6)
     speed = min(1.0, distance / (2.0 * period))
-    gripper = LIFT if distance < GRIP_RANGE else LET_GO
+    gripper = LIFT if distance < parameters.grip_range else LET_GO
     return x / distance + 0.5 * push_x, y / distance + 0.5 * push_y, speed, gripper
 
 
@@ -156,43 +209,50 @@ def search_direction(
     x: float,
     y: float,
     is_inside: bool,
+    parameters: HomingParameters,
 ) -> tuple[float, float]:
     """Return the direction in which a robot searches that drives in direction (x, y)."""
     walls = observation[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
     nearest = np.argmin(walls)
     wall_x, wall_y = 0.0, 0.0
-    if walls[nearest] < WALL_RANGE:
+    if walls[nearest] < parameters.wall_range:
         angle = 2.0 * math.pi * nearest / row.N_BEAMS
         towards_x, towards_y = math.cos(angle), math.sin(angle)
         approach = x * towards_x + y * towards_y
-        if walls[nearest] < MIRROR_RANGE and approach > 0.0:
+        if walls[nearest] < parameters.mirror_range and approach > 0.0:
             x -= 2.0 * approach * towards_x
             y -= 2.0 * approach * towards_y
-        push = WALL_GAIN * (1.0 - walls[nearest] / WALL_RANGE)
+        push = parameters.wall_gain * (1.0 - walls[nearest] / parameters.wall_range)
         wall_x, wall_y = -push * towards_x, -push * towards_y
-    spread_x, spread_y = away_from_neighbours(observation, SPREAD_RANGE, SPREAD_GAIN)
+    reach, gain = parameters.spread_range, parameters.spread_gain
+    spread_x, spread_y = away_from_neighbours(observation, reach, gain)
     x += wall_x + spread_x
     y += wall_y + spread_y
-    home = length_of(memory[column.HOME_X], memory[column.HOME_Y])
-    if is_inside and home > 0.5:
-        x -= memory[column.HOME_X] / home
-        y -= memory[column.HOME_Y] / home
+    home = length_of(memory[MEMORY.home_x], memory[MEMORY.home_y])
+    if is_inside and home > KNOWN:
+        x -= memory[MEMORY.home_x] / home
+        y -= memory[MEMORY.home_y] / home
     return x, y
 
 
 @kernel
 def home_direction(
-    observation: NDArray[np.float32], memory: NDArray[np.float64], x: float, y: float
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    x: float,
+    y: float,
+    parameters: HomingParameters,
 ) -> tuple[float, float]:
     """Return the direction in which a laden robot goes that drives in direction (x, y)."""
-    home = length_of(memory[column.HOME_X], memory[column.HOME_Y])
+    home = length_of(memory[MEMORY.home_x], memory[MEMORY.home_y])
     trust = 1.0
-    if home > 0.5:
-        x = HOME_SHARE * memory[column.HOME_X] / home + (1.0 - HOME_SHARE) * x
-        y = HOME_SHARE * memory[column.HOME_Y] / home + (1.0 - HOME_SHARE) * y
-        trust = 1.0 / home if home < SURE else 0.0
+    if home > KNOWN:
+        share = parameters.home_share
+        x = share * memory[MEMORY.home_x] / home + (1.0 - share) * x
+        y = share * memory[MEMORY.home_y] / home + (1.0 - share) * y
+        trust = 1.0 / home if home < parameters.sure else 0.0
     if observation[row.LOWEST_TIMER] > 0.5:
-        lead_x, lead_y = observation[row.LOWEST_TIMER + 1], observation[row.LOWEST_TIMER + 2]
+        lead_x, lead_y = observation[row.LOWEST_TIMER_X], observation[row.LOWEST_TIMER_Y]
         distance = length_of(lead_x, lead_y)
         if distance > 0.0:
             x += trust * lead_x / distance
@@ -202,7 +262,11 @@ def home_direction(
 
 @kernel
 def freest_direction(
-    observation: NDArray[np.float32], memory: NDArray[np.float64], x: float, y: float
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    x: float,
+    y: float,
+    parameters: HomingParameters,
 ) -> tuple[float, float]:
     """Return the direction that is nearest to (x, y) and meets no item or wall."""
     length = max(length_of(x, y), 1e-9)
@@ -212,16 +276,17 @@ def freest_direction(
         angle = 2.0 * math.pi * direction / N_DIRECTIONS
         go_x, go_y = math.cos(angle), math.sin(angle)
         worth = go_x * x + go_y * y
-        worth += 0.3 * (go_x * memory[column.HEADING_X] + go_y * memory[column.HEADING_Y])
+        worth += 0.3 * (go_x * memory[MEMORY.heading_x] + go_y * memory[MEMORY.heading_y])
         for item in range(row.N_ITEMS_IN_VIEW):
             start = row.ITEMS + row.ITEM_WIDTH * item
-            if observation[start] < 0.5:
+            if observation[start + row.ITEM.present] < 0.5:
                 break
-            along = observation[start + 1] * go_x + observation[start + 2] * go_y
-            aside = abs(observation[start + 1] * go_y - observation[start + 2] * go_x)
-            if aside < CLEARANCE and 0.0 < along < OBSTACLE_RANGE + 0.25:
-                near = 1.0 - max(0.0, along - 0.25) / OBSTACLE_RANGE
-                worth -= 2.0 * near * min(1.0, (CLEARANCE - aside) / 0.05)
+            item_x, item_y = observation[start + row.ITEM.x], observation[start + row.ITEM.y]
+            along = item_x * go_x + item_y * go_y
+            aside = abs(item_x * go_y - item_y * go_x)
+            if aside < parameters.clearance and 0.0 < along < parameters.obstacle_range + 0.25:
+                near = 1.0 - max(0.0, along - 0.25) / parameters.obstacle_range
+                worth -= 2.0 * near * min(1.0, (parameters.clearance - aside) / 0.05)
         beam = direction // 2
         wall = observation[row.RANGE_WALLS + beam]
         if direction % 2:  # between two beams
@@ -236,6 +301,11 @@ def freest_direction(
 class Homing(Scripted):
     """Every robot remembers for some ten seconds where it last entered the delivery area.
 
+    Its keyword arguments are the fields of `HomingParameters`.
+
+    Raises:
+        PolicyError: a parameter is unknown or out of range.
+
     Example:
         >>> policy = Homing()
         >>> policy.reset(n_robots=3, seed=0)
@@ -243,8 +313,13 @@ class Homing(Scripted):
         (3, 4)
     """
 
+    parameters_type = HomingParameters
+    parameters: HomingParameters
+    _fill_commands: ClassVar[Callable[..., None]] = staticmethod(act_homing)
+
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: the control period."""
+        self._values = self.parameters.values()
         self._period = scenario.control_period
         self._frame = MotionView(scenario)
 
@@ -260,11 +335,9 @@ class Homing(Scripted):
         """
         self._frame.check(observations)
         commands = np.empty((len(observations), 4))
-        self._fill(observations, commands)
-        return commands
-
-    def _fill(self, observations: NDArray[np.float32], commands: NDArray[np.float64]) -> None:
-        """Fill the commands (N, 4) of the robots' next step."""
         frame = self._frame
-        memory, keys, counts, turned = frame.memory, frame.keys, frame.counts, frame.turned
-        act_homing(observations, memory, keys, counts, turned, self._period, commands)
+        self._fill_commands(
+            observations, frame.memory, frame.keys, frame.counts, frame.turned, self._period,
+            self._values, commands,
+        )  # fmt: skip
+        return commands

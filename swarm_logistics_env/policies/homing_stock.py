@@ -28,24 +28,23 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, ValidationInfo, field_validator
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
-from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import command_own_frames
-from swarm_logistics_env.motion.memory import length_of, set_velocity
+from swarm_logistics_env.motion.memory import MEMORY, has_failed, kept_home, length_of
 from swarm_logistics_env.motion.network_inputs import (
     RANDOM_HEADING_TIME,
     random_heading,
     random_heading_number,
     turn_frames,
 )
+from swarm_logistics_env.motion.steering import set_velocity
 from swarm_logistics_env.policies.homing import (
-    AVOID_GAIN,
-    AVOID_RANGE,
     HOLD,
     LET_GO,
     LIFT,
     Homing,
+    HomingParameters,
+    avoid_neighbours,
     away_from_neighbours,
     fetch,
     freest_direction,
@@ -53,7 +52,6 @@ from swarm_logistics_env.policies.homing import (
     requested_item,
     search_direction,
 )
-from swarm_logistics_env.records import Record
 
 # Lengths in m; distances from the delivery area are as a robot reckons them.
 ROLE_TIME = 40.0  # [s]
@@ -66,9 +64,30 @@ SPREAD_GAIN, SPREAD_RANGE = 0.3, 1.5  # along the border, away from neighbours
 LOST = 0.8  # that a reckoned distance may be wrong
 LEAST_CERTAINTY = 0.3  # of a direction home that was taken once, after 72 s
 STUCK = 0.4  # a robot tries a random direction until the memory's 1 has fallen to this
+TRIES_AGAIN = 0.5  # of `cannot_deliver`: below it a robot holds items inside again
 PULL = 0.4  # home, beside a random direction of length 1
 
 
+class HomingStockParameters(HomingParameters):
+    """Those of `Homing`, and the distances of `HomingStock`, both fitted, see above."""
+
+    near: PositiveFloat = Field(
+        0.8, description="robots put items down nearer to the area than this [m]; fitted"
+    )
+    far: PositiveFloat = Field(
+        1.2, description="robots that stock lift items farther from it than this [m]; fitted"
+    )
+
+    @field_validator("far")
+    @classmethod
+    def _check_far(cls, far: float, about: ValidationInfo) -> float:
+        near = about.data.get("near", far)
+        if far < near:
+            raise ValueError(f"should be at least near = {near:g} [m]")
+        return far
+
+
+Parameters = HomingStockParameters.for_kernels()
 Home: TypeAlias = tuple[float, float, float]  # the direction, and how often it was taken lately
 Push: TypeAlias = tuple[float, float]  # away from near neighbours
 Motion: TypeAlias = tuple[float, float, float, float]  # direction (x, y), speed, gripper
@@ -82,14 +101,13 @@ def act_homing_stock(
     counts: NDArray[np.int64],
     turned: NDArray[np.float64],
     period: float,
-    near: float,
-    far: float,
+    values: tuple[float, ...],
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4) of a step of `HomingStock`, see `act_homing`."""
     turn_frames(rows, period, memories, turned)
     counts += 1
-    decide_homing_stock(rows, memories, keys, counts, period, near, far, commands)
+    decide_homing_stock(rows, memories, keys, counts, period, Parameters(*values), commands)
     command_own_frames(commands, turned, rows, memories)
 
 
@@ -100,40 +118,39 @@ def decide_homing_stock(
     keys: NDArray[np.uint64],
     counts: NDArray[np.int64],
     period: float,
-    near: float,
-    far: float,
+    parameters: HomingStockParameters,
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill the commands (N, 4) from rows (N, D), memories and counts, see `decide_homing`.
-
-    Args:
-        near, far: as `HomingStock` has them.
-    """
+    """Fill the commands (N, 4) from rows (N, D), memories and counts, see `decide_homing`."""
     for robot in range(rows.shape[0]):
         observation, memory = rows[robot], memories[robot]
         is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
         carries = observation[row.CARRYING] > 0.5
         carries_requested = observation[row.CARRYING_REQUESTED] > 0.5
         role = role_of(keys[robot], random_heading_number(counts[robot] - 1, period))
-        holds = role < HOLDERS and memory[column.CANNOT_DELIVER] < 0.5
+        holds = role < HOLDERS and memory[MEMORY.cannot_deliver] < TRIES_AGAIN
         forget_if_lost(memory, is_inside)
-        home = column.kept_home(memory)
+        home = kept_home(memory)
         if home[2] < LEAST_CERTAINTY:
             home = 0.0, 0.0, 0.0
-        push = away_from_neighbours(observation, AVOID_RANGE, AVOID_GAIN)
+        push = avoid_neighbours(observation, parameters)
         # A robot stands in the area to deliver: that is not to be stuck.
-        is_stuck = memory[column.STUCK] > STUCK and not (is_inside and carries_requested)
+        is_stuck = memory[MEMORY.stuck] > STUCK and not (is_inside and carries_requested)
         if carries and is_stuck:
             angle = random_heading(keys[robot], counts[robot] - 1, period)
-            motion = break_free(observation, memory, home, push, angle)
+            motion = break_free(observation, memory, home, push, angle, parameters)
         elif carries_requested:
-            motion = drive_home(observation, memory, home, push, is_inside)
+            motion = drive_home(observation, memory, home, push, is_inside, parameters)
         elif carries:
-            motion = carry_stock(observation, memory, home, push, is_inside, holds, period, near)
+            motion = carry_stock(
+                observation, memory, home, push, is_inside, holds, period, parameters
+            )
         else:
             stocks = holds or role > HOLDERS
-            least = 0.0 if holds else far
-            motion = search_items(observation, memory, home, push, is_inside, stocks, least, period)
+            least = 0.0 if holds else parameters.far
+            motion = search_items(
+                observation, memory, home, push, is_inside, stocks, least, period, parameters
+            )
         x, y, speed, gripper = motion
         set_velocity(x, y, speed, gripper, commands[robot])
 
@@ -156,10 +173,11 @@ def break_free(
     home: Home,
     push: Push,
     angle: float,
+    parameters: HomingStockParameters,
 ) -> Motion:
     """Return the motion of a laden robot that is stuck: in a random direction, not from home."""
     x, y = math.cos(angle) + PULL * home[0], math.sin(angle) + PULL * home[1]
-    x, y = freest_direction(observation, memory, x + push[0], y + push[1])
+    x, y = freest_direction(observation, memory, x + push[0], y + push[1], parameters)
     return x, y, 1.0, HOLD
 
 
@@ -170,19 +188,20 @@ def drive_home(
     home: Home,
     push: Push,
     is_inside: bool,
+    parameters: HomingStockParameters,
 ) -> Motion:
     """Return the motion of a robot with the requested item: home, and to a stand inside."""
     home_x, home_y, certainty = home
-    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
     # Inside it lets go only once it takes its delivery for broken.
-    lets_go = is_inside and memory[column.FAILED] >= 0.5
+    lets_go = is_inside and has_failed(memory)
     gripper = LET_GO if lets_go else LIFT
     speed = 0.0 if is_inside and not lets_go else 1.0
     if not is_inside and certainty > 0.0:
         x, y = home_x, home_y
     elif not is_inside:
-        x, y = home_direction(observation, memory, x, y)
-    x, y = freest_direction(observation, memory, x + push[0], y + push[1])
+        x, y = home_direction(observation, memory, x, y, parameters)
+    x, y = freest_direction(observation, memory, x + push[0], y + push[1], parameters)
     return x, y, speed, gripper
 
 
@@ -195,27 +214,27 @@ def carry_stock(
     is_inside: bool,
     holds: bool,
     period: float,
-    near: float,
+    parameters: HomingStockParameters,
 ) -> Motion:
     """Return the motion of a robot with an item that nobody asks for: to hold or to stock it."""
     home_x, home_y, certainty = home
-    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
     item = requested_item(observation, memory, False)
     if item >= 0:  # it lets go outside, and lifts that one
-        return observation[item + 1], observation[item + 2], 1.0, LET_GO
+        return observation[item + row.ITEM.x], observation[item + row.ITEM.y], 1.0, LET_GO
     if certainty == 0.0:
-        x, y = search_direction(observation, memory, x, y, is_inside)
+        x, y = search_direction(observation, memory, x, y, is_inside, parameters)
         return x, y, 1.0, LET_GO
-    if not holds and is_gap(observation, memory, is_inside, near):
+    if not holds and is_gap(observation, memory, is_inside, parameters):
         return x, y, 1.0, LET_GO
     if not holds and (is_inside or x * home_x + y * home_y < -0.3):
-        gripper = LET_GO if memory[column.AWAY] > CARRIED_OFF else HOLD
-        x, y = freest_direction(observation, memory, push[0] - home_x, push[1] - home_y)
+        gripper = LET_GO if memory[MEMORY.away] > CARRIED_OFF else HOLD
+        x, y = freest_direction(observation, memory, push[0] - home_x, push[1] - home_y, parameters)
         return x, y, 1.0, gripper
     x, y = hold_direction(observation, memory, home_x, home_y, is_inside, period)
     if is_inside:
         return x, y, min(1.0, length_of(x, y)), HOLD
-    x, y = freest_direction(observation, memory, x + push[0], y + push[1])
+    x, y = freest_direction(observation, memory, x + push[0], y + push[1], parameters)
     return x, y, 1.0, HOLD
 
 
@@ -229,6 +248,7 @@ def search_items(
     stocks: bool,
     least: float,
     period: float,
+    parameters: HomingStockParameters,
 ) -> Motion:
     """Return the motion of an unladen robot: to an item in view, or on its search.
 
@@ -237,16 +257,16 @@ def search_items(
     """
     home_x, home_y, certainty = home
     item = requested_item(observation, memory, False)
-    if item >= 0 and is_inside and observation[item + 4] > 0.5:
+    if item >= 0 and is_inside and observation[item + row.ITEM.recently_held] > 0.5:
         item = -1  # it could not deliver it
-    if item < 0 and stocks and certainty > 0.0 and memory[column.CANNOT_LIFT] <= 0.0:
+    if item < 0 and stocks and certainty > 0.0 and memory[MEMORY.cannot_lift] <= 0.0:
         item = item_to_stock(observation, memory, home_x, home_y, least)
     if item >= 0:
-        return fetch(observation, item, push[0], push[1], period)
-    x, y = memory[column.HEADING_X], memory[column.HEADING_Y]
+        return fetch(observation, item, push[0], push[1], period, parameters)
+    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
     if certainty == 0.0 and observation[row.LOWEST_TIMER] > 0.5:
-        x, y = home_direction(observation, memory, x, y)
-    x, y = search_direction(observation, memory, x, y, is_inside)
+        x, y = home_direction(observation, memory, x, y, parameters)
+    x, y = search_direction(observation, memory, x, y, is_inside, parameters)
     x, y = x + push[0], y + push[1]
     return x, y, min(1.0, max(length_of(x, y), 0.3)), LET_GO
 
@@ -254,23 +274,26 @@ def search_items(
 @kernel
 def forget_if_lost(memory: NDArray[np.float64], is_inside: bool) -> None:
     """Forget the kept direction home if the distance reckoned with it cannot be."""
-    is_lost = memory[column.AWAY] > LOST if is_inside else memory[column.AWAY] < -LOST
+    is_lost = memory[MEMORY.away] > LOST if is_inside else memory[MEMORY.away] < -LOST
     if is_lost:
-        memory[column.KEPT_X], memory[column.KEPT_Y], memory[column.AWAY] = 0.0, 0.0, 0.0
+        memory[MEMORY.kept_x], memory[MEMORY.kept_y], memory[MEMORY.away] = 0.0, 0.0, 0.0
 
 
 @kernel
 def is_gap(
-    observation: NDArray[np.float32], memory: NDArray[np.float64], is_inside: bool, near: float
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    is_inside: bool,
+    parameters: HomingStockParameters,
 ) -> bool:
-    """Return whether an item may be put down here for stock: `near` the area, amid no others.
+    """Return whether an item may be put down here for stock: near the area, amid no others.
 
     The nearest item comes first in a row.
     """
-    if is_inside or memory[column.AWAY] >= near:
+    if is_inside or memory[MEMORY.away] >= parameters.near:
         return False
-    x, y = observation[row.ITEMS + 1], observation[row.ITEMS + 2]
-    return bool(observation[row.ITEMS] < 0.5 or length_of(x, y) > ITEM_SPACING)
+    x, y = observation[row.ITEMS + row.ITEM.x], observation[row.ITEMS + row.ITEM.y]
+    return bool(observation[row.ITEMS + row.ITEM.present] < 0.5 or length_of(x, y) > ITEM_SPACING)
 
 
 @kernel
@@ -284,7 +307,7 @@ def hold_direction(
 ) -> tuple[float, float]:
     """Return the velocity, in top speeds, to where a robot holds its item inside the area."""
     least = -1.0 if is_inside else 0.5
-    deeper = max(least, min(1.0, (memory[column.AWAY] + DEPTH) / (2.0 * period)))
+    deeper = max(least, min(1.0, (memory[MEMORY.away] + DEPTH) / (2.0 * period)))
     far_x, far_y = away_from_neighbours(observation, SPREAD_RANGE, 1.0)
     aside = max(-0.7, min(0.7, SPREAD_GAIN * (home_x * far_y - home_y * far_x)))
     return deeper * home_x - aside * home_y, deeper * home_y + aside * home_x
@@ -301,34 +324,13 @@ def item_to_stock(
     """Return the column of the nearest item farther than `least` [m] from the area; -1: none."""
     for item in range(row.N_ITEMS_IN_VIEW):
         start = row.ITEMS + row.ITEM_WIDTH * item
-        if observation[start] < 0.5:
+        if observation[start + row.ITEM.present] < 0.5:
             break
-        x, y = observation[start + 1], observation[start + 2]
-        distance = memory[column.AWAY] - x * home_x - y * home_y
-        if observation[start + 4] < 0.5 and distance > least:
+        x, y = observation[start + row.ITEM.x], observation[start + row.ITEM.y]
+        distance = memory[MEMORY.away] - x * home_x - y * home_y
+        if observation[start + row.ITEM.recently_held] < 0.5 and distance > least:
             return start
     return -1
-
-
-class HomingStockParameters(Record):
-    """The distances of `HomingStock`, both fitted, see above."""
-
-    error_type = PolicyError
-
-    near: PositiveFloat = Field(
-        0.8, description="robots put items down nearer to the area than this [m]; fitted"
-    )
-    far: PositiveFloat = Field(
-        1.2, description="robots that stock lift items farther from it than this [m]; fitted"
-    )
-
-    @field_validator("far")
-    @classmethod
-    def _check_far(cls, far: float, about: ValidationInfo) -> float:
-        near = about.data.get("near", far)
-        if far < near:
-            raise ValueError(f"should be at least near = {near:g} [m]")
-        return far
 
 
 class HomingStock(Homing):
@@ -349,9 +351,4 @@ class HomingStock(Homing):
     parameters_type = HomingStockParameters
     parameters: HomingStockParameters
 
-    def _fill(self, observations: NDArray[np.float32], commands: NDArray[np.float64]) -> None:
-        frame, parameters = self._frame, self.parameters
-        act_homing_stock(
-            observations, frame.memory, frame.keys, frame.counts, frame.turned, self._period,
-            parameters.near, parameters.far, commands,
-        )  # fmt: skip
+    _fill_commands = staticmethod(act_homing_stock)

@@ -8,9 +8,9 @@ from __future__ import annotations
 import hashlib
 import html
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,6 +150,7 @@ class LearnedParameters(_Part):
 
 
 STREAM = "trained policy"
+PlaySteps: TypeAlias = Callable[[int, NDArray[np.float32], NDArray[np.float64]], tuple[int, bool]]
 
 
 class LearnedPolicy(Described):
@@ -233,13 +234,22 @@ class LearnedPolicy(Described):
         self._n_steps += 1
         return commands
 
-    def play_steps(
+    @property
+    def play_steps(self) -> PlaySteps | None:
+        """What acts in a world as `act` and `Warehouse.step` do, many steps in one call.
+
+        None where a subclass or somebody's own `act` may decide otherwise.
+        """
+        is_replaced = type(self) is not LearnedPolicy or "act" in vars(self)
+        return None if is_replaced else self._play_steps
+
+    def _play_steps(
         self,
         world_address: int,
         observations: NDArray[np.float32],
         positions: NDArray[np.float64],
     ) -> tuple[int, bool]:
-        """Act in a world, step by step as `act` and `Warehouse.step` do, within one call.
+        """Play steps, see `play_steps`.
 
         Args:
             world_address: `Warehouse.address`; the caller has to `take` the last step.

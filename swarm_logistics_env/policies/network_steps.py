@@ -66,7 +66,7 @@ def play_at(
     rows: NDArray[np.float32],
     positions: NDArray[np.float64],
 ) -> tuple[int, bool]:
-    """Play steps in a world, see `LearnedPolicy.play_steps`.
+    """Play steps in a world, see `LearnedPolicy._play_steps`.
 
     Args:
         n_before: steps since the reset of the policy.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import html
 import sys
-from collections.abc import Iterable, Iterator
+from collections import namedtuple
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,8 @@ class Policy(Protocol):
       as its control period;
     * `wrap(env)`: returns wrappers around `env`, an environment: what the policy senses and how it
       commands, if not by rows and commands of the warehouse (see `policies.within`);
+    * `play_steps(world_address, rows, positions)`: plays many steps in one call, as
+      `LearnedPolicy.play_steps` does; None where `act` has to be called for each;
     * `identity`: text that names everything its behaviour depends on (see `identity`).
     """
 
@@ -70,10 +73,27 @@ class Described:
         return f"<b>{html.escape(repr(self))}</b><br>{html.escape(' '.join(about.split()))}"
 
 
-class NoParameters(Record):
-    """The parameters of a policy that has none."""
+class ScriptParameters(Record):
+    """The parameters of a script, each with its unit and its meaning. This one has none.
+
+    Compiled code reads them by the same names, see `for_kernels`.
+    """
 
     error_type = PolicyError
+
+    @classmethod
+    def for_kernels(cls) -> Callable[..., Self]:
+        """Return what makes a NamedTuple with the fields of this record, in their order.
+
+        Kernels take no record; their annotations say the record, as mypy knows its fields. The
+        kernel that Python calls takes the plain `values` and names them: numba looks at each field
+        of a tuple with names, which takes a microsecond.
+        """
+        return cast("Callable[..., Self]", namedtuple(cls.__name__, cls.model_fields))
+
+    def values(self) -> tuple[Any, ...]:
+        """Return the values of the fields, in their order."""
+        return tuple(dict(self).values())
 
 
 class Scripted(Described):
@@ -88,7 +108,7 @@ class Scripted(Described):
         PolicyError: a parameter is unknown or out of range.
     """
 
-    parameters_type: ClassVar[type[Record]] = NoParameters
+    parameters_type: ClassVar[type[ScriptParameters]] = ScriptParameters
     parameters: Any  # of that type, as subclasses declare
 
     def __init__(self, **parameters: Any) -> None:

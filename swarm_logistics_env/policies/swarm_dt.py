@@ -21,13 +21,12 @@ from pydantic import Field, NonNegativeFloat
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.errors import PolicyError
 from swarm_logistics_env.kernels import kernel, uniform
-from swarm_logistics_env.policies.policy import Scripted
-from swarm_logistics_env.records import Record
+from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
 
 
-class SwarmDTParameters(Record):
+class SwarmDTParameters(ScriptParameters):
     """The constants of Swarm D-T.
 
     Where a description ends with "fitted", the default is of the fit `shipped` of
@@ -35,8 +34,6 @@ class SwarmDTParameters(Record):
     the paper's author, which draws the noise of the heading and the drop both once a step.
     `CONSTANTS_2026` are those before, which were fitted by hand to all of the paper's tables.
     """
-
-    error_type = PolicyError
 
     diffusion: NonNegativeFloat = Field(
         0.07057, description="of the stored heading [rad^2/s]; fitted"
@@ -86,28 +83,21 @@ CONSTANTS_2026 = {
 }
 
 
+Parameters = SwarmDTParameters.for_kernels()
+
+
 class StepConstants(NamedTuple):
-    """The parameters for one control period, as compiled code reads them.
+    """What follows from parameters and the robot's body for one control period.
 
     Attributes:
-        widest_turn: the largest turn of the stored heading by diffusion [rad].
+        turn_by_diffusion: the largest turn of the stored heading [rad].
         drop_probability: the probability to drop an item that is not requested.
-        avoidance_gain, avoidance_range, item_avoidance_gain, item_avoidance_range, wall_distance,
-            taxis_gain, heading_follows, full_speed: the parameters of these names.
-        widest_step: the largest turn of a differential robot's body [rad]; 0 if it is holonomic.
+        turn_of_body: the largest turn of a differential robot's body [rad]; 0 if it is holonomic.
     """
 
-    widest_turn: float
+    turn_by_diffusion: float
     drop_probability: float
-    avoidance_gain: float
-    avoidance_range: float
-    item_avoidance_gain: float
-    item_avoidance_range: float
-    wall_distance: float
-    taxis_gain: float
-    heading_follows: bool
-    full_speed: bool
-    widest_step: float
+    turn_of_body: float
 
 
 class SwarmDT(Scripted):
@@ -130,14 +120,15 @@ class SwarmDT(Scripted):
 
     def configure(self, scenario: Scenario) -> None:
         """Take what the maker of a robot knows: its control period and its drive."""
-        parameters, period = self.parameters, scenario.control_period
+        parameters = self.parameters
+        period = scenario.control_period
         is_differential = scenario.drive == "differential"
         self._constants = StepConstants(
-            widest_turn=math.sqrt(3.0 * parameters.diffusion * period),
+            turn_by_diffusion=math.sqrt(3.0 * parameters.diffusion * period),
             drop_probability=-math.expm1(-parameters.drop_rate * period),
-            widest_step=scenario.max_turn_rate * period if is_differential else 0.0,
-            **parameters.model_dump(exclude={"diffusion", "drop_rate"}),
+            turn_of_body=scenario.max_turn_rate * period if is_differential else 0.0,
         )
+        self._values = parameters.values()
 
     def reset(self, n_robots: int, seed: int) -> None:
         """Begin an episode with random stored headings."""
@@ -157,6 +148,7 @@ class SwarmDT(Scripted):
             observations,
             self._keys,
             self._step,
+            self._values,
             self._constants,
             self._heading,
             commands,
@@ -170,11 +162,17 @@ def decide_swarm_dt(
     observations: NDArray[np.float32],
     keys: NDArray[np.uint64],
     step: int,
+    values: tuple[float, ...],
     constants: StepConstants,
     heading: NDArray[np.float64],
     commands: NDArray[np.float64],
 ) -> None:
-    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading."""
+    """Fill each robot's command (N, 4) from its own row, its own stream and stored heading.
+
+    Args:
+        values: of the fields of `SwarmDTParameters`.
+    """
+    parameters = Parameters(*values)
     for robot in range(observations.shape[0]):
         observation = observations[robot]
         carries = observation[row.CARRYING] > 0.5
@@ -183,12 +181,12 @@ def decide_swarm_dt(
         if math.isnan(heading[robot]):
             heading[robot] = (2.0 * uniform(keys[robot], 0) - 1.0) * math.pi
         share = 2.0 * uniform(keys[robot], 2 * step + 1) - 1.0
-        heading[robot] += constants.widest_turn * share
+        heading[robot] += constants.turn_by_diffusion * share
         x, y = math.cos(heading[robot]), math.sin(heading[robot])
 
         walls = observation[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
         nearest = np.argmin(walls)
-        if walls[nearest] < constants.wall_distance:
+        if walls[nearest] < parameters.wall_distance:
             towards = 2.0 * math.pi * nearest / row.N_BEAMS
             wall_x, wall_y = math.cos(towards), math.sin(towards)
             approach = x * wall_x + y * wall_y
@@ -197,37 +195,37 @@ def decide_swarm_dt(
                 y -= 2.0 * approach * wall_y
                 heading[robot] = math.atan2(y, x)
 
-        gain, reach = constants.avoidance_gain, constants.avoidance_range
+        gain, reach = parameters.avoidance_gain, parameters.avoidance_range
         push_x, push_y = avoid(observation, row.NEIGHBOURS, row.N_NEIGHBOURS, gain, reach)
         x += push_x
         y += push_y
         if carries:
-            gain, reach = constants.item_avoidance_gain, constants.item_avoidance_range
+            gain, reach = parameters.item_avoidance_gain, parameters.item_avoidance_range
             push_x, push_y = avoid(observation, row.ITEMS, row.N_ITEMS_IN_VIEW, gain, reach)
             x += push_x
             y += push_y
         if delivers and observation[row.LOWEST_TIMER] > 0.5:
-            lead_x, lead_y = observation[row.LOWEST_TIMER + 1], observation[row.LOWEST_TIMER + 2]
+            lead_x, lead_y = observation[row.LOWEST_TIMER_X], observation[row.LOWEST_TIMER_Y]
             distance = math.sqrt(lead_x * lead_x + lead_y * lead_y)
             if distance > 0.0:
-                x += constants.taxis_gain * lead_x / distance
-                y += constants.taxis_gain * lead_y / distance
-        if constants.heading_follows:
+                x += parameters.taxis_gain * lead_x / distance
+                y += parameters.taxis_gain * lead_y / distance
+        if parameters.heading_follows:
             heading[robot] = math.atan2(y, x)
 
         length = math.sqrt(x * x + y * y)
-        norm = length if constants.full_speed and length > 0.0 else max(length, 1.0)
+        norm = length if parameters.full_speed and length > 0.0 else max(length, 1.0)
         commands[robot, 0] = x / norm
         commands[robot, 1] = y / norm
         commands[robot, 2] = 0.0
-        if constants.widest_step > 0.0:
+        if constants.turn_of_body > 0.0:
             # It turns towards where it wants to go and drives as far as it then faces that way;
             # the stored heading is kept in the robot's frame, so it turns back by as much.
             direction, speed = math.atan2(y, x), math.sqrt(x * x + y * y) / norm
-            turn = min(max(direction, -constants.widest_step), constants.widest_step)
+            turn = min(max(direction, -constants.turn_of_body), constants.turn_of_body)
             commands[robot, 0] = speed * max(math.cos(direction - turn), 0.0)
             commands[robot, 1] = 0.0
-            commands[robot, 2] = turn / constants.widest_step
+            commands[robot, 2] = turn / constants.turn_of_body
             heading[robot] -= turn
         lets_go = (
             carries
@@ -244,10 +242,11 @@ def avoid(
     """Return the push away from the things in a block of (present, x, y, ..) columns."""
     push_x, push_y = 0.0, 0.0
     for number in range(count):
-        column = first + row.ITEM_WIDTH * number  # neighbours are as wide
-        if observation[column] < 0.5:
+        # A neighbour is as wide, and begins with the same columns.
+        column = first + row.ITEM_WIDTH * number
+        if observation[column + row.ITEM.present] < 0.5:
             break
-        x, y = observation[column + 1], observation[column + 2]
+        x, y = observation[column + row.ITEM.x], observation[column + row.ITEM.y]
         distance = math.sqrt(x * x + y * y)
         if distance >= reach:
             break

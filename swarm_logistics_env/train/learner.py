@@ -1,8 +1,6 @@
 """The learner: stable-baselines3's PPO, its networks, and the checkpoints it goes on from.
 
-The value network reads more than a robot can sense, such as where the requested item is: it judges
-while the policy learns and is not shipped (an asymmetric critic, Pinto et al. 2018). The network
-that decides never sees this.
+The value network reads more than a robot can sense, see `privileged`.
 """
 
 from __future__ import annotations
@@ -10,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import inspect
 import io
-import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,81 +23,14 @@ from stable_baselines3.common.torch_layers import create_mlp
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from swarm_logistics_env.errors import TrainingError
-from swarm_logistics_env.kernels import engine_kernel, kernel
 from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.motion.memory import body_of, length_of, to_frame
+from swarm_logistics_env.motion.memory import body_of
 from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.records import atomic_write
 from swarm_logistics_env.streams import key, row_keys
+from swarm_logistics_env.train.privileged import PRIVILEGED, fill_privileged
 from swarm_logistics_env.train.training import Training, make_worlds
-from swarm_logistics_env.warehouse.addresses import unpacked_at
-from swarm_logistics_env.warehouse.structs import NOBODY, World
-
-# Lengths are in units of 10 m; directions are in the frame of the robot's motion.
-PRIVILEGED = (
-    "to_delivery", "y", "frame_cos", "frame_sin", "drift", "swarm_size",
-    "lifts", "delivers",
-    "requested_along", "requested_aside", "requested_distance", "requested_nearness",
-    "is_carried", "carrier_to_delivery", "carrier_delivers",
-)  # fmt: skip
-
-
-@engine_kernel
-def fill_privileged(
-    address: int,
-    turned: NDArray[np.float64],
-    to_delivery: NDArray[np.float64],
-    privileged: NDArray[np.float32],
-) -> None:
-    """Fill `privileged` (rows, len(PRIVILEGED)); rows without a robot stay as they are.
-
-    Args:
-        address: of the world (`Warehouse.address`).
-        turned: how far each row's frame is turned from its robot's body (rows,) [rad].
-        to_delivery: the way of each robot to the nearest dock, in one less than 0 (N,) [m].
-    """
-    world = unpacked_at(World, address)
-    robots, able, items = world.robots, world.able, world.items
-    height = world.parameters.warehouse_height
-    for robot in range(len(robots.position)):
-        row = privileged[robot]
-        x, y = robots.position[robot, 0], robots.position[robot, 1]
-        requested = nearest_request(world, x, y)
-        carrier = NOBODY if requested == NOBODY else items.carrier[requested]
-        frame = robots.heading[robot] + turned[robot]
-        cos, sin = math.cos(frame), math.sin(frame)
-        row[0], row[1] = to_delivery[robot] / 10.0, (y - 0.5 * height) / 10.0
-        row[2], row[3] = cos, sin
-        row[4] = 10.0 * robots.heading_drift[robot]
-        row[5] = math.log(len(robots.position)) / 5.0
-        row[6] = 1.0 if able.lifts[robot] else 0.0
-        row[7] = 1.0 if able.delivers[robot] else 0.0
-        row[8:] = 0.0
-        if requested != NOBODY:
-            to_x, to_y = items.position[requested, 0] - x, items.position[requested, 1] - y
-            distance = max(length_of(to_x, to_y), 1e-9)
-            along, aside = to_frame((cos, sin), to_x, to_y)
-            row[8], row[9] = along / distance, aside / distance
-            row[10] = distance / 10.0
-            row[11] = max(0.0, 1.0 - distance / 2.0)
-        if carrier != NOBODY:
-            row[12] = 1.0
-            row[13] = to_delivery[carrier] / 10.0
-            row[14] = 1.0 if able.delivers[carrier] else 0.0
-
-
-@kernel
-def nearest_request(world: World, x: float, y: float) -> int:
-    """Return the item that is asked for and lies nearest to (x, y) [m], or NOBODY."""
-    nearest, least = NOBODY, math.inf
-    for item in world.progress.requested:
-        if item != NOBODY:
-            position = world.items.position[item]
-            distance = length_of(position[0] - x, position[1] - y)
-            if distance < least:
-                nearest, least = item, distance
-    return nearest
 
 
 def check_finite(name: str, numbers: NDArray[Any]) -> None:

@@ -142,7 +142,7 @@ class PPOSettings(Part):
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.
         value_hidden: widths of the value network, which is not shipped. It reads more than a robot
-            can sense, see `learner.PRIVILEGED`.
+            can sense, see `privileged.PRIVILEGED`.
     """
 
     n_steps: PositiveInt = 128

@@ -73,11 +73,12 @@ def describe_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed
         position = world.items.position
         forward, left = in_frame(pose, position[item, 0], position[item, 1])
         column = row.ITEMS + rank * row.ITEM_WIDTH
-        out[column] = 1.0
-        out[column + 1] = forward
-        out[column + 2] = left
-        out[column + 3] = 1.0 if is_known_request(world, me, item) else 0.0
-        out[column + 4] = 1.0 if is_remembered(robots.memory, me, item) else 0.0
+        out[column + row.ITEM.present] = 1.0
+        out[column + row.ITEM.x] = forward
+        out[column + row.ITEM.y] = left
+        out[column + row.ITEM.requested] = 1.0 if is_known_request(world, me, item) else 0.0
+        is_recent = is_remembered(robots.memory, me, item)
+        out[column + row.ITEM.recently_held] = 1.0 if is_recent else 0.0
 
 
 @inlined_kernel
@@ -92,11 +93,12 @@ def describe_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) ->
         forward, left = in_frame(pose, robots.position[other, 0], robots.position[other, 1])
         tells = is_heard and not math.isnan(robots.told[other])
         column = row.NEIGHBOURS + rank * row.NEIGHBOUR_WIDTH
-        out[column] = 1.0
-        out[column + 1] = forward
-        out[column + 2] = left
-        out[column + 3] = 1.0 if tells else 0.0
-        out[column + 4] = robots.told[other] if tells else parameters.timer_limit
+        out[column + row.NEIGHBOUR.present] = 1.0
+        out[column + row.NEIGHBOUR.x] = forward
+        out[column + row.NEIGHBOUR.y] = left
+        out[column + row.NEIGHBOUR.timer_heard] = 1.0 if tells else 0.0
+        timer = robots.told[other] if tells else parameters.timer_limit
+        out[column + row.NEIGHBOUR.timer] = timer
         if is_heard and width > 0:
             for part in range(width):
                 out[row.MESSAGES + rank * width + part] = robots.message[other, part]

@@ -81,9 +81,9 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
         robots.heard[me] = timer
         forward, left = in_frame(pose, robots.position[lowest, 0], robots.position[lowest, 1])
         out[row.LOWEST_TIMER] = 1.0
-        out[row.LOWEST_TIMER + 1] = forward
-        out[row.LOWEST_TIMER + 2] = left
-        out[row.LOWEST_TIMER + 3] = timer
+        out[row.LOWEST_TIMER_X] = forward
+        out[row.LOWEST_TIMER_Y] = left
+        out[row.LOWEST_TIMER_TIME] = timer
     n_chosen = choose(me, pose, world, grid, n_found, ROBOT_SEEN)
     describe_neighbours(pose, world, n_chosen, out)
     return is_anchored
@@ -124,8 +124,8 @@ def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     out[row.IN_DELIVERY_AREA] = 1.0 if robots.in_delivery[me] else 0.0
     out[row.TIMER_RUNS] = 1.0 if runs else 0.0
     out[row.TIMER] = timer if runs else parameters.timer_limit
-    out[row.VELOCITY] = min(max(forward, -limit), limit)
-    out[row.VELOCITY + 1] = min(max(left, -limit), limit)
+    out[row.VELOCITY_X] = min(max(forward, -limit), limit)
+    out[row.VELOCITY_Y] = min(max(left, -limit), limit)
     out[row.CONTACT] = 1.0 if robots.contact[me] else 0.0
     limit = parameters.max_turn_rate
     out[row.TURN_RATE] = min(max(robots.turn_rate[me], -limit), limit)

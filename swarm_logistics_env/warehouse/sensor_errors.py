@@ -73,10 +73,12 @@ def disturb_positions(key: np.uint64, first: int, parameters: Parameters, out: S
         else:
             column = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (thing - row.N_ITEMS_IN_VIEW)
             limit = far
-        if out[column] > 0.5:
+        # An item and a neighbour begin with the same columns.
+        if out[column + row.ITEM.present] > 0.5:
             for axis in range(2):
                 error = parameters.position_noise * gaussian(key, first + 2 * thing + axis)
-                out[column + 1 + axis] = min(max(out[column + 1 + axis] + error, -limit), limit)
+                at = column + row.ITEM.x + axis
+                out[at] = min(max(out[at] + error, -limit), limit)
 
 
 @kernel

@@ -31,7 +31,7 @@ def test_an_approach_counts_along_the_free_floor() -> None:
     way = world.floor.edge - world.floor.along(world.state.robot_position)
     assert way[0] > 2.0
     robot = env.state()[: len(ROBOT_FEATURES)]
-    assert robot[ROBOT_FEATURES.index("to_delivery")] == pytest.approx(way[0])
+    assert robot[list(ROBOT_FEATURES).index("to_delivery")] == pytest.approx(way[0])
     assert env.state_space.contains(env.state())
 
 

@@ -7,8 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import observations as row
-from swarm_logistics_env.motion import memory as column
 from swarm_logistics_env.motion.frame import MotionView, command_own_frames
+from swarm_logistics_env.motion.memory import (
+    MEMORY,
+    body_of,
+)
 from swarm_logistics_env.motion.network_inputs import INPUTS, LEAD
 from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.streams import row_keys
@@ -60,8 +63,8 @@ def test_how_the_body_stands_does_not_matter() -> None:
     for x in [*(first + 1 for first in firsts), row.VELOCITY]:
         other_rows[:, x], other_rows[:, x + 1] = turned(rows[:, x], rows[:, x + 1])
     one, other = frame_of(40), frame_of(40)
-    heading = turned(one.memory[:, column.HEADING_X], one.memory[:, column.HEADING_Y])
-    other.memory[:, column.HEADING_X], other.memory[:, column.HEADING_Y] = heading
+    heading = turned(one.memory[:, MEMORY.heading_x], one.memory[:, MEMORY.heading_y])
+    other.memory[:, MEMORY.heading_x], other.memory[:, MEMORY.heading_y] = heading
     first, second = one.read(rows), other.read(other_rows)
     whims = [INPUTS.index("whim_along"), INPUTS.index("whim_aside")]
     np.testing.assert_allclose(
@@ -91,7 +94,7 @@ def test_the_way_home_is_the_way_in() -> None:
     outside, inside = amid(), amid()
     inside[0, row.IN_DELIVERY_AREA] = 1.0
     inside[0, row.VELOCITY : row.VELOCITY + 2] = 0.6, 0.8
-    home = frame.memory[0, column.HOME_X : column.HOME_Y + 1]
+    home = frame.memory[0, MEMORY.home_x : MEMORY.home_y + 1]
     frame.read(outside)
     assert home.tolist() == [0.0, 0.0]
     for _ in range(3):
@@ -144,7 +147,7 @@ def test_a_robot_that_knows_the_way_home_is_not_led_astray_and_one_that_is_deaf_
     np.testing.assert_array_equal(np.delete(unheard, LEAD, 1), np.delete(read, LEAD, 1))
     assert not unheard[:, LEAD].any()
     assert not deaf.peek(rows, np.array([0]))[:, LEAD].any()
-    frame.memory[0, column.HOME_X] = 6.0
+    frame.memory[0, MEMORY.home_x] = 6.0
     np.testing.assert_allclose(frame.read(rows)[:, LEAD], 0.0, atol=1e-4)
 
 
@@ -180,7 +183,7 @@ def test_a_caged_robot_lets_go_and_carries_off_what_is_in_its_way() -> None:
 def test_a_robot_knows_its_own_body_whatever_its_neighbours_have() -> None:
     scenario = Scenario(max_speed=1.0, handling_time=0.5, drive="differential")
     frame, rows = MotionView(Scenario()), np.tile(amid(), (2, 1))
-    bodies = np.stack([column.body_of(Scenario()), column.body_of(scenario)])
+    bodies = np.stack([body_of(Scenario()), body_of(scenario)])
     frame.begin(row_keys(0, "test", 2), bodies)
     # Its top speed, handling time, whether it turns to drive, and the time to its top speed.
     body_inputs = frame.read(rows)[:, -4:]

@@ -11,8 +11,16 @@ from swarm_logistics_env import Fault, Scenario, policies
 from swarm_logistics_env import observations as row
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.episode import Play
-from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.memory import wall_angle
+from swarm_logistics_env.motion.memory import (
+    MEMORY,
+    N_COLUMNS,
+    OPEN,
+    kept_home,
+    note_command,
+    remember_observation,
+    wall_angle,
+)
+from swarm_logistics_env.motion.steering import nearest_items
 
 Memory = NDArray[np.float64]
 
@@ -32,37 +40,37 @@ LADEN_INSIDE = sensed(row.CARRYING, row.CARRYING_REQUESTED, row.IN_DELIVERY_AREA
 
 @pytest.fixture
 def memory() -> Memory:
-    return np.zeros((1, column.N_COLUMNS))
+    return np.zeros((1, N_COLUMNS))
 
 
 def go_on(memory: Memory, rows: Any, seconds: float) -> None:
     """Command nothing new for a while."""
     for _ in range(round(seconds / 0.1)):
-        column.remember_observation(rows, 0.1, memory)
+        remember_observation(rows, 0.1, memory)
 
 
 def hold(memory: Memory, rows: Any, times: int, gripper: float = 1.0) -> None:
     """Hold on to what is in view, and learn what came of it."""
     for _ in range(times):
-        column.note_command(rows[0], np.array([0.0, 0.0, 0.0, gripper]), memory[0])
-        column.remember_observation(rows, 0.1, memory)
+        note_command(rows[0], np.array([0.0, 0.0, 0.0, gripper]), memory[0])
+        remember_observation(rows, 0.1, memory)
 
 
 @pytest.mark.parametrize("handling_time", [0.0, 1.5])
 def test_a_robot_that_holds_the_requested_item_inside_takes_its_delivery_for_broken_for_a_while(
     memory: Memory, handling_time: float
 ) -> None:
-    memory[0, column.HANDLING_TIME] = handling_time
+    memory[0, MEMORY.handling_time] = handling_time
     hold(memory, LADEN_INSIDE, round(10 * handling_time) + 8, gripper=0.0)
-    assert memory[0, column.CANNOT_DELIVER] == 0.0, "a reading may come late"
+    assert memory[0, MEMORY.cannot_deliver] == 0.0, "a reading may come late"
     hold(memory, LADEN_INSIDE, 4, gripper=0.0)
-    assert memory[0, column.CANNOT_DELIVER] > 0.99
-    memory[0, column.HELD] = 0.0
+    assert memory[0, MEMORY.cannot_deliver] > 0.99
+    memory[0, MEMORY.held] = OPEN
     go_on(memory, sensed(), 60.0)
-    assert memory[0, column.CANNOT_DELIVER] == pytest.approx(0.5, abs=0.01)
-    assert memory[0, column.FAILED] < 0.5
+    assert memory[0, MEMORY.cannot_deliver] == pytest.approx(0.5, abs=0.01)
+    assert memory[0, MEMORY.failed] < 0.5
     go_on(memory, sensed(), 61.0)
-    assert memory[0, column.CANNOT_DELIVER] == 0.0, "it may have been repaired"
+    assert memory[0, MEMORY.cannot_deliver] == 0.0, "it may have been repaired"
 
 
 def test_a_robot_that_holds_on_in_vain_takes_its_gripper_for_broken_and_tries_again_later(
@@ -70,41 +78,41 @@ def test_a_robot_that_holds_on_in_vain_takes_its_gripper_for_broken_and_tries_ag
 ) -> None:
     for _ in range(20):  # evidence fades
         hold(memory, sensed(item_at=0.1), 1)
-        memory[0, column.HELD] = 0.0
+        memory[0, MEMORY.held] = OPEN
         go_on(memory, sensed(), 30.0)
     hold(memory, sensed(item_at=0.1), 7)
-    assert memory[0, column.CANNOT_LIFT] == 0.0
+    assert memory[0, MEMORY.cannot_lift] == 0.0
     hold(memory, sensed(item_at=0.1), 4)
-    memory[0, column.HELD] = 0.0
+    memory[0, MEMORY.held] = OPEN
     go_on(memory, sensed(), 118.0)
-    assert memory[0, column.CANNOT_LIFT] > 0.0
+    assert memory[0, MEMORY.cannot_lift] > 0.0
     go_on(memory, sensed(), 3.0)
-    assert memory[0, column.CANNOT_LIFT] == 0.0
+    assert memory[0, MEMORY.cannot_lift] == 0.0
 
 
 def test_a_lift_or_a_delivery_shows_that_the_robot_can(memory: Memory) -> None:
     hold(memory, sensed(item_at=0.1), 12)
-    assert memory[0, column.CANNOT_LIFT] > 0.0
-    column.remember_observation(sensed(row.CARRYING), 0.1, memory)
-    assert memory[0, column.CANNOT_LIFT] == 0.0
+    assert memory[0, MEMORY.cannot_lift] > 0.0
+    remember_observation(sensed(row.CARRYING), 0.1, memory)
+    assert memory[0, MEMORY.cannot_lift] == 0.0
     hold(memory, sensed(item_at=0.1), 9)
-    assert memory[0, column.CANNOT_LIFT] == 0.0, "what it held in vain before the lift is forgotten"
+    assert memory[0, MEMORY.cannot_lift] == 0.0, "what it held in vain before the lift is forgotten"
     hold(memory, LADEN_INSIDE, 15, gripper=0.0)
-    column.remember_observation(sensed(row.IN_DELIVERY_AREA), 0.1, memory)
-    assert memory[0, column.CANNOT_DELIVER] == memory[0, column.DELIVERING] == 0.0
+    remember_observation(sensed(row.IN_DELIVERY_AREA), 0.1, memory)
+    assert memory[0, MEMORY.cannot_deliver] == memory[0, MEMORY.delivering] == 0.0
 
 
 def test_its_memory_turns_as_its_gyro_tells_whatever_was_commanded(memory: Memory) -> None:
-    memory[0, column.HOME_X], memory[0, column.HEADING_Y] = 1.0, 1.0
+    memory[0, MEMORY.home_x], memory[0, MEMORY.heading_y] = 1.0, 1.0
     rows = sensed()
     rows[0, row.TURN_RATE] = 2.0  # rad/s to the left, for half a second
     for _ in range(5):
-        column.remember_observation(rows, 0.1, memory)
-    home = math.atan2(memory[0, column.HOME_Y], memory[0, column.HOME_X])
-    heading = math.atan2(memory[0, column.HEADING_Y], memory[0, column.HEADING_X])
+        remember_observation(rows, 0.1, memory)
+    home = math.atan2(memory[0, MEMORY.home_y], memory[0, MEMORY.home_x])
+    heading = math.atan2(memory[0, MEMORY.heading_y], memory[0, MEMORY.heading_x])
     assert home == pytest.approx(-1.0, abs=1e-6)
     assert heading == pytest.approx(0.5 * math.pi - 1.0, abs=1e-6)
-    assert memory[0, column.WALL] == pytest.approx(-1.0, abs=1e-6)
+    assert memory[0, MEMORY.wall] == pytest.approx(-1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -113,18 +121,18 @@ def test_its_memory_turns_as_its_gyro_tells_whatever_was_commanded(memory: Memor
 def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(memory: Memory, rows: Any) -> None:
     hold(memory, rows, 20)
     hold(memory, LADEN, 1)
-    column.remember_observation(sensed(item_at=0.1), 0.1, memory)  # it delivered, and holds on
+    remember_observation(sensed(item_at=0.1), 0.1, memory)  # it delivered, and holds on
     hold(memory, sensed(item_at=0.1), 9)
-    assert memory[0, column.CANNOT_LIFT] == 0.0
+    assert memory[0, MEMORY.cannot_lift] == 0.0
 
 
 def test_the_border_sets_right_how_far_it_is_home(memory: Memory) -> None:
-    memory[0, column.AWAY] = 5.0  # it has reckoned wrongly
+    memory[0, MEMORY.away] = 5.0  # it has reckoned wrongly
     for way in (1.0, -1.0, 1.0):  # in, out and in again, at 1 m/s
         rows = sensed()
         rows[0, row.VELOCITY], rows[0, row.IN_DELIVERY_AREA] = way, way > 0.0
-        column.remember_observation(rows, 0.1, memory)
-        assert memory[0, column.AWAY] == pytest.approx(-0.1 * way)
+        remember_observation(rows, 0.1, memory)
+        assert memory[0, MEMORY.away] == pytest.approx(-0.1 * way)
 
 
 @pytest.mark.compiled
@@ -133,7 +141,7 @@ def test_in_a_run_robots_with_fm2_find_out_and_no_healthy_one_believes_it() -> N
     play = Play(Scenario(restock=True, duration=90.0), policy, 60_001, [Fault("FM2", 3)])
     while not play.is_over:
         play.step()
-        takes_for_broken = policy._frame.memory[:, column.CANNOT_LIFT] > 0.0
+        takes_for_broken = policy._frame.memory[:, MEMORY.cannot_lift] > 0.0
         assert not np.any(takes_for_broken & play.world.state.lifts)
     assert (takes_for_broken == ~play.world.state.lifts).all()
 
@@ -174,15 +182,15 @@ def test_the_way_home_is_kept_though_the_body_turns_unnoticed() -> None:
     while env.agents:
         observations, *_ = env.step_arrays(policy.act(observations))
     state, memory = env.warehouse.state, policy._frame.memory
-    ways = np.array([column.kept_home(own) for own in memory])
+    ways = np.array([kept_home(own) for own in memory])
     has = ways[:, 2] > 0
     assert has.sum() >= 8
     # The area lies along x, so the body's heading tells how far the direction kept is off.
     off = np.arctan2(ways[has, 1], ways[has, 0]) + state.robot_heading[has]
     assert np.median(np.abs(np.angle(np.exp(1j * off)))) < math.radians(8)
     away = scenario.storage_width - state.robot_position[has, 0]
-    assert np.median(np.abs(memory[has, column.AWAY] - away)) < 0.6
-    drifts = memory[has, column.DRIFT] + state.robot_heading_drift[has]
+    assert np.median(np.abs(memory[has, MEMORY.away] - away)) < 0.6
+    drifts = memory[has, MEMORY.drift] + state.robot_heading_drift[has]
     assert np.median(np.abs(drifts)) < 0.01
 
 
@@ -191,5 +199,5 @@ def test_of_several_requested_items_in_view_the_nearest_counts() -> None:
     for place, (away, asked) in enumerate(zip(ahead, [0, 1, 1, 0])):
         there = row.ITEMS + row.ITEM_WIDTH * place
         rows[0, there : there + row.ITEM_WIDTH] = [1, away, 0, asked, 0]
-    requested, other = column.nearest_items(rows[0])
+    requested, other = nearest_items(rows[0])
     assert (requested, other) == (row.ITEMS + row.ITEM_WIDTH, row.ITEMS)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.motion import memory as column
-from swarm_logistics_env.motion.memory import steer
+from swarm_logistics_env.motion.memory import MEMORY, N_COLUMNS
+from swarm_logistics_env.motion.steering import steer
 
 
 @pytest.mark.parametrize("direction", [0.3, 1.5, -0.6, 3.0, -2.0])
 def test_it_gets_to_drive_where_it_wants_to(direction: float) -> None:
-    memory = np.zeros((1, column.N_COLUMNS))
-    memory[0, column.WIDEST_TURN] = 0.6
+    memory = np.zeros((1, N_COLUMNS))
+    memory[0, MEMORY.widest_turn] = 0.6
     heading, wanted = 0.0, direction
     for _ in range(10):
         command = np.array([math.cos(wanted), math.sin(wanted), 0.0, 1.0])

@@ -95,10 +95,24 @@ def test_steps_played_in_one_call_are_those_of_a_call_each(
 
 
 def test_an_act_of_somebody_else_is_asked(card: PolicyCard, tensors: Tensors) -> None:
-    policy: Any = LearnedPolicy(card, tensors)
-    policy.act = lambda rows: np.zeros((len(rows), 4))
+    class Standing:
+        """Passes on to the policy what it has not itself."""
+
+        def __init__(self, policy: Any) -> None:
+            self.policy = policy
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.policy, name)
+
+        def act(self, rows: Any) -> Any:
+            return np.zeros((len(rows), 4))
+
+    replaced: Any = LearnedPolicy(card, tensors)
+    replaced.act = lambda rows: np.zeros((len(rows), 4))
     scenario = Scenario(n_robots=2, n_items=3, duration=2.0)
-    assert run_episode(scenario, policy, seed=0).contacts.mean_acceleration == 0.0
+    policies: list[Any] = [replaced, Standing(LearnedPolicy(card, tensors))]
+    for policy in policies:
+        assert run_episode(scenario, policy, seed=0).contacts.mean_acceleration == 0.0
 
 
 def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:

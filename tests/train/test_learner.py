@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,56 +10,10 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
-from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.motion.memory import BODY, HELD, body_of
+from swarm_logistics_env.motion.memory import BODY, MEMORY, OPEN, body_of
 from swarm_logistics_env.motion.network_inputs import INPUTS
-from swarm_logistics_env.train.learner import PRIVILEGED, NetworkView, fill_privileged, make_learner
-from swarm_logistics_env.warehouse.state import CARRIED
-
-
-def fill(env: SwarmLogisticsEnv, turned: Any, privileged: Any) -> None:
-    floor = env.warehouse.floor
-    to_delivery = floor.edge - floor.along(env.warehouse.state.robot_position)
-    fill_privileged(env.warehouse.address, turned, to_delivery, privileged)
-
-
-def test_the_critic_knows_where_the_requested_item_is() -> None:
-    env = SwarmLogisticsEnv(n_robots=3, n_items=5)
-    env.reset_arrays(seed=0)
-    state = env.warehouse.state
-    state.robot_position[0], state.robot_heading[0] = (4.0, 5.0), 0.5 * math.pi
-    state.item_position[state.requested] = (4.0, 6.0)
-    turned, privileged = np.zeros(3), np.zeros((4, len(PRIVILEGED)), np.float32)
-    turned[0] = 0.5 * math.pi  # so that the frame looks along -x
-    fill(env, turned, privileged)
-    told = dict(zip(PRIVILEGED, privileged[0].tolist()))
-    expected = {
-        "to_delivery": 0.4, "frame_cos": -1.0, "frame_sin": 0.0, "requested_along": 0.0,
-        "requested_aside": -1.0, "requested_distance": 0.1, "is_carried": 0.0,
-    }  # fmt: skip
-    assert {name: told[name] for name in expected} == pytest.approx(expected, abs=1e-6)
-    assert not privileged[3].any()
-
-    state.item_status[state.requested], state.item_carrier[state.requested] = CARRIED, 1
-    state.robot_position[1] = (7.0, 5.0)
-    fill(env, turned, privileged)
-    told = dict(zip(PRIVILEGED, privileged[0].tolist()))
-    assert (told["is_carried"], told["carrier_delivers"]) == (1.0, 1.0)
-    assert told["carrier_to_delivery"] == pytest.approx(0.1)
-
-
-def test_of_several_requests_the_critic_knows_the_nearest() -> None:
-    env = SwarmLogisticsEnv(n_robots=2, n_items=5, n_requests=3)
-    env.reset_arrays(seed=0)
-    state = env.warehouse.state
-    state.robot_position[:], state.robot_heading[:] = [(4.0, 5.0), (1.0, 1.0)], 0.0
-    state.item_position[state.open_requests] = [(7.0, 9.0), (4.0, 6.0), (1.0, 3.0)]
-    privileged = np.zeros((2, len(PRIVILEGED)), np.float32)
-    fill(env, np.zeros(2), privileged)
-    assert privileged[:, PRIVILEGED.index("requested_distance")] == pytest.approx([0.1, 0.2])
-    state.item_carrier[state.open_requests[1]] = 0
-    fill(env, np.zeros(2), privileged)
-    assert privileged[:, PRIVILEGED.index("is_carried")].tolist() == [1.0, 0.0]
+from swarm_logistics_env.train.learner import NetworkView, make_learner
+from swarm_logistics_env.train.privileged import PRIVILEGED
 
 
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:
@@ -75,7 +28,7 @@ def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None
         n_steps += 1
         # Decisions in this episode, and whether any command in it is remembered.
         assert view.frame.counts.tolist() == np.where(dones, 1, n_steps + 1).tolist()
-        assert ((view.frame.memory[:, HELD] > 0.0) == ~dones).all()
+        assert ((view.frame.memory[:, MEMORY.held] != OPEN) == ~dones).all()
     assert n_steps > 5
 
 

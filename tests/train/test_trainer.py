@@ -29,13 +29,13 @@ from swarm_logistics_env.train import trainer
 from swarm_logistics_env.train.evaluation import versions
 from swarm_logistics_env.train.learner import (
     CHECKPOINT,
-    PRIVILEGED,
     NetworkView,
     make_learner,
     read_checkpoint,
     save_checkpoint,
     tensors_of,
 )
+from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import Scores
 from swarm_logistics_env.train.trainer import train
 

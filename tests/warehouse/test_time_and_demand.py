@@ -204,7 +204,7 @@ def test_the_item_of_any_open_request_is_told_and_can_be_let_go_of_inside(build:
     world = build(robots, items, [Fault("FM4", (0, 1))], n_requests=2, pickup_range=0.3)
     rows = steps(world, STAY, STAY)
     assert world.state.open_requests.tolist() == [0, 1]
-    at = [row.ITEMS + row.ITEM_WIDTH * place + 3 for place in range(2)]
+    at = [row.ITEMS + row.ITEM_WIDTH * place + row.ITEM.requested for place in range(2)]
     assert rows[0, at].tolist() == [1.0, 0.0]  # items 1 and 2, the nearer first
     steps(world, HOLD, HOLD)
     assert world.state.robot_item.tolist() == [1, 2]
