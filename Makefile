@@ -33,14 +33,15 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help first-look paper paper-fit tables test quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
+.PHONY: help first-look paper paper-fit tables test coverage quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
 	@echo "make paper-fit MINUTES=40  fit the constants of swarm-dt to the paper's tables, then confirm them for as long: results/paper_fit"
 	@echo "make tables          play the studies behind docs/results.md (26,000 runs, two to four hours of two cores; with the learners of make interop, if there), write its tables, the README's numbers and the scores of judge --benchmark"
-	@echo "make test            the gate: lint, types, tests with coverage"
+	@echo "make test            the gate: lint, types, tests"
+	@echo "make coverage        once a day: tests with coverage, and kernels by the interpreter, which checks their indices"
 	@echo "make quick           lint, types and the fastest tests, within a minute: for every commit"
 	@echo "make check           lint and types only"
 	@echo "make soak MINUTES=10 random worlds, every invariant at every step"
@@ -82,6 +83,11 @@ test: lint
 	$(DEV)/bin/mypy & types=$$!; \
 	$(DEV)/bin/python -m verification.trajectories && \
 	$(DEV)/bin/swarm-logistics run --policy ppo-robust --set duration=5 && wait $$types
+	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup
+
+# Once a day: coverage makes a test twice as dear, and the interpreter is the only one that tells the lines of kernels
+# and checks their indices.
+coverage: $(DEV)/installed
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
 	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest --numprocesses=2 -p verification.interpreted \
 		--cov --cov-append --cov-report= $(KERNELS) -m "not compiled"

@@ -7,9 +7,7 @@ import importlib
 import math
 import os
 import pkgutil
-import sys
-import threading
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +16,7 @@ from hypothesis import Phase, settings
 
 import swarm_logistics_env
 from swarm_logistics_env import fast_kernels
+from swarm_logistics_env.report import drawing
 from swarm_logistics_env.studies import Study
 
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
@@ -32,6 +31,27 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 # Whether compiling is told would depend on the machine's speed, and tests read what is printed.
 fast_kernels._SILENCE = math.inf
 
+# PDF and PNG take three quarters of the time of a report, so most tests draw figures as SVG alone.
+_draw_file = drawing._file
+
+
+def _draw_svg_alone(canvas: Any, ending: str) -> bytes:
+    return _draw_file(canvas, ending) if ending == "svg" else b""
+
+
+vars(drawing).update(_file=_draw_svg_alone)
+
+
+@contextlib.contextmanager
+def drawn_in_all_formats() -> Iterator[None]:
+    """Draw figures as PDF and PNG as well, for a test that looks at these."""
+    vars(drawing).update(_file=_draw_file)
+    try:
+        yield
+    finally:
+        vars(drawing).update(_file=_draw_svg_alone)
+
+
 ROOT = Path(__file__).parents[1]
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 # Beside an installed package (`make test-lowest`) there is no source tree to read.
@@ -39,53 +59,17 @@ if not (ROOT / "swarm_logistics_env").is_dir():
     collect_ignore = ["test_imports.py", "test_packaging.py", "verification/test_mutants.py"]
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
-    """Import all modules before the tests, so that their lines count whichever test comes first."""
-    if session.config.getoption("--cov", None):
-        for module in pkgutil.walk_packages(swarm_logistics_env.__path__, "swarm_logistics_env."):
-            importlib.import_module(module.name)
-        _draw_uncovered()
-    with _uncovered():
-        return (yield)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """With coverage run the tests that mirror the package alone: measured ones take twice as long.
 
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the tests that mirror nothing first: kernels compile faster without coverage."""
-    items.sort(key=lambda item: mirrors(item.path))
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Measure coverage with the tests that mirror the package alone: measured ones are slower."""
-    with contextlib.nullcontext() if mirrors(item.path) else _uncovered():
-        return (yield)
-
-
-@contextlib.contextmanager
-def _uncovered() -> Iterator[None]:
-    # pytest-cov's `no_cover` ends one of the two measurements that a worker of xdist starts.
-    trace, trace_of_threads = sys.gettrace(), threading.gettrace()
-    sys.settrace(None)
-    threading.settrace(None)
-    try:
-        yield
-    finally:
-        sys.settrace(trace)
-        threading.settrace(trace_of_threads)
-
-
-def _draw_uncovered() -> None:
-    """Measure no coverage while figures are written: no line of the package runs then."""
-    from matplotlib.figure import Figure
-
-    write = Figure.savefig
-
-    def write_uncovered(figure: Figure, *args: Any, **options: Any) -> None:
-        with _uncovered():
-            write(figure, *args, **options)
-
-    Figure.savefig = write_uncovered  # type: ignore[assignment]
+    All modules are imported first, so that their lines count whichever test comes first.
+    """
+    if not config.getoption("--cov", None):
+        return
+    for module in pkgutil.walk_packages(swarm_logistics_env.__path__, "swarm_logistics_env."):
+        importlib.import_module(module.name)
+    config.hook.pytest_deselected(items=[item for item in items if not mirrors(item.path)])
+    items[:] = [item for item in items if mirrors(item.path)]
 
 
 def mirrors(test: Path) -> bool:
