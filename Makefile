@@ -57,7 +57,7 @@ help:
 	@echo "make dotbots         bodies in the DotBots' simulator: the tests, and 20 DotBots for 20 s (half a minute, once pydotbot is installed)"
 	@echo "make bodies          how far results carry to MuJoCo and to the DotBots' simulator: the tables of docs/bodies.md (two core-hours)"
 	@echo "make docs            the documentation site, site/index.html"
-	@echo "make docs-check      every command of README and pages, with few seeds and steps"
+	@echo "make docs-check      once a day: what every page prints, and every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
@@ -177,8 +177,9 @@ docs: $(DOCS)/installed
 docs/media/run.html: $(DEV)/installed
 	$(DEV)/bin/swarm-logistics watch --fault FM4:3@60 --save $@ --until 150
 
-# What the pages print is held by `make test`; this runs what they do not show.
+# Once a day: what all pages print, of which `make test` leaves out the three that take longest; then what they do not show.
 docs-check: $(DEV)/installed
+	HYPOTHESIS_PROFILE=nightly $(DEV)/bin/python -m pytest tests/test_docs.py
 	$(DEV)/bin/python docs/blocks.py --small
 
 # Each distribution is installed in an environment of its own and plays an episode, away from this tree.

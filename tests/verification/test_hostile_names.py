@@ -100,21 +100,24 @@ def table(column: str, names: list[str]) -> str:
     return text.getvalue()
 
 
-@pytest.mark.parametrize("column", ["policy", "table", "fault", "header"])
+COLUMNS = ["policy", "table", "fault", "header"]
+
+
+@pytest.mark.parametrize("column", COLUMNS)
 def test_cells_of_trials_are_refused_or_reported(
     column: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, out = tmp_path / "one.csv", tmp_path / "out"
     kept: list[str] = []
-    # A header and a table have a report each, which take long.
-    for number, name in enumerate(WRITTEN[:: 3 if column in ("header", "table") else 1]):
+    # Each name in one of the columns.
+    for number, name in enumerate(WRITTEN[COLUMNS.index(column) :: len(COLUMNS)]):
         file.write_text(table(column, [name]), encoding="utf-8", newline="")
         try:
             import_results(read_trials(file), tmp_path / "tried" / str(number))
         except (StudyError, IndicatorError):
             continue
         kept.append(name.strip())
-    assert len(kept) >= 10
+    assert len(kept) >= 4
     file.write_text(table(column, list(dict.fromkeys(kept))), encoding="utf-8", newline="")
     capsys.readouterr()
     assert app.run(["judge", str(file), "--out", str(out), "--full"]) == 0
