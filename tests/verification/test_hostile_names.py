@@ -34,8 +34,11 @@ ALONE = ["é" * 40, "x" * 300, "x" * 80, "`" * 5, "|", "\\", "a|b", "-rf", "%s%n
 NAMES = sorted({*WORDS, *map("".join, zip(itertools.cycle(SIGNS), WORDS)), *ALONE})
 WRITTEN = [name for name in NAMES if name != "\ud800"]  # which no file of UTF-8 can hold
 
-# The page's own pictures are drawings that stand in it.
-ACTIVE = r'<img\b(?! src="data:image/svg)|<(?:iframe|object)\b|<\w[^<>]*\son\w+=|<script>alert'
+# The page's own pictures are drawings that stand in it; what stands in quotation marks is a text.
+ACTIVE = (
+    r'<img\b(?! src="data:image/svg)|<(?:iframe|object)\b'
+    r'|<\w(?:[^<>"]|"[^"]*")*\son\w+=|<script>alert'
+)
 
 
 def check_report(out: Path) -> None:
