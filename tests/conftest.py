@@ -18,6 +18,7 @@ from hypothesis import Phase, settings
 
 import swarm_logistics_env
 from swarm_logistics_env import fast_kernels
+from swarm_logistics_env.report import drawing
 from swarm_logistics_env.studies import Study
 
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
@@ -32,6 +33,27 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 # Whether compiling is told would depend on the machine's speed, and tests read what is printed.
 fast_kernels._SILENCE = math.inf
 
+# PDF and PNG take three quarters of the time of a report, so most tests draw figures as SVG alone.
+_draw_file = drawing._file
+
+
+def _draw_svg_alone(canvas: Any, ending: str) -> bytes:
+    return _draw_file(canvas, ending) if ending == "svg" else b""
+
+
+vars(drawing).update(_file=_draw_svg_alone)
+
+
+@contextlib.contextmanager
+def drawn_in_all_formats() -> Iterator[None]:
+    """Draw figures as PDF and PNG as well, for a test that looks at these."""
+    vars(drawing).update(_file=_draw_file)
+    try:
+        yield
+    finally:
+        vars(drawing).update(_file=_draw_svg_alone)
+
+
 ROOT = Path(__file__).parents[1]
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 # Beside an installed package (`make test-lowest`) there is no source tree to read.
@@ -45,7 +67,6 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
     if session.config.getoption("--cov", None):
         for module in pkgutil.walk_packages(swarm_logistics_env.__path__, "swarm_logistics_env."):
             importlib.import_module(module.name)
-        _draw_uncovered()
     with _uncovered():
         return (yield)
 
@@ -73,19 +94,6 @@ def _uncovered() -> Iterator[None]:
     finally:
         sys.settrace(trace)
         threading.settrace(trace_of_threads)
-
-
-def _draw_uncovered() -> None:
-    """Measure no coverage while figures are written: no line of the package runs then."""
-    from matplotlib.figure import Figure
-
-    write = Figure.savefig
-
-    def write_uncovered(figure: Figure, *args: Any, **options: Any) -> None:
-        with _uncovered():
-            write(figure, *args, **options)
-
-    Figure.savefig = write_uncovered  # type: ignore[assignment]
 
 
 def mirrors(test: Path) -> bool:

@@ -126,7 +126,7 @@ def make_env(n_robots):
 class Idle:
     identity = "idle"
     def act(self, observations):
-        import mark_in_act
+        import mark_in_lane
         return [0] * len(observations)
 """
 LANE_STUDY = """
@@ -138,26 +138,23 @@ sizes = [{ values = [2, 3] }]
 """
 
 
-def test_what_is_named_finds_its_neighbours_whenever_it_imports_them(folder: Path) -> None:
-    for name in ("mark_at_import", "mark_at_reset", "mark_in_act", "mark_unnamed"):
+def test_what_is_named_finds_its_neighbours_whenever_it_and_its_workers_import_them(
+    folder: Path,
+) -> None:
+    for name in ("mark_at_import", "mark_at_reset", "mark_in_act", "mark_in_lane", "mark_unnamed"):
         (folder / f"{name}.py").write_text(WRITES.format(str(folder.parent / "marks")))
-    (folder / "own_policy.py").write_text(OWN)
-    run_in(
+    for name, text in (("own_policy", OWN), ("own_lane", LANE), ("neighbour", NEIGHBOUR)):
+        (folder / f"{name}.py").write_text(text)
+    (folder / "lane.toml").write_text(LANE_STUDY)
+    printed = run_in(
         folder,
         "run --set duration=1 --policy own_policy:Mine",
         "study run small.toml --processes 2 --policy own_policy:Mine --out policy",
+        "study run lane.toml --trust-code --processes 2 --out task",
     )
-    assert marks(folder) == ["mark_at_import", "mark_at_reset", "mark_in_act"]
-
-
-def test_a_task_that_is_named_is_found_by_workers_as_well(folder: Path) -> None:
-    for name, text in (("own_lane", LANE), ("neighbour", NEIGHBOUR), ("mark_in_act", "")):
-        (folder / f"{name}.py").write_text(text)
-    (folder / "lane.toml").write_text(LANE_STUDY)
-    printed = run_in(folder, "study run lane.toml --trust-code --processes 2 --out task")
+    assert marks(folder) == ["mark_at_import", "mark_at_reset", "mark_in_act", "mark_in_lane"]
+    assert printed.count(" 0 failed") == 2
     assert "4 runs played" in printed
-    assert "0 failed" in printed
-    assert marks(folder) == []
 
 
 def test_an_installed_module_that_was_named_finds_nothing_here(

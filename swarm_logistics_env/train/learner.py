@@ -205,7 +205,8 @@ def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
 
 
 def _array(tensor: torch.Tensor) -> NDArray[np.float32]:
-    return tensor.detach().cpu().numpy().astype(np.float32)
+    array: NDArray[np.float32] = tensor.detach().cpu().numpy().astype(np.float32)
+    return array
 
 
 def save_checkpoint(directory: Path, learner: PPO, log: Any) -> None:
@@ -300,7 +301,7 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
             raise FloatingPointError("an output of the network is not finite") from error
 
 
-class _TwoReaders(torch.nn.Module):
+class _TwoReaders(torch.nn.Module):  # type: ignore[misc]  # torch is Any to mypy
     def __init__(self, n_columns: int, widths: dict[str, list[int]]) -> None:
         super().__init__()
         self.n_inputs = n_columns - len(PRIVILEGED)

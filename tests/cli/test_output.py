@@ -22,6 +22,20 @@ TRIALS = "robots,width,delivered\n" + "".join(
 )
 ENCODINGS = ["ascii", "cp1252", "cp437", "latin-1", "koi8-r", "shift_jis", "utf-8", "utf-16"]
 COMMAND = [sys.executable, "-c", "from swarm_logistics_env.cli import app; app()"]
+# Several commands of one process, then the last as the process itself ends.
+COMMANDS = """
+import sys
+from swarm_logistics_env.cli import app
+from swarm_logistics_env.cli.output import prepare_output
+
+prepare_output()
+*first, last = sys.argv[1:]
+for words in first:
+    if app.run(words.split()) != 0:
+        sys.exit(f"failed: {words}")
+sys.argv[1:] = last.split()
+app()
+"""
 
 
 @given(st.text(), st.sampled_from(ENCODINGS))
@@ -72,8 +86,8 @@ def test_every_command_prints_in_every_encoding(
     assert "no such" in Path("stderr").read_bytes().decode(encoding).lower()
 
 
-def run(words: str, **how: Any) -> int:
-    done = subprocess.Popen([*COMMAND, *words.split()], **how)
+def run(*commands: str, **how: Any) -> int:
+    done = subprocess.Popen([sys.executable, "-c", COMMANDS, *commands], **how)
     if done.stdout is not None:
         done.stdout.close()  # as `head` does that has read enough
     if done.stderr is not None:
@@ -97,10 +111,10 @@ def test_nothing_is_lost_where_nobody_reads(closed: Sequence[int], folder: Path)
     streams: dict[str, Any] = {"preexec_fn": closing(*closed)}
     if not closed:
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    assert run("judge t.csv --out o", **streams) == 0
+    # If a text of ours was written into the store, no report can be made of it.
+    assert run("judge t.csv --out o", "study report o", "judge nosuch.csv", **streams) == 2
     assert {"report.html", "report.md", "study.sqlite"} <= {one.name for one in Path("o").iterdir()}
-    assert run("study report o", **streams) == 0  # no text of ours was written into the store
-    assert run("judge nosuch.csv", **streams) == 2
+    assert run("list faults", **streams) == 0
 
 
 def test_output_that_cannot_be_written_is_still_told(folder: Path) -> None:

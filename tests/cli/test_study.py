@@ -23,6 +23,7 @@ from swarm_logistics_env.questions.presets import PRESETS
 from swarm_logistics_env.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.studies import Study
 from tests.cli.conftest import Command
+from tests.conftest import drawn_in_all_formats
 
 FILE = """
 seeds = 2
@@ -86,7 +87,8 @@ def test_figures_are_drawn_as_wide_and_in_the_letters_that_a_paper_needs(
     page = Path("out/report.html").read_text()
     drawing, picture = Path("out/figures/answer.svg"), Path("out/figures/answer.png")
     assert 'width="374.4pt"' in drawing.read_text()  # 72 a inch
-    command("study report out --figure-width 3.5 --font serif")
+    with drawn_in_all_formats():
+        command("study report out --figure-width 3.5 --font serif")
     assert 'width="252pt"' in drawing.read_text()
     assert "font-family: 'STIXGeneral'" in drawing.read_text()
     assert struct.unpack(">I", picture.read_bytes()[16:20]) == (1050,)  # 300 an inch

@@ -20,8 +20,7 @@ print(os.environ["MPLBACKEND"], matplotlib.rcParams["backend"])
 @pytest.mark.parametrize(
     ("backend", "left"),
     [
-        ("module://matplotlib_inline.backend_inline", None),  # of a notebook
-        ("no_such_backend", None),
+        ("module://matplotlib_inline.backend_inline", None),  # of a notebook, not installed here
         ("TkAgg", "tkagg"),
     ],
 )

@@ -12,9 +12,11 @@ from xml.etree import ElementTree
 import pytest
 
 from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.drawing import images
 from swarm_logistics_env.report.section import Section, limits, sentence, word_to_count
 from swarm_logistics_env.report.write import markdown, section_markdown, write_report
 from swarm_logistics_env.verdicts.results import StudyResults
+from tests.conftest import drawn_in_all_formats
 from tests.made_up import paper
 
 
@@ -43,17 +45,28 @@ def test_no_name_is_markup_in_markdown(text: str) -> None:
 @pytest.fixture(scope="module")
 def directory(few: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("report")
-    write_report(few, directory)
+    with drawn_in_all_formats():
+        write_report(few, directory)
     return directory
 
 
 def test_equal_rows_give_equal_bytes(few: StudyResults, directory: Path, tmp_path: Path) -> None:
     write_report(replace(few, outcomes=dict(reversed(list(few.outcomes.items())))), tmp_path)
     files, others = (
-        {path.relative_to(here): path.read_bytes() for path in here.rglob("*.*")}
+        {
+            path.relative_to(here): path.read_bytes()
+            for path in here.rglob("*.*")
+            if path.suffix not in (".pdf", ".png")
+        }
         for here in (directory, tmp_path)
     )
     assert files == others
+    figure = document(few).figures[0]
+    with drawn_in_all_formats():
+        drawing = images(figure.draw, figure.height)
+    file = directory / "figures" / figure.name
+    assert file.with_suffix(".pdf").read_bytes() == drawing.pdf
+    assert file.with_suffix(".png").read_bytes() == drawing.png
 
 
 def test_page_needs_nothing_but_itself(directory: Path) -> None:

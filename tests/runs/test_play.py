@@ -42,10 +42,13 @@ class Exiting(SwarmDT):
             raise self.raised
 
 
-@pytest.mark.parametrize("processes", [1, 2])
 @pytest.mark.parametrize(
-    ("moment", "raised"),
-    [("reset", SystemExit(0)), ("act", SystemExit("done")), ("act", GeneratorExit())],
+    ("moment", "raised", "processes"),
+    [
+        ("reset", SystemExit(0), 1),
+        ("act", SystemExit("done"), 2),
+        ("act", GeneratorExit(), 1),
+    ],
 )
 def test_a_run_in_which_a_policy_exits_has_failed(
     sizes: dict[str, Any], moment: str, raised: BaseException, processes: int

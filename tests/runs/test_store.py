@@ -176,7 +176,7 @@ def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "text", ["\udc80", "a\0b", "x" * 5_000_000, "\x1b[2J\u2028", "line\n" * 30_000, "\n", ""]
+    "text", ["\udc80a\0b\x1b[2J\u2028", "x" * 5_000_000, "line\n" * 30_000, "\n", ""]
 )
 def test_a_policy_that_fails_with_any_text_leaves_a_study_that_is_finished_and_reported(
     sizes: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str

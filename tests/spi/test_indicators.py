@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
@@ -115,6 +115,7 @@ VALUES = st.floats(0.1, 40.0) | st.sampled_from([0.1, 0.2, 0.3, 0.6, 1.0, 2.0, 4
     values=st.tuples(VALUES, VALUES | st.just(0.0)),
     threshold=st.sampled_from([0.0, 1.0, -1.0, -0.5, -2.0]),
 )
+@settings(max_examples=settings().max_examples // 2)  # each estimates four times
 def test_what_no_performance_can_refute_has_no_verdict_and_all_else_can_be_either(
     symbol: str, samples: tuple[list[int], ...], n: int, m: int, values: tuple[float, float],
     threshold: float,

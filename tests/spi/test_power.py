@@ -110,7 +110,7 @@ def test_what_cannot_be_is_named() -> None:
 @pytest.mark.parametrize("n_pilot", [5, 10, 20])
 def test_a_promised_power_of_80_percent_is_kept_on_average(n_pilot: int) -> None:
     mean, sd, effect = 40.0, 6.0, 0.08
-    draws = np.random.default_rng(n_pilot).normal(0.0, sd, (400, n_pilot))
+    draws = np.random.default_rng(n_pilot).normal(0.0, sd, (150, n_pilot))
     achieved, least = [], list[float]()
     for difference in draws:
         pilot = spi.relative_change(np.full(n_pilot, mean), mean + difference)

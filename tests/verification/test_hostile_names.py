@@ -34,8 +34,11 @@ ALONE = ["é" * 40, "x" * 300, "x" * 80, "`" * 5, "|", "\\", "a|b", "-rf", "%s%n
 NAMES = sorted({*WORDS, *map("".join, zip(itertools.cycle(SIGNS), WORDS)), *ALONE})
 WRITTEN = [name for name in NAMES if name != "\ud800"]  # which no file of UTF-8 can hold
 
-# The page's own pictures are drawings that stand in it.
-ACTIVE = r'<img\b(?! src="data:image/svg)|<(?:iframe|object)\b|<\w[^<>]*\son\w+=|<script>alert'
+# The page's own pictures are drawings that stand in it; what stands in quotation marks is a text.
+ACTIVE = (
+    r'<img\b(?! src="data:image/svg)|<(?:iframe|object)\b'
+    r'|<\w(?:[^<>"]|"[^"]*")*\son\w+=|<script>alert'
+)
 
 
 def check_report(out: Path) -> None:
@@ -100,21 +103,24 @@ def table(column: str, names: list[str]) -> str:
     return text.getvalue()
 
 
-@pytest.mark.parametrize("column", ["policy", "table", "fault", "header"])
+COLUMNS = ["policy", "table", "fault", "header"]
+
+
+@pytest.mark.parametrize("column", COLUMNS)
 def test_cells_of_trials_are_refused_or_reported(
     column: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, out = tmp_path / "one.csv", tmp_path / "out"
     kept: list[str] = []
-    # A header and a table have a report each, which take long.
-    for number, name in enumerate(WRITTEN[:: 3 if column in ("header", "table") else 1]):
+    # Each name in one of the columns.
+    for number, name in enumerate(WRITTEN[COLUMNS.index(column) :: len(COLUMNS)]):
         file.write_text(table(column, [name]), encoding="utf-8", newline="")
         try:
             RecordedStudy.of(read_trials(file)).keep(tmp_path / "tried" / str(number))
         except SwarmLogisticsError:
             continue
         kept.append(name.strip())
-    assert len(kept) >= 10
+    assert len(kept) >= 4
     file.write_text(table(column, list(dict.fromkeys(kept))), encoding="utf-8", newline="")
     capsys.readouterr()
     assert app.run(["judge", str(file), "--out", str(out), "--full"]) == 0

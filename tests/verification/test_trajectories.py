@@ -16,6 +16,12 @@ from verification.trajectories import GOLDEN, digests, explained, read_record
 
 ROOT = Path(trajectories.__file__).parents[1]
 STORIES = read_record()["stories"]
+ANOTHER_PROCESS = """
+from verification.trajectories import GOLDEN, digests, explained
+
+names = list(GOLDEN)[::8]
+print(explained({name: digests(GOLDEN[name]) for name in names}))
+"""
 
 
 def complain(found: str | None) -> None:
@@ -36,10 +42,10 @@ def test_every_golden_trajectory_is_as_recorded_when_a_copy_goes_on() -> None:
 
 
 def test_another_process_plays_them_as_recorded() -> None:
-    words = [sys.executable, "-m", "verification.trajectories"]
+    # Some of them: `make test` begins with all, in a process of its own.
+    words = [sys.executable, "-c", ANOTHER_PROCESS]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout == f"all {len(GOLDEN)} golden trajectories are as recorded\n"
+    assert done.stdout == "None\n", done.stdout + done.stderr
 
 
 @pytest.mark.skipif(
