@@ -11,7 +11,6 @@ from .hidden import Collapsed, share_stalled
 from .inputs import IndicatorError
 from .multiplicity import (
     FaultBudget,
-    Spending,
     adjust,
     adjusted_p_values,
     fault_budget,
@@ -31,13 +30,10 @@ from .power import (
 from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_index
 from .summaries import (
     Interval,
-    interquartile_mean,
     mean_interval,
     median_interval,
     pairing_correlation,
     prediction_interval,
-    probability_of_improvement,
-    worst_decile,
 )
 from .trials import Trial, Trials, read_trials
 
@@ -51,7 +47,6 @@ __all__ = [
     "Interval",
     "Options",
     "Phases",
-    "Spending",
     "SurvivalCurve",
     "Trial",
     "Trials",
@@ -64,7 +59,6 @@ __all__ = [
     "fault_budget",
     "fault_tolerance",
     "holm",
-    "interquartile_mean",
     "kaplan_meier",
     "look_alphas",
     "lower_decile_of_power",
@@ -74,7 +68,6 @@ __all__ = [
     "no_plan_because",
     "pairing_correlation",
     "prediction_interval",
-    "probability_of_improvement",
     "read_trials",
     "relative_change",
     "repair_times",
@@ -87,7 +80,6 @@ __all__ = [
     "share_stalled",
     "trainings_against_collapses",
     "two_phases",
-    "worst_decile",
 ]
 
 # Public names that went with 0.3.0, and where to look instead.
