@@ -21,7 +21,7 @@ P_F = np.array([33.0, 36, 39, 25, 40, 36, 35])
 FEWER_F = P_F[:5]  # of a sample that shares no seeds
 
 
-def change(p_o: Any, p_new: Any, threshold: float = 0.0) -> Any:
+def change(p_o: Any, p_new: Any, *, threshold: float = 0.0) -> Any:
     terms = [Term(p_new, 1.0, 0.0), Term(p_o, -1.0, 1.0)]
     hidden = [stalls(term.sample) for term in terms]
     return ratio_test(terms, Design(), hidden, offset=0.0, threshold=threshold, confidence=0.95)
