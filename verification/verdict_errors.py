@@ -19,7 +19,6 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.questions.specification import looks_up_to
 from swarm_logistics_env.spi.hidden import hidden_of
 from swarm_logistics_env.spi.ratio import Balance, Design, RatioTest, Term, ratio_test
-from swarm_logistics_env.verdicts.until_clear import SPENDING
 
 from .generators import CHOSEN_ON, HELD_OUT, LEARNED_P, P_O, Floats, Rng, Shape
 
@@ -140,7 +139,7 @@ def wrong_verdicts(
         _, p_new = draw(rng, (studies, looks[-1]), mean_f)
     running = np.arange(studies)
     above = below = 0
-    for n, level in zip(looks, spi.look_alphas(looks, alpha, spending=SPENDING)):
+    for n, level in zip(looks, spi.look_alphas(looks, alpha)):
         samples = p_o[running, :n], p_new[running, :n]
         truth = mean_f / mean_o - 1
         p, side = _p_values(*samples, truth, level, paired=paired, only_seen=only_seen)

@@ -49,7 +49,9 @@ def forest_figure(results: StudyResults, answer: Answer) -> Figure:
     rows = list(zip(answer.questions, forest_points(results, answer)))
     verdicts = answer.verdicts
     n_most = max(len(points) for _, points in rows)
-    order = " Marks in one row stand from top to bottom in the order of its label." * (n_most > 1)
+    order = ""
+    if n_most > 1:
+        order = " Marks in one row stand from top to bottom in the order of its label."
     # Where there are several, each row names its own.
     title = results.policies[0] if len(results.policies) == 1 else ""
     return Figure(

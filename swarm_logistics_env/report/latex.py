@@ -53,9 +53,11 @@ def latex_tables(results: StudyResults, report: Document) -> str:
     parts = ["% In the preamble: \\usepackage{booktabs}\n"]
     for section in (_readable(section, labels) for section in sections if section.rows):
         key = slug(section.title).lower()
-        number = f"-{keys.count(key) + 1}" if key in keys else ""
+        label = f"tab:{key}"
+        if key in keys:
+            label += f"-{keys.count(key) + 1}"
         keys.append(key)
-        parts.append("\n".join(_table(section, about, f"tab:{key}{number}")) + "\n")
+        parts.append("\n".join(_table(section, about, label)) + "\n")
     return "\n".join(parts)
 
 
@@ -130,8 +132,9 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     intervals = f"{levels[0]} intervals in brackets." if levels else ""
     if len(levels) > 1:
         intervals = "Intervals in brackets, at the levels in the headings."
-    capped = CAPPED * any(SATURATED in cell for row in section.rows for cell in row)
-    caption = [f"{section.title}.", about, intervals, *(section.lines or [_HOLM]), capped]
+    caption = [f"{section.title}.", about, intervals, *(section.lines or [_HOLM])]
+    if any(SATURATED in cell for row in section.rows for cell in row):
+        caption.append(CAPPED)
     columns = [_aligned(column) for column in zip(*section.rows)]
     columns[0] = [_escape(row[0]) for row in section.rows]
     widths = [max(map(len, column)) for column in zip(section.columns, *section.rows)]
@@ -155,19 +158,22 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
 
 def _row(cells: Iterable[str]) -> str:
     row = " & ".join(cells)
-    # A row that starts so would be read as an option of the line break before it.
-    return f"{'{}' * row.startswith(('[', '*'))}{row} \\\\"
+    if row.startswith(("[", "*")):  # or it would be read as an option of the line break before it
+        row = f"{{}}{row}"
+    return rf"{row} \\"
 
 
 def _aligned(cells: Texts) -> list[str]:
     """Return the cells of a column; their numbers have their points below each other."""
-    numbers = [_NUMBER.findall(cell) for cell in cells]
-    by_rank = list(zip_longest(*numbers, fillvalue=""))
+    by_rank = list(zip_longest(*map(_NUMBER.findall, cells), fillvalue=""))
     aligned = []
-    for cell, of_cell in zip(cells, numbers):
-        texts = map(_escape, _NUMBER.split(cell))
-        padded = [_padded(*pair) for pair in zip(of_cell, by_rank)]
-        row = "".join(map("".join, zip_longest(texts, padded, fillvalue="")))
+    for cell in cells:
+        row = ""
+        end = 0
+        for match, numbers_of_rank in zip(_NUMBER.finditer(cell), by_rank):
+            row += _escape(cell[end : match.start()]) + _padded(match[0], numbers_of_rank)
+            end = match.end()
+        row += _escape(cell[end:])
         # Room for digits stands outside of brackets and behind a comma.
         row = re.sub(rf"\[\$({_ROOM})", r"$\1$[$", row)
         aligned.append(re.sub(rf"({_ROOM})\$([],])", r"$\2$\1$", row))
@@ -176,20 +182,30 @@ def _aligned(cells: Texts) -> list[str]:
 
 def _padded(number: str, column: Sequence[str]) -> str:
     """Return a number in math mode, as wide before its point and behind it as those of `column`."""
+    before, behind = _zeros(number)
+    widest_before = max((_zeros(text)[0] for text in column), key=len)
+    widest_behind = max((_zeros(text)[1] for text in column), key=len)
+    left = _room(widest_before[len(before) :])
+    right = _room(widest_behind[len(behind) :])
+    sign = ""
+    if number.startswith("-"):
+        sign = "{-}" if left else "-"  # a bare one would be binary behind that room
+    elif any("-" in text for text in column):
+        sign = _room("-")
+    digits = number.lstrip("-").replace("∞", r"\infty ")
+    return f"${left}{sign}{digits}{right}$"
 
-    def widths(text: str) -> tuple[int, int]:
-        digits, _, decimals = text.lstrip("-").replace("∞", "00").partition(".")
-        return len(digits), len(decimals) + bool(decimals)
 
-    most_before, most_behind = map(max, zip(*map(widths, column)))
-    before, behind = widths(number)
-    sign = "-" if number.startswith("-") else r"\phantom{-}" * any("-" in text for text in column)
-    left = rf"\phantom{{{'0' * (most_before - before)}}}" * (most_before > before)
-    if left and sign == "-":  # which is binary behind another sign
-        sign = "{-}"
-    zeros = "0" * (most_behind - max(behind, 1))
-    right = rf"\phantom{{{'.' * (not behind)}{zeros}}}" * (most_behind > behind)
-    return f"${left}{sign}{number.lstrip('-')}{right}$".replace("∞", r"\infty ")
+def _zeros(number: str) -> tuple[str, str]:
+    """Return zeros as wide as a number without its sign: before its point, and from it on."""
+    zeros = re.sub(r"\d", "0", number.lstrip("-").replace("∞", "00"))
+    digits, point, decimals = zeros.partition(".")
+    return digits, point + decimals
+
+
+def _room(text: str) -> str:
+    """Return room as wide as a text."""
+    return rf"\phantom{{{text}}}" if text else ""
 
 
 def _escape(text: str) -> str:
@@ -197,8 +213,12 @@ def _escape(text: str) -> str:
 
     def special(match: re.Match[str]) -> str:
         sign, math, letter = match.groups()
-        if letter and sign is None:
+        if sign is not None:
+            return _ESCAPES[sign]
+        if letter is not None:
             return rf"\texttt{{U+{ord(letter):04X}}}"
-        return _ESCAPES[sign] if sign else f"${{{math}}}$" if "=" in math else f"${math}$"
+        if "=" in math:  # no line ends within
+            return f"${{{math}}}$"
+        return f"${math}$"
 
     return _SPECIAL.sub(special, plain(text))

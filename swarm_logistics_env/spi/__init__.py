@@ -9,7 +9,6 @@ from .hidden import Collapsed, share_stalled
 from .inputs import IndicatorError
 from .multiplicity import (
     FaultBudget,
-    Spending,
     adjust,
     adjusted_p_values,
     fault_budget,
@@ -29,13 +28,10 @@ from .power import (
 from .resilience import SurvivalCurve, kaplan_meier, repair_times, resilience_index
 from .summaries import (
     Interval,
-    interquartile_mean,
     mean_interval,
     median_interval,
     pairing_correlation,
     prediction_interval,
-    probability_of_improvement,
-    worst_decile,
 )
 from .trials import Trial, Trials, read_trials
 
@@ -49,7 +45,6 @@ __all__ = [
     "Interval",
     "Options",
     "Phases",
-    "Spending",
     "SurvivalCurve",
     "Trial",
     "Trials",
@@ -62,7 +57,6 @@ __all__ = [
     "fault_budget",
     "fault_tolerance",
     "holm",
-    "interquartile_mean",
     "kaplan_meier",
     "look_alphas",
     "lower_decile_of_power",
@@ -72,7 +66,6 @@ __all__ = [
     "no_plan_because",
     "pairing_correlation",
     "prediction_interval",
-    "probability_of_improvement",
     "read_trials",
     "relative_change",
     "repair_times",
@@ -85,5 +78,4 @@ __all__ = [
     "share_stalled",
     "trainings_against_collapses",
     "two_phases",
-    "worst_decile",
 ]

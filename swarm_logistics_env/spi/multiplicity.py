@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,58 +66,54 @@ def adjusted_p_values(estimates: Sequence[Estimate | Equivalence]) -> tuple[floa
     return tuple(float(next(adjusted)) if is_tested else None for is_tested in tested)
 
 
-Spending = Literal["obrien-fleming", "linear"]
 _REACH = 9.0  # standard deviations that the integration grid covers
 _GRID = 801  # its points: the boundaries are then right to five digits
 
 
-def look_alphas(
-    looks: Sequence[int], alpha: float = 0.05, *, spending: Spending = "obrien-fleming"
-) -> tuple[float, ...]:
+def look_alphas(looks: Sequence[int], alpha: float = 0.05) -> tuple[float, ...]:
     """Two-sided p below which to stop at each declared look, in order.
 
-    Lan and DeMets' (1983) spending of alpha on both sides, with the share of the final number of
-    seeds as information. A single look gives (alpha,).
+    Lan and DeMets' (1983) spending of alpha on both sides, in proportion to the seeds (Kim and
+    DeMets 1987), so that clear cases stop early. A single look gives (alpha,).
 
     Args:
         looks: Numbers of seeds at which the study is looked at, rising.
         alpha: Chance of any false verdict over all looks, in (0, 1).
-        spending: "obrien-fleming" leaves nearly all of alpha to the last look; "linear" spends it
-            in proportion to the seeds (Kim and DeMets 1987), so that clear cases stop early.
 
     Raises:
-        IndicatorError: No looks, one below 1, not rising; alpha outside (0, 1); no such spending.
+        IndicatorError: No looks, one below 1, not rising; alpha outside (0, 1).
     """
-    if spending not in get_args(Spending):
-        raise IndicatorError(
-            f"spending = {spending!r}: should be one of {', '.join(get_args(Spending))}"
-        )
     between_0_and_1("alpha", alpha)
     seeds = [count("look", look) for look in looks]
     if not seeds or any(later <= earlier for earlier, later in pairwise(seeds)):
         raise IndicatorError(f"looks = {tuple(looks)}: should be rising numbers of seeds")
-    return _boundaries(tuple(seeds), alpha, spending)
+    return _boundaries(tuple(seeds), alpha)
 
 
 @functools.lru_cache(maxsize=256)
-def _boundaries(seeds: tuple[int, ...], alpha: float, spending: Spending) -> tuple[float, ...]:
+def _boundaries(seeds: tuple[int, ...], alpha: float) -> tuple[float, ...]:
     from scipy.special import ndtr
 
     # The sum process is Brownian motion on [0, 1]; `mass` is that of paths not stopped so far, on
     # the points of the last look, where they start.
-    start, mass = np.zeros(1), np.ones(1)
-    alphas, information, spent = [], 0.0, 0.0
+    start = np.zeros(1)
+    mass = np.ones(1)
+    alphas = []
+    information = 0.0
+    spent = 0.0
     for look in seeds:
         now = look / seeds[-1]
         step = math.sqrt(now - information)
-        to_spend = _spent(now, alpha, spending) - spent
+        to_spend = alpha * now - spent
         boundary = _boundary(start, mass, step, to_spend, _REACH * math.sqrt(now))
         alphas.append(2.0 * float(ndtr(-boundary / math.sqrt(now))))
         points = np.linspace(-boundary, boundary, _GRID)
         steps = (points[:, None] - start) / step
         density = np.exp(-0.5 * steps**2) @ mass / (step * math.sqrt(2.0 * math.pi))
-        start, mass = points, _simpson(points) * density
-        information, spent = now, spent + to_spend
+        start = points
+        mass = _simpson(points) * density
+        information = now
+        spent += to_spend
     return tuple(alphas)
 
 
@@ -131,15 +127,6 @@ def _boundary(start: Numbers, mass: Numbers, step: float, to_spend: float, reach
         return 2.0 * float((mass * ndtr((start - boundary) / step)).sum()) - to_spend
 
     return reach if excess(reach) >= 0.0 else float(brentq(excess, 0.0, reach))
-
-
-def _spent(information: float, alpha: float, spending: Spending) -> float:
-    """Error spent, over both sides, when `information` in (0, 1] of the seeds are in."""
-    if spending == "linear":
-        return alpha * information
-    from scipy.special import ndtr, ndtri
-
-    return 4.0 * float(ndtr(ndtri(alpha / 4.0) / math.sqrt(information)))
 
 
 def _simpson(points: Numbers) -> Numbers:

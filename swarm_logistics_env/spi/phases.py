@@ -149,26 +149,24 @@ def _shares_of_draws(n: int, n_at_bottom: int) -> Numbers:
 
 def collapsed_runs(
     runs_by_size: Mapping[int, ArrayLike],
-    level: float = LEVEL,
     phases: Mapping[int, Phases] | None = None,
 ) -> dict[int, int] | None:
     """Count the runs of each swarm size that collapsed; None: no size shows two phases.
 
-    The size that shows them most clearly, at the level divided by the number of sizes, tells the
+    The size that shows them most clearly, at LEVEL divided by the number of sizes, tells the
     others: a run has collapsed that has less of its size's good P than what lies halfway between
     the phases there. The good P of a smaller size is its median; that of a larger one goes on with
     the power of N by which it grew so far.
 
     Args:
         runs_by_size: N -> P of its runs.
-        level: chance that a size is named where all have one phase, in (0, 1).
         phases: N -> `two_phases` of its runs at level 1; None: they are tested here.
     """
     samples = {n: performance(f"p of N = {n}", runs) for n, runs in runs_by_size.items()}
     tested = phases or {n: two_phases(runs, 1.0) for n, runs in samples.items()}
     clearest = min(samples, key=lambda n: (tested[n].p_value, abs(tested[n].share_low - 0.5)))
     boundary = tested[clearest].boundary
-    if boundary is None or tested[clearest].p_value > level / len(tested):
+    if boundary is None or tested[clearest].p_value > LEVEL / len(tested):
         return None
     counts = {}
     for n, runs in samples.items():

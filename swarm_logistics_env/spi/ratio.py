@@ -24,7 +24,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from .hidden import Hidden, least_seen, p_with_hidden, stalls
+from .hidden import Hidden, least_seen, p_with_hidden
 from .inputs import Numbers
 from .summaries import mean_over_trainings
 
@@ -168,16 +168,6 @@ def statistic(log_ratio: Numbers, s: Numbers) -> Numbers:
     """Student's statistic of a logarithm with standard error s."""
     with np.errstate(all="ignore"):
         return np.nan_to_num((log_ratio - s**2 / 2.0) / (s * (1.0 + _SKEWNESS * s**2)))
-
-
-def paired_ratio(
-    terms: Sequence[Term], *, offset: float = 0.0, threshold: float = 0.0, confidence: float = 0.95
-) -> RatioTest[Numbers]:
-    """Interval and test over paired seeds, for one study or many at once: samples (..., n)."""
-    hidden = [stalls(term.sample) for term in terms]
-    return ratio_test(
-        terms, Design(), hidden, offset=offset, threshold=threshold, confidence=confidence
-    )
 
 
 def ratio_test(

@@ -53,28 +53,6 @@ def prediction_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     return t_interval(performance("p", p), confidence, of_one_run=True, least=0.0)
 
 
-def interquartile_mean(p: ArrayLike) -> float:
-    """Mean without the lowest and the highest floor(n/4) seeds [items].
-
-    Raises:
-        IndicatorError: p empty, negative or not finite.
-    """
-    # Without scipy.stats, which wants a temporary file when it is imported: a disk may be full.
-    ascending = np.sort(performance("p", p))
-    cut = ascending.size // 4
-    return float(ascending[cut : ascending.size - cut].mean())
-
-
-def worst_decile(p: ArrayLike) -> float:
-    """Mean of the worst tenth of the seeds, rounded up to whole seeds [items].
-
-    Raises:
-        IndicatorError: p empty, negative or not finite.
-    """
-    ascending = np.sort(performance("p", p))
-    return float(ascending[: math.ceil(ascending.size / 10)].mean())
-
-
 def median_interval(times: ArrayLike, confidence: float = 0.95) -> Interval:
     """Median of times [s] with its interval by the sign test, which assumes no distribution.
 
@@ -99,31 +77,6 @@ def median_interval(times: ArrayLike, confidence: float = 0.95) -> Interval:
     if not k:
         return Interval(value, None, None)
     return Interval(value, float(ascending[k - 1]), float(ascending[n - k]))
-
-
-def probability_of_improvement(
-    p_o: ArrayLike, p_new: ArrayLike, confidence: float = 0.95
-) -> Interval:
-    """Share of seeds on which P_new > P_o, ties counting half, with Wilson's interval.
-
-    Raises:
-        IndicatorError: A sample empty, negative or not finite, unequal seed sets; confidence
-            outside (0, 1).
-    """
-    from scipy.special import ndtri
-
-    between_0_and_1("confidence", confidence)
-    before, after = performance("p_o", p_o), performance("p_new", p_new)
-    same_seeds(p_o=before, p_new=after)
-    share = float(np.mean((after > before) + 0.5 * (after == before)))
-    n = before.size
-    if n == 1:
-        return Interval(share, None, None)
-    z2 = float(ndtri(0.5 + confidence / 2)) ** 2
-    # Ties make the scores less variable than Wilson's 0 or 1: the interval is never too short.
-    centre = (share + z2 / (2 * n)) / (1 + z2 / n)
-    half = math.sqrt(z2 * (share * (1 - share) / n + z2 / (4 * n * n))) / (1 + z2 / n)
-    return Interval(share, max(0.0, centre - half), min(1.0, centre + half))
 
 
 def pairing_correlation(p_a: ArrayLike, p_b: ArrayLike) -> float | None:

@@ -36,7 +36,6 @@ from .cell import Cell
 from .verdict import Decision, Verdict, judge_comparison
 
 MOST_SEEDS_UNTIL_CLEAR = 200
-SPENDING: spi.Spending = "linear"
 HARDLY = 0.1  # chance of a verdict below which no further seed is played
 
 
@@ -162,7 +161,7 @@ class _Looks:
 
     def alpha(self, n_seeds: int, alpha: float) -> float:
         """Return what is spent of an error up to the look at `n_seeds`, or the next one."""
-        spent = spi.look_alphas(self.seeds, alpha, spending=SPENDING)
+        spent = spi.look_alphas(self.seeds, alpha)
         return spent[bisect_left(self.seeds, n_seeds)]
 
 

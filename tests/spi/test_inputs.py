@@ -31,7 +31,7 @@ REFUSED: list[tuple[Any, str]] = [
 
 @pytest.mark.parametrize(("values", "words"), REFUSED)
 def test_what_is_no_real_number_is_refused_by_its_place_or_kind(values: Any, words: str) -> None:
-    for ask in (spi.mean_interval, spi.worst_decile, spi.share_stalled):
+    for ask in (spi.mean_interval, spi.share_stalled):
         with pytest.raises(spi.IndicatorError, match=words) as refused:
             ask(values)
         assert isinstance(refused.value, SwarmLogisticsError)

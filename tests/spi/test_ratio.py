@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy.stats import t, ttest_ind, ttest_rel
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.ratio import RAISED, Term, paired_ratio
+from swarm_logistics_env.spi.hidden import stalls
+from swarm_logistics_env.spi.ratio import RAISED, Design, Term, ratio_test
 from verification.verdict_errors import share_supported, wrong_verdicts
 
 P_O = np.array([35.0, 41, 38, 29, 44, 36, 40])
@@ -20,8 +21,10 @@ P_F = np.array([33.0, 36, 39, 25, 40, 36, 35])
 FEWER_F = P_F[:5]  # of a sample that shares no seeds
 
 
-def change(p_o: Any, p_new: Any, **asked: Any) -> Any:
-    return paired_ratio([Term(p_new, 1.0, 0.0), Term(p_o, -1.0, 1.0)], **asked)
+def change(p_o: Any, p_new: Any, *, threshold: float = 0.0) -> Any:
+    terms = [Term(p_new, 1.0, 0.0), Term(p_o, -1.0, 1.0)]
+    hidden = [stalls(term.sample) for term in terms]
+    return ratio_test(terms, Design(), hidden, offset=0.0, threshold=threshold, confidence=0.95)
 
 
 @pytest.mark.parametrize("paired", [True, False])

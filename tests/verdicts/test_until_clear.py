@@ -25,7 +25,7 @@ from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.studies import Study
 from swarm_logistics_env.tasks.task import Outcome, Run
 from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.until_clear import SPENDING, predictive_power
+from swarm_logistics_env.verdicts.until_clear import predictive_power
 from swarm_logistics_env.verdicts.verdict import Verdict
 from tests.made_up import decided, delivered
 from verification.generators import MODELS
@@ -168,7 +168,7 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
     for test in study.findings().verdicts:
         estimate = test.estimate
         assert estimate is not None
-        alpha = spi.look_alphas(looks, spending=SPENDING)[looks.index(estimate.n_seeds)]
+        alpha = spi.look_alphas(looks)[looks.index(estimate.n_seeds)]
         assert estimate.confidence == pytest.approx(1 - alpha)
         p_o, p_f = (
             [made_up(Run(arm.case, "", seed)).delivered for seed in range(estimate.n_seeds)]
@@ -220,10 +220,7 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
         n_open = len(found)
         for n_seeds, p, verdict in sorted(found, key=lambda one: one[:2]):
             look = looks.index(n_seeds)
-            alone, level = (
-                spi.look_alphas(looks, alpha, spending=SPENDING)[look]
-                for alpha in (0.05, 0.05 / n_open)
-            )
+            alone, level = (spi.look_alphas(looks, alpha)[look] for alpha in (0.05, 0.05 / n_open))
             is_clear = verdict != "open"
             assert is_clear == (p < level)
             softened += level <= p < alone
@@ -349,10 +346,7 @@ def test_every_step_of_holm_at_a_look_has_a_level_of_its_own() -> None:
 def test_equivalences_step_down_too_each_at_the_level_of_its_own_look(
     shares: tuple[float, ...], equivalent: set[str]
 ) -> None:
-    levels = [
-        spi.look_alphas(looks_up_to(60), 0.1 / n_open, spending=SPENDING)[-1] / 2
-        for n_open in (1, 2, 3)
-    ]
+    levels = [spi.look_alphas(looks_up_to(60), 0.1 / n_open)[-1] / 2 for n_open in (1, 2, 3)]
 
     def p_of_equivalence(p_f: Numbers) -> float | None:
         return spi.equivalence(P_O, p_f).p_value

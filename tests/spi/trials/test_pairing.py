@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.ratio import Term, paired_ratio
+from swarm_logistics_env.spi.hidden import stalls
+from swarm_logistics_env.spi.ratio import Design, Term, ratio_test
 
 
 def test_trials_of_a_block_count_as_one_and_blocks_alike(tmp_path: Path) -> None:
@@ -78,7 +79,10 @@ def test_verdicts_hold_where_a_fault_costs_more_in_some_maps(
         np.array([row.performance for row in rows if row.fault == fault]).reshape(STUDIES, n_maps)
         for fault in ("none", "jam")
     )
-    test = paired_ratio([Term(p_f, 1.0, 0.0), Term(p_o, 0.0, 1.0)], offset=-0.9)  # R, which is 0
+    terms = [Term(p_f, 1.0, 0.0), Term(p_o, 0.0, 1.0)]
+    hidden = [stalls(term.sample) for term in terms]
+    # R, which is 0
+    test = ratio_test(terms, Design(), hidden, offset=-0.9, threshold=0.0, confidence=0.95)
     is_wrong = test.p_value < 0.05
     for side in (1, -1):
         assert np.mean(is_wrong & (side * test.mean_difference > 0.0)) <= 0.025
