@@ -146,7 +146,7 @@ def test_shares_and_survivors_are_told(
 
     monkeypatch.setattr(sampling, "run_tests", run_tests)
     borrowed = copies.Copies(1, tree, tree.parent / "copies")
-    assert sampling.measure_sample(99, 0, ["sizes"], borrowed, n_workers=1, root=tree) == 0
+    assert sampling.measure_sample(99, 0, ["sizes"], borrowed, 1, 60.0, tree) == 0
     *_, total, first, second, third, _, _ = capsys.readouterr().out.splitlines()
     assert total == "all: 3 of 6 survive, 50.0% [18.8%, 81.2%]"
     assert first.startswith("SURVIVES old/sizes.py:9 1.0 -> ")

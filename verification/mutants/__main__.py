@@ -78,11 +78,16 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--sample", type=int, metavar="N", help="draw N faults; no listed ones")
     parser.add_argument("--seed", type=int, default=0, help="of the drawn faults")
     parser.add_argument("--workers", type=int, default=2, help="copies of the tree to work in")
+    parser.add_argument(
+        "--seconds", type=float, default=60.0, help="of a core for the tests of a drawn fault"
+    )
     options = parser.parse_args(arguments)
     if options.sample is None:
         return make_listed(options.words, options.workers)
     copies = Copies(options.workers, folder=COPIES / "sample")
-    return measure_sample(options.sample, options.seed, options.words, copies, options.workers)
+    return measure_sample(
+        options.sample, options.seed, options.words, copies, options.workers, options.seconds
+    )
 
 
 if __name__ == "__main__":

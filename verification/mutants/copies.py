@@ -19,7 +19,7 @@ LEFT_OUT = shutil.ignore_patterns(
 )  # fmt: skip
 # Those that take the interpreter a minute or more; see KERNELS in the Makefile.
 SLOW = "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or in_a_run)"
-NO_END = "no end"  # what is said of tests that were stopped
+NO_END = "no end"  # what is said of tests that were stopped, or whose process crashed
 NO_IMPORT = "pytest itself"  # what is said where pytest cannot start: a module is not imported
 
 
@@ -102,6 +102,8 @@ def run_tests(
         return NO_END
     if running.returncode == 0:
         return ""
+    if running.returncode < 0:
+        return NO_END
     failed = [line for line in output.splitlines() if line.startswith(("FAILED ", "ERROR "))]
     if failed:
         return failed[0].partition(" ")[2].split(" - ")[0]

@@ -21,8 +21,7 @@ from .mutation import PACKAGE, ROOT, read_equal, replaced
 from .nearest import Nearest
 from .places import find_places, is_kernel, required_parameters
 
-BEGIN_UNTIL = 60.0  # [s] after which no further test of a fault begins
-LONGEST = 240.0  # [s] after which its tests are stopped
+LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
 _COMPILER = ("numba", "llvmlite")  # who imports these changes how kernels are compiled
 # Kernels that were compiled once serve all faults that are in none; see `fast_kernels`.
 _FENCE = "fast_kernels.py"
@@ -109,13 +108,21 @@ def draw(package: Package, seed: int) -> Iterable[Fault]:
 
 
 def measure_sample(
-    count: int, seed: int, words: Sequence[str], copies: Copies, n_workers: int, root: Path = ROOT
+    count: int,
+    seed: int,
+    words: Sequence[str],
+    copies: Copies,
+    n_workers: int,
+    seconds: float,
+    root: Path = ROOT,
 ) -> int:
     """Make `count` faults in files whose paths hold one of these words; print what survives.
 
-    Returns 2 if a test that caught faults also fails without one, else 0.
+    `seconds`: of a core, after which no further test of a fault begins. Returns 2 if a test that
+    caught faults also fails without one, else 0.
     """
     start = time.monotonic()
+    os.environ[budget.SECONDS] = str(seconds)
     faults = iter(draw(Package(root, words), seed))
     results: list[tuple[Fault, str]] = []
     n_not_imported = 0
@@ -180,7 +187,6 @@ def _caught_by(fault: Fault, copy: Path) -> str:
 
 
 def _run(fault: Fault, copy: Path) -> str:
-    os.environ[budget.SECONDS] = str(BEGIN_UNTIL)
     options = ["-p", budget.__name__]
     if fault.interpreted:
         options += ["-m", "not compiled"]
