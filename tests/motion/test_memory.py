@@ -186,6 +186,26 @@ def test_the_way_home_is_kept_though_the_body_turns_unnoticed() -> None:
     assert np.median(np.abs(drifts)) < 0.01
 
 
+def test_a_gyro_that_drifts_is_found_out_beside_a_wall(memory: Memory) -> None:
+    """Its heading seems to stand, and the wall turns by .02 rad/s."""
+    for step in range(600):
+        column.watch_walls(scan(0.002 * step, 1.0), 0.1, memory[0])
+    assert memory[0, column.DRIFT] == pytest.approx(-0.02, rel=0.1)
+    # The wall is that of the first sighting all the time.
+    assert memory[0, column.WALL] == pytest.approx(-0.002 * 599, abs=0.01)
+
+
+@pytest.mark.parametrize(("sightings", "angle"), [(0.0, 0.2), (1.0, 0.0)])
+def test_the_way_home_is_at_a_right_angle_to_a_wall_that_was_seen(
+    memory: Memory, sightings: float, angle: float
+) -> None:
+    memory[0, [column.KEPT_X, column.KEPT_Y]] = 3.0 * math.cos(0.2), 3.0 * math.sin(0.2)
+    memory[0, [column.SIGHTINGS, column.WALL]] = sightings, 0.3
+    expected = (math.cos(angle + 0.3), math.sin(angle + 0.3), 3.0)
+    assert column.kept_home(memory[0]) == pytest.approx(expected)
+    assert column.kept_home(np.zeros(column.N_COLUMNS)) == (0.0, 0.0, 0.0)
+
+
 def test_of_several_requested_items_in_view_the_nearest_counts() -> None:
     rows, ahead = sensed(), [0.3, 0.5, 0.6, 0.8]
     for place, (away, asked) in enumerate(zip(ahead, [0, 1, 1, 0])):
