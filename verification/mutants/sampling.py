@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import os
 import time
 from collections import Counter
@@ -143,7 +144,7 @@ def measure_sample(
 
     with ThreadPoolExecutor(n_workers) as pool:
         while len(results) < count:
-            drawn = [fault for fault, _ in zip(faults, range(count - len(results)))]
+            drawn = list(itertools.islice(faults, count - len(results)))
             if not drawn:
                 break
             made = list(pool.map(make, drawn))
