@@ -11,11 +11,17 @@ from xml.etree import ElementTree
 
 import pytest
 
+from swarm_logistics_env.report.answer import answer
+from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.document import document
+from swarm_logistics_env.report.latex import latex_tables
 from swarm_logistics_env.report.section import Section, limits, sentence, word_to_count
 from swarm_logistics_env.report.write import markdown, section_markdown, write_report
 from swarm_logistics_env.verdicts.results import StudyResults
 from tests.made_up import paper
+from tests.report.conftest import NARROW
+
+FROZEN = Path(__file__).parents[1] / "frozen"
 
 
 def test_no_headline_counts_a_verdict_that_assumes_normal_differences(few: StudyResults) -> None:
@@ -45,6 +51,23 @@ def directory(few: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Pa
     directory = tmp_path_factory.mktemp("report")
     write_report(few, directory)
     return directory
+
+
+def test_reports_are_as_recorded(few: StudyResults, compared: StudyResults, tmp_path: Path) -> None:
+    """Every number and sentence, of few seeds and of many; but for the sheet of the set-up."""
+    many = document(paper(seeds=12, noise=2.0, full=NARROW, same=frozenset({"FM2"})))
+    texts = {
+        "report.md": markdown(many).partition("\n## Set-up")[0],
+        "tables.tex": latex_tables(few, document(few)),
+        "answer.txt": digest(answer(compared, most=None), 80, most=None),
+    }
+    for name, text in texts.items():
+        made = tmp_path / name
+        made.write_text(f"{text.rstrip()}\n", encoding="utf-8")
+        lines = (FROZEN / name).read_text(encoding="utf-8").splitlines()
+        assert made.read_text(encoding="utf-8").splitlines() == lines, (
+            f"if {made} is as it should be, put it into {FROZEN}"
+        )
 
 
 def test_equal_rows_give_equal_bytes(few: StudyResults, directory: Path, tmp_path: Path) -> None:
