@@ -15,6 +15,7 @@ from typing import NamedTuple
 from .mutation import PACKAGE
 
 MOST_FILES = 8
+PLAYS = "verification/trajectories.py"
 
 
 class _Names(NamedTuple):
@@ -44,6 +45,7 @@ class Nearest:
         tests = sorted((root / "tests").rglob("test_*.py"))
         self._tests = {test: _read(test, "") for test in tests}
         self._imports_of_tests = {test: self._modules_of(self._tests[test]) for test in tests}
+        self._played = self._reached_from(root / PLAYS)
 
     def of(self, file: str) -> list[str]:
         """Return the nearest files of tests, the nearest first, of a file in the package."""
@@ -63,6 +65,10 @@ class Nearest:
         tests = dict.fromkeys(test for test in candidates if test in self._tests)
         return [str(test.relative_to(self._root)) for test in tests][:MOST_FILES]
 
+    def is_played(self, file: str) -> bool:
+        """Return whether the golden trajectories may run code of a file in the package."""
+        return _dotted(Path(PACKAGE) / file) in self._played
+
     def sources_of(self, file: str, names: set[str]) -> set[str]:
         """Return the files of the package that a file takes one of these names from."""
         imported = self._names[_dotted(Path(PACKAGE) / file)].imported
@@ -78,6 +84,15 @@ class Nearest:
     def _mirror(self, module: str) -> Path:
         path = self._paths[module].relative_to(self._root / PACKAGE)
         return self._root / "tests" / path.with_name(f"test_{path.name}")
+
+    def _reached_from(self, script: Path) -> set[str]:
+        """Return the modules that a script imports, and those that these import, and so on."""
+        reached: set[str] = set()
+        following = self._modules_of(_read(script, "")) if script.exists() else set()
+        while following:
+            reached |= following
+            following = set[str]().union(*(self._imports[name] for name in following)) - reached
+        return reached
 
     def _modules_of(self, names: _Names) -> set[str]:
         """Return the modules that are imported: by name, or by a name that they define."""

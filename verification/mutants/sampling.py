@@ -23,7 +23,7 @@ from .nearest import Nearest
 from .places import find_places, is_kernel, required_parameters
 
 LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
-# What kernels do in worlds, to the bit: asked of faults in kernels that no nearer test catches.
+# What worlds and policies do, to the bit: asked of faults in them that no nearer test catches.
 _TRAJECTORIES = "tests/verification/test_trajectories.py"
 _COMPILER = ("numba", "llvmlite")  # who imports these changes how kernels are compiled
 # Kernels that were compiled once serve all faults that are in none; see `fast_kernels`.
@@ -45,6 +45,7 @@ class Fault(NamedTuple):
     tests: tuple[str, ...]
     interpreted: bool  # whether kernels run in the interpreter, as it changes one
     compiles_anew: bool  # whether it may change how kernels are compiled
+    is_played: bool  # whether golden trajectories may run it
 
     @property
     def room(self) -> str:
@@ -97,6 +98,7 @@ class Package:
             tests=tuple(self._nearest.of(file)),
             interpreted=is_read_by_kernels,
             compiles_anew=file in self._compiler and not is_read_by_kernels,
+            is_played=self._nearest.is_played(file),
         )
 
 
@@ -178,11 +180,12 @@ def _share(count: int, total: int) -> str:
 
 def _caught_by(fault: Fault, copy: Path) -> str:
     test = _caught_by_nearest(fault, copy)
-    if test or not fault.interpreted:
+    if test or not fault.is_played:
         return test
-    # Compiled, as the interpreter would take minutes.
-    anew = fault._replace(tests=(_TRAJECTORIES,), interpreted=False, compiles_anew=True)
-    return _caught_by_nearest(anew, copy)
+    # Kernels are compiled, as the interpreter would take minutes.
+    anew = fault.interpreted or fault.compiles_anew
+    played = fault._replace(tests=(_TRAJECTORIES,), interpreted=False, compiles_anew=anew)
+    return _caught_by_nearest(played, copy)
 
 
 def _caught_by_nearest(fault: Fault, copy: Path) -> str:
