@@ -35,8 +35,8 @@ TIMES = [np.cumsum(counts(5, 60 + seed, scatter=0.9, phase=seed)) for seed in ra
 SLOWER = [np.append(times[times < 100.0], 100.0 + 2.0 * times) for times in TIMES]
 
 SMALL = spi.robustness(MANY, LESS, n=25, m=3)
-CLEAR = spi.scalability(FEW, 2 * FEW, n=10, m=10)
-THREE = spi.scalability(TRAINED[:3], 2 * TRAINED[:3], n=10, m=10)
+SLIGHTLY_LESS = spi.relative_change(MANY, MANY - 1.0 + 0.3 * np.cos(np.arange(12)))
+FIVE = spi.relative_change(TRAINED[:5], 0.93 * TRAINED[:5] + np.cos(np.arange(40)).reshape(5, 8))
 OF_TRAININGS = spi.robustness(TRAINED, TRAINED_LESS, n=25, m=3)
 SAME = spi.equivalence(MANY, MANY + np.tile([1.0, -1.0], 6))
 
@@ -59,7 +59,7 @@ CASES: dict[str, Callable[[], Any]] = {
         TRAINED, TRAINED_LESS[:, :6], n=25, m=3, paired=False
     ),
     "R, collapsed": lambda: spi.robustness(TRAINED, COLLAPSED, n=25, m=3),
-    "S, clear": lambda: [CLEAR, THREE],
+    "changes that stalls or collapses may hide": lambda: [SLIGHTLY_LESS, FIVE],
     "A": lambda: spi.adaptability(MANY, LESS, x_o=10.0, x_new=15.0),
     "change": lambda: spi.relative_change(MANY, LESS, threshold=-0.33),
     "equivalence": lambda: SAME,
@@ -76,8 +76,8 @@ CASES: dict[str, Callable[[], Any]] = {
     "detectable": lambda: [spi.minimum_detectable_effect(e, 0.9) for e in (SMALL, OF_TRAININGS)],
     "seeds": lambda: [spi.seeds_for_power(SMALL, effect) for effect in (-0.3, -0.1, 0.02, 0.1)],
     "seeds for equivalence": lambda: spi.seeds_for_equivalence(SAME),
-    "seeds against stalls": lambda: spi.seeds_against_stalls(CLEAR),
-    "trainings": lambda: spi.trainings_against_collapses(THREE),
+    "seeds against stalls": lambda: spi.seeds_against_stalls(SLIGHTLY_LESS),
+    "trainings": lambda: spi.trainings_against_collapses(FIVE),
     "power": lambda: [spi.lower_decile_of_power(SMALL, 0.1, n) for n in (12, 40)],
     "Holm": lambda: [
         *spi.holm([0.01, 0.04, 0.03, 0.5]),
