@@ -88,7 +88,7 @@ def room() -> Frame:
     """A busy room: every activity, halos of two ages, a link, marks, obstacles and requests."""
     fields: dict[str, Any] = {"n_robots": 6, "n_items": 5, "n_requests": 2}
     scenario = Scenario(**fields, n_obstacles=2, obstacle_radius=0.4, radio_range=6.0)
-    state = WarehouseState(scenario)
+    state: Any = WarehouseState(scenario)
     state.robot_position = [[1, 1], [3, 4], [5, 8], [7, 2], [8.5, 6], [2, 7]]
     state.robot_heading = [0.0, 0.8, 2.0, -1.2, 3.1, -2.4]
     state.item_position = [[4.2, 1.1], [2, 5.5], [5.5, 5], [1, 9], [7, 7]]
@@ -110,7 +110,7 @@ def hall() -> Frame:
     """A floor plan, wider than high, with requests that name docks."""
     plan = "A.::::::.B\nA.::==::.B\nA.::==::.B\n..::##::..\n++::##::.A\n++::::::.A"
     scenario = Scenario(floor=plan, n_robots=2, n_items=3, request_docks="random", cell_size=1.0)
-    state = WarehouseState(scenario)
+    state: Any = WarehouseState(scenario)
     state.robot_position, state.item_position = [[0.6, 0.5], [7, 1]], [[3, 5], [2.5, 1.5], [7, 4]]
     state.open_requests[:], state.requested_docks[:] = 1, 1
     state.failed[1], state.failure_modes = True, ((), ("of_my_own",))

@@ -20,7 +20,7 @@ RECORD = Path(__file__).parents[1] / "frozen" / "estimates.json"
 def counts(mean: float, *shape: int, scatter: float = 0.2, phase: float = 0.0) -> NDArray[Any]:
     """Return deliveries of runs around a mean: numbers that no generator draws."""
     waves = np.sin(1.7 * np.arange(np.prod(shape)) ** 1.3 + phase)
-    return np.rint(mean * (1.0 + scatter * waves)).reshape(shape)
+    return np.asarray(np.rint(mean * (1.0 + scatter * waves)).reshape(shape))
 
 
 # P of 12 seeds, of 4, and of 6 trainings over 8 seeds; with runs that stall, that deliver next to
