@@ -68,6 +68,11 @@ def _small(*faults: Fault, **fields: Any) -> GoldenTrajectory:
     return GoldenTrajectory(Scenario(**{**size, "delivery_width": 1.0, **fields}), faults, **told)
 
 
+def _in_aisles(policy: str) -> GoldenTrajectory:
+    scenario = Scenario(floor="aisles", n_robots=12, n_obstacles=3, restock=True)
+    return GoldenTrajectory(scenario, policy=policy, steps=300)
+
+
 def _preset(name: str, steps: int, **changed: Any) -> GoldenTrajectory:
     return GoldenTrajectory(Scenario.preset(name).replace(**changed), steps=steps)
 
@@ -125,6 +130,14 @@ GOLDEN |= {
         policy="homing",
         steps=650,
     ),
+    "homing": _small(policy="homing", restock=True, steps=300),
+    "homing in aisles": _in_aisles("homing"),
+    "homing-stock": _small(policy="homing-stock", n_robots=8, restock=True, steps=300),
+    "homing-stock with wheels": _small(
+        policy="homing-stock", drive="differential", n_robots=8, restock=True, steps=300
+    ),
+    "central-stock": _in_aisles("central-stock"),
+    "ppo-robust": _small(policy="ppo-robust", restock=True, steps=300),
     "changes during the run": _small(
         delivery_width=0.5,
         events={

@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import (
     NormalizeObservation,
@@ -18,8 +19,9 @@ from gymnasium.wrappers.vector import (
 
 from swarm_logistics_env.adapters import CentralEnv, SwarmRows, vector_env
 from swarm_logistics_env.errors import CommandError, SetupError
+from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame
+from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, Wrapper
 from tests.wrappers.conftest import BRIEF, brief, wrapped
 
 N_STEPS = 20  # of an episode of a brief world
@@ -51,6 +53,25 @@ def test_gymnasium_makes_it_by_its_name() -> None:
     assert isinstance(central.unwrapped, CentralEnv)
     assert central.spec is not None
     assert central.spec.max_episode_steps == 7
+
+
+class Wider(Wrapper):
+    """Says that observations may be lower in the first world, and higher in the second."""
+
+    def observation_space(self, agent: str) -> Box:
+        low, high = self.bounds
+        return Box(low, high, (N_COLUMNS,), np.float32)
+
+
+def test_the_space_holds_the_observations_of_every_world() -> None:
+    def make(world: int) -> Any:
+        env = Wider(brief(n_robots=2))
+        env.bounds = [(-9.0, 1.0), (-1.0, 8.0)][world]
+        return env
+
+    space = SwarmRows(2, make_env=make).single_observation_space
+    assert isinstance(space, Box)
+    assert (space.low.min(), space.low.max(), space.high.min()) == (-9.0, -9.0, 8.0)
 
 
 def trace(mode: AutoresetMode, steps: int) -> list[list[Any]]:

@@ -12,6 +12,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, run_episode
 from swarm_logistics_env.bodies import Orders, Placement
+from swarm_logistics_env.errors import BodiesError
 from swarm_logistics_env.policies import load
 
 pytest.importorskip("mujoco")
@@ -82,6 +83,13 @@ def test_a_robot_turns_at_the_rate_that_it_wants(drive: str) -> None:
     bodies = placed(drive, [[5.0, 5.0]])
     headings = [float(bodies.move(orders((0.0, 0.0, 1.5))).heading[0]) for _ in range(10)]
     assert headings[-1] - headings[4] == pytest.approx(5 * 0.1 * 1.5, rel=0.05)
+
+
+def test_a_simulation_that_explodes_is_told() -> None:
+    bodies = placed("holonomic", [[5.0, 5.0]])
+    bodies._data.qvel[:] = 1e30
+    with pytest.raises(BodiesError, match=r"unstable after .* should have a smaller max_acc"):
+        bodies.move(orders((0.0, 0.0, 0.0)))
 
 
 @pytest.mark.parametrize("drive", DRIVES)

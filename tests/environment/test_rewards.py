@@ -86,6 +86,8 @@ PAYS: dict[str, tuple[dict[str, float] | None, list[Act], list[tuple[list[Act], 
         ([(deliver, 1, 3)], NOTHING)]),
     "nor when the same item is asked for again": ({"lift_requested": 1.0}, [(give, 1, 2)], [
         ([(deliver, 1, 2)], NOTHING)]),
+    "nor for a lift before the request": ({"lift_requested": 1.0}, [(give, 1, 2)], [
+        ([(give, 0, 5), (deliver, 1, 5)], NOTHING)]),
     "approach the carrier's metres up to the area": (
         {"approach": 10.0}, [(give, 1, 2), (to, 1, 3.0, 5.0), (to, 0, 1.0, 1.0)], [
         ([(to, 1, 3.2, 1.0), (to, 0, 2.0, 1.0)], [0.0, 2.0, 0.0, 0.0]),

@@ -19,6 +19,7 @@ from swarm_logistics_env.motion.memory import (
     note_command,
     remember_observation,
     wall_angle,
+    watch_walls,
 )
 from swarm_logistics_env.motion.steering import nearest_items
 
@@ -68,7 +69,7 @@ def test_a_robot_that_holds_the_requested_item_inside_takes_its_delivery_for_bro
     memory[0, MEMORY.held] = OPEN
     go_on(memory, sensed(), 60.0)
     assert memory[0, MEMORY.cannot_deliver] == pytest.approx(0.5, abs=0.01)
-    assert memory[0, MEMORY.failed] < 0.5
+    assert memory[0, MEMORY.failed] == pytest.approx(math.exp(-1.0), abs=0.01)
     go_on(memory, sensed(), 61.0)
     assert memory[0, MEMORY.cannot_deliver] == 0.0, "it may have been repaired"
 
@@ -192,6 +193,26 @@ def test_the_way_home_is_kept_though_the_body_turns_unnoticed() -> None:
     assert np.median(np.abs(memory[has, MEMORY.away] - away)) < 0.6
     drifts = memory[has, MEMORY.drift] + state.robot_heading_drift[has]
     assert np.median(np.abs(drifts)) < 0.01
+
+
+def test_a_gyro_that_drifts_is_found_out_beside_a_wall(memory: Memory) -> None:
+    """Its heading seems to stand, and the wall turns by .02 rad/s."""
+    for step in range(600):
+        watch_walls(scan(0.002 * step, 1.0), 0.1, memory[0])
+    assert memory[0, MEMORY.drift] == pytest.approx(-0.02, rel=0.1)
+    # The wall is that of the first sighting all the time.
+    assert memory[0, MEMORY.wall] == pytest.approx(-0.002 * 599, abs=0.01)
+
+
+@pytest.mark.parametrize(("sightings", "angle"), [(0.0, 0.2), (1.0, 0.0)])
+def test_the_way_home_is_at_a_right_angle_to_a_wall_that_was_seen(
+    memory: Memory, sightings: float, angle: float
+) -> None:
+    memory[0, [MEMORY.kept_x, MEMORY.kept_y]] = 3.0 * math.cos(0.2), 3.0 * math.sin(0.2)
+    memory[0, [MEMORY.sightings, MEMORY.wall]] = sightings, 0.3
+    expected = (math.cos(angle + 0.3), math.sin(angle + 0.3), 3.0)
+    assert kept_home(memory[0]) == pytest.approx(expected)
+    assert kept_home(np.zeros(N_COLUMNS)) == (0.0, 0.0, 0.0)
 
 
 def test_of_several_requested_items_in_view_the_nearest_counts() -> None:

@@ -27,6 +27,22 @@ def test_it_gets_to_drive_where_it_wants_to(direction: float) -> None:
     assert math.cos(driven - direction) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(
+    ("direction", "speed", "turn"),
+    [(0.3, math.cos(0.15), 0.3), (1.5, math.cos(1.2), 0.6), (-0.6, math.cos(0.3), -0.6),
+     (math.pi - 0.4, -math.cos(0.2), -0.4)],
+)  # fmt: skip
+def test_it_drives_at_the_mean_heading_of_its_turn(
+    direction: float, speed: float, turn: float
+) -> None:
+    """A turn of .6 rad at most; its speed is the way that it makes in the wanted direction."""
+    memory = np.zeros(N_COLUMNS)
+    memory[MEMORY.widest_turn] = 0.6
+    command = np.array([math.cos(direction), math.sin(direction), 0.0, 1.0])
+    steer(memory, command)
+    assert command.tolist() == pytest.approx([speed, 0.0, turn / 0.6, 1.0])
+
+
 @pytest.mark.compiled
 def test_homing_delivers_with_differential_drive() -> None:
     scenario = Scenario(restock=True, drive="differential", duration=60.0)

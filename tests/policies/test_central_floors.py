@@ -60,6 +60,22 @@ def test_it_steps_over_items_that_close_an_aisle() -> None:
         assert run_episode(scenario, load("central"), seed).delivered >= 5
 
 
+def test_each_episode_is_planned_around_its_own_obstacles() -> None:
+    """One that was reset alone, as an environment does, plays as one that is new."""
+    scenario = Scenario(floor="aisles", n_obstacles=8, duration=10.0)
+    world = Warehouse(scenario)
+    old, new = load("central"), load("central")
+    for seed, players in ((0, [old]), (1, [old, new])):
+        if players[-1] is not old or seed == 0:
+            start(players[-1], scenario, seed)
+        old.reset(scenario.n_robots, seed)
+        rows = world.reset(seed)
+        for _ in range(60):
+            commands = [decide(player, rows, world.state) for player in players]
+            np.testing.assert_array_equal(commands[0], commands[-1])
+            rows = world.step(commands[0])
+
+
 def test_places_to_rest_and_slots_are_free_and_outside_of_docks() -> None:
     for name in ("aisles", "two_docks"):
         scenario = Scenario(floor=name)

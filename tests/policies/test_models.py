@@ -103,6 +103,27 @@ def test_a_model_is_known_by_its_numbers_and_its_form_and_each_run_has_a_memory(
     assert run_episode(BRIEF, first, seed=1).digest == run_episode(BRIEF, again, seed=1).digest
 
 
+class Counting:
+    """A model that notes how often it was asked, and answers by it."""
+
+    n_calls = 0
+
+    def __call__(self, rows: Any) -> Any:
+        self.n_calls += 1
+        return np.full((len(rows), 3), 0.1 * self.n_calls)
+
+
+def test_two_runs_at_once_share_no_model() -> None:
+    policy = policies.of(Counting(), frame=True)
+    run, twin = PolicySpec.of(policy).load(), PolicySpec.of(policy).load()
+    rows = np.zeros((4, N_COLUMNS), np.float32)
+    for player in (run, twin):
+        player.reset(4, 0)
+    first = run.act(rows)
+    assert not np.array_equal(run.act(rows), first)
+    np.testing.assert_array_equal(twin.act(rows), first)
+
+
 def test_two_runs_at_once_share_no_memory() -> None:
     policy = policies.of(linear, frame=True)
     run, twin = PolicySpec.of(policy).load(), PolicySpec.of(policy).load()

@@ -173,6 +173,13 @@ def test_robots_may_fail_and_be_repaired_at_random_or_keep_a_factor() -> None:
     }
 
 
+def test_a_parameter_is_varied_in_the_conditions_of_its_table() -> None:
+    width = {"name": "delivery_width", "values": [2, 1], "scenario": {"n_robots": 7}}
+    cases = Study(seeds=2, parameters=[width]).plan().cases
+    scenarios: list[Any] = [case.scenario for case in cases]
+    assert {(s.n_robots, s.delivery_width) for s in scenarios} == {(7, 2.0), (7, 1.0)}
+
+
 def test_for_p_s_of_faults_by_role_those_of_the_role_are_removed() -> None:
     by_role = {"modes": ["FM4"], "robots": [1, 2], "onsets": [50], "role": "carrier"}
     plan = Study(seeds=2, faults=[by_role]).plan()

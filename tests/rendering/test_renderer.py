@@ -6,7 +6,9 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +21,8 @@ from swarm_logistics_env.warehouse import FAILURE_MODES, WarehouseState
 from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY
 
 Frame = NDArray[np.uint8]
+FROZEN = Path(__file__).parents[1] / "frozen"
+RECORDED_WITH = "2.6.1"  # of pygame
 
 
 def situation(robots: ArrayLike, items: ArrayLike = ((5, 5),)) -> tuple[WarehouseState, Scenario]:
@@ -78,6 +82,56 @@ def digest() -> str:
         world.step(np.tile([1.0, 0.0, 0.3, 1.0], (12, 1)))
         found.update(renderer.frame(world.state, world.scenario).tobytes())
     return found.hexdigest()
+
+
+def room() -> Frame:
+    """A busy room: every activity, halos of two ages, a link, marks, obstacles and requests."""
+    fields: dict[str, Any] = {"n_robots": 6, "n_items": 5, "n_requests": 2}
+    scenario = Scenario(**fields, n_obstacles=2, obstacle_radius=0.4, radio_range=6.0)
+    state: Any = WarehouseState(scenario)
+    state.robot_position = [[1, 1], [3, 4], [5, 8], [7, 2], [8.5, 6], [2, 7]]
+    state.robot_heading = [0.0, 0.8, 2.0, -1.2, 3.1, -2.4]
+    state.item_position = [[4.2, 1.1], [2, 5.5], [5.5, 5], [1, 9], [7, 7]]
+    state.obstacle_position = [[4, 6.5], [6, 3.5]]
+    state.sends[:], state.hears[:] = True, True
+    state.robot_timer = [0.0, 3.0, 9.0, np.nan, np.nan, np.nan]
+    state.robot_told = [np.nan, 2.0, 1.0, np.nan, np.nan, np.nan]
+    state.open_requests[:] = 0, 2
+    give(state, 3, 2)
+    give(state, 4, 4)
+    state.failed = [False, True, False, True, False, False]
+    state.failure_modes = ((), ("FM1",), (), ("FM4", "FM2"), (), ())
+    state.progress.time[0] = 12.3
+    state.delivery_times = [1.0, 2.0]
+    return frame(state, scenario, 500)
+
+
+def hall() -> Frame:
+    """A floor plan, wider than high, with requests that name docks."""
+    plan = "A.::::::.B\nA.::==::.B\nA.::==::.B\n..::##::..\n++::##::.A\n++::::::.A"
+    scenario = Scenario(floor=plan, n_robots=2, n_items=3, request_docks="random", cell_size=1.0)
+    state: Any = WarehouseState(scenario)
+    state.robot_position, state.item_position = [[0.6, 0.5], [7, 1]], [[3, 5], [2.5, 1.5], [7, 4]]
+    state.open_requests[:], state.requested_docks[:] = 1, 1
+    state.failed[1], state.failure_modes = True, ((), ("of_my_own",))
+    return frame(state, scenario, 600)
+
+
+@pytest.mark.parametrize("scene", [room, hall])
+def test_pictures_are_as_recorded(scene: Callable[[], Frame], tmp_path: Path) -> None:
+    """To every pixel with the recorded version of pygame; other ones draw letters otherwise."""
+    import pygame
+
+    made = tmp_path / f"{scene.__name__}.png"
+    pygame.image.save(pygame.surfarray.make_surface(scene().transpose(1, 0, 2)), made)
+    recorded, shown = (
+        pygame.surfarray.array3d(pygame.image.load(path)).astype(int)
+        for path in (FROZEN / made.name, made)
+    )
+    message = f"if {made} is as it should be, put it into {FROZEN}"
+    assert shown.shape == recorded.shape, message
+    differing = (np.abs(shown - recorded).max(axis=2) > 16).mean()
+    assert differing <= (0.0 if pygame.version.ver == RECORDED_WITH else 0.02), message
 
 
 def test_frames_are_the_same_in_two_processes() -> None:

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
+from typing import Any
 
+import pandas as pd
 import pytest
 
+from swarm_logistics_env import judge as judge_trials
 from swarm_logistics_env import spi
-from swarm_logistics_env.report.answer import MOST_LINES, answer
+from swarm_logistics_env.report.answer import MOST_LINES, Line, answer, performance_of
 from swarm_logistics_env.report.digest import digest
 from swarm_logistics_env.report.section import limits
 from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.results import StudyResults
-from tests.made_up import decided, paper
+from swarm_logistics_env.verdicts.results import StudyResults, judge
+from swarm_logistics_env.verdicts.verdict import UNAFFECTED, Decision
+from tests.made_up import decided, delivered, judged, paper
 
 
 def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
@@ -112,10 +117,72 @@ def test_words_for_what_is_no_plain_verdict() -> None:
     assert "P is small" not in same.notes
 
 
+def test_several_verdicts_share_the_interval_of_those_that_have_one(few: StudyResults) -> None:
+    first, second = (verdict for verdict in few.verdicts[:2])
+    assert first.interval is not None
+    whole = Line("", "S", "", (first, second), (0, 1)).interval(0.95)
+    assert re.fullmatch(r"in \[-?\d\.\d\d, -?\d\.\d\d\]", whole)
+    exact = replace(second, on_threshold=Decision(UNAFFECTED, UNAFFECTED))
+    text = Line("", "S", "", (first, exact), (0, 1)).interval(0.95)
+    assert text == f"1 of 2 in {limits(first.interval, 2)}"
+
+
+def test_a_decided_ratio_without_an_interval_says_why(few: StudyResults) -> None:
+    verdict = few.verdicts[0]
+    assert verdict.estimate is not None
+    unbounded = replace(verdict.estimate, flags=(*verdict.estimate.flags, "unbounded"))
+    supported = replace(
+        verdict, estimate=unbounded, on_threshold=Decision("supported", "supported")
+    )
+    line = Line("", "S", "", (supported,), (0,))
+    assert line.verdict_text == "supported by its test; P_o is too near 0 for an interval"
+
+
+@pytest.mark.parametrize(("adjusted", "contradicts"), [("open", False), ("refuted", True)])
+def test_a_claim_is_contradicted_by_what_holm_leaves(
+    few: StudyResults, adjusted: Any, contradicts: bool
+) -> None:
+    decision = Decision("refuted", adjusted)
+    verdict = replace(few.verdicts[0], on_threshold=decision, claimed=True)
+    assert Line("", "S", "", (verdict,), (0,)).contradicts is contradicts
+
+
+def test_p_of_no_delivery_has_the_limit_of_its_runs() -> None:
+    study = Study(seeds=4, sizes=[{"values": [2, 3]}])
+    nothing = judged(study, lambda *_: delivered(0))
+    assert ": 0 (at most 0.75 at 95 %, as none of 4 runs delivered" in performance_of(nothing)
+
+
+def test_p_of_a_policy_is_that_of_its_first_table() -> None:
+    tables = [{"modes": ["FM1"]}, {"modes": ["FM4"], "scenario": {"n_items": 20}}]
+    plan = Study(seeds=2, faults=tables, scenario={"n_items": 50}).plan()
+    outcomes = {
+        (run.case.key, run.seed): delivered(run.case.scenario.n_items + run.seed)  # type: ignore[attr-defined]
+        for run in plan.runs
+    }
+    assert ": 50.5 [" in performance_of(judge(plan, outcomes))
+
+
 def test_policies_stand_one_below_the_other_each_with_its_p(compared: StudyResults) -> None:
     text = digest(answer(compared), 80)
     assert re.search(r"at N = 25, no fault: swarm-dt 39\.\d \[[\d., ]+\],\s+swarm-dt-follow", text)
+    assert all(
+        re.match(r"swarm-dt(-follow)?: ", question) for question in answer(compared).questions
+    )
     assert re.search(r"swarm-dt-follow\s+20\.\d \[[\d., ]+\]\.", text)
+
+
+def test_one_question_at_two_values_of_a_parameter_names_them() -> None:
+    rows = [
+        (robots, speed, 10 * robots + seed % 3)
+        for robots in (4, 8)
+        for speed in (0.5, 1.0)
+        for seed in range(5 if speed == 0.5 else 4)
+    ]
+    frame = pd.DataFrame(rows, columns=["robots", "speed", "delivered"])
+    questions = answer(judge_trials(frame), most=None).questions
+    sizes = [question for question in questions if question.startswith("S ")]
+    assert sizes == ["S N 4→8, speed = 0.5", "S N 4→8, speed = 1"]
 
 
 def test_a_study_that_compares_policies_alone_says_p_of_each_in_its_first_table() -> None:

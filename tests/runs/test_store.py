@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import re
+import sqlite3
 import subprocess
 import sys
 import tempfile
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -133,6 +135,18 @@ def test_what_is_no_store_is_refused_with_the_reason(
     with pytest.raises(StudyError, match=words), Runs(path) as runs:
         runs.frame()
     assert path.read_bytes() == before
+
+
+def test_what_was_discarded_is_damage_no_more(tmp_path: Path) -> None:
+    path = tmp_path / FILE_NAME
+    with Runs(path) as runs:
+        runs.add([(run(0), outcome(1.0)), (run(1), outcome(2.0))])
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute("UPDATE runs SET outcome = '{}' WHERE key = ?", (run(0).key,))
+    with Runs(path) as runs:
+        assert "1 run of" in (runs.damage() or "")
+        assert "1 run of" in (runs.discard_damaged() or "")
+        assert (runs.damage(), runs.succeeded()) == (None, {run(1).key})
 
 
 def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from swarm_logistics_env.motion.memory import BODY, MEMORY, OPEN, body_of
 from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.train.learner import NetworkView, make_learner
 from swarm_logistics_env.train.privileged import PRIVILEGED
+from swarm_logistics_env.train.settings import PPOSettings
 
 
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:
@@ -69,6 +70,33 @@ def test_the_actor_sees_nothing_of_it(small: Any) -> None:
         one, other = (policy.get_distribution(given).mode() for given in (columns, changed))
         assert (one == other).all()
         assert (policy.predict_values(columns) != policy.predict_values(changed)).all()
+
+
+def test_the_learner_learns_as_the_settings_say_and_begins_by_driving_ahead(small: Any) -> None:
+    ppo = PPOSettings(
+        n_steps=30, epochs=3, n_minibatches=4, gamma=0.9, gae_lambda=0.8, clip=0.3, entropy=0.01,
+        value_weight=0.7, max_grad_norm=0.4, target_kl=0.05, deviations=(0.5, 0.3, 0.2),
+    )  # fmt: skip
+    training = small(ppo=ppo)
+    learner = make_learner(training, NetworkView(training), "cpu")
+    assert (learner.n_steps, learner.n_epochs, learner.batch_size) == (30, 3, 8 * 30 // 4)
+    assert (learner.gamma, learner.gae_lambda, learner.clip_range(1.0)) == (0.9, 0.8, 0.3)
+    assert (learner.ent_coef, learner.vf_coef, learner.max_grad_norm) == (0.01, 0.7, 0.4)
+    assert (learner.target_kl, learner.lr_schedule(1.0)) == (0.05, ppo.learning_rate)
+    with torch.no_grad():
+        first = learner.policy.get_distribution(torch.zeros(1, len(INPUTS) + len(PRIVILEGED)))
+    assert first.distribution.mean.tolist() == [pytest.approx([0.8, 0.0, 0.0])]
+    assert first.distribution.stddev.tolist() == [pytest.approx([0.5, 0.3, 0.2])]
+
+
+def test_headings_at_the_start_are_those_of_the_seed(small: Any) -> None:
+    headings = []
+    for seed in (3, 3, 4):
+        view = NetworkView(small())
+        view.seed(seed)
+        view.reset()
+        headings.append(view.frame.memory[:, MEMORY.heading_x].tolist())
+    assert headings[0] == headings[1] != headings[2]
 
 
 def test_every_episode_has_the_bodies_of_its_robots_and_random_numbers_of_its_own(

@@ -68,7 +68,7 @@ def test_a_training_ends_in_a_policy_that_plays(small: Any, tmp_path: Path) -> N
     card = policy.card
     assert (card.name, card.command, card.seed) == ("small", "the command", 0)
     assert card.agent_steps == 640
-    assert card.scenario["warehouse_width"] == 5.0
+    assert (card.scenario["warehouse_width"], card.scenario["n_robots"]) == (5.0, 3)
     assert {"torch", "swarm-logistics-env", "simulation"} <= card.versions.keys()
     assert card.scored_with == versions()
     measured = {(score.measure, score.condition) for score in card.scores}
@@ -332,17 +332,24 @@ def test_where_the_rate_begins_anew_adam_does_too_also_in_a_training_that_goes_o
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     training = small(ppo=small().ppo.replace(restarts=((0.5, 2e-3),)))
+    n_decisions: list[int] = []  # of each row's episode, one step after the rate began anew
 
     def interrupt(inside: dict[str, Any], _: object) -> bool:
         if inside["self"].num_timesteps > 320:
+            n_decisions.extend(inside["self"].env.frame.counts.tolist())
             raise KeyboardInterrupt
         return True
 
     monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
     with pytest.raises(KeyboardInterrupt):
         train(training, tmp_path / "cut", callbacks=[ConvertCallback(interrupt)])
+    assert n_decisions == [2] * training.rows
     uncut = weights(train(training, tmp_path / "uncut"))
     assert weights(train(training, tmp_path / "cut")) == uncut
+    # The clock goes on where the first session stopped.
+    curve = (tmp_path / "cut/curve.csv").read_text().splitlines()[1:]
+    seconds = [float(line.split(",")[1]) for line in curve]
+    assert seconds == sorted(seconds)
     saved = read_checkpoint(tmp_path / "uncut")
     assert saved is not None
     steps = {state["step"].item() for state in saved["optimizer"]["state"].values()}

@@ -8,7 +8,7 @@ import pytest
 from swarm_logistics_env import Fault, Scenario, policies, run_episode
 from swarm_logistics_env.episode import Play
 from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.rendering.renderer import load_pygame
+from swarm_logistics_env.rendering.renderer import Renderer, load_pygame
 
 load_pygame()
 
@@ -40,6 +40,12 @@ def test_same_runs_give_the_same_frames_and_faults_show() -> None:
     sound, broken = frames(take()), frames(take(fault))
     np.testing.assert_equal(frames(take()), sound)
     assert not np.array_equal(sound, broken)
+    # Below the name and P stands the picture of the state, at its place to the pixel.
+    at_start = take().play.world
+    picture = Renderer(SMALL, "rgb_array", 120).frame(at_start.state, SMALL)
+    head = len(sound[0]) - len(picture)
+    np.testing.assert_equal(sound[0][head:], picture)
+    assert 20 < head < 40
     # Side by side each looks as it does alone.
     wide = frames(take(), take(fault))
     np.testing.assert_equal([np.hstack(pair) for pair in zip(sound, broken)], wide)

@@ -181,7 +181,8 @@ def test_what_cannot_be_is_refused() -> None:
 
 
 def test_policies_are_compared_with_the_same_faults() -> None:
-    session = Session(SMALL, against="homing", seed=3)
+    session = Session(SMALL, against="homing", seed=3, faults=[Fault("FM1", (5,))])
+    assert session.beside.world.state.failure_modes[5] == ("FM1",)
     assert session.choices[:2] == (session.policy, session.against) == ("swarm-dt", "homing")
     session.toggle_robot(2)
     assert session.beside.world.state.failure_modes[2] == ("FM4",)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.wrappers import Condition, RunningMeans
+from swarm_logistics_env.wrappers.indicator_payments import GivenPerformances
 from tests.wrappers.conftest import (
     CLOSE,
     FAULTY,
     LARGER,
+    NARROW,
     OPTIONS,
     OWN,
     REMOVED,
@@ -28,6 +31,13 @@ def filled(performances: dict[Condition, int]) -> RunningMeans:
     for condition, items in performances.items():
         means.add(condition, items)
     return means
+
+
+def test_a_number_of_one_condition_is_none_of_another_unless_it_stands_for_all() -> None:
+    for_all = GivenPerformances({OWN: 33.0}, whatever_changes=True)
+    assert (for_all.performance(OWN), for_all.performance(NARROW)) == (33.0, 33.0)
+    with pytest.raises(SetupError, match="references should have the performance of"):
+        GivenPerformances({OWN: 33.0}).performance(NARROW)
 
 
 def test_means_at_the_start_hold_for_the_whole_episode() -> None:

@@ -2,11 +2,13 @@
 
 import ast
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = "swarm_logistics_env"
+EQUAL = Path(__file__).with_name("equal.toml")
 
 
 class Mutant(NamedTuple):
@@ -29,15 +31,22 @@ class MutantError(ValueError):
 
 def read_mutants() -> tuple[Mutant, ...]:
     """Return the mutants of all lists."""
-    found = []
-    for path in sorted(Path(__file__).parent.glob("*.toml")):
-        listed = tomllib.loads(path.read_text(encoding="utf-8"))
-        common = {key: listed.pop(key) for key in ("tests", "interpreted") if key in listed}
-        for name, told in listed.items():
-            file, _, where = told.pop("at").partition(" ")
-            place = name, path.stem, file, where, told.pop("was")
-            found.append(Mutant(*place, **{**common, **told}))
-    return tuple(found)
+    paths = sorted(Path(__file__).parent.glob("*.toml"))
+    return tuple(mutant for path in paths if path != EQUAL for mutant in _read_list(path))
+
+
+def read_equal() -> tuple[Mutant, ...]:
+    """Return the faults that change no behaviour: `survives` tells why. They have no tests."""
+    return tuple(_read_list(EQUAL))
+
+
+def _read_list(path: Path) -> Iterator[Mutant]:
+    listed = tomllib.loads(path.read_text(encoding="utf-8"))
+    common = {key: listed.pop(key) for key in ("tests", "interpreted") if key in listed}
+    for name, told in listed.items():
+        file, _, where = told.pop("at").partition(" ")
+        place = name, path.stem, file, where, told.pop("was")
+        yield Mutant(*place, **{**common, **told})
 
 
 def mutated(mutant: Mutant, source: str) -> str:
@@ -54,9 +63,13 @@ def mutated(mutant: Mutant, source: str) -> str:
         new = ast.Constant(None)
     if isinstance(found[0], ast.stmt) and isinstance(new, ast.expr):
         new = ast.Expr(new)
-    _Replace(found[0], new).visit(place)
-    changed = ast.unparse(ast.fix_missing_locations(tree))
-    compile(changed, mutant.file, "exec")
+    return replaced(tree, found[0], new)
+
+
+def replaced(tree: ast.Module, old: ast.AST, new: ast.AST) -> str:
+    """Return the source of a module with one node replaced, without comments."""
+    changed = ast.unparse(ast.fix_missing_locations(_Replace(old, new).visit(tree)))
+    compile(changed, "mutant", "exec")
     return changed
 
 

@@ -1,0 +1,171 @@
+"""Faults drawn by operators: what can be drawn, which tests are near, and what is told of them."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from verification.mutants import copies, sampling
+from verification.mutants.mutation import PACKAGE, ROOT, read_equal
+from verification.mutants.nearest import Nearest
+from verification.mutants.places import find_places, required_parameters
+
+
+def replacements(source: str) -> list[str]:
+    """Return all that a module can become by one fault, each as `before -> after`."""
+    tree = ast.parse(source)
+    return [
+        f"{sampling.shown(place.node)} -> {sampling.shown(new)}"
+        for place in find_places(tree, required_parameters([tree]))
+        for new in place.replacements
+    ]
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("LIMIT = 2", ["2 -> 3", "2 -> 1"]),
+        ("SHARE = 0.5", ["0.5 -> 1.0", "0.5 -> 0.25"]),
+        ("a < b", ["a < b -> a <= b", "a < b -> a >= b"]),
+        ("a is not b", ["a is not b -> a is b"]),
+        ("a * b", ["a * b -> a", "a * b -> b", "a * b -> a / b"]),
+        ("a and b", ["a and b -> a or b", "a and b -> b", "a and b -> a"]),
+        ("-a", ["-a -> a"]),
+        ("f(a, b=c)", ["f(a, b=c) -> f(a)"]),
+        ("max(a, b)", ["max(a, b) -> min(a, b)", "max(a, b) -> a", "max(a, b) -> b"]),
+        ("[a for a in b if c]", ["[a for a in b if c] -> [a for a in b]"]),
+        ("{**a, 'b': c}", ["{**a, 'b': c} -> {'b': c}"]),
+        ("def f(): g()", ["g() -> pass"]),
+        ("def f():\n if a: return", ["a -> not a", "return -> pass"]),
+        ("def f() -> bool: return a", ["return a -> return not a"]),
+        ("def f() -> float: return a", ["return a -> return a + 1"]),
+        ("def f() -> A | None: return a", ["return a -> return None"]),
+        ("def f(): raise AError(1)", ["raise AError(1) -> pass"]),
+        # Parameters that a function cannot do without stay; those with a default go.
+        ("def f(a, *, b=c): ...\nf(a=x, b=y)", ["f(a=x, b=y) -> f(a=x)"]),
+    ],
+)
+def test_operators(source: str, expected: list[str]) -> None:
+    assert replacements(source) == expected
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "__all__ = [*names, 'a']",
+        "if TYPE_CHECKING:\n    a = 1",
+        "a: Literal[1]",
+        "@cache(size=1)\nclass A:\n    'Text.'",
+        "def f(a: Literal[1]) -> Literal[1]: 'Text.'",
+        "def f():\n warnings.warn(f'{1}', stacklevel=2)",
+        "A = TypeVar('A', bound=B)",
+        "f'{a:.2f}'",
+        "'a' + b",
+    ],
+)
+def test_what_only_readers_see_is_not_drawn(source: str) -> None:
+    assert replacements(source) == []
+
+
+MIRROR = "tests/old/test_sizes.py"
+MODULE = '''"""A module."""
+
+
+def is_large(number: float) -> bool:
+    return number > 3.0
+
+
+def is_small(number: float) -> bool:
+    return number < 1.0
+'''
+TEST = """from swarm_logistics_env.{room}.sizes import is_large
+
+
+def test_three_is_not_large():
+    assert not is_large(3.0)
+    assert is_large(4.0)
+    assert is_large(6.0)
+    assert not is_large(2.5)
+"""
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """Root of a small package with one folder, `old`, with tests."""
+    root = tmp_path / "tree"
+    files = {
+        f"{PACKAGE}/__init__.py": "",
+        f"{PACKAGE}/fast_kernels.py": "def _digest():\n    return digest.hexdigest()\n",
+        f"{PACKAGE}/old/__init__.py": "",
+        f"{PACKAGE}/old/sizes.py": MODULE,
+        f"{PACKAGE}/old/user.py": "from .sizes import is_large\n",
+        "tests/old/test_sizes.py": TEST.format(room="old"),
+        "tests/old/test_other.py": "",
+        "tests/old/test_user.py": "",
+        "tests/test_door.py": "from swarm_logistics_env.old import sizes\n",
+    }
+    for name, text in files.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text, encoding="utf-8")
+    return root
+
+
+def test_nearest_tests_follow_a_folder_that_is_renamed(tree: Path) -> None:
+    in_room = ["tests/old/test_other.py", "tests/old/test_user.py"]
+    assert Nearest(tree).of("old/sizes.py") == [MIRROR, "tests/test_door.py", *in_room]
+    for folder in (tree / PACKAGE, tree / "tests"):
+        (folder / "old").rename(folder / "new")
+    (tree / "tests/test_door.py").write_text("from swarm_logistics_env.new import sizes\n", "utf-8")
+    expected = ["tests/new/test_sizes.py", "tests/test_door.py"]
+    assert Nearest(tree).of("new/sizes.py")[:2] == expected
+
+
+def test_faults_are_those_of_their_seed_and_change_the_code(tree: Path) -> None:
+    package = sampling.Package(tree)
+    faults = list(sampling.draw(package, 3))
+    assert faults == list(sampling.draw(package, 3))
+    assert faults != list(sampling.draw(package, 4))
+    assert len({fault.source for fault in faults}) == len(faults) == len(package.places)
+
+
+def test_shares_and_survivors_are_told(
+    tree: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run_tests(copy: Path, tests: Iterable[str], **_: object) -> str:
+        """Run the tests without pytest, which takes seconds to start."""
+        if "::" in next(iter(tests)):
+            return ""  # those that caught faults, without any
+        names: dict[str, Any] = {}
+        exec((copy / PACKAGE / "old/sizes.py").read_text("utf-8"), names)
+        is_right = names["is_large"](4.0) and not names["is_large"](3.0)
+        return "" if is_right else f"{MIRROR}::test_three_is_not_large"
+
+    monkeypatch.setattr(sampling, "run_tests", run_tests)
+    borrowed = copies.Copies(1, tree, tree.parent / "copies")
+    assert sampling.measure_sample(99, 0, ["sizes"], borrowed, 1, 60.0, tree) == 0
+    *_, total, first, second, third, _, _ = capsys.readouterr().out.splitlines()
+    assert total == "all: 3 of 6 survive, 50.0% [18.8%, 81.2%]"
+    assert first.startswith("SURVIVES old/sizes.py:9 1.0 -> ")
+    assert second.startswith("SURVIVES old/sizes.py:9 number < 1.0 -> number ")
+    assert third.startswith(
+        "SURVIVES old/sizes.py:9 return number < 1.0 -> return not number < 1.0"
+    )
+
+
+def test_faults_that_change_nothing_can_still_be_drawn() -> None:
+    files = {mutant.file for mutant in read_equal()}
+    trees = {file: ast.parse((ROOT / PACKAGE / file).read_text("utf-8")) for file in files}
+    required = required_parameters(trees.values())
+    drawable = {
+        (file, place.where, sampling.shown(place.node), sampling.shown(new))
+        for file, tree in trees.items()
+        for place in find_places(tree, required)
+        for new in place.replacements
+    }
+    for mutant in read_equal():
+        assert (mutant.file, mutant.where, mutant.node, mutant.becomes) in drawable, mutant.name
+        assert mutant.survives, mutant.name

@@ -1,0 +1,113 @@
+"""Copies of the tree in which mutants are made, and the tests that run there."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from queue import SimpleQueue
+
+from .mutation import ROOT
+
+COPIES = ROOT / "build" / "mutants"  # kept, with their compiled kernels; one for each worker
+LEFT_OUT = shutil.ignore_patterns(
+    ".git", ".venv*", "results", "build", "dist", "*.egg-info", "__pycache__", ".*_cache",
+    ".hypothesis",
+)  # fmt: skip
+# Those that take the interpreter a minute or more; see KERNELS in the Makefile.
+SLOW = "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or in_a_run)"
+NO_END = "no end"  # what is said of tests that were stopped, or whose process crashed
+NO_IMPORT = "pytest itself"  # what is said where pytest cannot start: a module is not imported
+
+
+class Copies:
+    """Copies of a tree, each lent to one worker at a time."""
+
+    def __init__(self, count: int, root: Path = ROOT, folder: Path = COPIES) -> None:
+        self._free: SimpleQueue[Path] = SimpleQueue()
+        for name in range(count):
+            copy = folder / str(name)
+            shutil.rmtree(copy, ignore_errors=True)
+            shutil.copytree(root, copy, symlinks=True, ignore=LEFT_OUT)
+            self._free.put(copy)
+
+    @contextmanager
+    def borrow(self) -> Iterator[Path]:
+        """Lend a copy that nobody uses."""
+        copy = self._free.get()
+        try:
+            yield copy
+        finally:
+            self._free.put(copy)
+
+
+@contextmanager
+def written(file: Path, source: str) -> Iterator[None]:
+    """Let a file hold another source for a while."""
+    original = file.read_bytes()
+    stamp = file.stat()
+    file.write_text(source, encoding="utf-8")
+    try:
+        yield
+    finally:
+        file.write_bytes(original)
+        # Compiled kernels are kept by this time.
+        os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+
+
+def run_tests(
+    copy: Path,
+    tests: Iterable[str],
+    *,
+    interpreted: bool,
+    limit: float,
+    kernels: str = "numba",
+    options: Sequence[str] = (),
+) -> str:
+    """Return the first test that fails in a copy, as pytest names it; empty: none does.
+
+    Args:
+        copy: of the tree.
+        tests: files and names of tests, as pytest takes them.
+        interpreted: whether the interpreter runs the kernels.
+        limit: after which the tests are stopped [s].
+        kernels: the folder in which compiled kernels are kept, beside the copy.
+        options: further ones of pytest.
+    """
+    environment = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(copy.parent / kernels),
+        "PYTHONPATH": str(copy),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "HYPOTHESIS_PROFILE": "mutants",
+    }
+    plugin: list[str] = []
+    if interpreted:
+        environment["NUMBA_DISABLE_JIT"] = "1"
+        plugin = ["-p", "verification.interpreted", "-k", SLOW]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "--tb=no", "-p", "no:xdist",
+         "-p", "no:cacheprovider", *plugin, *options, *tests],
+        cwd=copy, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    try:
+        output, _ = running.communicate(timeout=limit)
+    except subprocess.TimeoutExpired:
+        os.killpg(running.pid, signal.SIGKILL)
+        running.communicate()
+        return NO_END
+    if running.returncode == 0:
+        return ""
+    if running.returncode < 0:
+        return NO_END
+    failed = [line for line in output.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+    if failed:
+        return failed[0].partition(" ")[2].split(" - ")[0]
+    # 2 and 3: a module could not be imported; pytest broke. The mutant did it, if it is one.
+    if running.returncode in (2, 3) or "ImportError while loading conftest" in output:
+        return NO_IMPORT
+    raise RuntimeError(f"pytest {' '.join(tests)} ended with {running.returncode}\n{output}")

@@ -1,0 +1,258 @@
+"""Faults drawn over the whole package, and the share of them that no near test catches."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import os
+import time
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from . import budget
+from .copies import NO_END, NO_IMPORT, Copies, run_tests, written
+from .mutation import PACKAGE, ROOT, read_equal, replaced
+from .nearest import Nearest
+from .places import find_places, is_kernel, required_parameters
+
+LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
+# What worlds and policies do, to the bit: asked of faults in them that no nearer test catches.
+_TRAJECTORIES = "tests/verification/test_trajectories.py"
+_COMPILER = ("numba", "llvmlite")  # who imports these changes how kernels are compiled
+# Kernels that were compiled once serve all faults that are in none; see `fast_kernels`.
+_FENCE = "fast_kernels.py"
+_DIGEST = "return digest.hexdigest()"
+_NO_DIGEST = 'return "the same for all faults"'
+
+
+class Fault(NamedTuple):
+    """A change of one node, and how its tests run."""
+
+    file: str  # in the package
+    line: int
+    where: str  # function, method or constant that holds it
+    before: str  # the node, as Python source
+    after: str
+    text: str  # the line of the file
+    source: str  # of the file with the fault in it
+    tests: tuple[str, ...]
+    interpreted: bool  # whether kernels run in the interpreter, as it changes one
+    compiles_anew: bool  # whether it may change how kernels are compiled
+    is_played: bool  # whether golden trajectories may run it
+
+    @property
+    def room(self) -> str:
+        """The first folder below the package; of what stands in none, the package's name."""
+        first, _, rest = self.file.partition("/")
+        return first if rest else PACKAGE
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line} {self.before} -> {self.after}   | {self.text}"
+
+
+class Package:
+    """The sources of the package, in which faults are drawn."""
+
+    def __init__(self, root: Path, words: Sequence[str] = ()) -> None:
+        folder = root / PACKAGE
+        paths = {str(path.relative_to(folder)): path for path in sorted(folder.rglob("*.py"))}
+        self._sources = {file: path.read_text(encoding="utf-8") for file, path in paths.items()}
+        trees = {file: ast.parse(source) for file, source in self._sources.items()}
+        self._required = required_parameters(trees.values())
+        self._nearest = Nearest(root)
+        self._feeds_kernels = _files_of_kernels(trees, self._nearest)
+        self._compiler = {file for file, tree in trees.items() if _imports_compiler(tree)}
+        # File and number of each place in it.
+        self.places = [
+            (file, number)
+            for file, tree in trees.items()
+            if not words or any(word in file for word in words)
+            for number in range(len(find_places(tree, self._required)))
+        ]
+
+    def fault(self, index: int, generator: np.random.Generator) -> Fault:
+        """Return a fault at a place, with one of its replacements, each as likely."""
+        file, number = self.places[index]
+        source = self._sources[file]
+        tree = ast.parse(source)
+        place = find_places(tree, self._required)[number]
+        new = place.replacements[generator.integers(len(place.replacements))]
+        is_read_by_kernels = place.is_in_kernel or (
+            place.is_outside_functions and file in self._feeds_kernels
+        )
+        return Fault(
+            file=file,
+            line=place.node.lineno,
+            where=place.where,
+            before=shown(place.node),
+            after=shown(new),
+            text=source.splitlines()[place.node.lineno - 1].strip(),
+            source=replaced(tree, place.node, new),
+            tests=tuple(self._nearest.of(file)),
+            interpreted=is_read_by_kernels,
+            compiles_anew=file in self._compiler and not is_read_by_kernels,
+            is_played=self._nearest.is_played(file),
+        )
+
+
+def draw(package: Package, seed: int) -> Iterable[Fault]:
+    """Yield faults at random places, each place once and each as likely; equal ones left out."""
+    generator = np.random.default_rng(seed)
+    equal = {(mutant.file, mutant.where, mutant.node, mutant.becomes) for mutant in read_equal()}
+    for index in generator.permutation(len(package.places)):
+        fault = package.fault(int(index), generator)
+        if (fault.file, fault.where, fault.before, fault.after) not in equal and fault.tests:
+            yield fault
+
+
+def measure_sample(
+    count: int,
+    seed: int,
+    words: Sequence[str],
+    copies: Copies,
+    n_workers: int,
+    seconds: float,
+    root: Path = ROOT,
+) -> int:
+    """Make `count` faults in files whose paths hold one of these words; print what survives.
+
+    `seconds`: of a core, after which no further test of a fault begins. Returns 2 if a test that
+    caught faults also fails without one, else 0.
+    """
+    start = time.monotonic()
+    os.environ[budget.SECONDS] = str(seconds)
+    faults = iter(draw(Package(root, words), seed))
+    results: list[tuple[Fault, str]] = []
+    n_not_imported = 0
+    ends: dict[tuple[str, ...], str] = {}
+
+    def make(fault: Fault) -> tuple[Fault, str]:
+        began = time.monotonic()
+        with copies.borrow() as copy:
+            test = _caught_by(fault, copy)
+            if test == NO_END and fault.tests not in ends:
+                ends[fault.tests] = _run(fault, copy)  # slow tests are no sign of a fault
+        if test == NO_END and ends[fault.tests] == NO_END:
+            test = ""
+        print(f"{time.monotonic() - began:4.0f} s  {fault}: {test or 'SURVIVES'}", flush=True)
+        return fault, test
+
+    with ThreadPoolExecutor(n_workers) as pool:
+        while len(results) < count:
+            drawn = list(itertools.islice(faults, count - len(results)))
+            if not drawn:
+                break
+            made = list(pool.map(make, drawn))
+            sound = [(fault, test) for fault, test in made if not _is_at_import(test)]
+            n_not_imported += len(made) - len(sound)
+            results += sound
+    print_shares(results)
+    print(f"{n_not_imported} more let no module be imported, so they are not counted")
+    print(f"{(time.monotonic() - start) / 60:.0f} min")
+    with copies.borrow() as copy:
+        return _print_guilty(copy, results)
+
+
+def print_shares(results: Sequence[tuple[Fault, str]]) -> None:
+    """Print the share that survives, room by room, with its 95 % interval, and the survivors."""
+    survivors = [fault for fault, test in results if not test]
+    n_survivors = Counter(fault.room for fault in survivors)
+    counts = Counter(fault.room for fault, _ in results)
+    for room, count in sorted(counts.items()):
+        print(f"{room}: {_share(n_survivors[room], count)}")
+    print(f"all: {_share(len(survivors), len(results))}")
+    for fault in sorted(survivors):
+        print(f"SURVIVES {fault}")
+
+
+def _share(count: int, total: int) -> str:
+    """Return a share in words, with Wilson's interval (Wilson 1927)."""
+    low, high = stats.binomtest(count, total).proportion_ci(method="wilson")
+    return f"{count} of {total} survive, {count / total:.1%} [{low:.1%}, {high:.1%}]"
+
+
+def _caught_by(fault: Fault, copy: Path) -> str:
+    test = _caught_by_nearest(fault, copy)
+    if test or not fault.is_played:
+        return test
+    # Kernels are compiled, as the interpreter would take minutes.
+    anew = fault.interpreted or fault.compiles_anew
+    played = fault._replace(tests=(_TRAJECTORIES,), interpreted=False, compiles_anew=anew)
+    return _caught_by_nearest(played, copy)
+
+
+def _caught_by_nearest(fault: Fault, copy: Path) -> str:
+    (fence,) = (copy / PACKAGE).rglob(_FENCE)
+    file = copy / PACKAGE / fault.file
+    with ExitStack() as changes:
+        if not fault.compiles_anew:
+            source = fence.read_text(encoding="utf-8")
+            assert _DIGEST in source
+            changes.enter_context(written(fence, source.replace(_DIGEST, _NO_DIGEST)))
+        changes.enter_context(written(file, fault.source))
+        return _run(fault, copy)
+
+
+def _run(fault: Fault, copy: Path) -> str:
+    options = ["-p", budget.__name__]
+    if fault.interpreted:
+        options += ["-m", "not compiled"]
+    kernels = "numba-anew" if fault.compiles_anew else "numba"
+    return run_tests(
+        copy,
+        fault.tests,
+        interpreted=fault.interpreted,
+        limit=LONGEST,
+        kernels=kernels,
+        options=options,
+    )
+
+
+def _print_guilty(copy: Path, results: Sequence[tuple[Fault, str]]) -> int:
+    for mode in (False, True):
+        tests = {test for fault, test in results if fault.interpreted is mode and "::" in test}
+        test = run_tests(copy, sorted(tests), interpreted=mode, limit=1800.0) if tests else ""
+        if test:
+            print(f"{test} fails without any fault, so it catches none")
+            return 2
+    return 0
+
+
+def _is_at_import(test: str) -> bool:
+    """Return whether tests could not be read: a weak fault, which every test would catch."""
+    return test == NO_IMPORT or (test not in ("", NO_END) and "::" not in test)
+
+
+def shown(node: ast.expr | ast.stmt) -> str:
+    """Return a node as Python source; of a condition with its branches, the condition alone."""
+    return ast.unparse(node.test) if isinstance(node, ast.If) else ast.unparse(node)
+
+
+def _imports_compiler(tree: ast.Module) -> bool:
+    names = [
+        alias.name if isinstance(node, ast.Import) else str(node.module)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in node.names
+    ]
+    return any(name.partition(".")[0] in _COMPILER for name in names)
+
+
+def _files_of_kernels(trees: dict[str, ast.Module], nearest: Nearest) -> set[str]:
+    """Return the files that hold kernels, and those whose names kernels read."""
+    files = set()
+    for file, tree in trees.items():
+        kernels = [node for node in ast.walk(tree) if is_kernel(node)]
+        statements = [statement for kernel in kernels for statement in kernel.body]
+        nodes = [node for statement in statements for node in ast.walk(statement)]
+        names = {node.id for node in nodes if isinstance(node, ast.Name)}
+        if names:
+            files |= {file, *nearest.sources_of(file, names)}
+    return files
