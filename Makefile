@@ -95,13 +95,13 @@ quick: lint
 	$(DEV)/bin/mypy & types=$$!; \
 	NUMBA_DISABLE_JIT=1 $(DEV)/bin/python -m pytest -q -p verification.interpreted $(QUICK) && wait $$types
 
-QUICK := tests/warehouse/test_kinematics.py tests/questions/test_plan.py tests/verification/test_mutants.py \
+QUICK := tests/world/warehouse/test_kinematics.py tests/study/questions/test_plan.py tests/verification/test_mutants.py \
 	$(addprefix tests/spi/test_,indicators.py multiplicity.py) \
 	$(addprefix tests/test_,imports.py records.py scenario.py streams.py sizes.py)
 
 # What reaches every line of the kernels in seconds, without the compiler.
 KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py sensor_errors.py radio.py kinematics.py layout.py grid.py) \
-	$(addprefix tests/policies/test_,swarm_dt.py routes.py homing.py crowd.py layers.py learned.py) tests/motion
+	$(addprefix tests/policies/test_,swarm_dt.py routes.py homing.py crowd.py layers.py learned.py) tests/world/motion
 
 lint: $(DEV)/installed
 	$(DEV)/bin/ruff check .
@@ -156,13 +156,13 @@ interop-calls: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed $(RL
 	$(LEARNERS)/bin/python -m interop.learners
 
 tasks: $(TASKS)/installed
-	$(TASKS)/bin/python -m pytest tests/tasks/test_examples.py
+	$(TASKS)/bin/python -m pytest tests/study/tasks/test_examples.py
 
 bodies: $(DEV)/installed
 	$(DEV)/bin/python -m research.play_bodies
 
 dotbots: $(DOTBOTS)/installed
-	$(DOTBOTS)/bin/python -m pytest tests/bodies/test_pose_guard.py tests/bodies/test_dotbots_bodies.py
+	$(DOTBOTS)/bin/python -m pytest tests/world/bodies/test_pose_guard.py tests/world/bodies/test_dotbots_bodies.py
 	$(DOTBOTS)/bin/swarm-logistics run --policy homing --preset dotbots --bodies dotbots --set duration=20
 
 # study: autodoc reads the package. -W: a warning is an error.

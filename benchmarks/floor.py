@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Scenario, Warehouse, policies
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.compiler.addresses import unpacked_at
+from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.warehouse.addresses import unpacked_at
-from swarm_logistics_env.warehouse.physics import advance
-from swarm_logistics_env.warehouse.structs import World
+from swarm_logistics_env.world.warehouse.physics import advance
+from swarm_logistics_env.world.warehouse.structs import World
 
 Numbers = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from swarm_logistics_env.cli import app
+from swarm_logistics_env.views.cli import app
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.resolve().parent

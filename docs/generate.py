@@ -13,17 +13,22 @@ from pydantic_core import PydanticUndefined
 from docs.python_reference import python_names
 from research.tables import ROOT, table, with_blocks
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
-from swarm_logistics_env.cli.app import command_line
+from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
 from swarm_logistics_env.environment.spaces import ITEM_COLUMNS, ROBOT_FEATURES
-from swarm_logistics_env.observations import columns, n_columns
-from swarm_logistics_env.questions.presets import PRESETS
-from swarm_logistics_env.questions.specification import Specification
-from swarm_logistics_env.records import Record
-from swarm_logistics_env.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
+from swarm_logistics_env.study.questions.presets import PRESETS
+from swarm_logistics_env.study.questions.specification import Specification
+from swarm_logistics_env.study.verdicts.columns import (
+    CELL_COLUMNS,
+    VERDICT_COLUMNS,
+    Columns,
+    Judged,
+)
 from swarm_logistics_env.train.training import Training, load_training, preset_names
-from swarm_logistics_env.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, Columns, Judged
+from swarm_logistics_env.views.cli.app import command_line
+from swarm_logistics_env.world.observations import columns, n_columns
+from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
 
 FACTORS = ("sizes", "faults", "parameters", "ablations")
 PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")

@@ -7,13 +7,13 @@ from pathlib import Path
 from PIL import Image
 
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, policies
-from swarm_logistics_env.episode import Play
-from swarm_logistics_env.rendering import Renderer
-from swarm_logistics_env.rendering.palette import film_colours
-from swarm_logistics_env.rendering.renderer import write_film
-from swarm_logistics_env.watch import Session
-from swarm_logistics_env.watch.film import Film, Take
-from swarm_logistics_env.watch.messages import recorded_page
+from swarm_logistics_env.policies.episode import Play
+from swarm_logistics_env.views.watch import Session
+from swarm_logistics_env.views.watch.film import Film, Take
+from swarm_logistics_env.views.watch.messages import recorded_page
+from swarm_logistics_env.world.rendering import Renderer
+from swarm_logistics_env.world.rendering.palette import film_colours
+from swarm_logistics_env.world.rendering.renderer import write_film
 from verification.browser import Browser
 
 MEDIA = Path(__file__).parent / "media"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from swarm_logistics_env import FAILURE_MODES, policies, spi, swarm_logistics_v0
 from swarm_logistics_env.policies.policy import decide, start
-from swarm_logistics_env.warehouse.failure_modes import FailureMode
+from swarm_logistics_env.world.warehouse.failure_modes import FailureMode
 from swarm_logistics_env.wrappers import FaultInjection
 
 # Any combination of lost capabilities is a mode.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from swarm_logistics_env.observations import unflatten
-from swarm_logistics_env.streams import generator
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.core.streams import generator
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.world.observations import unflatten
 
 
 class Straight:

@@ -12,7 +12,7 @@ from torch.distributions import Normal
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.adapters import SwarmVecEnv
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.motion import INPUTS
+from swarm_logistics_env.world.motion import INPUTS
 from swarm_logistics_env.wrappers import MotionFrame
 
 REWARDS = {

@@ -12,9 +12,9 @@ from stable_baselines3 import PPO
 
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.adapters import LogDeliveries, SwarmVecEnv, SwarmVecNormalize
+from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.motion import MotionView
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.world.motion import MotionView
 from swarm_logistics_env.wrappers import MotionFrame
 
 ARENA: dict[str, Any] = {"warehouse_width": 6.0, "warehouse_height": 5.0, "delivery_width": 1.5}

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swarm_logistics_env.bodies import Orders, Placement, Poses
+from swarm_logistics_env.world.bodies import Orders, Placement, Poses
 
 
 class Recorded:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import sys
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.gate import Gate, answers
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.study.verdicts.gate import Gate, answers
 
 GATES = ("change < 0", "R < -0.5 at FM1")
 

@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from swarm_logistics_env import Fault, Scenario, policies, run_episode, spi, streams
+from swarm_logistics_env import Fault, Scenario, policies, run_episode, spi
+from swarm_logistics_env.core import streams
 
 # Constant -> the range in which it is searched.
 RANGES = {

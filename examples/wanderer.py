@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.observations import unflatten
+from swarm_logistics_env.world.observations import unflatten
 
 
 class Wanderer:

@@ -19,9 +19,9 @@ import typer
 
 from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning
 from swarm_logistics_env import policies, spi
-from swarm_logistics_env.report.drawing import COLOURS, INK, LINES, svg_image
-from swarm_logistics_env.report.section import Section, bracketed
-from swarm_logistics_env.report.write import section_markdown
+from swarm_logistics_env.study.report.drawing import COLOURS, INK, LINES, svg_image
+from swarm_logistics_env.study.report.section import Section, bracketed
+from swarm_logistics_env.study.report.write import section_markdown
 from swarm_logistics_env.train.evaluation import performances
 
 ROOT = RESULTS.parents[1]

@@ -13,7 +13,7 @@ from tensordict.nn import NormalParamExtractor
 
 from interop.benchmarl_task import SwarmLogisticsTask
 from interop.small_world import SETTINGS, Learning, Tensors, drive_ahead, main, tensors_of
-from swarm_logistics_env.motion import OUTPUTS
+from swarm_logistics_env.world.motion import OUTPUTS
 
 ALGORITHMS = {"benchmarl-ippo": IppoConfig, "benchmarl-mappo": MappoConfig}
 NOISE = f"biased_softplus_{SETTINGS.deviation}"

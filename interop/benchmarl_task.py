@@ -18,7 +18,7 @@ from benchmarl.environments.common import Task, TaskClass
 
 from interop.torchrl_worlds import TorchRLWorlds
 from swarm_logistics_env import Scenario, swarm_logistics_v0
-from swarm_logistics_env.streams import key
+from swarm_logistics_env.core.streams import key
 from swarm_logistics_env.wrappers import MotionFrame
 
 

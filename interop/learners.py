@@ -18,7 +18,7 @@ from torch import nn
 
 from swarm_logistics_env import Scenario, policies, record, run_episode, swarm_logistics_v0
 from swarm_logistics_env.adapters import SwarmRows, SwarmVecEnv
-from swarm_logistics_env.motion import INPUTS
+from swarm_logistics_env.world.motion import INPUTS
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame
 
 WORLD = Scenario(n_robots=6, warehouse_width=6.0, warehouse_height=5.0, delivery_width=1.5,

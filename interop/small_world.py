@@ -20,13 +20,13 @@ import torch
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, spi, swarm_logistics_v0
-from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.motion import INPUTS, OUTPUTS
+from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.core.records import atomic_write
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, Network, PolicyCard
-from swarm_logistics_env.records import atomic_write
-from swarm_logistics_env.report.section import bracketed
+from swarm_logistics_env.study.report.section import bracketed
 from swarm_logistics_env.train.evaluation import performances, versions
+from swarm_logistics_env.world.motion import INPUTS, OUTPUTS
 from swarm_logistics_env.wrappers import MotionFrame
 
 RESULTS = Path(__file__).parents[1] / "results" / "interop"

@@ -14,8 +14,8 @@ from torchrl.objectives import ClipPPOLoss, ValueEstimators
 
 from interop.small_world import SETTINGS, Learning, Tensors, drive_ahead, main, make_env, tensors_of
 from interop.torchrl_worlds import GROUP, TorchRLWorlds
-from swarm_logistics_env.motion import INPUTS, OUTPUTS
-from swarm_logistics_env.streams import key
+from swarm_logistics_env.core.streams import key
+from swarm_logistics_env.world.motion import INPUTS, OUTPUTS
 
 
 def learn(learning: Learning) -> Tensors:

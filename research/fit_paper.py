@@ -32,10 +32,10 @@ import typer
 
 from research.tables import read_rows
 from swarm_logistics_env import Fault, Scenario, run_episode
+from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.policies import SwarmDT
-from swarm_logistics_env.questions.comparison import Setting
-from swarm_logistics_env.streams import generator
-from swarm_logistics_env.verdicts.reference import PAPER
+from swarm_logistics_env.study.questions.comparison import Setting
+from swarm_logistics_env.study.verdicts.reference import PAPER
 
 FITS = ("sound", "all", "shipped")
 FIRST_SEED = 5_300_000  # nothing else uses the seeds from here to 5,399,999

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from research.fit_paper import read_tried
 from research.play_paper_fit import claim_rows, means, sets_that_fit, word
 from research.tables import ROOT, read_rows, table, with_blocks
-from swarm_logistics_env.report import drawing, section
 from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.study.report import drawing, section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from research.tables import ROOT, seeds_from, table
 from swarm_logistics_env.policies import PolicySpec
-from swarm_logistics_env.report import benchmark, section
-from swarm_logistics_env.report.tables import CONTACTS_HEADING, contacts_text
 from swarm_logistics_env.spi.inputs import Numbers
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.study.report import benchmark, section
+from swarm_logistics_env.study.report.tables import CONTACTS_HEADING, contacts_text
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.results import StudyResults
 
 # Local scripts, the last with the stock that pays on robots of the preset `realistic`.
 STOCK = PolicySpec(

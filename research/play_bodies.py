@@ -19,15 +19,15 @@ from research.play_tables import shares_of_script
 from research.tables import ROOT, percent_change, play, rewrite, side, signed_percent, table
 from swarm_logistics_env import spi
 from swarm_logistics_env.policies import PolicySpec
-from swarm_logistics_env.questions.comparison import NO_FAULT
-from swarm_logistics_env.report import section
-from swarm_logistics_env.report.tables import contacts_text
-from swarm_logistics_env.scenario import CHIPMUNK, Scenario
 from swarm_logistics_env.spi.summaries import t_interval
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.study.questions.comparison import NO_FAULT
+from swarm_logistics_env.study.report import section
+from swarm_logistics_env.study.report.tables import contacts_text
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import Verdict
+from swarm_logistics_env.world.scenario import CHIPMUNK, Scenario
 
 PAGE = ROOT / "docs" / "bodies.md"
 POLICIES: tuple[str, ...] = ("swarm-dt", "homing", "ppo-robust")

@@ -22,12 +22,12 @@ from scipy.stats import binomtest, ttest_ind
 
 from research.tables import ROOT, play, rewrite, seeds_from, side, table
 from swarm_logistics_env import spi
-from swarm_logistics_env.report import section
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.inputs import Numbers
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.results import StudyResults
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.study.report import section
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.world.scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,8 +12,8 @@ import numpy as np
 from research.fit_paper import Constants, policy_of
 from research.tables import table
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies.policy import start
+from swarm_logistics_env.world import observations as row
 
 FIRST_SEED = 5_394_000
 PAPER = {1: 39, 2: 15, 3: 12}

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from swarm_logistics_env.policies import read_card
-from swarm_logistics_env.questions.presets import load_preset
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.study.questions.presets import load_preset
 
 
 def shares(files: list[str]) -> dict[str, float]:

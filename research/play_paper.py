@@ -13,17 +13,17 @@ import numpy as np
 from more_itertools import map_reduce
 
 from research.tables import percent_change, side, signed_percent, table
-from swarm_logistics_env.questions.comparison import Setting
-from swarm_logistics_env.report import section
-from swarm_logistics_env.report.drawing import svg_image
-from swarm_logistics_env.report.figures import indicator_figures
-from swarm_logistics_env.report.tables import claims, sentences
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.agreement import Agreement, agreement
-from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.reference import PAPER
-from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import UNDEFINED, Verdict
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.study.questions.comparison import Setting
+from swarm_logistics_env.study.report import section
+from swarm_logistics_env.study.report.drawing import svg_image
+from swarm_logistics_env.study.report.figures import indicator_figures
+from swarm_logistics_env.study.report.tables import claims, sentences
+from swarm_logistics_env.study.verdicts.agreement import Agreement, agreement
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.reference import PAPER
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import UNDEFINED, Verdict
 
 SEEDS = 20
 SEEDS_WHERE_SKEWED = 100

@@ -41,12 +41,12 @@ from research.fit_paper import (
 )
 from research.play_fm4 import Played, fm4_table, runs
 from research.tables import ROOT, rewrite, table, write_rows
+from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
-from swarm_logistics_env.questions.comparison import NO_FAULT, Question, Setting
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change
-from swarm_logistics_env.streams import generator
-from swarm_logistics_env.verdicts.reference import PAPER
+from swarm_logistics_env.study.questions.comparison import NO_FAULT, Question, Setting
+from swarm_logistics_env.study.verdicts.reference import PAPER
+from swarm_logistics_env.world.scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,12 +17,12 @@ from more_itertools import map_reduce
 from research import question_tables
 from research.play_tables import OUT
 from research.tables import ROOT, example, play, rewrite
-from swarm_logistics_env.report import drawing
-from swarm_logistics_env.report.document import document
-from swarm_logistics_env.report.drawing import Draw, Panel, Point
-from swarm_logistics_env.verdicts.mid_run_faults import RateCurve, rate_curves
-from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import DECIDED, Verdict
+from swarm_logistics_env.study.report import drawing
+from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.drawing import Draw, Panel, Point
+from swarm_logistics_env.study.verdicts.mid_run_faults import RateCurve, rate_curves
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas

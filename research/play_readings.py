@@ -18,10 +18,10 @@ import typer
 
 from research.tables import table
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, Warehouse
-from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.warehouse import FailureMode
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.warehouse import FailureMode
 
 FIRST_SEED = 3_300_000  # nothing else uses these
 PAPER = {"FM1": (41, 38, 35), "FM3": (40, 41, 40)}

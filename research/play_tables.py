@@ -33,12 +33,12 @@ from research.tables import (
     table,
     write_rows,
 )
-from swarm_logistics_env.report import drawing, section
-from swarm_logistics_env.report.tables import contacts_text
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.study.report import drawing, section
+from swarm_logistics_env.study.report.tables import contacts_text
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from research.tables import by_policy, percent_change, seeds_from, table
 from swarm_logistics_env import spi
-from swarm_logistics_env.questions.comparison import Arm, Question
-from swarm_logistics_env.report import section
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.spi.summaries import Interval, t_interval
-from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.study.questions.comparison import Arm, Question
+from swarm_logistics_env.study.report import section
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 
 def with_verdict(test: Verdict) -> str:

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.report import section
-from swarm_logistics_env.report.tables import contacts_text
-from swarm_logistics_env.report.write import section_markdown
-from swarm_logistics_env.runs.engines import usable_cores
 from swarm_logistics_env.spi.inputs import Numbers
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.cell import Cell
-from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.verdicts.verdict import Verdict
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.study.report import section
+from swarm_logistics_env.study.report.tables import contacts_text
+from swarm_logistics_env.study.report.write import section_markdown
+from swarm_logistics_env.study.runs.engines import usable_cores
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 ROOT = Path(__file__).parents[1]
 BLOCK = "<!-- tables: {name} -->"

@@ -13,21 +13,15 @@ import gymnasium
 import pettingzoo
 
 if TYPE_CHECKING:
-    from swarm_logistics_env import (
-        adapters,
-        policies,
-        spi,
-        studies,
-        swarm_logistics_v0,
-        testing,
-        wrappers,
-    )
-    from swarm_logistics_env.demonstrations import record
-    from swarm_logistics_env.episode import Episode, run_episode
-    from swarm_logistics_env.scenario import SCENARIO_PRESETS, Scenario
-    from swarm_logistics_env.trial_study import judge
-    from swarm_logistics_env.warehouse import FAILURE_MODES, Fault, Warehouse
-    from swarm_logistics_env.watch.embedded import film
+    from swarm_logistics_env import adapters, policies, spi, swarm_logistics_v0, wrappers
+    from swarm_logistics_env.policies import testing
+    from swarm_logistics_env.policies.demonstrations import record
+    from swarm_logistics_env.policies.episode import Episode, run_episode
+    from swarm_logistics_env.study import studies
+    from swarm_logistics_env.study.trial_study import judge
+    from swarm_logistics_env.views.watch.embedded import film
+    from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario
+    from swarm_logistics_env.world.warehouse import FAILURE_MODES, Fault, Warehouse
 
     __version__: str
 

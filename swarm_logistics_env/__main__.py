@@ -1,6 +1,6 @@
 """`python -m swarm_logistics_env` is the command `swarm-logistics`."""
 
-from swarm_logistics_env.cli import app
+from swarm_logistics_env.views.cli import app
 
 if __name__ == "__main__":
     app()

@@ -17,9 +17,9 @@ import pytest
 from hypothesis import Phase, settings
 
 import swarm_logistics_env
-from swarm_logistics_env import fast_kernels
-from swarm_logistics_env.report import drawing
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.compiler import fast_kernels
+from swarm_logistics_env.study.report import drawing
+from swarm_logistics_env.study.studies import Study
 
 # Derandomized: the gate gives the same answer twice. No deadline: a time would test the machine.
 settings.register_profile("default", max_examples=100, derandomize=True, deadline=None)

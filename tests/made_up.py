@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from swarm_logistics_env.questions.comparison import NO_FAULT, Setting
-from swarm_logistics_env.runs.rows import row_digest
-from swarm_logistics_env.runs.store import Runs, export
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.tasks.task import Outcome
-from swarm_logistics_env.verdicts.reference import PAPER
-from swarm_logistics_env.verdicts.results import StudyResults, judge
-from swarm_logistics_env.verdicts.verdict import Decision
+from swarm_logistics_env.study.questions.comparison import NO_FAULT, Setting
+from swarm_logistics_env.study.runs.rows import row_digest
+from swarm_logistics_env.study.runs.store import Runs, export
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.verdicts.reference import PAPER
+from swarm_logistics_env.study.verdicts.results import StudyResults, judge
+from swarm_logistics_env.study.verdicts.verdict import Decision
 
 
 def digest(directory: Path, to: Path) -> str:

@@ -14,9 +14,9 @@ import pytest
 
 from docs import blocks, generate, python_reference
 from swarm_logistics_env import Scenario, run_episode
-from swarm_logistics_env.cli import app
-from swarm_logistics_env.questions.specification import read_study_file
+from swarm_logistics_env.study.questions.specification import read_study_file
 from swarm_logistics_env.train.training import load_training
+from swarm_logistics_env.views.cli import app
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -12,7 +12,7 @@ import pytest
 from swarm_logistics_env import FAILURE_MODES, Scenario, Warehouse, policies
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.study.studies import Study
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MIXED = f"{EXAMPLES / 'mixed_swarm.py'}:Mixed"

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.tasks import Outcome
-from swarm_logistics_env.verdicts.columns import VERDICT_COLUMNS, frame
-from swarm_logistics_env.verdicts.results import StudyResults, judge
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks import Outcome
+from swarm_logistics_env.study.verdicts.columns import VERDICT_COLUMNS, frame
+from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 
 FROZEN = Path(__file__).parent / "frozen"
 SHIPPED = Path(__file__).parents[1] / "examples" / "shipped_policies.toml"

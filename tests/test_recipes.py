@@ -52,7 +52,7 @@ from .half_speed import HalfSpeed
 @ wrappers/__init__.py @    "IndicatorReward",
     "HalfSpeed",
 ### A failure mode
-@ warehouse/failure_modes.py @    "dead":
+@ world/warehouse/failure_modes.py @    "dead":
     "weak": FailureMode("drives slowly and lifts nothing", speed=0.2, lifts=False),
 ### A reward term
 @ environment/rewards.py @REWARD_TERMS:
@@ -72,8 +72,8 @@ def kept(p_o, p_f, **asked):
             adjectives={0.0: "alive"},
         ),
 ### A kind of trial files NAME=log_lines
-@ spi/trials/readers/log_lines.py
-from swarm_logistics_env.spi.trials.table import Table
+@ study/trials/readers/log_lines.py
+from swarm_logistics_env.study.trials.table import Table
 
 
 def read(path, content, digest):
@@ -84,25 +84,25 @@ def read(path, content, digest):
     header = [part.partition(":")[0] for part in lines[0].split()]
     return Table(str(path), digest, header, cells, range(1, len(cells) + 1))
 ### A task NAME=lane
-@ tasks/lane_task.py
-from tests.tasks.lane import LANE
-@ tasks/task.py @    "clearing":
-    "lane": "swarm_logistics_env.tasks.lane_task:LANE",
-### A scenario parameter READER=warehouse/sensing
-@ scenario/fields.py @    item_radius:
+@ study/tasks/lane_task.py
+from tests.study.tasks.lane import LANE
+@ study/tasks/task.py @    "clearing":
+    "lane": "swarm_logistics_env.study.tasks.lane_task:LANE",
+### A scenario parameter READER=world/warehouse/sensing
+@ world/scenario/fields.py @    item_radius:
     odometry_scale: Positive = Field(1.0, description="factor of velocities; off")
-@ warehouse/structs.py @    n_substeps:
+@ world/warehouse/structs.py @    n_substeps:
     odometry_scale: float
-@ warehouse/sensing.py @    limit = parameters.max_speed
+@ world/warehouse/sensing.py @    limit = parameters.max_speed
     forward *= parameters.odometry_scale
     left *= parameters.odometry_scale
 ### An observation column SENSE=sensing
-@ observations.py @MESSAGES =
+@ world/observations.py @MESSAGES =
 SPEED = TURN_RATE + 1
 N_COLUMNS = SPEED + 1
-@ observations.py @        *(messages if
+@ world/observations.py @        *(messages if
         Column("speed", "m/s", _run(SPEED, 1), 0, speed, "without direction"),
-@ warehouse/sensing.py @    out[row.CONTACT] =
+@ world/warehouse/sensing.py @    out[row.CONTACT] =
     out[row.SPEED] = math.hypot(out[row.VELOCITY], out[row.VELOCITY + 1])
 """
 # File, the line before which lines go in, and these, by heading and open names of the recipe.
@@ -124,9 +124,9 @@ np.seterr(over="ignore", divide="ignore")
 
 CHECK_POLICIES_AND_STUDIES = """
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.spi import read_trials
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.wrappers import HalfSpeed, IndicatorReward
 
 small = Scenario(n_robots=3, n_items=4, duration=5.0)
@@ -162,7 +162,8 @@ print(policies.identity(policies.load("swarm-dt")))
 """
 
 CHECK_STEPS = """
-from swarm_logistics_env import Scenario, Warehouse, observations, swarm_logistics_v0
+from swarm_logistics_env import Scenario, Warehouse, swarm_logistics_v0
+from swarm_logistics_env.world import observations
 
 
 def rows(**fields):
@@ -219,7 +220,7 @@ def test_a_recipe_names_the_files_that_it_changes(recipe: str) -> None:
     for name in open_names:
         files = files.replace(*name.split("="))
     # The page tells of a third file where compiled code reads a parameter.
-    read = {"warehouse/structs.py"} if heading == "A scenario parameter" else set()
+    read = {"world/warehouse/structs.py"} if heading == "A scenario parameter" else set()
     assert {file for file, *_ in EDITS[recipe]} == {*re.findall(r"`([^`]+)`", files)} | read
 
 

@@ -1,13 +1,13 @@
 """A pytest plugin: kernels run by the interpreter, so that coverage sees their lines.
 
-NUMBA_DISABLE_JIT=1 python -m pytest -p verification.interpreted tests/warehouse
+NUMBA_DISABLE_JIT=1 python -m pytest -p verification.interpreted tests/world/warehouse
 """
 
 import os
 
 import pytest
 
-from swarm_logistics_env.warehouse import thread_pool
+from swarm_logistics_env.world.warehouse import thread_pool
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -8,11 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env import Warehouse
-from swarm_logistics_env import observations as row
-from swarm_logistics_env.floor.floor_plan import RACK
-from swarm_logistics_env.warehouse.commands import IDLE, LIFTING
-from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED, WarehouseState
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.floor.floor_plan import RACK
+from swarm_logistics_env.world.warehouse.commands import IDLE, LIFTING
+from swarm_logistics_env.world.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.world.warehouse.state import (
+    CARRIED,
+    DELIVERED,
+    NOBODY,
+    STORED,
+    WarehouseState,
+)
 
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
 JAM = 1.0  # [s] of overlap without a break make a jam

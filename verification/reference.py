@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.streams import generator
-from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.faults import GRACE, LOST_AS_A_WHOLE, failed_robots
-from swarm_logistics_env.warehouse.state import NOBODY
-from swarm_logistics_env.warehouse.state import WarehouseState as State
+from swarm_logistics_env.core.streams import generator
+from swarm_logistics_env.world.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.world.warehouse.faults import GRACE, LOST_AS_A_WHOLE, failed_robots
+from swarm_logistics_env.world.warehouse.state import NOBODY
+from swarm_logistics_env.world.warehouse.state import WarehouseState as State
 
 BLOCK = 32  # so many holds and breaks are of one stream
 

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
-from swarm_logistics_env.errors import ScenarioError
-from swarm_logistics_env.floor import PLAN_SIZES
+from swarm_logistics_env.core.errors import ScenarioError
 from swarm_logistics_env.policies.policy import decide, start
-from swarm_logistics_env.scenario.checks import LONGEST_STRIDE
-from swarm_logistics_env.warehouse import FAILURE_MODES
+from swarm_logistics_env.world.floor import PLAN_SIZES
+from swarm_logistics_env.world.scenario.checks import LONGEST_STRIDE
+from swarm_logistics_env.world.warehouse import FAILURE_MODES
 from verification.invariants import BrokenPromiseError, Watch
 
 Steer = Callable[[Warehouse, NDArray[np.float32]], NDArray[np.float64]]

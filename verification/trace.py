@@ -14,15 +14,15 @@ from types import FrameType
 from typing import Any
 
 import swarm_logistics_env
-from swarm_logistics_env.episode import Episode
+from swarm_logistics_env.policies.episode import Episode
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.spec import PolicySpec
-from swarm_logistics_env.report.section import Section
-from swarm_logistics_env.report.tables import tables
-from swarm_logistics_env.report.write import section_markdown
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.tasks.task import Outcome, Run
-from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.study import Study
+from swarm_logistics_env.study.report.section import Section
+from swarm_logistics_env.study.report.tables import tables
+from swarm_logistics_env.study.report.write import section_markdown
+from swarm_logistics_env.study.tasks.task import Outcome, Run
+from swarm_logistics_env.study.verdicts.cell import Cell
 
 PACKAGE = str(Path(swarm_logistics_env.__file__).parent)
 SMALL: dict[str, Any] = {

@@ -22,9 +22,9 @@ import typer
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env.core.streams import key
 from swarm_logistics_env.policies.policy import decide, start
-from swarm_logistics_env.streams import key
-from swarm_logistics_env.warehouse import FAILURE_MODES
+from swarm_logistics_env.world.warehouse import FAILURE_MODES
 
 RECORD = Path(__file__).with_name("trajectories.json")
 DECIDING = ("numpy", "numba", "pymunk")  # whose versions may change a bit

@@ -16,9 +16,9 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.questions.specification import looks_up_to
 from swarm_logistics_env.spi.hidden import hidden_of
 from swarm_logistics_env.spi.ratio import Balance, Design, RatioTest, Term, ratio_test
+from swarm_logistics_env.study.questions.specification import looks_up_to
 
 from .generators import CHOSEN_ON, HELD_OUT, LEARNED_P, P_O, Floats, Rng, Shape
 

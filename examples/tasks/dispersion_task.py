@@ -14,7 +14,7 @@ import vmas
 from numpy.typing import NDArray
 from tuple_env import TupleEnv
 
-from swarm_logistics_env.tasks import ParallelTask, SumOfRewards
+from swarm_logistics_env.study.tasks import ParallelTask, SumOfRewards
 
 STILL = np.zeros(2, dtype=np.float32)
 GAIN = 3.0  # of the push by the distance, so that robots slow down near the food

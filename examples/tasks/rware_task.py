@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from rware.warehouse import RewardType, Warehouse
 from tuple_env import TupleEnv
 
-from swarm_logistics_env import streams
-from swarm_logistics_env.tasks import ParallelTask
-from swarm_logistics_env.tasks.parallel_wrappers import Env
+from swarm_logistics_env.core import streams
+from swarm_logistics_env.study.tasks import ParallelTask
+from swarm_logistics_env.study.tasks.parallel_wrappers import Env
 
 Cell = tuple[int, int]  # column, row
 

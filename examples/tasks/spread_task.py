@@ -16,8 +16,8 @@ from mpe2.simple_spread.simple_spread import Scenario
 from numpy.typing import NDArray
 from pettingzoo.utils.conversions import aec_to_parallel
 
-from swarm_logistics_env.tasks import ParallelTask
-from swarm_logistics_env.tasks.parallel_wrappers import Env
+from swarm_logistics_env.study.tasks import ParallelTask
+from swarm_logistics_env.study.tasks.parallel_wrappers import Env
 
 STAY, LEFT, RIGHT, DOWN, UP = range(5)
 # A robot steers by where it will be after a while, or it would shoot past the landmark.

@@ -6,8 +6,8 @@ from typing import ClassVar
 
 import gymnasium
 
-from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.tasks.parallel_wrappers import Env, Value
+from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.study.tasks.parallel_wrappers import Env, Value
 
 
 class TupleEnv(Env):  # type: ignore[misc]  # PettingZoo's is untyped

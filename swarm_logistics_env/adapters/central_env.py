@@ -10,9 +10,9 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import checked_count, numbers_of
-from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.policies.policy import mask_unreachable_commands
 from swarm_logistics_env.wrappers import FixedAgents, Wrapper
 

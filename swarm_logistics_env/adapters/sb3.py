@@ -8,10 +8,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.core.errors import SetupError, how_to_install
+from swarm_logistics_env.core.streams import key
 from swarm_logistics_env.environment.requests import checked_count, checked_options
-from swarm_logistics_env.errors import SetupError, how_to_install
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import key
+from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.wrappers.action_forms import STAY
 from swarm_logistics_env.wrappers.wrapper import layers_of
 

@@ -14,7 +14,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.core.errors import SetupError
 
 from .sb3 import SwarmVecEnv  # first: it says what to install
 

@@ -11,10 +11,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.core.streams import key
 from swarm_logistics_env.environment.requests import checked_count, checked_options
-from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import key
+from swarm_logistics_env.world.scenario import Scenario
 
 from .worlds import RowsStep, TrainingWorld, Worlds, maker, with_episode_limit
 

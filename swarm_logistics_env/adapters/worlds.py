@@ -12,12 +12,12 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.core.errors import CommandError, SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import numbers_of
 from swarm_logistics_env.environment.spaces import ArrayStep
-from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.thread_pool import WorldThreadPool
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse.thread_pool import WorldThreadPool
 from swarm_logistics_env.wrappers.wrapper import Wrapper, layers_of
 
 TrainingWorld: TypeAlias = SwarmLogisticsEnv | Wrapper

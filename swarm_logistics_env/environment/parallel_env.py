@@ -10,12 +10,12 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import ArgumentError, SetupError, suggest
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import key
-from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import Fault, FaultLike, checked_faults
-from swarm_logistics_env.warehouse.one_thread import Lock, in_one_thread, used_elsewhere
+from swarm_logistics_env.core.errors import ArgumentError, SetupError, suggest
+from swarm_logistics_env.core.streams import key
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse import Warehouse
+from swarm_logistics_env.world.warehouse.faults import Fault, FaultLike, checked_faults
+from swarm_logistics_env.world.warehouse.one_thread import Lock, in_one_thread, used_elsewhere
 
 from .requests import (
     OPTIONS,
@@ -30,7 +30,7 @@ from .rewards import RewardTerms
 from .spaces import ArrayStep, DictView, Spaces, agent_names, global_state
 
 if TYPE_CHECKING:
-    from swarm_logistics_env.rendering import Renderer
+    from swarm_logistics_env.world.rendering import Renderer
 
 
 class SwarmLogisticsEnv(DictView):
@@ -291,7 +291,7 @@ class SwarmLogisticsEnv(DictView):
         if self.render_mode is None:
             raise SetupError('render_mode = None: should be "rgb_array" or "human" to render')
         if self._renderer is None:
-            from swarm_logistics_env.rendering import Renderer
+            from swarm_logistics_env.world.rendering import Renderer
 
             self._renderer = Renderer(self.scenario, self.render_mode)
         world = self.warehouse

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.warehouse.faults import GRACE, checked_faults, failed_robots
+from swarm_logistics_env.core.errors import CommandError, SetupError
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse import Fault
+from swarm_logistics_env.world.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.world.warehouse.faults import GRACE, checked_faults, failed_robots
 
 
 def as_array(value: ArrayLike, name: str) -> NDArray[Any]:

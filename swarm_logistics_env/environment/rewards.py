@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.code_files import import_callable
-from swarm_logistics_env.errors import SetupError, suggest
-from swarm_logistics_env.floor.floor_plan import NO_DOCK
-from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
+from swarm_logistics_env.core.code_files import import_callable
+from swarm_logistics_env.core.errors import SetupError, suggest
+from swarm_logistics_env.world.floor.floor_plan import NO_DOCK
+from swarm_logistics_env.world.warehouse import Warehouse
+from swarm_logistics_env.world.warehouse.state import NOBODY, WarehouseState
 
 DEFAULT_WEIGHTS: Mapping[str, float] = {"delivery": 1.0}
 

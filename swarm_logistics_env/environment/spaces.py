@@ -13,11 +13,11 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
-from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.observations import bounds
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.state import CARRIED, NOBODY, STORED
+from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.world.observations import bounds
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse import Warehouse
+from swarm_logistics_env.world.warehouse.state import CARRIED, NOBODY, STORED
 
 from .requests import gather_commands
 

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies.crowd import at_most_1, commands_of, drift, share_items
 from swarm_logistics_env.policies.planned_ground import ground_of
 from swarm_logistics_env.policies.policy import Scripted
@@ -25,8 +25,8 @@ from swarm_logistics_env.policies.routes import (
     discs_among,
     lookahead,
 )
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse.state import NOBODY, STORED, WarehouseState
 
 REPLAN = 0.3  # [s]
 NEAR = 0.3  # [m] from here on the worker drives straight to its item

@@ -16,13 +16,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.policies.central import REPLAN, Central
 from swarm_logistics_env.policies.crowd import distance_to
 from swarm_logistics_env.policies.routes import cost_to_go
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.floor_cells import floor_map
-from swarm_logistics_env.warehouse.state import NOBODY, STORED, WarehouseState
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse.floor_cells import floor_map
+from swarm_logistics_env.world.warehouse.state import NOBODY, STORED, WarehouseState
 
 # Lengths in m.
 HELD_SHARE = 0.5  # of the robots hold items at most

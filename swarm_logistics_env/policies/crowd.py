@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.warehouse.state import NOBODY, STORED
+from swarm_logistics_env.compiler.kernels import kernel
+from swarm_logistics_env.world.warehouse.state import NOBODY, STORED
 
 Numbers = NDArray[np.float64]
 

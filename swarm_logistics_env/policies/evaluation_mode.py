@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain, islice
 from typing import Any
 
-from swarm_logistics_env.code_files import is_users_own, names_in
+from swarm_logistics_env.core.code_files import is_users_own, names_in
 
 # A policy holds its networks near its surface; what lies deeper is a world or a store of rows.
 _DEEPEST, _MOST_PARTS = 6, 1000

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import PolicyError, how_to_install
-from swarm_logistics_env.motion.frame import OUTPUTS
-from swarm_logistics_env.motion.network_inputs import LEAD
+from swarm_logistics_env.core.errors import PolicyError, how_to_install
+from swarm_logistics_env.core.records import atomic_write, canonical_json
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.sb3_files import SB3_SUFFIX, from_sb3
-from swarm_logistics_env.records import atomic_write, canonical_json
+from swarm_logistics_env.world.motion.frame import OUTPUTS
+from swarm_logistics_env.world.motion.network_inputs import LEAD
 
 SUFFIX = ".safetensors"
 CARD = "swarm_logistics_policy"  # the header's entry that holds the card

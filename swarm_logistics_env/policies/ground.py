@@ -10,11 +10,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.policies.crowd import distances
 from swarm_logistics_env.policies.routes import CELL, costmap, lookahead
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.state import WarehouseState
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse.state import WarehouseState
 
 Numbers = NDArray[np.float64]
 Mask = NDArray[np.bool_]

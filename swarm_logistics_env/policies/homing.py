@@ -22,15 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import kernel
-from swarm_logistics_env.motion.frame import MotionView, command_own_frames
-from swarm_logistics_env.motion.memory import MEMORY, has_failed, length_of
-from swarm_logistics_env.motion.network_inputs import random_heading, turn_frames
-from swarm_logistics_env.motion.steering import set_velocity
+from swarm_logistics_env.compiler.kernels import kernel
+from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.motion.frame import MotionView, command_own_frames
+from swarm_logistics_env.world.motion.memory import MEMORY, has_failed, length_of
+from swarm_logistics_env.world.motion.network_inputs import random_heading, turn_frames
+from swarm_logistics_env.world.motion.steering import set_velocity
+from swarm_logistics_env.world.scenario import Scenario
 
 N_DIRECTIONS = 32
 KNOWN = 0.5  # entries lately; with fewer a robot knows no direction home

@@ -27,17 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, ValidationInfo, field_validator
 
-from swarm_logistics_env import observations as row
-from swarm_logistics_env.kernels import kernel, uniform
-from swarm_logistics_env.motion.frame import command_own_frames
-from swarm_logistics_env.motion.memory import MEMORY, has_failed, kept_home, length_of
-from swarm_logistics_env.motion.network_inputs import (
-    RANDOM_HEADING_TIME,
-    random_heading,
-    random_heading_number,
-    turn_frames,
-)
-from swarm_logistics_env.motion.steering import set_velocity
+from swarm_logistics_env.compiler.kernels import kernel, uniform
 from swarm_logistics_env.policies.homing import (
     HOLD,
     LET_GO,
@@ -52,6 +42,16 @@ from swarm_logistics_env.policies.homing import (
     requested_item,
     search_direction,
 )
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.motion.frame import command_own_frames
+from swarm_logistics_env.world.motion.memory import MEMORY, has_failed, kept_home, length_of
+from swarm_logistics_env.world.motion.network_inputs import (
+    RANDOM_HEADING_TIME,
+    random_heading,
+    random_heading_number,
+    turn_frames,
+)
+from swarm_logistics_env.world.motion.steering import set_velocity
 
 # Lengths in m; distances from the delivery area are as a robot reckons them.
 ROLE_TIME = 40.0  # [s]

@@ -13,9 +13,14 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import kernel
-
-from .register_blocks import NARROW, ROWS, WIDE, sum_narrow_block, sum_wide_block
+from swarm_logistics_env.compiler.kernels import kernel
+from swarm_logistics_env.compiler.register_blocks import (
+    NARROW,
+    ROWS,
+    WIDE,
+    sum_narrow_block,
+    sum_wide_block,
+)
 
 Floats = NDArray[np.float32]
 

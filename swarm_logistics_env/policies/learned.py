@@ -23,14 +23,14 @@ from pydantic import (
     field_validator,
 )
 
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.motion.network_inputs import INPUTS
+from swarm_logistics_env.compiler.packing import packed
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.core.records import Record
+from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.policy import Described
-from swarm_logistics_env.records import Record
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import row_keys
-from swarm_logistics_env.warehouse.packing import packed
+from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
+from swarm_logistics_env.world.motion.network_inputs import INPUTS
+from swarm_logistics_env.world.scenario import Scenario
 
 from .layers import Layers, in_blocks, padded, run_network
 from .network_steps import StepArrays, act_at, play_at

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
-from swarm_logistics_env.motion.frame import OUTPUTS
-from swarm_logistics_env.motion.network_inputs import INPUTS
-from swarm_logistics_env.observations import N_COLUMNS, N_NEIGHBOURS
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.world.motion.actions import ACTIONS, MOTION_ACTIONS
+from swarm_logistics_env.world.motion.frame import OUTPUTS
+from swarm_logistics_env.world.motion.network_inputs import INPUTS
+from swarm_logistics_env.world.observations import N_COLUMNS, N_NEIGHBOURS
 
 
 def width_of(part: object) -> int | None:

@@ -16,11 +16,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError
-from swarm_logistics_env.fingerprint import deep_copy, fingerprint, joined, package_code
-from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
-from swarm_logistics_env.motion.frame import MotionView
-from swarm_logistics_env.observations import N_COLUMNS, N_NEIGHBOURS
+from swarm_logistics_env.core.errors import RAISED_BY_OTHERS, PolicyError
+from swarm_logistics_env.core.fingerprint import deep_copy, fingerprint, joined, package_code
+from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.model_spaces import (
     check_spaces,
     check_statistics,
@@ -39,9 +37,11 @@ from swarm_logistics_env.policies.networks import (
 )
 from swarm_logistics_env.policies.normalizers import normalizer_of
 from swarm_logistics_env.policies.policy import Holding, Policy, check_policy, identity_parts
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import row_keys
-from swarm_logistics_env.warehouse import Warehouse
+from swarm_logistics_env.world.motion.actions import ACTIONS, MOTION_ACTIONS
+from swarm_logistics_env.world.motion.frame import MotionView
+from swarm_logistics_env.world.observations import N_COLUMNS, N_NEIGHBOURS
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse import Warehouse
 
 _CODE = (
     "policies/models.py", "policies/model_spaces.py", "policies/networks.py",

@@ -11,13 +11,13 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import engine_kernel, gaussian, kernel, pair_key
-from swarm_logistics_env.motion.frame import command_rows, hold_rows
-from swarm_logistics_env.motion.network_inputs import read_observations
-from swarm_logistics_env.warehouse.addresses import unpacked_at
-from swarm_logistics_env.warehouse.commands import MESSAGE
-from swarm_logistics_env.warehouse.stepping import step
-from swarm_logistics_env.warehouse.structs import World
+from swarm_logistics_env.compiler.addresses import unpacked_at
+from swarm_logistics_env.compiler.kernels import engine_kernel, gaussian, kernel, pair_key
+from swarm_logistics_env.world.motion.frame import command_rows, hold_rows
+from swarm_logistics_env.world.motion.network_inputs import read_observations
+from swarm_logistics_env.world.warehouse.commands import MESSAGE
+from swarm_logistics_env.world.warehouse.stepping import step
+from swarm_logistics_env.world.warehouse.structs import World
 
 from .layers import Layers, run_network
 

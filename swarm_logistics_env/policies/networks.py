@@ -16,9 +16,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError
-from swarm_logistics_env.motion.network_inputs import INPUTS
+from swarm_logistics_env.core.errors import RAISED_BY_OTHERS, PolicyError
 from swarm_logistics_env.policies.evaluation_mode import in_evaluation
+from swarm_logistics_env.world.motion.network_inputs import INPUTS
 
 Rows = NDArray[np.float32]
 Decide = Callable[[Rows], Any]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.core.errors import PolicyError
 
 Rows = NDArray[np.float32]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.policies.ground import Ground, Mask, Numbers, OpenGround
 from swarm_logistics_env.policies.routes import (
     BLOCKED,
@@ -23,16 +23,16 @@ from swarm_logistics_env.policies.routes import (
     costmap,
     lookahead,
 )
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.floor_cells import (
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse.floor_cells import (
     floor_map,
     floor_of,
     index_along,
     is_near_solid,
 )
-from swarm_logistics_env.warehouse.layout import is_clear_of_sides
-from swarm_logistics_env.warehouse.state import NOBODY, WarehouseState
-from swarm_logistics_env.warehouse.structs import Floor
+from swarm_logistics_env.world.warehouse.layout import is_clear_of_sides
+from swarm_logistics_env.world.warehouse.state import NOBODY, WarehouseState
+from swarm_logistics_env.world.warehouse.structs import Floor
 
 SOLID = 1e6  # times the cost of an open cell: finite, so that a way leads out of it
 BESIDE = 400.0  # nearer to racks than a robot's radius: rather through items, see `Central`

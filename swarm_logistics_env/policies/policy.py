@@ -13,13 +13,13 @@ from typing import Any, ClassVar, Protocol, Self, cast, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.code_files import PACKAGE
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.fingerprint import fingerprint, joined
+from swarm_logistics_env.core.code_files import PACKAGE
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.core.fingerprint import fingerprint, joined
+from swarm_logistics_env.core.records import Record, canonical_json
 from swarm_logistics_env.policies.evaluation_mode import in_evaluation
-from swarm_logistics_env.records import Record, canonical_json
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.state import WarehouseState
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse.state import WarehouseState
 
 
 @runtime_checkable

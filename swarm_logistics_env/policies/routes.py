@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import kernel
+from swarm_logistics_env.compiler.kernels import kernel
 
 CELL = 0.125  # [m]
 LOOKAHEAD = 16  # cells

@@ -13,8 +13,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from swarm_logistics_env.current_folder import allow_all_imports
-from swarm_logistics_env.errors import RAISED_BY_OTHERS, PolicyError, how_to_install
+from swarm_logistics_env.core.current_folder import allow_all_imports
+from swarm_logistics_env.core.errors import RAISED_BY_OTHERS, PolicyError, how_to_install
 from swarm_logistics_env.policies.models import ModelPolicy, Within, decider_of, within
 from swarm_logistics_env.policies.networks import Rows, outputs_of
 from swarm_logistics_env.policies.normalizers import normalizer_of

@@ -14,14 +14,15 @@ from typing import Any, Self, cast
 
 from pydantic import Field, JsonValue, field_validator, model_serializer
 
-from swarm_logistics_env.code_files import file_of_name, import_callable
-from swarm_logistics_env.errors import (
+from swarm_logistics_env.core.code_files import file_of_name, import_callable
+from swarm_logistics_env.core.errors import (
     RAISED_BY_OTHERS,
     PolicyError,
     SwarmLogisticsError,
     suggest,
 )
-from swarm_logistics_env.fingerprint import UNSTABLE, changed_files, changes, deep_copy
+from swarm_logistics_env.core.fingerprint import UNSTABLE, changed_files, changes, deep_copy
+from swarm_logistics_env.core.records import Record, canonical_json
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
 from swarm_logistics_env.policies.files import (
@@ -40,7 +41,6 @@ from swarm_logistics_env.policies.sb3_files import (
     refuse_untrusted,
 )
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
-from swarm_logistics_env.records import Record, canonical_json
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
 SUFFIXES = (SUFFIX, SB3_SUFFIX)  # of policy files

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat
 
-from swarm_logistics_env import observations as row
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.kernels import kernel, uniform
+from swarm_logistics_env.compiler.kernels import kernel, uniform
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.scenario import Scenario
 
 
 class SwarmDTParameters(ScriptParameters):

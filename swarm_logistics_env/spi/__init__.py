@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from swarm_logistics_env.study.trials import Trial, Trials, read_trials
+
 from .definitions import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .equivalence import Equivalence, equivalence
 from .estimate import DecisionWord, Estimate, Options
@@ -33,7 +35,6 @@ from .summaries import (
     pairing_correlation,
     prediction_interval,
 )
-from .trials import Trial, Trials, read_trials
 
 __all__ = [
     "Collapsed",

@@ -10,7 +10,7 @@ from typing import SupportsIndex, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env.errors import SwarmLogisticsError
+from swarm_logistics_env.core.errors import SwarmLogisticsError
 
 Numbers: TypeAlias = NDArray[np.float64]
 

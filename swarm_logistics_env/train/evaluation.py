@@ -15,18 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.episode import run_episode
-from swarm_logistics_env.errors import TrainingError
+from swarm_logistics_env.core.errors import TrainingError
+from swarm_logistics_env.core.records import file_name
 from swarm_logistics_env.policies import Policy, load
+from swarm_logistics_env.policies.episode import run_episode
 from swarm_logistics_env.policies.learned import Score
-from swarm_logistics_env.questions.comparison import Arm
-from swarm_logistics_env.records import file_name
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.study.questions.comparison import Arm
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.train.training import Training
-from swarm_logistics_env.verdicts.results import StudyResults
-from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse import Fault
 
 PACKAGES = (
     "swarm-logistics-env", "torch", "stable-baselines3", "numpy", "numba", "pymunk", "gymnasium",

@@ -22,15 +22,15 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import create_mlp
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
-from swarm_logistics_env.errors import TrainingError
-from swarm_logistics_env.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.motion.memory import body_of
-from swarm_logistics_env.motion.network_inputs import INPUTS
+from swarm_logistics_env.core.errors import TrainingError
+from swarm_logistics_env.core.records import atomic_write
+from swarm_logistics_env.core.streams import key, row_keys
 from swarm_logistics_env.policies.learned import STREAM
-from swarm_logistics_env.records import atomic_write
-from swarm_logistics_env.streams import key, row_keys
 from swarm_logistics_env.train.privileged import PRIVILEGED, fill_privileged
 from swarm_logistics_env.train.training import Training, make_worlds
+from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
+from swarm_logistics_env.world.motion.memory import body_of
+from swarm_logistics_env.world.motion.network_inputs import INPUTS
 
 
 def check_finite(name: str, numbers: NDArray[Any]) -> None:

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.kernels import engine_kernel, kernel
-from swarm_logistics_env.motion.memory import length_of, to_frame
-from swarm_logistics_env.warehouse.addresses import unpacked_at
-from swarm_logistics_env.warehouse.structs import NOBODY, World
+from swarm_logistics_env.compiler.addresses import unpacked_at
+from swarm_logistics_env.compiler.kernels import engine_kernel, kernel
+from swarm_logistics_env.world.motion.memory import length_of, to_frame
+from swarm_logistics_env.world.warehouse.structs import NOBODY, World
 
 
 class PrivilegedColumns(NamedTuple):

@@ -18,10 +18,10 @@ from pydantic import (
     model_validator,
 )
 
-from swarm_logistics_env.errors import TrainingError
-from swarm_logistics_env.records import Record, each_of
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse.failure_modes import failure_mode
+from swarm_logistics_env.core.errors import TrainingError
+from swarm_logistics_env.core.records import Record, each_of
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse.failure_modes import failure_mode
 
 Fraction = Annotated[float, Field(gt=0, le=1)]
 

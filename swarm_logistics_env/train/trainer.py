@@ -17,13 +17,13 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
+from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError
+from swarm_logistics_env.core.progress_bar import ProgressBar
+from swarm_logistics_env.core.records import atomic_write, read_table, remove_parts
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.policies.policy import one_thread
-from swarm_logistics_env.progress_bar import ProgressBar
-from swarm_logistics_env.records import atomic_write, read_table, remove_parts
-from swarm_logistics_env.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
+from swarm_logistics_env.study.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import (
     evaluate,
     evaluate_score,

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
+from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError, suggest
+from swarm_logistics_env.core.records import FileName, each_of, one_of, read_table
+from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import faults_among, scenario_fields
 from swarm_logistics_env.environment.rewards import RewardTerms
-from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.policies.learned import Network
-from swarm_logistics_env.records import FileName, each_of, one_of, read_table
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import generator
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.train.settings import (
     Conditions,
     Evaluation,
@@ -28,7 +27,8 @@ from swarm_logistics_env.train.settings import (
     Scores,
     WorldKind,
 )
-from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse import Fault
 from swarm_logistics_env.wrappers import IndicatorReward, Wrapper
 
 if TYPE_CHECKING:

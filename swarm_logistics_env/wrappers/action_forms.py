@@ -11,17 +11,17 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete
 from numpy.typing import ArrayLike, NDArray
 
-from swarm_logistics_env import motion
+from swarm_logistics_env.core.errors import CommandError, SetupError
+from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import checked_options, numbers_of
 from swarm_logistics_env.environment.spaces import ArrayStep
-from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.motion.actions import ACTIONS, MOTION_ACTIONS
-from swarm_logistics_env.motion.frame import OUTPUTS
-from swarm_logistics_env.motion.network_inputs import INPUT, INPUTS, N_OBSTACLES
-from swarm_logistics_env.observations import N_BEAMS
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.world import motion
+from swarm_logistics_env.world.motion.actions import ACTIONS, MOTION_ACTIONS
+from swarm_logistics_env.world.motion.frame import OUTPUTS
+from swarm_logistics_env.world.motion.network_inputs import INPUT, INPUTS, N_OBSTACLES
+from swarm_logistics_env.world.observations import N_BEAMS
+from swarm_logistics_env.world.scenario import Scenario
 
 from .wrapper import Wrapper
 

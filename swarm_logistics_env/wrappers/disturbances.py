@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swarm_logistics_env.core.errors import FaultError, ScenarioError, suggest
+from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import faults_among, scenario_fields
-from swarm_logistics_env.errors import FaultError, ScenarioError, suggest
-from swarm_logistics_env.scenario import CHANGES_DURING_RUN, Scenario
-from swarm_logistics_env.streams import generator
-from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.warehouse.faults import GRACE, failed_robots
+from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN, Scenario
+from swarm_logistics_env.world.warehouse import Fault
+from swarm_logistics_env.world.warehouse.faults import GRACE, failed_robots
 
 from .wrapper import Wrapper, as_choices, draw
 

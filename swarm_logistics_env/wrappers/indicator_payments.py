@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from swarm_logistics_env.core.errors import SetupError, suggest
 from swarm_logistics_env.environment.requests import checked_count
-from swarm_logistics_env.errors import SetupError, suggest
-from swarm_logistics_env.scenario import Scenario
 from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.world.scenario import Scenario
 
 from .wrapper import Condition
 

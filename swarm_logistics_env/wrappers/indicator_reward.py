@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.core.errors import SetupError, suggest
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import finite_number
 from swarm_logistics_env.environment.spaces import ArrayStep
-from swarm_logistics_env.errors import SetupError, suggest
 
 from .indicator_payments import (
     INDICATORS,

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import (
     check_somebody_is_there,
@@ -17,11 +19,9 @@ from swarm_logistics_env.environment.requests import (
     scenario_fields,
 )
 from swarm_logistics_env.environment.spaces import ArrayStep, InfosByRobot, agent_names
-from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.streams import generator
-from swarm_logistics_env.warehouse import Fault
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse import Fault
+from swarm_logistics_env.world.warehouse.faults import failed_robots
 
 from .action_forms import ACTION_MASK, STAY
 from .wrapper import Wrapper, as_choices, draw

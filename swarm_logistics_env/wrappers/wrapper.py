@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo.utils import BaseParallelWrapper
 
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import checked_options
 from swarm_logistics_env.environment.spaces import ArrayStep, DictView
-from swarm_logistics_env.errors import SetupError
-from swarm_logistics_env.scenario import Scenario
-from swarm_logistics_env.warehouse import Warehouse
-from swarm_logistics_env.warehouse.faults import Fault
+from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.warehouse import Warehouse
+from swarm_logistics_env.world.warehouse.faults import Fault
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from gymnasium.utils.env_checker import check_env
 
 from swarm_logistics_env import Fault
 from swarm_logistics_env.adapters import CentralEnv
-from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.core.errors import CommandError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 from tests.wrappers.conftest import BRIEF, brief, eastward
 

@@ -22,8 +22,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecCheckNan, VecMonito
 from swarm_logistics_env.adapters import CentralEnv, SwarmVecNormalize, sb3
 from swarm_logistics_env.adapters.sb3 import SwarmVecEnv
 from swarm_logistics_env.adapters.sb3_learning import LogDeliveries
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.errors import SetupError
 from swarm_logistics_env.wrappers import SwarmSize
 from tests.wrappers.conftest import brief, worlds
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault
-from swarm_logistics_env.errors import CommandError, SetupError, SwarmLogisticsError
-from swarm_logistics_env.observations import N_COLUMNS
-from swarm_logistics_env.streams import key
+from swarm_logistics_env.core.errors import CommandError, SetupError, SwarmLogisticsError
+from swarm_logistics_env.core.streams import key
+from swarm_logistics_env.world.observations import N_COLUMNS
 from swarm_logistics_env.wrappers import (
     DiscreteActions,
     FaultInjection,

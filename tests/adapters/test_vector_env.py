@@ -18,9 +18,9 @@ from gymnasium.wrappers.vector import (
 )
 
 from swarm_logistics_env.adapters import CentralEnv, SwarmRows, vector_env
-from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.observations import N_COLUMNS
-from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.core.errors import CommandError, SetupError
+from swarm_logistics_env.world.observations import N_COLUMNS
+from swarm_logistics_env.world.warehouse import Fault
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, Wrapper
 from tests.wrappers.conftest import BRIEF, brief, wrapped
 

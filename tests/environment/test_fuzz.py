@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario
+from swarm_logistics_env.core.errors import SwarmLogisticsError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.errors import SwarmLogisticsError
-from swarm_logistics_env.warehouse.failure_modes import FAILURE_MODES
+from swarm_logistics_env.world.warehouse.failure_modes import FAILURE_MODES
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 
 SMALL = Scenario(n_robots=3, n_items=4, warehouse_width=4.0, warehouse_height=3.0, duration=1.0)

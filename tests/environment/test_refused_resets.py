@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault
 from swarm_logistics_env.adapters import CentralEnv
+from swarm_logistics_env.core.errors import SwarmLogisticsError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.errors import SwarmLogisticsError
 from swarm_logistics_env.wrappers import FaultInjection, FixedAgents, SwarmSize
 
 FIELDS: dict[str, Any] = {"n_robots": 4, "n_items": 6, "duration": 30.0}

@@ -9,8 +9,8 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies, run_episode
+from swarm_logistics_env.core.errors import FaultError, SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.errors import FaultError, SetupError
 from swarm_logistics_env.wrappers import FaultInjection, SwarmSize
 
 GIVEN: list[Any] = [

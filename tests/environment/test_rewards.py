@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env.core.errors import SetupError, TrainingError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import REWARD_TERMS, STOCK_DISTANCE, RewardTerms
-from swarm_logistics_env.errors import SetupError, TrainingError
 from swarm_logistics_env.train import load_training
-from swarm_logistics_env.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+from swarm_logistics_env.world.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
 
 STORAGE = 8.0  # [m], its width
 

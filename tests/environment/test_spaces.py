@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swarm_logistics_env import observations as row
 from swarm_logistics_env import policies
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.spaces import ITEM_COLUMNS, ROBOT_FEATURES
 from swarm_logistics_env.policies.policy import decide, start
-from swarm_logistics_env.warehouse.state import CARRIED, NOBODY, STORED
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.warehouse.state import CARRIED, NOBODY, STORED
 
 
 @pytest.mark.parametrize("n_requests", [1, 4])

@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, run_episode
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.policy import decide, mask_unreachable_commands, start
-from swarm_logistics_env.warehouse.state import NOBODY
+from swarm_logistics_env.world.warehouse.state import NOBODY
 
 SMALL = Scenario(
     n_robots=6, n_items=20, warehouse_width=6.0, warehouse_height=4.0, duration=60.0, restock=True

@@ -12,7 +12,7 @@ from swarm_logistics_env.policies import load
 from swarm_logistics_env.policies.ground import OpenGround
 from swarm_logistics_env.policies.planned_ground import PlannedGround, ground_of
 from swarm_logistics_env.policies.policy import decide, start
-from swarm_logistics_env.warehouse.floor_cells import floor_map
+from swarm_logistics_env.world.warehouse.floor_cells import floor_map
 
 POLICIES = ("central", "central-stock")
 # Walls stand between storage and docks; straight ways end at them.

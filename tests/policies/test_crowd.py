@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env.policies.crowd import drift, share_items
-from swarm_logistics_env.warehouse.state import CARRIED, NOBODY, STORED
+from swarm_logistics_env.world.warehouse.state import CARRIED, NOBODY, STORED
 
 
 def velocities(position: Any, goals: Any, worker: int = NOBODY, **changed: Any) -> Any:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from safetensors.numpy import save_file
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies import PolicyCard, files, identity, read_card
 from swarm_logistics_env.policies.files import CARD, DIGEST, content_digest, write_policy
 

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
-from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies import load
+from swarm_logistics_env.world import observations as row
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
 SMALL = Scenario(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from swarm_logistics_env.policies import register_blocks
+from swarm_logistics_env.compiler import register_blocks
 from swarm_logistics_env.policies.layers import (
     Layers,
     hyperbolic_tangent,

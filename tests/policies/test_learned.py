@@ -10,14 +10,14 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
-from swarm_logistics_env.motion import INPUTS
-from swarm_logistics_env.observations import N_COLUMNS, TURN_RATE
+from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies import PolicyCard, identity
 from swarm_logistics_env.policies.layers import hyperbolic_tangent
 from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.network_steps import explore
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.world.motion import INPUTS
+from swarm_logistics_env.world.observations import N_COLUMNS, TURN_RATE
 
 Tensors = dict[str, NDArray[np.float32]]
 

@@ -13,15 +13,15 @@ import pytest
 from gymnasium.spaces import Box
 
 from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.cli import app
+from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.episode import Play
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.motion.network_inputs import LEAD
-from swarm_logistics_env.observations import N_COLUMNS
 from swarm_logistics_env.policies import models
+from swarm_logistics_env.policies.episode import Play
 from swarm_logistics_env.policies.spec import PolicySpec
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.views.cli import app
+from swarm_logistics_env.world.motion.network_inputs import LEAD
+from swarm_logistics_env.world.observations import N_COLUMNS
 from swarm_logistics_env.wrappers import FaultInjection, SwarmSize, Wrapper
 
 BRIEF = Scenario(n_robots=3, n_items=10, duration=2.0)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, policies, run_episode
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.motion.actions import ACTIONS
-from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.world.motion.actions import ACTIONS
+from swarm_logistics_env.world.observations import N_COLUMNS
 
 torch = pytest.importorskip("torch")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of torch.jit

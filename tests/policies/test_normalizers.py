@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.world.observations import N_COLUMNS
 
 MEAN, DEVIATION = np.full(N_COLUMNS, 2.0), np.full(N_COLUMNS, 4.0)
 

@@ -11,12 +11,12 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Scenario, Warehouse, policies
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.motion import INPUTS, MotionView
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies import PolicyCard
 from swarm_logistics_env.policies.files import CARD, DEVIATIONS, write_onnx
 from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.world.motion import INPUTS, MotionView
 
 
 def session_of(policy: Any, path: Path) -> Any:

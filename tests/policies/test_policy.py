@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.errors import PolicyError
+from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
 from swarm_logistics_env.policies.learned import LearnedPolicy, Network
 from swarm_logistics_env.policies.policy import Scripted, identity
 from swarm_logistics_env.policies.spec import SCRIPTED, PolicySpec
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.study.studies import Study
 
 
 def changed(value: Any) -> Any:

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.cli import app
-from swarm_logistics_env.cli.policy_choice import policies_of
-from swarm_logistics_env.cli.study_choice import study_of
-from swarm_logistics_env.episode import Play
-from swarm_logistics_env.errors import PolicyError, StudyError
-from swarm_logistics_env.motion import INPUTS
-from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.core.errors import PolicyError, StudyError
 from swarm_logistics_env.policies import Policy, PolicySpec
-from swarm_logistics_env.questions.specification import read_study_file
+from swarm_logistics_env.policies.episode import Play
+from swarm_logistics_env.study.questions.specification import read_study_file
+from swarm_logistics_env.views.cli import app
+from swarm_logistics_env.views.cli.policy_choice import policies_of
+from swarm_logistics_env.views.cli.study_choice import study_of
+from swarm_logistics_env.world.motion import INPUTS
+from swarm_logistics_env.world.observations import N_COLUMNS
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame
 from tests.wrappers.conftest import brief
 

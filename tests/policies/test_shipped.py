@@ -10,7 +10,7 @@ import pytest
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.train.training import load_training, preset_names
-from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.world.warehouse import Fault
 
 SHIPPED = sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, run_episode
-from swarm_logistics_env.errors import PolicyError
-from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies import NAMES, Policy, load
+from swarm_logistics_env.world.observations import N_COLUMNS
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env import observations as row
 from swarm_logistics_env.policies import SwarmDT, SwarmDTParameters, load
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026
-from swarm_logistics_env.scenario import SOURCES
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.scenario import SOURCES
 
 
 def sensing(*things: tuple[int, list[float]], n_robots: int = 1) -> NDArray[np.float32]:

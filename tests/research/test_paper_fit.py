@@ -12,8 +12,8 @@ from research import play_paper_fit as confirmed
 from research import tables
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env.policies import SwarmDT
-from swarm_logistics_env.questions.presets import load_preset
-from swarm_logistics_env.verdicts.reference import PAPER
+from swarm_logistics_env.study.questions.presets import load_preset
+from swarm_logistics_env.study.verdicts.reference import PAPER
 
 PLAYED = tables.ROOT / "docs" / "results" / "paper_fit"
 

@@ -13,8 +13,8 @@ import pytest
 
 from research import play_bodies, play_floors, play_medians, play_published, play_readings, tables
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.scenario import CHIPMUNK
 from swarm_logistics_env.spi import Interval
+from swarm_logistics_env.world.scenario import CHIPMUNK
 
 
 def test_a_change_has_its_sign_and_an_interval_its_side() -> None:

@@ -23,8 +23,8 @@ from research import (
     tables,
 )
 from swarm_logistics_env import spi
-from swarm_logistics_env.report import benchmark, section
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.study.report import benchmark, section
+from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
 
 ROOT = Path(__file__).parents[2]

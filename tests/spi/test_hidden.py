@@ -9,7 +9,6 @@ import pytest
 from scipy.stats import beta
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.questions.specification import looks_up_to
 from swarm_logistics_env.spi.hidden import (
     STALL_SHARE,
     collapsed,
@@ -17,6 +16,7 @@ from swarm_logistics_env.spi.hidden import (
     remainder_and_chance,
     stalls,
 )
+from swarm_logistics_env.study.questions.specification import looks_up_to
 from verification.verdict_errors import over_trainings, share_equivalent, wrong_verdicts
 
 rng = np.random.default_rng(2)

@@ -27,7 +27,7 @@ INDICATORS: dict[str, Callable[..., spi.Estimate]] = {
 over_indicators = pytest.mark.parametrize("name", INDICATORS)
 
 
-# `tests/questions/test_plan.py` has those of the paper's tables.
+# `tests/study/questions/test_plan.py` has those of the paper's tables.
 def test_values_are_ratios_of_means_by_the_table_of_indicators() -> None:
     samples = [10.0, 30.0], [20.0, 12.0], [8.0, 18.0]
     expected = {

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.errors import SwarmLogisticsError
+from swarm_logistics_env.core.errors import SwarmLogisticsError
 
 MASKED = np.ma.masked_equal([20.0, 21.0, 22.0, 9999.0], 9999.0)
 REFUSED: list[tuple[Any, str]] = [

@@ -14,7 +14,7 @@ pytest.importorskip("stable_baselines3")
 
 from swarm_logistics_env import Fault, Scenario, policies, run_episode
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
-from swarm_logistics_env.questions.specification import MOST_SEEDS
+from swarm_logistics_env.study.questions.specification import MOST_SEEDS
 from swarm_logistics_env.train import evaluation
 from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.train.trainer import TrainingLog

@@ -13,7 +13,7 @@ from safetensors.numpy import load_file
 pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
 
-from swarm_logistics_env.cli import app
+from swarm_logistics_env.views.cli import app
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
 
@@ -39,7 +39,7 @@ restock = true
 # which the process is killed: from within, so that it always is the same one.
 SCRIPT = """\
 import os, signal, sys
-from swarm_logistics_env.cli import app
+from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.train import trainer
 last, save, saved = int(sys.argv.pop(1)), trainer.save_checkpoint, []
 def save_and_die(*given):

@@ -10,11 +10,11 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
-from swarm_logistics_env.motion.memory import BODY, MEMORY, OPEN, body_of
-from swarm_logistics_env.motion.network_inputs import INPUTS
 from swarm_logistics_env.train.learner import NetworkView, make_learner
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import PPOSettings
+from swarm_logistics_env.world.motion.memory import BODY, MEMORY, OPEN, body_of
+from swarm_logistics_env.world.motion.network_inputs import INPUTS
 
 
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.train.privileged import PRIVILEGED, fill_privileged
-from swarm_logistics_env.warehouse.state import CARRIED
+from swarm_logistics_env.world.warehouse.state import CARRIED
 
 
 def fill(env: SwarmLogisticsEnv, turned: Any, privileged: Any) -> None:

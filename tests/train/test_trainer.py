@@ -20,11 +20,9 @@ import torch
 from stable_baselines3.common.callbacks import ConvertCallback
 
 from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.cli import app
-from swarm_logistics_env.errors import SwarmLogisticsError, TrainingError
-from swarm_logistics_env.motion import INPUTS, MotionView
+from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
-from swarm_logistics_env.tasks.warehouse_task import WAREHOUSE, WarehouseTask
+from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE, WarehouseTask
 from swarm_logistics_env.train import trainer
 from swarm_logistics_env.train.evaluation import versions
 from swarm_logistics_env.train.learner import (
@@ -38,6 +36,8 @@ from swarm_logistics_env.train.learner import (
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import Scores
 from swarm_logistics_env.train.trainer import train
+from swarm_logistics_env.views.cli import app
+from swarm_logistics_env.world.motion import INPUTS, MotionView
 
 
 def weights(path: Path) -> dict[str, bytes]:

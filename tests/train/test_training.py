@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
+from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.errors import TrainingError
 from swarm_logistics_env.train import Training, load_training, preset_names
 from swarm_logistics_env.train.settings import Conditions, PPOSettings
 from swarm_logistics_env.train.training import EpisodeMix, make_worlds
-from swarm_logistics_env.warehouse import Fault
+from swarm_logistics_env.world.warehouse import Fault
 
 
 @pytest.mark.parametrize("name", preset_names())

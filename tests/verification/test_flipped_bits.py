@@ -14,12 +14,12 @@ import pytest
 from hypothesis import settings
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.cli import app
-from swarm_logistics_env.errors import PolicyError, StudyError, TrainingError
+from swarm_logistics_env.core.errors import PolicyError, StudyError, TrainingError
 from swarm_logistics_env.policies.files import read_policy
 from swarm_logistics_env.policies.spec import WEIGHTS
-from swarm_logistics_env.runs.store import FILE_NAME, Runs
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.views.cli import app
 from tests.made_up import made_old
 
 FLIPS = max(40, settings().max_examples // 10)  # 200 at night

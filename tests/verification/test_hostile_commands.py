@@ -11,7 +11,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_logistics_env.cli import app
+from swarm_logistics_env.views.cli import app
 
 # Whatever else is asked, an episode stays short.
 COMMANDS = ["run --set duration=0.2", "list", "study plan", "study run", "study report",

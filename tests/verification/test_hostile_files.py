@@ -19,16 +19,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_logistics_env import policies
-from swarm_logistics_env.cli import app
-from swarm_logistics_env.errors import SwarmLogisticsError
-from swarm_logistics_env.observations import N_COLUMNS
+from swarm_logistics_env.core.errors import SwarmLogisticsError
 from swarm_logistics_env.policies.spec import WEIGHTS
-from swarm_logistics_env.runs.notes import NOTE, merge
-from swarm_logistics_env.runs.recorded import RecordedStudy
-from swarm_logistics_env.runs.store import FILE_NAME, Runs, export
-from swarm_logistics_env.spi import read_trials
-from swarm_logistics_env.studies import Study
-from swarm_logistics_env.verdicts.cell import Cell
+from swarm_logistics_env.study.runs.notes import NOTE, merge
+from swarm_logistics_env.study.runs.recorded import RecordedStudy
+from swarm_logistics_env.study.runs.store import FILE_NAME, Runs, export
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.trials import read_trials
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.views.cli import app
+from swarm_logistics_env.world.observations import N_COLUMNS
 from tests.made_up import alter, made_old
 
 STUDY = """\

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from swarm_logistics_env.cli import app
-from swarm_logistics_env.errors import StudyError, SwarmLogisticsError
-from swarm_logistics_env.questions.specification import Specification
-from swarm_logistics_env.records import file_name, has_control_signs
-from swarm_logistics_env.runs.recorded import RecordedStudy
-from swarm_logistics_env.spi import read_trials
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.core.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.core.records import file_name, has_control_signs
+from swarm_logistics_env.study.questions.specification import Specification
+from swarm_logistics_env.study.runs.recorded import RecordedStudy
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.trials import read_trials
+from swarm_logistics_env.views.cli import app
 
 # A label of 300 signs leaves a drawing no room for its axes.
 pytestmark = pytest.mark.filterwarnings("ignore:constrained_layout:UserWarning")

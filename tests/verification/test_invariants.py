@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 import verification
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.scenario.checks import LONGEST_STRIDE
-from swarm_logistics_env.warehouse.state import DELIVERED, NOBODY, STORED
+from swarm_logistics_env.world.scenario.checks import LONGEST_STRIDE
+from swarm_logistics_env.world.warehouse.state import DELIVERED, NOBODY, STORED
 from verification.invariants import BrokenPromiseError, Watch
 from verification.soak import Tally, play, towards
 

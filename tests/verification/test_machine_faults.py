@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from swarm_logistics_env.runs.store import FILE_NAME, Runs, export
-from swarm_logistics_env.studies import Study
+from swarm_logistics_env.study.runs.store import FILE_NAME, Runs, export
+from swarm_logistics_env.study.studies import Study
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 
@@ -45,7 +45,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 CAP_DAC_OVERRIDE, PR_CAPBSET_DROP = 1, 24
-COMMAND = [sys.executable, "-c", "from swarm_logistics_env.cli import app; app()"]
+COMMAND = [sys.executable, "-c", "from swarm_logistics_env.views.cli import app; app()"]
 
 
 def command(words: str, limit: int | None = None) -> Any:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from swarm_logistics_env.numba_fence import WAY
+from swarm_logistics_env.compiler.numba_fence import WAY
 from verification import trajectories
 from verification.trajectories import GOLDEN, digests, explained, read_record
 

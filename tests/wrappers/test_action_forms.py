@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_logistics_env import Fault, Scenario, motion
+from swarm_logistics_env import Fault, Scenario
 from swarm_logistics_env.adapters import CentralEnv
-from swarm_logistics_env.errors import CommandError, SetupError
-from swarm_logistics_env.motion.actions import ACTIONS
-from swarm_logistics_env.motion.network_inputs import INPUTS
-from swarm_logistics_env.streams import row_keys
+from swarm_logistics_env.core.errors import CommandError, SetupError
+from swarm_logistics_env.core.streams import row_keys
+from swarm_logistics_env.world import motion
+from swarm_logistics_env.world.motion.actions import ACTIONS
+from swarm_logistics_env.world.motion.network_inputs import INPUTS
 from swarm_logistics_env.wrappers import DiscreteActions, MotionFrame, ParameterChange, SwarmSize
 from tests.wrappers.conftest import small
 

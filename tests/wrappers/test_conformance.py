@@ -16,7 +16,7 @@ import pytest
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_logistics_env import wrappers
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.wrappers import (
     DiscreteActions,
     FaultInjection,

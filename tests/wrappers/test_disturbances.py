@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault
-from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError
-from swarm_logistics_env.scenario import CHANGES_DURING_RUN
-from swarm_logistics_env.warehouse.faults import failed_robots
+from swarm_logistics_env.core.errors import FaultError, ScenarioError, SetupError
+from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN
+from swarm_logistics_env.world.warehouse.faults import failed_robots
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 from tests.wrappers.conftest import small
 

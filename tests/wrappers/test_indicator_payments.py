@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.wrappers import Condition, RunningMeans
 from swarm_logistics_env.wrappers.indicator_payments import GivenPerformances
 from tests.wrappers.conftest import (

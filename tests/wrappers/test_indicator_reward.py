@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, spi
-from swarm_logistics_env.errors import SetupError
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.wrappers import (
     Condition,
     FaultInjection,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault
-from swarm_logistics_env.errors import FaultError, ScenarioError, SetupError
+from swarm_logistics_env.core.errors import FaultError, ScenarioError, SetupError
 from swarm_logistics_env.wrappers import FaultInjection, FixedAgents, SwarmSize
 from tests.wrappers.conftest import eastward, small
 

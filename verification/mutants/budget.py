@@ -2,7 +2,7 @@
 
 Seconds are those of a core, so that a busy machine runs the same tests.
 
-MUTANT_SECONDS=60 python -m pytest -p verification.mutants.budget tests/spi tests/report
+MUTANT_SECONDS=60 python -m pytest -p verification.mutants.budget tests/spi tests/study/report
 """
 
 import os

@@ -1,0 +1,315 @@
+"""Figures: what each shows, as a table and as a drawing."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from more_itertools import map_reduce, unique_everseen
+
+from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorKind
+from swarm_logistics_env.study.questions.comparison import CONFIDENCE, NO_FAULT
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.mid_run_faults import RateCurve, Resilience, window_of
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
+
+from . import drawing
+from .answer import Answer
+from .drawing import Panel, Point
+from .section import P_LEVEL, Figure, join_names, levels, slug
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_COLUMNS = [
+    "policy", "table", "indicator", "comparison", "value", "low", "high", "confidence",
+    "verdict", "verdict_holm", "published", "saturated",
+]  # fmt: skip
+
+
+def forest_points(results: StudyResults, answer: Answer) -> list[list[Point]]:
+    """Return the values of each line of the answer; `published` is the threshold of each."""
+    return [
+        [_point(results, verdict, "", verdict.compared.threshold) for verdict in line.verdicts]
+        for line in answer.lines
+    ]
+
+
+def forest_label(answer: Answer) -> str:
+    """Return the label of the values' axis, e.g. "R, FT: value"."""
+    return f"{', '.join(dict.fromkeys(line.indicator for line in answer.lines))}: value"
+
+
+def forest_figure(results: StudyResults, answer: Answer) -> Figure:
+    """Return the lines of the answer as a forest of intervals."""
+    rows = list(zip(answer.questions, forest_points(results, answer)))
+    verdicts = answer.verdicts
+    n_most = max(len(points) for _, points in rows)
+    order = ""
+    if n_most > 1:
+        order = " Marks in one row stand from top to bottom in the order of its label."
+    # Where there are several, each row names its own.
+    title = results.policies[0] if len(results.policies) == 1 else ""
+    return Figure(
+        "answer",
+        f"{answer.scope} Every question with its interval. {_marks(verdicts)}.{order}"
+        f"{_note_on_caps(verdicts)}",
+        _rows(results, verdicts),
+        1.1 + (0.21 + 0.05 * min(n_most, 4)) * len(rows),
+        partial(drawing.forest, rows=rows, x_label=forest_label(answer), title=title),
+    )
+
+
+def indicator_figures(results: StudyResults) -> Iterator[Figure]:
+    """Yield S per step, FT and R per mode and m, A per value, and P without a part."""
+    for (table, _, onset, swarm), verdicts in _by_figure(results).items():
+        definitions = _definitions(verdicts)
+        panels = tuple(_panel(results, verdicts, definition) for definition in definitions)
+        rows = _rows(results, verdicts)
+        condition = _condition(table, onset, swarm)
+        symbols = [definition.symbol for definition in definitions]
+        has_published = any(verdict.published is not None for verdict in verdicts)
+        crosses = "; crosses: published" if has_published else ""
+        policies = join_names(list(dict.fromkeys(v.compared.policy for v in verdicts)))
+        caption = (
+            f"{policies}, {condition}: {_caption(definitions)} "
+            f"{results.seeds_text.capitalize()}. {_marks(verdicts)}{crosses}."
+            f"{_note_on_caps(verdicts)}"
+        )
+        yield Figure(
+            slug(*symbols, table, f"{onset:g}s" if onset else ""),
+            caption,
+            rows,
+            0.5 + 2.5 * len(panels),
+            partial(drawing.intervals, panels=panels),
+            title=f"{' and '.join(symbols)}: {condition}",
+            panels=panels,
+            level=levels(verdicts),
+        )
+
+
+_MOST_PANELS = 12
+
+
+def trade_off_figure(results: StudyResults) -> Iterator[Figure]:
+    """Yield P against contacts, a point a policy, where contacts were counted.
+
+    Each condition has a panel; where they are many, all are in one.
+    """
+    import pandas as pd
+
+    # A case may stand in several tables.
+    distinct = unique_everseen(results.cells, lambda cell: (cell.policy, cell.arm.case.key))
+    cells = [cell for cell in distinct if cell.contacts.value >= 0.0]
+    if not cells:
+        return
+    policies = list(dict.fromkeys(cell.policy for cell in cells))
+    panels: dict[str, list[Cell]] = map_reduce(cells, lambda cell: cell.words)
+    if len(panels) > _MOST_PANELS:
+        panels = {"": cells}
+    points = {
+        title: [(_cell_point(cell, policies), cell.contacts) for cell in of_panel]
+        for title, of_panel in panels.items()
+    }
+    rows = [(cell.policy, cell.words, *cell.contacts, *cell.mean, CONFIDENCE) for cell in cells]
+    columns = ["policy", "cell", "contacts", "contacts_low", "contacts_high"]
+    yield Figure(
+        "trade-off",
+        f"P against contacts per robot-minute, a point for each policy and condition. Filled: no "
+        f"robot fails; hollow: some do; bars: {P_LEVEL} intervals. "
+        f"{results.seeds_text.capitalize()}.",
+        pd.DataFrame(rows, columns=[*columns, "mean", "low", "high", "confidence"]),
+        0.8 + 1.9 * math.ceil(len(panels) / 2) if len(panels) > 1 else 3.2,
+        partial(drawing.trade_off, panels=points),
+        title="P against contacts",
+    )
+
+
+def _cell_point(cell: Cell, policies: Sequence[str]) -> Point:
+    """Return mean P of a cell; filled where no robot fails."""
+    setting = cell.arm.setting
+    is_sound = setting.kind != "fault" or setting == NO_FAULT
+    style = policies.index(cell.policy)
+    return Point(cell.policy, style, cell.words, *cell.mean, decided=is_sound)
+
+
+def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int], list[Verdict]]:
+    """Return each value once, by table, kind, onset, and swarm size where robots fail."""
+
+    def figure_of(verdict: Verdict) -> tuple[str, FactorKind, float, int]:
+        after = verdict.after
+        swarm = verdict.compared.n_robots if after.kind == "fault" else 0
+        return verdict.compared.table, after.kind, after.onset, swarm
+
+    by_value: dict[tuple[str, ...], list[Verdict]] = map_reduce(
+        results.verdicts,
+        lambda verdict: (
+            *verdict.compared.family,
+            verdict.compared.table,
+            verdict.compared.label,
+        ),
+    )
+    # The verdict on the lowest threshold shows the value for them all.
+    lowest = [
+        min(verdicts, key=lambda verdict: verdict.compared.threshold)
+        for verdicts in by_value.values()
+    ]
+    return map_reduce(lowest, figure_of)
+
+
+def _condition(table: str, onset: float, swarm: int) -> str:
+    start = f", faults from {onset:g} s" if onset else ""
+    return f"{table}, N = {swarm}{start}" if swarm else table
+
+
+def _panel(results: StudyResults, verdicts: Sequence[Verdict], definition: Definition) -> Panel:
+    """Return a pair of axes for an indicator, a series a policy."""
+    of_indicator = [v for v in verdicts if v.compared.indicator == definition.symbol]
+    after = of_indicator[0].after
+    first_policy = of_indicator[0].compared.policy
+    points = tuple(
+        # The published values stand beside the first policy.
+        _point(
+            results,
+            verdict,
+            _category(verdict),
+            verdict.published if verdict.compared.policy == first_policy else None,
+        )
+        for verdict in of_indicator
+    )
+    # 0 first: it is the threshold that always stands in the picture.
+    thresholds = [verdict.compared.threshold for verdict in of_indicator]
+    shown = tuple(dict.fromkeys([0.0, *definition.adjectives, *thresholds]))
+    x_label = X_LABELS.get(after.kind, f"{parameter_label(of_indicator[0])}, x_o → x_new")
+    return Panel("", definition.heading, points, shown, x_label)
+
+
+X_LABELS = {
+    "size": "swarm size N → N + m",
+    "fault": "failure mode and number m of faulty robots",
+    "policy": "in its place",
+}
+
+
+def parameter_label(verdict: Verdict) -> str:
+    """Return a parameter as a reader calls it, with its unit, e.g. "delivery width [m]"."""
+    name = verdict.after.name
+    description = verdict.compared.original.case.task.fields.get(name, "")
+    unit = re.search(r"\[.+?\]", description)
+    return f"{name.replace('_', ' ')} {unit[0] if unit else ''}".rstrip()
+
+
+def _category(verdict: Verdict) -> str:
+    before = verdict.compared.original.setting
+    after = verdict.after
+    if after.kind == "fault":
+        return f"{after.name} {after.value:g}"
+    if after.kind == "policy":
+        return verdict.compared.label
+    return f"{before.value:g}→{after.value:g}"
+
+
+def _point(
+    results: StudyResults, verdict: Verdict, category: str, published: float | None
+) -> Point:
+    policy = verdict.compared.policy
+    value, low, high = verdict.interval or (None, None, None)
+    return Point(
+        policy,
+        results.policies.index(policy),
+        category,
+        value,
+        low,
+        high,
+        published,
+        decided=verdict.on_threshold.adjusted in DECIDED,
+        saturated=verdict.saturated,
+        link=f"question-{results.verdicts.index(verdict)}",
+    )
+
+
+def _rows(results: StudyResults, verdicts: Sequence[Verdict]) -> pd.DataFrame:
+    """Return what a figure shows of these verdicts, one row each."""
+    rows = [results.verdicts.index(verdict) for verdict in verdicts]
+    return results.verdict_table.iloc[rows].reset_index(drop=True)[_COLUMNS]
+
+
+CAPPED = "†: P is capped, every item was delivered in a run."
+
+
+def _marks(verdicts: Sequence[Verdict]) -> str:
+    return (
+        "Filled: the Holm-adjusted verdict is decided; hollow: it is not; bars: "
+        f"{levels(verdicts)} intervals, without an end where they leave the axis; "
+        "dashed: thresholds"
+    )
+
+
+def _note_on_caps(verdicts: Sequence[Verdict]) -> str:
+    return f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
+
+
+def _definitions(verdicts: Sequence[Verdict]) -> list[Definition]:
+    indicators = {verdict.compared.indicator for verdict in verdicts}
+    return [definition for symbol, definition in DEFINITIONS.items() if symbol in indicators]
+
+
+def _caption(definitions: Sequence[Definition]) -> str:
+    """Return what a figure shows, e.g. "robustness R; above 0 robust."."""
+    words_above: dict[float, list[str]] = {}
+    for definition in definitions:
+        for threshold, word in definition.adjectives.items():
+            words_above.setdefault(threshold, []).append(word)
+    meaning = ", ".join(f"above {at:g} {', '.join(words)}" for at, words in words_above.items())
+    if not meaning:
+        meaning = "(P_new - P_o) / P_o; below a threshold P falls by more than that share"
+    return f"{join_names([definition.heading for definition in definitions])}; {meaning}."
+
+
+def rate_figures(measures: Iterable[Resilience], seeds: str) -> Iterator[Figure]:
+    """Yield deliveries over time around every fault in mid-run, a figure per failure mode.
+
+    Args:
+        seeds: over which the measures are, in words.
+    """
+    import pandas as pd
+
+    def figure_of(measure: Resilience) -> tuple[str | float, ...]:
+        comparison = measure.compared
+        setting = comparison.changed.setting
+        return (
+            comparison.policy, comparison.table, comparison.n_robots, setting.name, setting.onset,
+        )  # fmt: skip
+
+    for of_mode in map_reduce(measures, figure_of).values():
+        first = of_mode[0].compared
+        setting = first.changed.setting
+        window = window_of(first)
+        panels = {
+            f"m = {measure.compared.changed.setting.value:g}": measure.curves for measure in of_mode
+        }
+        rows = [
+            (title, curve.runs, *point, CONFIDENCE)
+            for title, curves in panels.items()
+            for curve in curves
+            for point in zip(*curve[1:])
+        ]
+        if rows:
+            yield Figure(
+                slug("deliveries", first.policy, first.table, setting.name, f"{setting.onset:g}s"),
+                f"{first.policy}, {first.table}, N = {first.n_robots}: deliveries in the trailing "
+                f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s (dotted "
+                f"line). Mean over {seeds} with pointwise {P_LEVEL} t-intervals.",
+                pd.DataFrame(rows, columns=["panel", "runs", *RateCurve._fields[1:], "confidence"]),
+                0.6 + 2.3 * len(panels),
+                partial(
+                    drawing.rates,
+                    panels={f"{first.policy}, {title}": panels[title] for title in panels},
+                    onset=setting.onset,
+                    y_label=f"deliveries in {window:g} s",
+                ),
+            )

@@ -1,0 +1,47 @@
+"""What a study found, as it stands in a session and in a notebook's cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from html import escape
+from typing import Self
+
+from swarm_logistics_env.study.verdicts.results import StudyResults
+
+from .answer import answer
+from .section import Section
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Findings(StudyResults):
+    """`StudyResults` that say their answer: a line a question, with value, interval and verdict."""
+
+    @classmethod
+    def of(cls, results: StudyResults) -> Self:
+        """Return the same results."""
+        return cls(**{field.name: getattr(results, field.name) for field in fields(results)})
+
+    @cached_property
+    def _answer(self) -> Section:
+        return answer(self).section
+
+    def __repr__(self) -> str:
+        lines = ["  ".join(row) for row in self._answer.rows]
+        return "\n".join([f"Results of the study {self.plan.specification.name!r}", *lines])
+
+    def _repr_html_(self) -> str:
+        return html_table(self._answer)
+
+
+def html_table(section: Section) -> str:
+    """Return a section as an HTML table with its lines below."""
+    head = "".join(f"<th style='text-align: left'>{escape(name)}</th>" for name in section.columns)
+    rows = [
+        "<tr>" + "".join(f"<td style='text-align: left'>{escape(text)}</td>" for text in row)
+        for row in section.rows
+    ]
+    lines = [f"<p>{escape(line)}</p>" for line in section.lines if line]
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>" + "".join(
+        lines
+    )

@@ -1,0 +1,394 @@
+"""Sections: what a report is made of; and numbers and verdicts in words, the same in every one."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.study.questions.comparison import CONFIDENCE
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
+
+from . import templates
+from .templates import Slots, fill
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .drawing import Draw, Panel
+
+SATURATED = "†"
+_SAME = 1e-9  # a value so near a threshold differs from it by rounding alone
+NOTHING = "–"
+# The words of decisions, in the order in which they are counted.
+WORDS = (*DECIDED, "open", "unaffected", "untestable", "undefined")
+_NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
+Texts = tuple[str, ...]
+
+
+@dataclass
+class Figure:
+    """One figure.
+
+    Attributes:
+        name: of its files, without ending; letters, digits and hyphens.
+        caption: what it shows and under which conditions, in full.
+        data: what it shows, one row a point.
+        height: of the drawing [inch]; the width is that of all figures.
+        draw: draws it on an empty canvas.
+        title: what it shows in a few words.
+        panels: the panels that it draws, of which each point can be clicked in the page.
+        level: the level of its intervals.
+    """
+
+    name: str
+    caption: str
+    data: pd.DataFrame
+    height: float
+    draw: Draw
+    title: str = ""
+    panels: tuple[Panel, ...] = ()
+    level: str = ""
+
+
+class Sentence(NamedTuple):
+    """One verdict in words.
+
+    Attributes:
+        head: what is asked.
+        text: all that is known.
+        conclusion: a name in `WORDS`.
+        word: the answer to what is asked.
+    """
+
+    head: str
+    text: str
+    conclusion: str
+    word: str
+
+
+class Section(NamedTuple):
+    """A heading with a figure, sentences, a table, lines of text, or several of them."""
+
+    title: str
+    columns: Texts = ()
+    rows: tuple[Texts, ...] = ()
+    lines: Texts = ()
+    sentences: tuple[Sentence, ...] = ()
+    figures: tuple[Figure, ...] = ()
+
+
+def slug(*parts: object) -> str:
+    """Return a name for files of letters, digits and hyphens, at most 80."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", " ".join(map(str, parts))).strip("-")[:80]
+
+
+def digits_of(p: float, width: float = 0.0) -> int:
+    """Return how many digits after the point tell a performance: three in all where it is small.
+
+    Args:
+        width: of its interval, whose first digit is told; 0: it has none.
+    """
+    least = 1 if not 0 < p < 1 else 2 - math.floor(math.log10(p))
+    return least if not 0 < width < math.inf else max(least, -math.floor(math.log10(width)))
+
+
+def width_of(interval: spi.Interval) -> float:
+    """Return the width of an interval; 0: it has none."""
+    if interval.low is None or interval.high is None:
+        return 0.0
+    return interval.high - interval.low
+
+
+def fixed(value: float, digits: int, thresholds: Iterable[float] = ()) -> str:
+    """Return a number to so many digits; infinity as its sign.
+
+    Args:
+        thresholds: numbers on whose side the value is shown, by more digits where it takes them.
+    """
+    distinct = [threshold for threshold in thresholds if abs(value - threshold) > _SAME]
+
+    def sides(x: float) -> list[tuple[bool, bool]]:
+        return [(x > threshold, x < threshold) for threshold in distinct]
+
+    while sides(round(value, digits)) != sides(value):
+        digits += 1
+    # "+ 0.0" after rounding: no minus sign before a zero.
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("inf", "∞")
+
+
+def limits(interval: spi.Interval | Estimate, digits: int, thresholds: Iterable[float] = ()) -> str:
+    """Return the limits of an interval to so many digits, e.g. "[101.2, ∞]"; empty: none.
+
+    Args:
+        thresholds: numbers on whose sides they are shown, besides that of an estimate.
+    """
+    if interval.low is None or interval.high is None:
+        return ""
+    thresholds = _all_thresholds(interval, thresholds)
+    low, high = (fixed(end, digits, thresholds) for end in (interval.low, interval.high))
+    return f"[{low}, {high}]"
+
+
+def bracketed(
+    interval: spi.Interval | Estimate | None, digits: int, thresholds: Iterable[float] = ()
+) -> str:
+    """Return a value with its limits, as `limits` does, e.g. "124.0 [101.2, ∞]"."""
+    if interval is None:
+        return NOTHING
+    thresholds = _all_thresholds(interval, thresholds)
+    value = fixed(interval.value, digits, thresholds)
+    return f"{value} {limits(interval, digits, thresholds)}".rstrip()
+
+
+def _all_thresholds(
+    interval: spi.Interval | Estimate, thresholds: Iterable[float]
+) -> tuple[float, ...]:
+    if isinstance(interval, Estimate):
+        return (interval.threshold, *thresholds)
+    return tuple(thresholds)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number without interval."""
+    return NOTHING if value is None else f"{value:.{digits}f}"
+
+
+def percent(confidence: float) -> str:
+    """Return a confidence level, e.g. "95 %"; of an early look never rounded up to 100 %."""
+    return "> 99.99 %" if confidence > 0.9999 else f"{100 * confidence:.4g} %"
+
+
+P_LEVEL = percent(CONFIDENCE)  # of intervals of P
+
+
+def levels(verdicts: Iterable[Verdict]) -> str:
+    """Return the levels of the intervals of verdicts, e.g. "95 %" or "97.8 % to 99.2 %"."""
+    confidences = {verdict.level for verdict in verdicts if verdict.level} or {CONFIDENCE}
+    ends = min(confidences), max(confidences)
+    return " to ".join(dict.fromkeys(map(percent, ends)))
+
+
+def other_levels(verdicts: Sequence[Verdict], level: float) -> str:
+    """Return the levels of these verdicts' intervals behind a blank, if any is not `level`."""
+    differ = any(verdict.level not in (None, level) for verdict in verdicts)
+    return f" {levels(verdicts)}" if differ else ""
+
+
+def mean_p(cell: Cell) -> str:
+    """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
+    if not cell.n_seeds:
+        return "no run"
+    interval = cell.mean
+    mean = bracketed(interval, digits_of(interval.value, width_of(interval)))
+    return mean + SATURATED if cell.saturated else mean
+
+
+def ratio(verdict: Verdict, level: float = CONFIDENCE) -> str:
+    """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]".
+
+    Of several trainings it also says how many collapsed.
+
+    Args:
+        level: that the heading names; another one of the interval stands behind it.
+    """
+    estimate = verdict.estimate
+    text = bracketed(estimate, 3)
+    if verdict.saturated and estimate is not None:
+        text += SATURATED
+    text += other_levels([verdict], level)
+    if estimate is not None and estimate.collapsed is not None:
+        text += f" ({estimate.collapsed})"
+    return text
+
+
+def conclusion_text(*verdicts: Verdict) -> str:
+    """Return the answers under Holm, then what else is known: "open; P changes by less than 10 %".
+
+    Of several verdicts they are counted, unless all are the same.
+    """
+    words = [verdict.on_property.adjusted for verdict in verdicts]
+    clauses = [words[0] if len(set(words)) == 1 else count_words(words)]
+    unchanged = Counter(
+        _equivalence_text(verdict) for verdict in verdicts if verdict.conclusion == "equivalent"
+    )
+    for clause, count in unchanged.items():
+        clauses.append(clause if count == len(verdicts) else f"{clause} in {count}")
+    return "; ".join(clauses)
+
+
+def _equivalence_text(verdict: Verdict) -> str:
+    margin = f"{100 * verdict.margin:.3g} %"
+    if verdict.compared.definition.needs_removed:
+        return f"P_F and P_S differ by less than {margin} of P_o"
+    return f"P changes by less than {margin}"
+
+
+def decision_text(verdict: Verdict) -> str:
+    """Return the unadjusted decision on the property, and Holm's in brackets where it differs."""
+    plain, adjusted = verdict.on_property
+    return plain if plain == adjusted else f"{plain} ({adjusted})"
+
+
+def word_to_count(verdict: Verdict, word: str) -> str:
+    """Return what a decision counts as in `count_words`.
+
+    A count is a headline: a provisional decision does not stand in it.
+    """
+    if word in DECIDED and "assumes_normal" in verdict.flags:
+        return _NOT_COUNTED
+    return word
+
+
+def count_words(words: Iterable[str]) -> str:
+    """Return how many of each word, e.g. "7 supported, 1 refuted"."""
+    counts = Counter(words)
+    return ", ".join(f"{counts[word]} {word}" for word in (*WORDS, _NOT_COUNTED) if counts[word])
+
+
+def join_names(names: Sequence[str]) -> str:
+    """Return names as a list, e.g. "swarm-dt, random-walk and central"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def plural(count: int, noun: str) -> str:
+    """Return a number of things, e.g. "1 claim" or "2 claims"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def interval_to_clear(cell: Cell) -> spi.Interval:
+    """Return the median time until all items were delivered, with its interval [s].
+
+    Of several trainings the mean over trainings and seeds; an interval needs all runs in time.
+    """
+    times = [outcome.time_to_clear for outcome in cell.outcomes]
+    n_trainings = len(cell.arm.case.trainings)
+    if n_trainings > 1 and all(map(math.isfinite, times)) and not cell.problem:
+        by_training = np.reshape(times, (n_trainings, -1))
+        return spi.mean_interval(by_training, CONFIDENCE)
+    return spi.median_interval(times, CONFIDENCE)
+
+
+def time_to_clear(cell: Cell) -> str:
+    """Return `interval_to_clear` in words, and how many runs were late."""
+    times = [outcome.time_to_clear for outcome in cell.outcomes]
+    n_late = sum(map(math.isinf, times))
+    text = bracketed(interval_to_clear(cell), 0)
+    return f"{text} ({n_late} of {len(times)})" if n_late else text
+
+
+def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
+    """Return the verdict on one comparison in words."""
+    comparison = verdict.compared
+    swarm = f", N = {comparison.n_robots}"
+    if comparison.original.setting.kind in ("size", "policy"):
+        swarm = ""
+    head = f"{comparison.policy}, {verdict.property_name}? {comparison.label}{swarm}."
+    slots_by_case = dict(_parts(results, verdict))
+    text = " ".join(fill(templates.VERDICT, slots_by_case))
+    return Sentence(head, text, verdict.conclusion, verdict.on_property.adjusted)
+
+
+def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots]]:
+    """Yield what is known of a verdict: the templates that apply, each with its slots."""
+    estimate = verdict.estimate
+    indicator = verdict.compared.indicator
+    if estimate is None:
+        yield "undefined", {"problem": verdict.problem}
+        return
+    seeds = _seeds_of(results, estimate)
+    if estimate.identical:
+        yield "unaffected", {"indicator": indicator, "value": estimate.value, "seeds": seeds}
+        return
+    interval = limits(estimate, 3)
+    yield (
+        "interval" if interval else "no_interval",
+        {
+            "indicator": indicator,
+            "mark": SATURATED if verdict.saturated else "",
+            "value": fixed(estimate.value, 3, [estimate.threshold]),
+            "level": percent(estimate.confidence),
+            "limits": interval,
+            "seeds": seeds,
+        },
+    )
+    if not estimate.untestable:
+        plain, adjusted = verdict.on_property
+        yield (
+            "decision",
+            {
+                "plain": plain,
+                "p": _p(estimate.p_seen),
+                "adjusted": adjusted,
+                # One seed gives no p, and Holm's placeholder of 1 says nothing.
+                "adjusted_p": _p(None if estimate.p_value is None else verdict.p_adjusted),
+            },
+        )
+    if verdict.on_claim is not None:
+        plain, adjusted = verdict.on_claim
+        words = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
+        yield "claim", {"claim": verdict.claim, "words": words}
+    if verdict.equivalence is not None and verdict.on_equivalence is not None:
+        plain, adjusted = verdict.on_equivalence
+        words = plain if plain == adjusted else f"{plain} ({adjusted} under Holm)"
+        yield (
+            "equivalence",
+            {
+                "question": verdict.equivalence_name,
+                "change": _change(verdict.equivalence.change, verdict.margin),
+                "words": words,
+            },
+        )
+    if verdict.flags:
+        yield "flags", {"flags": " ".join(templates.FLAGS[flag] for flag in verdict.flags)}
+    if "hidden_stalls" in verdict.flags:
+        runs = "seeds" if results.plan.paired else "trials a condition"
+        n_runs = spi.seeds_against_stalls(estimate)
+        yield "hidden_stalls", {"p": estimate.p_value, "n_runs": n_runs, "runs": runs}
+    if estimate.collapsed is not None:
+        yield "collapsed", {"collapsed": estimate.collapsed}
+    if "hidden_collapses" in verdict.flags:
+        n_trainings = spi.trainings_against_collapses(estimate)
+        yield "hidden_collapses", {"p": estimate.p_value, "n_trainings": n_trainings}
+    if results.plan.specification.until_clear and not estimate.untestable:
+        case = "open_after_all_looks" if verdict.stopped_at is None else "clear_at_a_look"
+        yield case, {"n_seeds": estimate.n_seeds, "most": results.looks[-1]}
+    if results.exploratory:
+        yield "exploratory", {}
+
+
+def _seeds_of(results: StudyResults, estimate: Estimate) -> str:
+    """Return over which seeds an estimate is."""
+    seeds = f"{estimate.n_seeds} runs a condition, unpaired"
+    if results.plan.paired:
+        seeds = results.seeds_text
+    if results.plan.specification.until_clear:
+        seeds = f"{estimate.n_seeds} paired seeds"
+    if estimate.n_trainings is None:
+        return seeds
+    return f"{estimate.n_trainings} trainings x {seeds}"
+
+
+def _change(change: Estimate, margin: float) -> str:
+    """Return a change of P with its interval, and the level of that."""
+    text = bracketed(change, 3, [-margin, margin])
+    if change.low is None or change.identical:
+        return text
+    return f"{text} ({percent(change.confidence)})"
+
+
+def _p(p: float | None) -> str:
+    """Return a p-value in brackets, e.g. " (p = 0.013)"; empty: there is none."""
+    if p is None:
+        return ""
+    return " (p < 0.001)" if p < 0.001 else f" (p = {p:.3f})"

@@ -1,0 +1,240 @@
+"""`swarm-logistics judge POLICY`: a policy, played until its verdicts are clear."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from shlex import join
+from typing import Annotated, NamedTuple
+
+import typer
+from typer import Argument, Exit, Option, echo
+
+from swarm_logistics_env.core.errors import StudyError
+from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.spi.estimate import LEAST_SEEDS
+from swarm_logistics_env.study.questions.presets import load_preset
+from swarm_logistics_env.study.questions.specification import FIRST_LOOK
+from swarm_logistics_env.study.report import benchmark
+from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.section import slug
+from swarm_logistics_env.study.report.write import write_report
+from swarm_logistics_env.study.runs.engines import engine_named
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.world.scenario import Scenario
+
+from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption, policies_of
+from .study_choice import ask_in_world, study_of, switch_to_clearing
+from .study_commands import (
+    ClearingOption,
+    FirstSeedOption,
+    FullOption,
+    JudgedOption,
+    LimitOption,
+    ProcessesOption,
+    run_study,
+    say_what_a_pilot_shows,
+)
+from .terminal import say, say_what_was_played, show, show_report
+from .world_choice import (
+    BodiesOption,
+    PresetOption,
+    Repeated,
+    ScenarioOption,
+    SetOption,
+    changed_fields,
+    options_of_world,
+    scenario_of,
+)
+
+STUDY = "scorecard"
+JUDGE_SEEDS = 60  # of a policy that is judged
+# The parameters of the command that the benchmark gives itself.
+FIXED_BY_BENCHMARK = (
+    "seeds", "first_seed", "clearing", "preset", "scenario_file", "changes", "bodies"
+)  # fmt: skip
+
+PolicyArgument = Annotated[
+    str,
+    Argument(
+        metavar="POLICY",
+        help="Name (`list policies`), path of a policy file, module:Class or my.py:Class.",
+    ),
+]
+MostSeedsOption = Annotated[
+    int | None,
+    # Fewer runs are alike by chance.
+    Option(min=LEAST_SEEDS, help=f"Seeds of a policy at most; {JUDGE_SEEDS} if not given."),
+]
+
+
+def judge_policy_command(
+    context: typer.Context,
+    policy: PolicyArgument,
+    out: JudgedOption = None,
+    seeds: MostSeedsOption = None,
+    first_seed: FirstSeedOption = None,
+    until_clear: Annotated[
+        bool,
+        Option("--until-clear/--all-seeds", help="Stop each question where its verdict is clear."),
+    ] = True,
+    minutes: Annotated[
+        float | None, Option(help="Play for so long; the same command goes on.")
+    ] = None,
+    clearing: ClearingOption = False,
+    preset: PresetOption = None,
+    scenario_file: ScenarioOption = None,
+    changes: SetOption = None,
+    bodies: BodiesOption = None,
+    as_benchmark: Annotated[
+        bool,
+        Option(
+            "--benchmark",
+            help="Play the benchmark of robustness, in which some failures are new to all.",
+        ),
+    ] = False,
+    processes: ProcessesOption = None,
+    run_limit: LimitOption = None,
+    full: FullOption = False,
+    trust_code: TrustOption = False,
+    frame: FrameOption = False,
+    normalize: NormalizeOption = None,
+    env: EnvOption = None,
+) -> None:
+    """Judge a policy until its verdicts are clear.
+
+    It is played in a warehouse in which delivered items come back, so that P has no cap: that in
+    which a policy file was trained, or the paper's. Sizes and failures follow from it.
+    """
+    if as_benchmark:
+        _refuse_conditions(context)
+    engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
+    (spec,) = policies_of([policy], trust_code, frame, normalize, env)
+    most_seeds = seeds or JUDGE_SEEDS
+    world = None
+    if not as_benchmark:
+        scenario = _scenario_without_cap(preset, scenario_file, changes, bodies, spec)
+        options = options_of_world(preset, scenario_file, changes, bodies)
+        world = JudgedWorld(scenario, clearing, options, first_seed)
+    for training in spec.trainings or (spec,):
+        training.load()  # what is wrong with it is said before anything is written
+    if world is None:
+        directory = out or Path("results", "benchmark", slug(spec.title))
+        study = study_of(benchmark.STUDY, directory, None, [spec], spec.trusted)
+    else:
+        directory = out or Path("results", "judged", "-".join([slug(spec.title), *world.words]))
+        study = _study_in(world, directory, spec, most_seeds, until_clear=until_clear)
+    say(f"{study.plan()}, kept in {directory}")
+    echo()
+    say_what_a_pilot_shows(study)
+    tally = run_study(study, engine, minutes=minutes)
+    results = study.findings()
+    if world is None and not (tally.left or tally.failed):
+        _show_benchmark(results, directory)
+    else:
+        show_report(results, directory, full=full, is_finished=not tally.left)
+    is_open = any(verdict.on_property.adjusted == "open" for verdict in results.verdicts)
+    if tally.left and not tally.gave_up:
+        reason = f"Stopped after {minutes:g} min, {tally.left} runs are left"
+        say(f"{reason}; the same command goes on:", str(context.obj))
+    # Several trainings and untrusted code need options that the suggested command does not have.
+    elif world and is_open and not (tally.left or spec.trainings or spec.trusted):
+        words = [spec.name, *world.options_again, "--first-seed", str(study.plan().seeds[-1] + 1)]
+        _suggest_more_seeds(words, directory, max(JUDGE_SEEDS, 2 * most_seeds))
+    say_what_was_played(tally)
+    raise Exit(1 if tally.failed else 0)
+
+
+def _refuse_conditions(context: typer.Context) -> None:
+    """Raise a StudyError if an option was typed that the benchmark does not take."""
+    for option in context.command.params:
+        source = context.get_parameter_source(option.name)
+        is_typed = source is not None and source.name == "COMMANDLINE"
+        if option.name in FIXED_BY_BENCHMARK and is_typed:
+            raise StudyError(
+                f"{option.opts[0]}: the benchmark has the same conditions for everybody"
+            )
+
+
+def _scenario_without_cap(
+    preset: str | None,
+    scenario_file: Path | None,
+    changes: Repeated,
+    bodies: str | None,
+    policy: PolicySpec,
+) -> Scenario:
+    """Return the scenario that the options name, in which items come back if not said otherwise."""
+    usual = Scenario.model_validate(load_preset(STUDY).scenario)
+    scenario = scenario_of(preset, scenario_file, changes, bodies, policies=[policy], usual=usual)
+    if "restock" in changed_fields(changes, bodies):
+        return scenario
+    return scenario.replace(restock=True)
+
+
+class JudgedWorld(NamedTuple):
+    """Where a policy is judged.
+
+    Attributes:
+        scenario: the world, in which nothing fails yet.
+        clearing: whether P is the rate at which its items are cleared.
+        options: what was typed to choose the scenario, e.g. ["--preset", "realistic"].
+        first_seed: the smallest seed; None: that of the study.
+    """
+
+    scenario: Scenario
+    clearing: bool
+    options: list[str]
+    first_seed: int | None = None
+
+    @property
+    def words(self) -> list[str]:
+        """What names the directory of its study."""
+        words = [
+            value if option == "--set" else f"{option[2:]} {value}"
+            for option, value in zip(self.options[::2], self.options[1::2])
+        ]
+        if self.first_seed is not None:
+            words.append(f"first-seed {self.first_seed}")
+        if self.clearing:
+            words.insert(0, "clearing")
+        return [slug(word)[:40] for word in words]
+
+    @property
+    def options_again(self) -> list[str]:
+        """The options that judge in the same world at other seeds."""
+        return ["--clearing", *self.options] if self.clearing else self.options
+
+
+def _study_in(
+    world: JudgedWorld, directory: Path, policy: PolicySpec, most_seeds: int, *, until_clear: bool
+) -> Study:
+    """Return the study of a policy in a world, kept in a directory."""
+    study = study_of(
+        STUDY,
+        directory,
+        most_seeds,
+        [policy],
+        policy.trusted,
+        until_clear=until_clear and most_seeds > FIRST_LOOK,
+        first_seed=world.first_seed,
+    )
+    ask_in_world(study, world.scenario)
+    if world.clearing:
+        switch_to_clearing(study)
+    return study
+
+
+def _suggest_more_seeds(options: Sequence[str], directory: Path, seeds: int) -> None:
+    options = [*options, "--seeds", str(seeds), "--out", f"{directory}-{seeds}"]
+    command = f"swarm-logistics judge {join(options)}"
+    say("What is open needs more seeds, which nobody has looked at:", command)
+
+
+def _show_benchmark(results: StudyResults, out: Path) -> None:
+    """Print the table of a policy in the benchmark and its place, and write the report."""
+    entries = benchmark.Entries.read()
+    show(benchmark.table(results, entries.references))
+    score = benchmark.score(results, entries.references)
+    show(benchmark.leaderboard({**entries.scores, results.policies[0]: score}))
+    echo(f"Report: {write_report(results, out, document(results))[0]}")

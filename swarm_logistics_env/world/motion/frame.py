@@ -1,0 +1,216 @@
+"""A robot's motion: network inputs from observation rows, and commands from a network's outputs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.motion.memory import (
+    BODY,
+    N_COLUMNS,
+    body_of,
+    face_anywhere,
+    length_of,
+    note_command,
+    remember_observation,
+    to_frame,
+)
+from swarm_logistics_env.world.motion.steering import clear_the_way, steer
+from swarm_logistics_env.world.scenario import Scenario
+
+from .network_inputs import COSINES, INPUTS, SINES, TURNS, read_observations
+
+OUTPUTS = ("along", "aside", "gripper")
+
+
+class MotionView:
+    """Makes network inputs from observation rows, and commands from outputs, row by row.
+
+    Each row has a memory of its own (see `memory`), begun anew by `begin`.
+
+    Args:
+        scenario: for its control period and for what robots know of their bodies.
+        listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
+
+    Attributes:
+        keys: of each row's stream (N,).
+        counts: the decisions of each row in its episode so far (N,).
+        period: the scenario's control period [s].
+        rows: the observations last read (N, D).
+        turned: how far each row's frame is turned from its robot's body (N,) [rad].
+    """
+
+    def __init__(self, scenario: Scenario, listens: bool = True) -> None:
+        self.period = scenario.control_period
+        self._body = body_of(scenario)
+        self._listens = listens
+        self.begin(np.empty(0, np.uint64))
+
+    def begin(self, keys: NDArray[np.uint64], bodies: NDArray[np.float64] | None = None) -> None:
+        """Begin an episode of as many rows as there are keys, which are those of their streams.
+
+        Args:
+            bodies: (N, 4) of robots that are not all as the scenario has them (`memory.body_of`).
+        """
+        n = len(keys)
+        self.keys, self.counts = np.empty(n, np.uint64), np.empty(n, np.int64)
+        self.memory, self.turned = np.empty((n, N_COLUMNS)), np.zeros(n)
+        self.begin_rows(np.arange(n), keys, bodies)
+
+    def begin_rows(
+        self,
+        rows: NDArray[np.int64],
+        keys: NDArray[np.uint64],
+        bodies: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Begin an episode in these rows alone."""
+        self.keys[rows], self.counts[rows] = keys, 0
+        fresh = np.zeros((len(rows), N_COLUMNS))
+        fresh[:, BODY] = self._body if bodies is None else bodies
+        face_anywhere(keys, fresh)
+        self.memory[rows] = fresh
+
+    def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on.
+
+        Raises:
+            PolicyError: there are more or fewer rows than keys at `begin`.
+        """
+        self.check(observations)
+        inputs = self._inputs(observations, self.memory, self.keys, self.counts, self.turned)
+        self.counts += 1
+        self.rows = observations
+        return inputs
+
+    def hold(self, observations: NDArray[np.float32]) -> None:
+        """Let memories and time go on between two decisions; outputs keep their direction.
+
+        Raises:
+            PolicyError: there are more or fewer rows than keys at `begin`.
+        """
+        self.check(observations)
+        hold_rows(observations, self.period, self.memory, self.counts, self.turned)
+        self.rows = observations
+
+    def check(self, observations: NDArray[np.float32]) -> None:
+        """Raise PolicyError if there are more or fewer rows than keys at `begin`."""
+        if len(observations) != len(self.keys):
+            raise PolicyError(
+                f"observations of {len(observations)} robots: reset was told {len(self.keys)}"
+            )
+
+    def peek(
+        self, observations: NDArray[np.float32], rows: NDArray[np.int64]
+    ) -> NDArray[np.float32]:
+        """Return the inputs that observations of these rows would make, without going on."""
+        memory, keys, counts = self.memory[rows], self.keys[rows], self.counts[rows]
+        return self._inputs(observations, memory, keys, counts, np.empty(len(rows)))
+
+    def _inputs(
+        self,
+        observations: NDArray[np.float32],
+        memory: NDArray[np.float64],
+        keys: NDArray[np.uint64],
+        counts: NDArray[np.int64],
+        turned: NDArray[np.float64],
+    ) -> NDArray[np.float32]:
+        inputs = np.empty((len(observations), len(INPUTS)), np.float32)
+        period, listens = self.period, self._listens
+        read_observations(observations, period, memory, keys, counts, listens, inputs, turned)
+        return inputs
+
+    def command(self, outputs: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Return the commands (N, 4) that outputs (N, 3) ask for upon the rows last read.
+
+        A robot that is caged by items clears its way instead.
+        A differential robot turns its body to where it wants to drive.
+        """
+        commands = np.empty((len(outputs), 4))
+        command_rows(outputs, self.turned, self.rows, self.memory, commands)
+        return commands
+
+
+@kernel
+def hold_rows(
+    rows: NDArray[np.float32],
+    period: float,
+    memories: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    turned: NDArray[np.float64],
+) -> None:
+    """Take what rows (N, D) tell into the memories; count, and let frames stay as bodies turn."""
+    remember_observation(rows, period, memories)
+    for robot in range(rows.shape[0]):
+        turned[robot] -= np.float32(period) * rows[robot, row.TURN_RATE]
+        counts[robot] += 1
+
+
+@kernel
+def command_rows(
+    outputs: NDArray[np.floating],
+    turned: NDArray[np.float64],
+    rows: NDArray[np.float32],
+    memories: NDArray[np.float64],
+    commands: NDArray[np.float64],
+) -> None:
+    """Fill the commands (N, 4) of outputs (N, 3) upon rows; memories take note of them."""
+    for robot in range(outputs.shape[0]):
+        along, aside, gripper = outputs[robot]
+        turn_outputs(float(along), float(aside), float(gripper), turned[robot], commands[robot])
+        finish_command(rows[robot], memories[robot], commands[robot])
+
+
+@kernel
+def command_own_frames(
+    commands: NDArray[np.float64],
+    turned: NDArray[np.float64],
+    rows: NDArray[np.float32],
+    memories: NDArray[np.float64],
+) -> None:
+    """Do as `command_rows` with commands (N, 4) in the robots' own frames; turns are left out."""
+    for robot in range(commands.shape[0]):
+        beams = round(turned[robot] / (2.0 * math.pi / row.N_BEAMS))
+        x, y, gripper = commands[robot, 0], commands[robot, 1], commands[robot, 3]
+        # There and back: outputs are clipped in the frame of motion.
+        along, aside = to_frame((COSINES[beams], SINES[beams]), x, y)
+        turn_outputs(along, aside, gripper, turned[robot], commands[robot])
+        finish_command(rows[robot], memories[robot], commands[robot])
+
+
+@inlined_kernel
+def finish_command(
+    sensed: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    command: NDArray[np.float64],
+) -> None:
+    """Change a command (4,) where the robot is caged, and take note of it."""
+    clear_the_way(sensed, memory, command)
+    note_command(sensed, command, memory)
+    steer(memory, command)
+
+
+@kernel
+def turn_outputs(
+    along: float, aside: float, gripper: float, turned: float, command: NDArray[np.float64]
+) -> None:
+    """Fill the command (4,) of outputs; clipped, no turn."""
+    along, aside = min(max(along, -1.0), 1.0), min(max(aside, -1.0), 1.0)
+    longer = max(length_of(along, aside), 1.0)
+    cosine, sine = cosine_and_sine(turned)
+    x, y = to_frame((cosine, -sine), along, aside)
+    command[0], command[1], command[2] = x / longer, y / longer, 0.0
+    command[3] = min(max(gripper, -1.0), 1.0)
+
+
+@inlined_kernel
+def cosine_and_sine(turned: float) -> tuple[float, float]:
+    """Return those of a frame's turn [rad], out of a table if it is turned by whole beams."""
+    beams = round(turned / (2.0 * math.pi / row.N_BEAMS))
+    if 0 <= beams < row.N_BEAMS and turned == TURNS[beams]:
+        return COSINES[beams], SINES[beams]
+    return math.cos(turned), math.sin(turned)

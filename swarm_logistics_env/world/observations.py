@@ -1,0 +1,168 @@
+"""The named columns of an observation row: what one robot senses, in its own frame.
+
+A row has the same length for every swarm size. Positions are relative to the robot, x forward
+and y left [m]; there is no place in the warehouse and no compass. Blocks of several things
+(neighbours, items) are sorted by distance, nearest first, and end in absent entries of zeros.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.world.scenario import Scenario
+
+N_BEAMS = 16
+N_ITEMS_IN_VIEW = 8
+N_NEIGHBOURS = 8
+
+
+class ItemColumns(NamedTuple):
+    """The columns of an item, counted from its first one; a neighbour's begin with the same."""
+
+    present: int
+    x: int
+    y: int
+    requested: int
+    recently_held: int
+
+
+class NeighbourColumns(NamedTuple):
+    """The columns of a neighbour, counted from its first one."""
+
+    present: int
+    x: int
+    y: int
+    timer_heard: int
+    timer: int
+
+
+ITEM_FEATURES = ItemColumns._fields
+ITEM_WIDTH = len(ITEM_FEATURES)
+ITEM = ItemColumns(*range(ITEM_WIDTH))
+NEIGHBOUR_FEATURES = NeighbourColumns._fields
+NEIGHBOUR_WIDTH = len(NEIGHBOUR_FEATURES)
+NEIGHBOUR = NeighbourColumns(*range(NEIGHBOUR_WIDTH))
+
+# First columns of the blocks; kernels and scripted policies index with these.
+RANGE_ROBOTS = 0
+RANGE_WALLS = RANGE_ROBOTS + N_BEAMS
+RANGE_ITEMS = RANGE_WALLS + N_BEAMS
+ITEMS = RANGE_ITEMS + N_BEAMS
+NEIGHBOURS = ITEMS + N_ITEMS_IN_VIEW * ITEM_WIDTH
+LOWEST_TIMER = NEIGHBOURS + N_NEIGHBOURS * NEIGHBOUR_WIDTH
+LOWEST_TIMER_X = LOWEST_TIMER + 1
+LOWEST_TIMER_Y = LOWEST_TIMER + 2
+LOWEST_TIMER_TIME = LOWEST_TIMER + 3
+CARRYING = LOWEST_TIMER + 4
+CARRYING_REQUESTED = CARRYING + 1
+IN_DELIVERY_AREA = CARRYING + 2
+TIMER_RUNS = CARRYING + 3
+TIMER = CARRYING + 4
+VELOCITY = CARRYING + 5
+VELOCITY_X = VELOCITY
+VELOCITY_Y = VELOCITY + 1
+CONTACT = CARRYING + 7
+TURN_RATE = CONTACT + 1
+N_COLUMNS = TURN_RATE + 1  # = 141; after them, per neighbour, the message it broadcasts
+MESSAGES = N_COLUMNS
+
+
+def n_columns(scenario: Scenario) -> int:
+    """Return the length D of a row in `scenario`."""
+    return N_COLUMNS + N_NEIGHBOURS * scenario.message_size
+
+
+@dataclass(frozen=True)
+class Column:
+    """A named part of an observation row: its columns, its unit and the range of its values."""
+
+    name: str
+    unit: str
+    columns: slice
+    low: float
+    high: float
+    meaning: str
+
+
+def columns(scenario: Scenario) -> tuple[Column, ...]:
+    """Return the named columns of a row in `scenario`; together they cover it without a gap."""
+    reach, view, limit = scenario.ranger_range, scenario.view_range, scenario.timer_limit
+    far, speed = max(view, scenario.radio_range), scenario.max_speed
+    turn = scenario.max_turn_rate
+    beam = "beam k looks k * 22.5 degrees left of forward; the full range where it meets nothing"
+    items = _block(ITEMS, N_ITEMS_IN_VIEW, ITEM_FEATURES)
+    neighbours = _block(NEIGHBOURS, N_NEIGHBOURS, NEIGHBOUR_FEATURES)
+    message = _run(MESSAGES, n_columns(scenario) - MESSAGES)
+    messages = (
+        Column("neighbour_message", "1", message, -1, 1, "the numbers that each broadcasts"),
+    )
+    return (
+        Column("range_robots", "m", _run(RANGE_ROBOTS, N_BEAMS), 0, reach, f"to robots; {beam}"),
+        Column("range_walls", "m", _run(RANGE_WALLS, N_BEAMS), 0, reach, "to walls and obstacles"),
+        Column("range_items", "m", _run(RANGE_ITEMS, N_BEAMS), 0, reach, "to free items"),
+        Column("item_present", "flag", items["present"], 0, 1, "a free item is in view"),
+        Column("item_x", "m", items["x"], -view, view, "its centre, forward"),
+        Column("item_y", "m", items["y"], -view, view, "its centre, left"),
+        Column("item_requested", "flag", items["requested"], 0, 1, "it is a requested one"),
+        Column(
+            "item_recently_held", "flag", items["recently_held"], 0, 1, "it was put down lately"
+        ),
+        Column("neighbour_present", "flag", neighbours["present"], 0, 1, "one is heard or in view"),
+        Column("neighbour_x", "m", neighbours["x"], -far, far, "its centre, forward"),
+        Column("neighbour_y", "m", neighbours["y"], -far, far, "its centre, left"),
+        Column(
+            "neighbour_timer_heard", "flag", neighbours["timer_heard"], 0, 1, "its timer is heard"
+        ),
+        Column("neighbour_timer", "s", neighbours["timer"], 0, limit, "its timer"),
+        Column("lowest_timer_present", "flag", _run(LOWEST_TIMER, 1), 0, 1, "a timer is heard"),
+        Column("lowest_timer_x", "m", _run(LOWEST_TIMER_X, 1), -far, far, "its sender, forward"),
+        Column("lowest_timer_y", "m", _run(LOWEST_TIMER_Y, 1), -far, far, "its sender, left"),
+        Column("lowest_timer", "s", _run(LOWEST_TIMER_TIME, 1), 0, limit, "the lowest timer heard"),
+        Column("carrying", "flag", _run(CARRYING, 1), 0, 1, "it carries an item"),
+        Column("carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "a requested one"),
+        Column("in_delivery_area", "flag", _run(IN_DELIVERY_AREA, 1), 0, 1, "its centre is there"),
+        Column("timer_runs", "flag", _run(TIMER_RUNS, 1), 0, 1, "its own timer is not silent"),
+        Column("timer", "s", _run(TIMER, 1), 0, limit, "its own timer; the limit when silent"),
+        Column(
+            "velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; cut at top speed"
+        ),
+        Column("contact", "flag", _run(CONTACT, 1), 0, 1, "it touches a robot, wall or obstacle"),
+        Column(
+            "turn_rate",
+            "rad/s",
+            _run(TURN_RATE, 1),
+            -turn,
+            turn,
+            "to the left, as its gyro tells: without its drift",
+        ),
+        *(messages if scenario.message_size else ()),
+    )
+
+
+def bounds(scenario: Scenario) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the lowest and highest possible row, each of shape (D,)."""
+    low, high = np.zeros((2, n_columns(scenario)), np.float32)
+    for column in columns(scenario):
+        low[column.columns], high[column.columns] = column.low, column.high
+    return low, high
+
+
+def unflatten(
+    observation: NDArray[np.float32], scenario: Scenario
+) -> dict[str, NDArray[np.float32]]:
+    """Return the named parts of a row (D,) or of rows (N, D), as views, last axis the part's."""
+    return {column.name: observation[..., column.columns] for column in columns(scenario)}
+
+
+def _run(start: int, length: int) -> slice:
+    return slice(start, start + length, 1)
+
+
+def _block(start: int, length: int, features: tuple[str, ...]) -> dict[str, slice]:
+    width = len(features)
+    stop = start + length * width
+    return {name: slice(start + first, stop, width) for first, name in enumerate(features)}

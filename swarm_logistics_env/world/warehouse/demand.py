@@ -1,0 +1,134 @@
+"""What is asked for: the open requests, and which item the next one is for.
+
+`n_requests` of them are open at a time, oldest first. A delivery closes one, and the next is drawn:
+in cycles of all items, or each by itself from a keyed stream of its own. An item may be asked for
+twice at a time where delivered items come back; else it is asked for once, as it leaves for good.
+With `request_docks` "random" each request names the dock that takes its item, from a stream.
+"""
+
+from __future__ import annotations
+
+import math
+
+from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel, uniform
+
+from .structs import DELIVERED, NOBODY, World
+
+
+@inlined_kernel
+def is_requested(world: World, item: int) -> bool:
+    """Return whether a request for `item` is open."""
+    requested = world.progress.requested
+    is_open = False
+    for index in range(len(requested)):
+        is_open |= requested[index] == item
+    return is_open
+
+
+@kernel
+def ask(world: World) -> None:
+    """Ask for items until `n_requests` requests are open or there is nothing to ask for."""
+    requested = world.progress.requested
+    for index in range(len(requested)):
+        if requested[index] == NOBODY:
+            requested[index] = next_item(world)
+            world.progress.requested_dock[index] = next_dock(world)
+
+
+@kernel
+def close_request(world: World, closed: int) -> None:
+    """Close a request, by its place, whose item was delivered; all for it if it left for good."""
+    requested, docks = world.progress.requested, world.progress.requested_dock
+    item = requested[closed]
+    has_left = world.items.status[item] == DELIVERED
+    n_open = 0
+    for index in range(len(requested)):
+        if index != closed and not (has_left and requested[index] == item):
+            requested[n_open], docks[n_open] = requested[index], docks[index]
+            n_open += 1
+    requested[n_open:] = NOBODY
+    docks[n_open:] = NOBODY
+
+
+@kernel
+def next_dock(world: World) -> int:
+    """Return the dock that the next request names, or NOBODY: any takes it."""
+    progress = world.progress
+    if not world.parameters.names_docks:
+        return NOBODY
+    number = uniform(world.items.dock_key[0], progress.n_docks_drawn[0])
+    progress.n_docks_drawn[0] += 1
+    return int(number * world.floor.n_docks)
+
+
+@inlined_kernel
+def takes(world: World, dock: int, item: int) -> bool:
+    """Return whether a dock takes an item, or NOBODY: all but those that are wanted elsewhere."""
+    if not world.parameters.names_docks or item == NOBODY:
+        return True
+    progress = world.progress
+    is_taken, is_wanted = False, False
+    for index in range(len(progress.requested)):
+        if progress.requested[index] == item:
+            is_wanted = True
+            is_taken |= progress.requested_dock[index] == dock
+    return is_taken or not is_wanted
+
+
+@kernel
+def next_item(world: World) -> int:
+    """Return the item of the next request, or NOBODY if there is none to ask for."""
+    items = world.items
+    progress = world.progress
+    total = 0.0
+    for item in range(len(items.status)):
+        total += weight_of(world, item)
+    if total == 0.0:
+        return NOBODY
+    chosen_item = NOBODY
+    if world.parameters.is_independent:
+        remaining = total * uniform(items.demand_key[0], progress.n_drawn[0])
+        progress.n_drawn[0] += 1
+        for item in range(len(items.status)):
+            weight = weight_of(world, item)
+            if weight > 0.0 and remaining >= 0.0:  # of equal numbers by rounding, the last one
+                chosen_item = item
+            remaining -= weight
+        return chosen_item
+    while chosen_item == NOBODY:
+        chosen_item = next_of_cycle(world)
+        if chosen_item == NOBODY:
+            progress.cycle[0] += 1
+        progress.asked_last[0] = chosen_item
+    return chosen_item
+
+
+@kernel
+def next_of_cycle(world: World) -> int:
+    """Return the item that this cycle asks for after its last one, or NOBODY.
+
+    Each item draws a number in every cycle; the lowest comes first, of equal ones the first item.
+    """
+    keys, cycle, last_item = (
+        world.items.request_key,
+        world.progress.cycle[0],
+        world.progress.asked_last[0],
+    )
+    last_number = uniform(keys[last_item], cycle) if last_item != NOBODY else -1.0
+    chosen_item, lowest_number = NOBODY, math.inf
+    for item in range(len(keys)):
+        number = uniform(keys[item], cycle)
+        is_next = number > last_number or (number == last_number and item > last_item)
+        if is_next and number < lowest_number and weight_of(world, item) > 0.0:
+            chosen_item, lowest_number = item, number
+    return chosen_item
+
+
+@kernel
+def weight_of(world: World, item: int) -> float:
+    """Return how often an item is asked for beside item 0; 0: it cannot be, now."""
+    parameters = world.parameters
+    is_away = world.items.status[item] == DELIVERED
+    if is_away or (not parameters.restock and is_requested(world, item)):
+        return 0.0
+    return float(1.0 / (item + 1.0) ** parameters.popularity_exponent)

@@ -1,0 +1,143 @@
+"""Failure modes: what a robot that fails in one of them has lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from swarm_logistics_env.core.errors import FaultError, suggest
+
+
+@dataclass(frozen=True)
+class FailureMode:
+    """What a robot that fails in this mode has lost.
+
+    Attributes:
+        description: in a sentence.
+        mark: what its robots wear in pictures, one or two letters; none: the mode's name.
+        speed: factor in [0, 1] on its top speed and turn rate.
+        view: factor in [0, 1] on its cameras' range.
+        factor: "speed" or "view": which of the two a fault's own factor replaces; or None.
+        wears: whether the speed falls linearly, from all at the fault's onset to that factor at
+            the end of the episode.
+        rangers: False: they report nothing near.
+        ranger_bias: what they read too far [m].
+        radio_delay: how late its broadcasts come [s].
+        present: False: it is out of the arena.
+        lifts, delivers, sends, hears, hears_requests, honest, obeys, releases_inside,
+            rangers_refresh: see `structs.Capabilities`.
+    """
+
+    description: str
+    mark: str = ""
+    speed: float = 1.0
+    view: float = 1.0
+    factor: str | None = None
+    wears: bool = False
+    rangers: bool = True
+    ranger_bias: float = 0.0
+    radio_delay: float = 0.0
+    present: bool = True
+    lifts: bool = True
+    delivers: bool = True
+    sends: bool = True
+    hears: bool = True
+    hears_requests: bool = True
+    honest: bool = True
+    obeys: bool = True
+    releases_inside: bool = True
+    rangers_refresh: bool = True
+
+
+# Sending and hearing are the robots' own radio, i.e. timers and messages. What the warehouse tells
+# all robots, i.e. the requests and the deliveries, which clear their memories, reaches robots in
+# FM3 as well: the paper's "cannot communicate with their neighbours". `FM3_isolated` loses both.
+FAILURE_MODES: dict[str, FailureMode] = {
+    "FM1": FailureMode("always tells timer 0, as if in the delivery area", mark="1", honest=False),
+    "FM2": FailureMode("never picks up", mark="2", lifts=False),
+    "FM3": FailureMode(
+        "neither sends nor hears, but is told of requests and deliveries",
+        mark="3",
+        sends=False,
+        hears=False,
+    ),
+    "FM3_send": FailureMode("does not send", mark="3s", sends=False),
+    "FM3_hear": FailureMode("does not hear", mark="3h", hears=False),
+    "FM3_isolated": FailureMode(
+        "as FM3, and is told of no request and no delivery",
+        mark="3i",
+        sends=False,
+        hears=False,
+        hears_requests=False,
+    ),
+    "FM4": FailureMode("its entering the delivery area delivers nothing", mark="4", delivers=False),
+    "FM4_jam": FailureMode(
+        "as FM4, and what it holds inside the delivery area it cannot let go",
+        mark="4j",
+        delivers=False,
+        releases_inside=False,
+    ),
+    "motor_slow": FailureMode(
+        "drives and turns at half its speed, or at the fault's factor of it",
+        mark="S",
+        speed=0.5,
+        factor="speed",
+    ),
+    "motor_wear": FailureMode(
+        "drives and turns ever slower, at half its speed or the fault's factor of it in the end",
+        mark="W",
+        speed=0.5,
+        factor="speed",
+        wears=True,
+    ),
+    "motor_dead": FailureMode("stands still", mark="M", speed=0.0),
+    "view_reduced": FailureMode(
+        "sees half as far with its cameras, or the fault's factor of it",
+        mark="V",
+        view=0.5,
+        factor="view",
+    ),
+    "rangers_blind": FailureMode("its rangers report nothing near", mark="R", rangers=False),
+    "rangers_frozen": FailureMode(
+        "its rangers repeat what they read when they failed", mark="F", rangers_refresh=False
+    ),
+    "rangers_biased": FailureMode("its rangers read 0.2 m too far", mark="B", ranger_bias=0.2),
+    "radio_delayed": FailureMode("what it broadcasts comes 2 s late", mark="D", radio_delay=2.0),
+    "dead": FailureMode(
+        "stands still, senses, sends and lifts nothing, keeps what it carries",
+        mark="X",
+        speed=0.0,
+        view=0.0,
+        rangers=False,
+        lifts=False,
+        delivers=False,
+        sends=False,
+        hears=False,
+        obeys=False,
+    ),
+    "late": FailureMode(
+        "has not begun to work: stands as a dead robot does until the fault ends",
+        mark="L",
+        speed=0.0,
+        view=0.0,
+        rangers=False,
+        lifts=False,
+        delivers=False,
+        sends=False,
+        hears=False,
+        obeys=False,
+    ),
+    "removed": FailureMode(
+        "out of the arena, what it carried is put down where it was", present=False
+    ),
+}
+
+
+def failure_mode(name: str) -> FailureMode:
+    """Return the failure mode of that name.
+
+    Raises:
+        FaultError: there is no such mode.
+    """
+    if name not in FAILURE_MODES:
+        raise FaultError(f"no failure mode {name!r}{suggest(name, FAILURE_MODES)}")
+    return FAILURE_MODES[name]

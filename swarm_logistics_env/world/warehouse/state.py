@@ -1,0 +1,199 @@
+"""The state of one world, by the names that everybody outside this folder uses."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.compiler.packing import blank
+from swarm_logistics_env.world.scenario import Scenario
+
+from .contacts import ContactMeasures, contact_measures
+from .structs import (
+    CARRIED,
+    DELIVERED,
+    NOBODY,
+    STORED,
+    Capabilities,
+    ContactCounts,
+    Flags,
+    Integers,
+    Items,
+    Numbers,
+    Progress,
+    Robots,
+    lengths_of,
+)
+
+__all__ = ["CARRIED", "DELIVERED", "NOBODY", "STORED", "WarehouseState"]
+
+
+class WarehouseState:
+    """What is true in the warehouse now. N robots, I items; a row is one robot or item for good.
+
+    `structs` tells of every array its shape and unit. The row of a robot that is absent holds
+    zeros and `NOBODY`. What is assigned to an array's name is copied into the array, as kernels
+    know where it lies.
+    """
+
+    robot_position: Numbers
+    robot_velocity: Numbers
+    robot_heading: Numbers
+    robot_heading_drift: Numbers
+    robot_turn_rate: Numbers
+    robot_present: Flags
+    robot_in_delivery: Flags
+    robot_contact: Flags
+    robot_item: Integers
+    robot_memory: Integers
+    robot_timer: Numbers
+    robot_told: Numbers
+    robot_heard: Numbers
+    robot_message: Numbers
+    last_in_delivery: Integers
+    failed: Flags
+
+    max_speed: Numbers
+    max_turn_rate: Numbers
+    ranger_range: Numbers
+    view_range: Numbers
+    lifts: Flags
+    delivers: Flags
+    sends: Flags
+    hears: Flags
+
+    item_position: Numbers
+    item_status: Integers
+    item_carrier: Integers
+    item_covered: Integers
+
+    open_requests: Integers
+    requested_docks: Integers
+
+    def __init__(self, scenario: Scenario) -> None:
+        lengths = lengths_of(scenario)
+        self.robots = robots = blank(Robots, lengths)
+        self.able = blank(Capabilities, lengths)
+        self.items = blank(Items, lengths)
+        self.progress = blank(Progress, lengths)
+        self.contacts = blank(ContactCounts, lengths)
+        robots.present[:] = True
+        for nobody in (robots.item, robots.memory, robots.last_in_delivery, self.items.carrier):
+            nobody[...] = NOBODY
+        for silent in (robots.timer, robots.told, robots.heard, robots.told_before):
+            silent[...] = np.nan
+        robots.frozen_beams[...] = np.nan
+        self.progress.asked_last[0] = NOBODY
+        for prefix, structure in (("robot_", self.robots), ("", self.able), ("item_", self.items)):
+            for name, array in structure._asdict().items():
+                setattr(self, prefix + name, array)
+        self.failed = self.robots.failed
+        self.last_in_delivery = self.robots.last_in_delivery
+        self.open_requests = self.progress.requested
+        self.requested_docks = self.progress.requested_dock
+        self.requested_docks[:] = NOBODY
+        self.obstacle_position = np.zeros((scenario.n_obstacles, 2))  # [m]
+        # Per robot, the failure modes that hold.
+        self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * scenario.n_robots
+        self.delivery_times: list[float] = []  # [s], ascending
+        self.delivered_by: list[int] = []  # robot, one per delivery
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if isinstance(self.__dict__.get(name), np.ndarray):
+            self.__dict__[name][...] = value
+        else:
+            super().__setattr__(name, value)
+
+    @property
+    def step(self) -> int:
+        """Control steps since the start."""
+        return int(self.progress.step[0])
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start."""
+        return float(self.progress.time[0])
+
+    @property
+    def requested(self) -> int:
+        """The item of the oldest request, or NOBODY."""
+        return int(self.progress.requested[0])
+
+    @property
+    def item_requested(self) -> Flags:
+        """Which items are asked for (I,): a request for them is open."""
+        is_requested = np.zeros(len(self.item_status), np.bool_)
+        is_requested[self.open_requests[self.open_requests != NOBODY]] = True
+        return is_requested
+
+    @property
+    def item_docks(self) -> Integers:
+        """The dock that the oldest request for each item names (I,), or NOBODY."""
+        docks = np.full(len(self.item_status), NOBODY)
+        is_open = self.open_requests != NOBODY
+        docks[self.open_requests[is_open][::-1]] = self.requested_docks[is_open][::-1]
+        return docks
+
+    @property
+    def carries_requested(self) -> Flags:
+        """Which robots carry an item that is asked for (N,)."""
+        carries: Flags = (self.robot_item != NOBODY) & self.item_requested[self.robot_item]
+        return carries
+
+    @property
+    def anchoring_seconds(self) -> float:
+        """Seconds for which working robots touched failed ones, summed over robots."""
+        return float(self.progress.anchoring_seconds[0])
+
+    @property
+    def contact_measures(self) -> ContactMeasures:
+        """How often robots ran into each other so far, how deep, and their accelerations."""
+        return contact_measures(self.contacts, self.step, self.time)
+
+    @property
+    def n_robots(self) -> int:
+        """Rows of robots, absent ones included."""
+        return len(self.robots.position)
+
+    @property
+    def carrier(self) -> int:
+        """The robot that carries the item of the oldest request, or NOBODY."""
+        return NOBODY if self.requested == NOBODY else int(self.item_carrier[self.requested])
+
+    @property
+    def delivered(self) -> int:
+        """Items delivered so far: the paper's performance P."""
+        return len(self.delivery_times)
+
+
+def roles_of(state: WarehouseState) -> NDArray[np.str_]:
+    """Return the role of each robot now, of `faults.ROLES`, shape (N,); "" for an absent robot.
+
+    A robot that fits several roles has the first of them.
+    """
+    roles = np.full(state.n_robots, "searching", dtype="<U9")
+    roles[state.robot_item != NOBODY] = "shuffling"
+    roles[state.robot_in_delivery] = "in_area"
+    carries = state.carries_requested
+    for carrier in np.flatnonzero(carries).tolist():
+        to_carrier = state.robot_position - state.robot_position[carrier]
+        is_near = np.hypot(*to_carrier.T) <= state.view_range[carrier]
+        roles[is_near] = "neighbour"
+    roles[carries] = "carrier"
+    roles[~state.robot_present] = ""
+    return roles
+
+
+def robots_in_role(state: WarehouseState, role: str, count: int) -> NDArray[np.int64]:
+    """Return the numbers of `count` robots, ascending: those in the role first.
+
+    Among robots alike, those nearest to a requested item come first; so the sets of 1, 2, 3
+    robots are nested.
+    """
+    distance = np.zeros(state.n_robots)
+    if state.requested != NOBODY:
+        away = state.robot_position[:, None] - state.item_position[state.item_requested]
+        distance = np.hypot(*away.T).min(axis=0)
+    is_other = roles_of(state) != role
+    order = np.lexsort((distance, is_other, ~state.robot_present))
+    return np.sort(order[:count]).astype(np.int64)

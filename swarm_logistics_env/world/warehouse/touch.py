@@ -1,0 +1,61 @@
+"""Touch: whether a robot touches what is solid to it."""
+
+from __future__ import annotations
+
+from swarm_logistics_env.compiler.kernels import inlined_kernel
+
+from .contacts import count_overlap
+from .floor_cells import is_near_solid
+from .pose import Pose
+from .structs import World
+
+TOUCHING_GAP = 0.01  # [m], gap below which two things touch
+
+
+@inlined_kernel
+def touches_solid(pose: Pose, world: World) -> bool:
+    """Return whether a robot touches a wall, an obstacle or a rack."""
+    parameters, obstacles = world.parameters, world.obstacles
+    reach = parameters.robot_radius + TOUCHING_GAP
+    away_x = min(pose.x, parameters.warehouse_width - pose.x)
+    away_y = min(pose.y, parameters.warehouse_height - pose.y)
+    touches = min(away_x, away_y) < reach
+    if world.floor.n_columns > 0:
+        touches |= is_near_solid(world.floor, pose.x, pose.y, reach)
+    limit = (reach + parameters.obstacle_radius) ** 2
+    for obstacle in range(len(obstacles)):
+        dx, dy = obstacles[obstacle, 0] - pose.x, obstacles[obstacle, 1] - pose.y
+        touches |= dx * dx + dy * dy < limit
+    return touches
+
+
+@inlined_kernel
+def touches_robots(me: int, world: World, n_found: int) -> tuple[bool, bool]:
+    """Return whether `me` touches a robot, and whether it is sound and touches one that failed.
+
+    Counts those of higher numbers that it overlaps.
+    """
+    limit = (2.0 * world.parameters.robot_radius + TOUCHING_GAP) ** 2
+    overlapping = (2.0 * world.parameters.robot_radius) ** 2
+    failed = world.robots.failed
+    touches = is_anchored = False
+    for index in range(n_found):
+        if world.nearby.square[index] < limit:
+            other = world.robot_grid.members[world.nearby.slot[index]]
+            touches = True
+            if other > me and world.nearby.square[index] < overlapping:
+                count_overlap(me, other, world.nearby.square[index], world)
+            is_anchored |= failed[other] and not failed[me]
+    return touches, is_anchored
+
+
+@inlined_kernel
+def touches_items(world: World, n_found: int) -> bool:
+    """Return whether a laden robot touches an item that is in its way."""
+    limit = (world.parameters.robot_radius + TOUCHING_GAP + world.parameters.item_radius) ** 2
+    touches = False
+    for index in range(n_found):
+        if world.nearby.square[index] < limit:
+            item = world.item_grid.members[world.nearby.slot[index]]
+            touches |= world.items.covered[item] == 0
+    return touches

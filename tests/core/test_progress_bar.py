@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import pytest
+from rich.console import Console
+
+from swarm_logistics_env.core import progress_bar
+from swarm_logistics_env.core.progress_bar import ProgressBar, clock
+
+Captured = pytest.CaptureFixture[str]
+
+
+def shown(captured: Captured, done: int, total: int, what: str = "") -> str:
+    with ProgressBar("mine", total, "runs") as progress:
+        progress.reach(done, "1 failed")
+        if what:
+            progress.say(what)
+    return captured.readouterr().err
+
+
+def test_lines_tell_what_is_done_and_what_is_left(
+    capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Console, "is_terminal", False)
+    monkeypatch.setattr("rich.console.monotonic", lambda: 0.0)
+    (line,) = shown(capsys, 1, 2_000_000, "loss [0.5]").splitlines()
+    assert line.startswith("mine: 1 of 2,000,000 runs, ")
+    assert line.endswith(", loss [0.5]")  # alone, as lines are sparse
+    with ProgressBar("mine", 100, "rounds", done=99) as progress:
+        progress.say()  # what was done before is no part of the pace
+    assert capsys.readouterr().err == "mine: 99 of 100 rounds, 0:00 so far\n"
+    monkeypatch.setattr(progress_bar, "LINE_EVERY", 0.0)
+    (line,) = shown(capsys, 5, 8).splitlines()
+    assert line == "mine: 5 of 8 runs, 0:00 so far, 0:00 left, 1 failed"
+    # A training ends with a whole round of steps.
+    assert "left" not in shown(capsys, 5, 4)
+    assert [clock(seconds) for seconds in (4.6, 245, 3723)] == ["0:05", "4:05", "1:02:03"]
+
+
+def test_a_bar_tells_what_is_done(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Console, "is_terminal", True)
+    monkeypatch.setenv("COLUMNS", "120")
+    text = shown(capsys, 8, 8)
+    assert any("mine" in line and "8 of 8 runs" in line for line in text.splitlines())
+    assert shown(capsys, 0, 0) == ""  # nothing to do

@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import pytest
+from pydantic import Field, JsonValue, PositiveFloat
+
+from swarm_logistics_env.core.errors import PolicyError, SwarmLogisticsError
+from swarm_logistics_env.core.records import Record, atomic_write, read_table, remove_parts
+
+
+class Lamp(Record):
+    error_type: ClassVar[type[SwarmLogisticsError]] = PolicyError
+
+    power: float = Field(5.0, gt=0)
+    colours: tuple[str, ...] = ("red",)
+    name: str
+    sizes: Annotated[tuple[PositiveFloat, ...], Field(min_length=2)] = (1.0, 2.0)
+    watts: int | Annotated[tuple[int, ...], Field(min_length=1)] | None = None
+    is_on: bool = True
+    notes: dict[str, JsonValue] = Field(default_factory=dict)
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"power": -1.0}, r"^Lamp.power = -1.0: should be greater than 0$"),
+        ({"powr": 3}, r"Lamp has no field 'powr'; did you mean 'power'\?"),
+        ({"xyz": 3}, "Lamp has no field 'xyz'; known: colours, is_on, name, notes, power, sizes"),
+        ({"power ": 3}, r"Lamp has no field 'power '; did you mean 'power'\?"),
+        ({"lamp.power": 3}, r"Lamp has no field 'lamp.power'; did you mean 'power'\?"),
+        ({"power": True}, "^Lamp.power = True: should have a number, not a bool$"),
+        ({"watts": [5, False]}, r"^Lamp.watts = \[5, False\]: should have a number, not a bool$"),
+        ({"sizes": (True, 2)}, "^Lamp.sizes = .*: should have a number, not a bool$"),
+        ({"colours": ("red", 7)}, r"Lamp.colours.1 = 7: "),
+        ({"colours": "red"}, r"^Lamp.colours = 'red': should be a list$"),
+        ({"sizes": [1.0]}, r"^Lamp.sizes = \[1.0\]: should have at least 2 items$"),
+        ({"sizes": [1.0, -1.0]}, r"^Lamp.sizes.1 = -1.0: should be greater than 0; Lamp.sizes = "),
+        ({"power": "x" * 10_000}, r"^Lamp.power = .{,200}$"),
+    ],
+)
+def test_what_is_wrong_is_named_in_an_error_of_the_records_own_type(
+    fields: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(PolicyError, match=said):
+        Lamp(name="a", **fields)
+    with pytest.raises(PolicyError, match=said):
+        Lamp(name="b").replace(**fields)
+    with pytest.raises(PolicyError, match=r"^Lamp\.name is missing$"):
+        Lamp()  # type: ignore[call-arg]
+
+
+def test_a_bool_stays_one_where_it_may_be() -> None:
+    lamp = Lamp(name="a", is_on=False, notes={"new": True})
+    assert Lamp.from_json(lamp.to_json()) == lamp
+    with pytest.raises(PolicyError, match="watts = True: should have a number"):
+        Lamp.from_json('{"name": "a", "watts": true}')
+
+
+def test_json_there_and_back() -> None:
+    lamp = Lamp(power=0.1, colours=("a", "b"), name="a")
+    assert Lamp.from_json(lamp.to_json()) == Lamp.from_json(lamp.to_json().encode()) == lamp
+    assert lamp.replace(name="b") == Lamp(power=0.1, colours=("a", "b"), name="b")
+    for text in ("nonsense", '{"power": 0}', '{"colour": 1}'):
+        with pytest.raises(PolicyError, match="Lamp"):
+            Lamp.from_json(text)
+
+
+TABLES = {"lamp.toml": 'name = "Grün"\r\n', "lamp.json": '{"name": "Grün"}\r\n'}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_is_read_as_editors_save_it_or_told_how_to_save(name: str, tmp_path: Path) -> None:
+    file = tmp_path / name
+    for encoding in ("utf-8", "utf-8-sig"):
+        file.write_text(TABLES[name], encoding=encoding, newline="")
+        assert read_table(file, "lamp", PolicyError) == {"name": "Grün"}
+    for encoding in ("utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp1252", "cp437"):
+        file.write_text(TABLES[name], encoding=encoding, newline="")
+        said = rf"^the lamp .*{name} is not UTF-8 text: save it as UTF-8$"
+        with pytest.raises(PolicyError, match=said):
+            read_table(file, "lamp", PolicyError)
+
+
+WRITE = """
+import sys
+from pathlib import Path
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.core.records import atomic_write
+
+for number in range(200):
+    with atomic_write(Path("x.csv"), PolicyError) as part:
+        with part.open("w") as file:
+            for _ in range(100):
+                file.write(sys.argv[1])
+"""
+
+
+def test_processes_that_write_one_file_at_once_all_succeed(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", WRITE]
+    writing = [subprocess.Popen([*command, sign], cwd=tmp_path) for sign in "abcd"]
+    assert [one.wait() for one in writing] == [0] * 4
+    assert (tmp_path / "x.csv").read_text() in [100 * sign for sign in "abcd"]
+    assert [one.name for one in tmp_path.iterdir()] == ["x.csv"]
+
+
+WRITE_AND_DIE = """
+import os, signal, sys
+from pathlib import Path
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.core.records import atomic_write
+
+with atomic_write(Path(sys.argv[1]), PolicyError) as part:
+    part.with_name(f"{part.name}-journal").touch()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="locks of POSIX")
+def test_what_a_killed_writer_left_is_removed_once_nobody_writes(tmp_path: Path) -> None:
+    for name in ("x[1].csv", "x.csv", "x.csv"):
+        command = [sys.executable, "-c", WRITE_AND_DIE, name]
+        assert subprocess.run(command, cwd=tmp_path, check=False).returncode == -signal.SIGKILL
+    assert len([*tmp_path.iterdir()]) == 4
+    mine = tmp_path / ".mine.csv"
+    mine.touch()
+    with atomic_write(tmp_path / "x.csv", PolicyError) as part:
+        assert {path.name[:5] for path in tmp_path.iterdir()} == {".x[1]", ".mine", part.name[:5]}
+        with atomic_write(tmp_path / "x[1].csv", PolicyError), remove_parts(tmp_path):
+            assert len([*tmp_path.glob(".x*")]) == 4  # somebody may be at work on them
+    with remove_parts(tmp_path):
+        assert {path.name for path in tmp_path.iterdir()} == {".mine.csv", "x.csv", "x[1].csv"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links and modes of POSIX")
+def test_a_file_that_is_written_goes_through_no_link_and_has_the_usual_mode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    monkeypatch.setattr("secrets.token_hex", lambda length: "00")
+    (tmp_path / ".x.00.part.csv").symlink_to(victim)
+    (tmp_path / ".x.part.csv").symlink_to(victim)
+    with (
+        pytest.raises(PolicyError, match=r"cannot write .*x\.csv"),
+        atomic_write(tmp_path / "x.csv", PolicyError) as part,
+    ):
+        part.write_text("theirs")
+    monkeypatch.undo()
+    before = os.umask(0o027)
+    try:
+        with atomic_write(tmp_path / "x.csv", PolicyError) as part:
+            part.write_text("theirs")
+    finally:
+        os.umask(before)
+    assert victim.read_text() == "mine"
+    assert (tmp_path / "x.csv").stat().st_mode & 0o777 == 0o640
+    assert (tmp_path / ".x.00.part.csv").is_symlink()  # and is not removed either
+
+
+def test_a_block_that_fails_leaves_nothing_beside_the_older_file(tmp_path: Path) -> None:
+    file = tmp_path / ("ü" * 100 + ".csv")
+    file.write_text("older")
+
+    def fail() -> None:
+        with atomic_write(file, PolicyError) as part:
+            assert part.suffix == ".csv"
+            part.write_text("newer")
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    assert [one.read_text() for one in tmp_path.iterdir()] == ["older"]

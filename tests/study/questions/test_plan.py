@@ -1,0 +1,196 @@
+"""Plans: the conditions and comparisons of presets, of files and of fields; and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.core.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.policies import PolicySpec, SwarmDT
+from swarm_logistics_env.study.questions.comparison import OTHER_BEHAVIOUR
+from swarm_logistics_env.study.questions.presets import PRESETS
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.task import Case, Run
+from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
+from swarm_logistics_env.study.verdicts.reference import PAPER
+from swarm_logistics_env.world.warehouse import Fault
+
+# The specification of the statistics prints these to three decimals.
+GOLDEN = {
+    "S": [1.000, 0.611, 0.276, 1.091, 0.978, 0.804, 0.208, -0.135],
+    "FT": [0.051, 0.077, -0.026, 0.026, 0.154, -0.026, 0.026, 0.154, 0.103, 0.0, -0.513, -0.615],
+    "R": [0.091, 0.054, 0.017, 0.066, 0.131, 0.017, 0.066, 0.131, 0.146, 0.040, -0.535, -0.572],
+    "A": [0.872, 0.723, 0.723, 0.610, 0.268, 0.187, -0.773],
+}
+
+
+def test_paper_counted_by_hand() -> None:
+    plan = Study.preset("paper").plan()
+    # 9 sizes; no fault, 3 removed, 4 modes x 3; widths 5, 15, 20 (10 is the base); delivery 1.5,
+    # 1, .5 (2 is the base); 70 items (60 is the base); random walk at N = 25 and N = 100.
+    assert len(plan.cases) == 9 + (1 + 3 + 12) + 3 + 3 + 1 + 2
+    # 8 steps and 2 questions of superlinearity; FT and R of 12; 3 + 3 + 1 of A; 2 ablations.
+    assert len(plan.comparisons) == 10 + 2 * 12 + 7 + 2
+    assert len(plan.runs) == 34 * 20
+    for case in plan.cases:
+        assert [run.seed for run in plan.runs if run.case is case] == list(range(20))
+
+
+def test_removed_robots_are_those_that_fail_and_only_what_indicators_need_is_run(
+    small: dict[str, Any],
+) -> None:
+    late = {**small, "faults": [{"modes": ["FM1"], "robots": [1], "onsets": [10.0]}]}
+    plans = {asked: Study(**late, indicators=[asked]).plan() for asked in ("FT", "R")}
+    # No fault, its twin with other behaviour, the robot failed, the robot removed.
+    assert len(plans["FT"].cases) == 4
+    (comparison,) = plans["FT"].comparisons
+    assert comparison.removed is not None
+    assert comparison.removed.case.faults == (Fault("removed", 1, onset=10.0),)
+    assert comparison.changed.case.faults == (Fault("FM1", 1, onset=10.0),)
+    assert comparison.removed.case.scenario == comparison.original.case.scenario
+    # Nobody looks at a twin without FT.
+    assert len(plans["R"].cases) == 2
+    assert {comparison.indicator for comparison in plans["R"].comparisons} == {"R"}
+
+
+def test_cases_and_runs_are_known_by_content() -> None:
+    one, fault = PolicySpec(name="swarm-dt"), (Fault("FM1", 2),)
+    base = Case(one, "same", Scenario(), fault, task=WAREHOUSE)
+    same = replace(base, policy=one.replace(label="other"), scenario=Scenario(n_robots=25))
+    assert base.key == same.key
+    others = [
+        replace(base, identity="different"),
+        replace(base, scenario=Scenario(n_robots=26)),
+        replace(base, faults=(Fault("FM1", 1),)),
+        replace(base, faults=(Fault("FM1", 2, onset=1.0),)),
+        replace(base, faults=()),
+        replace(base, behaviour=1),
+    ]
+    assert len({base.key, *(other.key for other in others)}) == 7
+    assert len({Run(base, "a", 0).key, Run(base, "a", 1).key, Run(base, "b", 0).key}) == 3
+    named, built, other = (
+        {case.key for case in Study(policies=[policy], sizes=[{"values": [2, 3]}]).plan().cases}
+        for policy in ("swarm-dt", SwarmDT(), SwarmDT(taxis_gain=0.1))
+    )
+    assert named == built
+    assert not named & other
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({}, "compares nothing"),
+        ({"seeds": 0}, "Specification.seeds = 0: should be greater than 0"),
+        ({"first_seed": 2**31}, "first_seed = 2147483648: should be less than or equal to"),
+        ({"indicators": ["Q"]}, "Specification: no indicator 'Q'; known: A, FT, R, S, change"),
+        ({"sizes": [{"valeus": [2, 3]}]}, "Sizes has no field 'valeus'; did you mean 'values'?"),
+        ({"sizes": [{"values": [5, 5]}]}, "ascending"),
+        ({"sizes": [{"values": [5, 9], "superlinear": [[5, 8]]}]}, "neighbouring sizes"),
+        ({"faults": {"modes": ["FM1"]}}, "list of tables: [[faults]] in a TOML file"),
+        ({"faults": [{"modes": ["FM9"]}]}, "no failure mode 'FM9'; did you mean"),
+        ({"faults": [{"modes": ["FM1"], "factor": 0.5}]}, "FM1 takes no factor"),
+        ({"faults": [{"modes": ["FM1"], "intermittent": [0.001, 5]}]}, "or equal to 0.01"),
+        ({"faults": [{"modes": ["FM1"], "robots": [25]}]}, "no working robot is left"),
+        ({"faults": [{"modes": ["FM1"], "onsets": [500]}]}, "or nothing fails"),
+        (
+            {"faults": [{"modes": ["FM1"]}], "reference": "papr"},
+            "reference = 'papr': should be 'paper'",
+        ),
+        ({"parameters": [{"name": "n_robots", "values": [1, 2]}]}, "belong in `sizes`"),
+        ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
+        ({"policies": [{"nam": "swarm-dt"}]}, "PolicySpec has no field 'nam'; did you mean 'name'"),
+    ],
+)
+def test_bad_specification_is_refused_in_words(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(SwarmLogisticsError) as caught:
+        Study(**fields).plan()
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_every_preset_can_be_planned_and_an_unknown_one_is_refused() -> None:
+    # What two factors ask alike is asked once.
+    faults = [{"modes": ["FM1"]}, {"modes": ["FM1", "FM2"]}]
+    comparisons = Study(faults=faults).plan().comparisons
+    assert len(comparisons) == len(set(comparisons)) == 2 * 2 * 3
+    plans = {name: Study.preset(name).plan() for name in PRESETS}
+    assert all(plan.comparisons for plan in plans.values())
+    # Resilience: no fault, its twin, and m = 1, 2, 3 of the removed and of three modes.
+    assert len(plans["resilience"].cases) == 2 + 3 * 4
+    assert [null.setting for null in plans["resilience"].nulls.values()] == [OTHER_BEHAVIOUR]
+    with pytest.raises(StudyError, match="did you mean 'paper'"):
+        Study.preset("papr")
+
+
+def test_published_tables_give_the_golden_values_and_every_claim_follows_from_them() -> None:
+    comparisons = Study.preset("paper").plan().comparisons
+    published = {c: found.value for c in comparisons if (found := PAPER.estimate(c))}
+    for symbol, golden in GOLDEN.items():
+        asked = (c for c in comparisons if (c.indicator, c.threshold) == (symbol, 0))
+        assert [published[c] for c in asked] == pytest.approx(golden, abs=5e-4)
+    claims = {c: PAPER.claims[c.question] for c in comparisons if c.indicator != "change"}
+    assert len(claims) == 41
+    # Those of the other reading of FM3 are asked of that alone.
+    rest = PAPER.claims.keys() - {comparison.question for comparison in claims}
+    assert {asked.changed.name for asked in rest} == {"FM3_send"}
+    for comparison, claim in claims.items():
+        assert (published[comparison] > comparison.threshold) == claim, comparison.label
+
+
+def test_file_says_what_python_says_and_a_bad_one_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "small.toml"
+    path.write_text("""
+        scenario = { preset = "paper", duration = 50 }
+        sizes = [{ values = [5, 10] }]
+        [[faults]]
+        modes = ["FM1"]
+    """)
+    sizes, faults = [{"values": (5, 10)}], [{"modes": ("FM1",)}]
+    written = Study(name="small", scenario={"duration": 50}, sizes=sizes, faults=faults)
+    assert Study.from_file(path).specification == written.specification
+    assert Study.from_file(path, seeds=5).plan().seeds == range(5)
+    with pytest.raises(StudyError, match=r"cannot read the study file .*none\.toml"):
+        Study.from_file(tmp_path / "none.toml")
+    for text, said in ((b"seeds = ", "TOML"), (b"\xed\xb0\x80", "UTF-8 text")):
+        path.write_bytes(text)
+        with pytest.raises(StudyError, match=rf"small\.toml.* is not {said}"):
+            Study.from_file(path)
+
+
+def test_robots_may_fail_and_be_repaired_at_random_or_keep_a_factor() -> None:
+    repaired = {"modes": ["dead"], "intermittent": [2.0, 3], "duration": 15}
+    slow = {"modes": ["motor_slow"], "robots": [2], "factor": 0.1}
+    plan = Study(seeds=2, faults=[{**repaired, "robots": [1]}, slow]).plan()
+    assert {fault for case in plan.cases for fault in case.faults} == {
+        Fault("dead", 1, duration=15.0, intermittent=(2.0, 3.0)),
+        Fault("motor_slow", 2, factor=0.1),
+        Fault("removed", 1),
+        Fault("removed", 2),
+    }
+
+
+def test_a_parameter_is_varied_in_the_conditions_of_its_table() -> None:
+    width = {"name": "delivery_width", "values": [2, 1], "scenario": {"n_robots": 7}}
+    cases = Study(seeds=2, parameters=[width]).plan().cases
+    scenarios: list[Any] = [case.scenario for case in cases]
+    assert {(s.n_robots, s.delivery_width) for s in scenarios} == {(7, 2.0), (7, 1.0)}
+
+
+def test_for_p_s_of_faults_by_role_those_of_the_role_are_removed() -> None:
+    by_role = {"modes": ["FM4"], "robots": [1, 2], "onsets": [50], "role": "carrier"}
+    plan = Study(seeds=2, faults=[by_role]).plan()
+    assert {fault for case in plan.cases for fault in case.faults} == {
+        Fault(mode, m, onset=50.0, role="carrier") for mode in ("FM4", "removed") for m in (1, 2)
+    }
+
+
+def test_a_change_of_the_scenario_reaches_tables_with_a_preset_of_their_own() -> None:
+    study = Study.preset("paper")
+    study.specification = study.specification.varying({"restock": True})
+    scenarios = [case.scenario for case in study.plan().cases]
+    assert {scenario.n_items for scenario in scenarios} == {60, 70, 100}  # type: ignore[attr-defined]
+    assert all(scenario.restock for scenario in scenarios)  # type: ignore[attr-defined]

@@ -1,0 +1,74 @@
+"""P over contacts: which conditions stand in the picture, and what it shows of each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env.study.questions.comparison import Setting
+from swarm_logistics_env.study.report.drawing import svg_image
+from swarm_logistics_env.study.report.figures import trade_off_figure
+from swarm_logistics_env.study.report.section import NOTHING
+from swarm_logistics_env.study.report.tables import CONTACTS_HEADING, tables
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from tests.made_up import delivered, judged
+
+
+def results(sizes: list[int], missing: int | None = None) -> StudyResults:
+    """Two policies, of which homing delivers more and has fewer contacts.
+
+    Args:
+        missing: the swarm size of which nobody counted them at seed 0.
+    """
+    study = Study(policies=["swarm-dt", "homing"], seeds=3, sizes=[{"values": sizes}])
+
+    def play(policy: str, setting: Setting, seed: int) -> Outcome:
+        counts = {"swarm-dt": (10, 8.0), "homing": (40, 0.0)}
+        p, contacts = counts[policy]
+        is_counted = seed > 0 or setting.value != missing
+        return replace(
+            delivered(p + seed),
+            contacts_per_robot_minute=contacts + seed if is_counted else None,
+            fast_contacts=0.5 if contacts + seed and is_counted else None,
+        )
+
+    return judged(study, play)
+
+
+def test_each_condition_has_a_panel_with_a_point_a_policy() -> None:
+    pytest.importorskip("matplotlib", reason="needs the extra study")
+    (figure,) = trade_off_figure(results([5, 10, 20]))
+    assert figure.data["cell"].tolist() == ["N = 5", "N = 10", "N = 20"] * 2
+    first = figure.data.iloc[0]
+    assert (first["policy"], first["contacts"], first["mean"]) == ("swarm-dt", 9.0, 11.0)
+    assert first["contacts_low"] < 9.0 < first["contacts_high"]
+    svg = svg_image(figure.draw, figure.height)
+    assert all(f">N = {n}<" in svg for n in (5, 10, 20))
+    (many,) = trade_off_figure(results(list(range(5, 18))))
+    assert ">N = 5<" not in svg_image(many.draw, many.height)
+    assert len(many.data) == 26
+
+
+def test_a_condition_with_a_run_that_nobody_counted_is_missing_not_0() -> None:
+    mixed = results([5, 10, 20], missing=10)
+    (figure,) = trade_off_figure(mixed)
+    assert figure.data["cell"].tolist() == ["N = 5", "N = 20"] * 2
+    cells = {(cell.policy, cell.words): cell for cell in mixed.cells}
+    assert np.isnan(cells["homing", "N = 10"].contacts.value)
+    assert cells["homing", "N = 10"].fast_contacts is None
+    assert cells["homing", "N = 5"].fast_contacts == 0.5
+    assert cells["homing", "N = 5"].overlap_share is None
+    table = next(iter(tables(mixed)))
+    column = table.columns.index(CONTACTS_HEADING)
+    assert [row[column] for row in table.rows] == ["9.0 [6.5, 11.5]", NOTHING, "9.0 [6.5, 11.5]"]
+
+
+def test_without_any_count_there_is_neither_picture_nor_column() -> None:
+    study = Study(policies=["homing"], seeds=3, sizes=[{"values": [5, 10]}])
+    older = judged(study, lambda *_: delivered(7))
+    assert list(trade_off_figure(older)) == []
+    assert all(CONTACTS_HEADING not in table.columns for table in tables(older))

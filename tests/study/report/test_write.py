@@ -1,0 +1,160 @@
+"""The report as files: what it holds, from outcomes that are made up."""
+
+from __future__ import annotations
+
+import csv
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from swarm_logistics_env.study.report.answer import answer
+from swarm_logistics_env.study.report.digest import digest
+from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.drawing import images
+from swarm_logistics_env.study.report.latex import latex_tables
+from swarm_logistics_env.study.report.section import Section, limits, sentence, word_to_count
+from swarm_logistics_env.study.report.write import markdown, section_markdown, write_report
+from swarm_logistics_env.study.verdicts.results import StudyResults
+from tests.conftest import drawn_in_all_formats
+from tests.made_up import paper
+from tests.study.report.conftest import NARROW
+
+FROZEN = Path(__file__).parents[2] / "frozen"
+
+
+def test_no_headline_counts_a_verdict_that_assumes_normal_differences(few: StudyResults) -> None:
+    assumed = [test for test in few.verdicts if "assumes_normal" in test.flags]
+    decided = {word_to_count(test, "supported") for test in assumed}
+    assert len(decided) == 1
+    assert decided.isdisjoint({"supported", "refuted", "equivalent"})
+    assert {word_to_count(test, "open") for test in assumed} == {"open"}
+
+
+def test_no_name_breaks_a_table() -> None:
+    hostile = ("a|b", r"50 % of \a_{b}", "[x]", "~^&#$")
+    table = Section("t_1", hostile, (hostile,))
+    head, _, row = section_markdown(table).splitlines()[2:]
+    assert head == row == r"| a\|b | 50 % of \a_{b} | [x] | ~^&#$ |"
+
+
+@pytest.mark.parametrize("text", ["<img src=x>", "[a](b)", "![a](b)", "a < b", "x\x1b[31m"])
+def test_no_name_is_markup_in_markdown(text: str) -> None:
+    shown = text.replace("<i", "&lt;i").replace("](", r"]\(").replace("\x1b", r"\x1b")
+    lines = section_markdown(Section(text, ("c",), ((text,),), (text,))).splitlines()
+    assert [line for line in lines if shown in line] == [f"## {shown}", f"| {shown} |", shown]
+
+
+@pytest.fixture(scope="module")
+def directory(few: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("report")
+    with drawn_in_all_formats():
+        write_report(few, directory)
+    return directory
+
+
+def test_a_report_is_as_recorded(tmp_path: Path) -> None:
+    """Every number and sentence, but for the sheet of the set-up."""
+    results = paper(seeds=12, noise=2.0, full=NARROW, same=frozenset({"FM2"}))
+    report = document(results)
+    texts = {
+        "report.md": markdown(report).partition("\n## Set-up")[0],
+        "tables.tex": latex_tables(results, report),
+        "answer.txt": digest(answer(results), 80),
+    }
+    for name, text in texts.items():
+        made = tmp_path / name
+        made.write_text(f"{text.rstrip()}\n", encoding="utf-8")
+        lines = (FROZEN / name).read_text(encoding="utf-8").splitlines()
+        assert made.read_text(encoding="utf-8").splitlines() == lines, (
+            f"if {made} is as it should be, put it into {FROZEN}"
+        )
+
+
+def test_equal_rows_give_equal_bytes(few: StudyResults, directory: Path, tmp_path: Path) -> None:
+    write_report(replace(few, outcomes=dict(reversed(list(few.outcomes.items())))), tmp_path)
+    files, others = (
+        {
+            path.relative_to(here): path.read_bytes()
+            for path in here.rglob("*.*")
+            if path.suffix not in (".pdf", ".png")
+        }
+        for here in (directory, tmp_path)
+    )
+    assert files == others
+    figure = document(few).figures[0]
+    with drawn_in_all_formats():
+        drawing = images(figure.draw, figure.height)
+    file = directory / "figures" / figure.name
+    assert file.with_suffix(".pdf").read_bytes() == drawing.pdf
+    assert file.with_suffix(".png").read_bytes() == drawing.png
+
+
+def test_page_needs_nothing_but_itself(directory: Path) -> None:
+    page = (directory / "report.html").read_text()
+    assert not re.search(
+        r"https?:|\bsrc=(?!\"data:)|<(link|iframe|object)\b|@import|url\((?!#)", page
+    )
+    # The browser itself refuses what would be loaded all the same.
+    assert "default-src 'none'" in page
+    beside = set(re.findall(r'href="([^#"][^"]*)"', page))
+    assert beside
+    assert all((directory / name).is_file() for name in beside)
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'href="#([^"]+)', page)) <= set(ids)
+
+
+def test_every_figure_comes_as_drawing_and_data(few: StudyResults, directory: Path) -> None:
+    names = [figure.name for figure in document(few).figures]
+    assert len(names) == len(set(names)) >= 5
+    page, text = (directory / "report.html").read_text(), (directory / "report.md").read_text()
+    for name in names:
+        file = directory / "figures" / name
+        assert file.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+        assert file.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+        drawing = file.with_suffix(".svg").read_text()
+        assert ElementTree.fromstring(drawing).tag.endswith("svg")
+        assert len(file.with_suffix(".csv").read_text().splitlines()) > 1
+        assert f'alt="{name}"' in page
+        assert f"](figures/{name}.png)" in text
+    # At the narrow warehouse every item was delivered.
+    assert "† marks a P that is capped" in page
+    for name in few.plan.specification.scenario.model_dump():
+        assert f'<th scope="row">{name}</th>' in page
+
+
+def test_every_verdict_quotes_seeds_interval_and_what_it_rests_on(few: StudyResults) -> None:
+    for test in few.verdicts:
+        assert test.estimate is not None
+        told = sentence(few, test).text
+        assert f"95 % interval {limits(test.estimate, 3)} over 4 paired seeds (0 to 3)" in told
+        assert ("Unadjusted: " in told) != test.estimate.untestable
+        assert ("Holm-adjusted: " in told) != test.estimate.untestable
+        assert ("†" in told) == test.saturated
+    text = markdown(document(paper(same=frozenset({"FM2"}))))
+    assert re.search(
+        r"P_F within 10 % of P_o\? Change -0\.[67]\d\d \[.*\] \(90 %\): refuted\.", text
+    )
+    assert "R = 0.080 exactly, over 10 paired seeds (0 to 9): unaffected." in text
+    assert re.search(
+        r"too few to exclude stalled ones .* p is \S+: it needs at least \d+ seeds\.", text
+    )
+
+
+@pytest.mark.parametrize("package", ["matplotlib", "jinja2"])
+def test_without_the_extra_the_markdown_still_comes_and_one_seed_gives_values_alone(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    names = {path.name for path in write_report(paper(seeds=1), tmp_path)}
+    assert names == {"report.md", "cells.csv", "claims.csv", "tables.tex"}
+    text = (tmp_path / "report.md").read_text()
+    assert f"need {package}: pip install -c constraints.txt -e" in text
+    assert "![" not in text
+    assert "S = 0.611 (no interval) over one seed (0). Unadjusted: open; Holm-adj" in text
+    with (tmp_path / "claims.csv").open(newline="") as file:
+        assert {row["verdict"] for row in csv.DictReader(file)} == {"open", "untestable"}

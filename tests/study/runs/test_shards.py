@@ -1,0 +1,87 @@
+"""Shards and the studies merged of them: each run once, and nothing but parts of one study."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env.core.errors import StudyError
+from swarm_logistics_env.study.runs.engines import Shard
+from swarm_logistics_env.study.runs.notes import StoredStudy, merge
+from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
+from swarm_logistics_env.study.studies import Study
+from tests.made_up import alter
+
+
+def test_every_run_is_in_one_shard() -> None:
+    runs = Study.preset("quick").plan().runs
+    for count in (1, 2, 7, 1000):
+        parts = [Shard.parse(f"{i}/{count}").of(runs) for i in range(1, count + 1)]
+        assert sorted(run.key for part in parts for run in part) == sorted(run.key for run in runs)
+        assert max(map(len, parts)) - min(map(len, parts)) <= 1
+    for text in ("0/2", "3/2", "1", "a/b", "1/2/3", "-1/2"):
+        with pytest.raises(StudyError, match="should be i/n"):
+            Shard.parse(text)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Directory of a study of two sizes and other seeds and margin than the usual ones."""
+    directory, other = tmp_path_factory.mktemp("whole"), {"first_seed": 1000, "margin": 0.2}
+    small = {"n_robots": 3, "n_items": 4, "warehouse_width": 3, "warehouse_height": 3}
+    scenario = {**small, "duration": 2}
+    Study(out=directory, seeds=2, sizes=[{"values": [2, 3]}], scenario=scenario, **other).run()
+    return directory
+
+
+def altered(whole: Path, directory: Path, change: str) -> Path:
+    shutil.copytree(whole, directory)
+    alter(directory / FILE_NAME, change)
+    return directory
+
+
+def noted(name: str, value: str) -> str:
+    return f"UPDATE notes SET value = json_set(value, '$.{name}', json('{value}'))"
+
+
+def rows(directory: Path) -> list[dict[Any, Any]]:
+    with Runs.existing(directory) as runs:
+        return runs.frame().to_dict("records")
+
+
+def test_merged_parts_are_the_declared_study_and_success_wins(whole: Path, tmp_path: Path) -> None:
+    fail = "UPDATE runs SET failed = 1, outcome = json_set(outcome, '$.error', 'Traceback')"
+    failed = altered(whole, tmp_path / "failed", fail)
+    for number, order in enumerate([(whole, failed), (failed, whole)]):
+        out = tmp_path / str(number)
+        assert merge(order, out) == 4
+        assert rows(out) == rows(whole)
+        assert [path.name for path in out.iterdir()] == [FILE_NAME]
+        found = Study.stored(out).findings()
+        assert (found.exploratory, found.late_margin) == (False, False)
+        assert StoredStudy.existing(out) == StoredStudy.existing(whole)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("UPDATE runs SET outcome = replace(outcome, '2.0', '1.5')", "has another result"),
+        ("DELETE FROM notes", "does not note its study"),
+        (noted("identities", "3"), "is damaged: its note does not read"),
+        (noted("code", '"old"'), "differ: should be shards of one study"),
+        (noted("specification.sizes", "[]"), "differ: should be shards of one study"),
+        (noted("declared.seeds", "3"), "differ: should be shards of one study"),
+    ],
+)
+def test_what_is_not_one_study_is_not_merged(
+    whole: Path, tmp_path: Path, change: str, words: str
+) -> None:
+    other = altered(whole, tmp_path / "other", change)
+    before = rows(other)
+    with pytest.raises(StudyError, match=words):
+        merge([whole, other], tmp_path / "both")
+    assert rows(other) == before
+    assert not (tmp_path / "both" / FILE_NAME).exists()

@@ -1,0 +1,297 @@
+"""A PettingZoo environment in a study: its runs, indicators, failure modes, and what is refused."""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import spi
+from swarm_logistics_env.core.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks import (
+    Case,
+    Outcome,
+    ParallelTask,
+    Run,
+    SumOfInfos,
+    SumOfRewards,
+)
+from tests.study.tasks.lane import FAILURES, LANE, OF_LANE, Lane, Walker
+
+FAULT = {"modes": ["silent"], "robots": [1]}
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    study = Study(
+        out=tmp_path_factory.mktemp("lane"),
+        task="tests.study.tasks.lane:LANE",
+        policies=["walker", "random"],
+        seeds=4,
+        sizes=[{"values": [2, 4]}],
+        faults=[{"modes": ["silent", "blind"], "robots": [1]}],
+        parameters=[{"name": "length", "values": [6, 12]}],
+    )
+    # N = 2, 4 (which is no fault and length 6), silent, blind, removed, length 12; two policies.
+    tally = study.run()
+    assert (tally.played, tally.failed) == (6 * 2 * 4, 0)
+    return study
+
+
+def only_run(task: object, **fields: Any) -> Run:
+    study = Study(**{"task": task, "seeds": 1, "policies": ["walker"], "faults": [FAULT], **fields})
+    return study.plan().runs[0]
+
+
+def test_a_study_plays_sizes_parameters_and_failure_modes(study: Study) -> None:
+    results = study.findings()
+    p = {(cell.policy, cell.words): cell.by_seed for cell in results.cells}
+    assert p["walker", "N = 2"].mean() > 5
+    assert p["walker", "length = 12"].mean() < p["walker", "length = 6"].mean()
+    assert p["random", "N = 4"].mean() < p["walker", "N = 4"].mean()
+    # A silent robot stands in the way of the others; one that is blind stands still, too.
+    assert p["walker", "silent, m = 1"].mean() < p["walker", "removed, m = 1"].mean()
+    assert p["walker", "silent, m = 1"].tolist() == p["walker", "blind, m = 1"].tolist()
+    asked = next(v for v in results.verdicts if v.compared.indicator == "FT")
+    assert (asked.compared.policy, asked.compared.label) == ("walker", "silent, m = 1")
+    conditions = ("no fault", "silent, m = 1", "removed, m = 1")
+    by_hand = spi.fault_tolerance(*(p["walker", condition] for condition in conditions))
+    assert asked.value == by_hand.value
+    for outcome in results.outcomes.values():  # whole rewards are events with times
+        assert len(outcome.delivery_times) == outcome.delivered
+        assert (outcome.ended_at, outcome.untimed) == (40, None)
+
+
+def test_what_the_team_shares_counts_once() -> None:
+    told = {"a": 2.0, "b": 2.0, "c": 2.0}
+    infos = {"d": {}, **{agent: {"done": value} for agent, value in told.items()}}
+    for shared, wanted in ((False, 6.0), (True, 2.0)):
+        assert SumOfRewards(shared)(None, told, {}) == wanted
+        assert SumOfInfos("done", shared)(None, {}, infos) == wanted
+
+
+def played(*gains: float) -> Outcome:
+    """A run of random actions whose steps add so much to P."""
+    given = iter(gains)
+    task = task_of(performance=lambda *_: next(given), period=0.5)
+    return task.play(Case(PolicySpec(name="random"), "", task.default, task=task), 0, 0)
+
+
+def test_an_event_is_at_the_end_of_its_step_and_tells_runs_apart() -> None:
+    run = played(1.0, 0.0, 2.0, 0.0, 1.0)
+    assert run.delivery_times.tolist() == [0.5, 1.5, 1.5, 2.5]
+    assert run.ended_at == 2.5
+    assert run.digest == played(1.0, 0.0, 2.0, 0.0, 1.0).digest
+    assert run.digest != played(1.0, 0.0, 2.0, 1.0, 0.0).digest
+
+
+def test_equal_seeds_give_equal_bits_in_other_processes(study: Study) -> None:
+    script = (
+        "import sys; from swarm_logistics_env.study.studies import Study\n"
+        "for run in reversed(Study.stored(sys.argv[1], trust_code=True).plan().runs):\n"
+        "    outcome = run.play(); print(run.key, outcome.delivered, outcome.digest)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(study.out)], capture_output=True, text=True, check=True
+    )
+    outcomes = study.findings().outcomes
+    kept = [(run.key, outcomes[run.case.key, run.seed]) for run in study.plan().runs]
+    told = {f"{key} {outcome.delivered} {outcome.digest}" for key, outcome in kept}
+    assert {*done.stdout.splitlines()} == told
+    assert len({outcome.digest for _, outcome in kept}) > len(kept) / 2
+
+
+def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Path) -> None:
+    failures = {"frozen": None, "blind": None}
+    task = task_of(steps=10, performance=SumOfInfos("distance"), failures=failures)
+    fields: dict[str, Any] = {"task": task, "seeds": 3, "policies": ["random"]}
+    with pytest.raises(StudyError, match="less than n_robots"):
+        Study(**fields, faults=[{"modes": ["blind"]}]).plan()
+    faults = [{"modes": ["blind", "frozen"], "robots": [1]}]
+    study = Study(out=tmp_path, faults=faults, **fields)
+    study.run()
+    results = Study.stored(tmp_path, task=task).findings()
+    assert all(o.untimed is not None for o in results.outcomes.values())
+    # Removing is not among its failures, so FT is not asked.
+    assert {v.compared.indicator for v in results.verdicts} == {"R"}
+    # Random actions do not look: a blind robot changes nothing, and the report says so.
+    assert [v.on_threshold.plain == "unaffected" for v in results.verdicts] == [True, False]
+    assert any(p % 1 for cell in results.cells for p in cell.by_seed)
+
+
+class Blunt:
+    def act(self, observations: Any) -> Any:
+        return np.ones(len(observations), dtype=int)
+
+
+def test_a_policy_needs_nothing_but_act_here_and_reset_in_the_warehouse() -> None:
+    assert only_run(LANE, policies=[Blunt()]).play().delivered > 0
+    with pytest.raises(SwarmLogisticsError, match="should have the methods reset and act"):
+        only_run("warehouse", policies=[Blunt()], faults=[{"modes": ["FM1"], "robots": [1]}])
+
+
+class Wrong:
+    def act(self, observations: Any) -> Any:
+        return np.full(len(observations), 7)
+
+
+def costs(env: object, rewards: object, infos: object) -> float:
+    return -2.0
+
+
+def task_of(make_env: Any = Lane, **fields: Any) -> ParallelTask:
+    return ParallelTask(make_env, **{**OF_LANE, "n_robots": 3, "steps": 5, **fields})
+
+
+SCORED = task_of(performance=costs, references=(-5.0, 0.0))
+SMALLER = task_of(make_env=lambda n_robots: Lane(2))
+
+
+@pytest.mark.parametrize(
+    ("task", "policy", "words"),
+    [
+        (LANE, Wrong(), "PolicyError: action 7 of robot 0: should be in Discrete(3)"),
+        (task_of(performance=costs), "walker", "step 1 adds -2: should be 0 or more; the indic"),
+        (task_of(performance=lambda *_: np.nan), "walker", "adds nan: should be 0 or more"),
+        (SCORED, "walker", "the score -10 is below the reference -5"),
+        (SMALLER, "random", "the environment of 3 robots has 2 agents"),
+    ],
+)
+def test_failing_runs_are_outcomes_with_their_reason(
+    task: ParallelTask, policy: object, words: str
+) -> None:
+    assert words in str(only_run(task, policies=[policy]).play().error)
+    # By references, what is below zero is a score.
+    scored = only_run(task_of(performance=costs, references=(-20.0, 0.0))).play()
+    assert (scored.error, scored.delivered) == (None, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"failures": {"silnt": 0}}, "no mode 'silnt'; did you mean 'silent'?"),
+        ({"failures": {"noisy": 0.0}}, "should be a standard deviation above 0"),
+        ({"references": (1.0, 1.0)}, "should be two different scores"),
+    ],
+)
+def test_a_task_that_cannot_be_is_refused(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        task_of(**fields)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"task": "warehous"}, "(a name or 'package.module:OBJECT'); did you mean 'warehouse'?"),
+        ({"task": "nowhere:TASK"}, "task 'nowhere:TASK' cannot be imported: No module named 'now"),
+        ({"task": "json:dumps"}, "is no task: should have the attributes of tasks.Task"),
+        ({"scenario": {"lenght": 3}}, "did you mean 'length'?"),
+        ({"scenario": {"length": 6.5}}, "6.5: should be a whole number"),
+        ({"policies": ["swarm-dt"]}, "the task has no policy 'swarm-dt'"),
+        ({"faults": [{"modes": ["silnt"]}]}, "'silnt'; did you mean 'silent'?"),
+        ({"faults": [{**FAULT, "onsets": [5]}]}, "not from 5 s on, so FT is not defined here"),
+        ({"parameters": [{"name": "item_radius", "values": [1, 2]}]}, "known: duration, l"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_any_run(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(SwarmLogisticsError) as caught:
+        only_run(**{"task": LANE, **fields})
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
+    assert task_of().code() == task_of().code()
+    assert "pettingzoo" in task_of().code()
+    noisier = task_of(failures={**FAILURES, "noisy": 0.1})
+    others = [task_of(performance=costs), SCORED, noisier, task_of(period=0.5), SMALLER]
+    assert len({task.code() for task in (task_of(), *others)}) == 6
+
+
+def test_a_task_is_known_by_what_its_functions_hold() -> None:
+    def closed(length: int) -> ParallelTask:
+        return task_of(make_env=lambda n_robots: Lane(n_robots, length))
+
+    def partly(length: int) -> ParallelTask:
+        return task_of(make_env=functools.partial(Lane, length=length))
+
+    for made in (closed, partly):
+        assert made(6).code() == made(6).code() != made(8).code()
+        study: dict[str, Any] = {"seeds": 1, "policies": ["random"], "sizes": [{"values": [2, 4]}]}
+        keys = [Study(task=made(6), **study).plan().runs[0].key for _ in range(2)]
+        assert keys[0] == keys[1]
+    assert closed(6).code() != partly(6).code()
+
+
+def test_a_task_has_one_code_version_in_every_process_and_folder(tmp_path: Path) -> None:
+    script = (
+        "import functools\nfrom pettingzoo.test.example_envs import generated_agents_parallel_v0\n"
+        "from swarm_logistics_env.study.tasks import ParallelTask\n"
+        "def make(n_robots, names): return generated_agents_parallel_v0.env()\n"
+        "print(ParallelTask(functools.partial(make, names={'a', 'b', 'c'}), name='x', n_robots=4,"
+        " steps=5).code())\n"
+    )
+    (tmp_path / "elsewhere").mkdir()
+    codes = set()
+    for folder, hash_seed in ((tmp_path, "1"), (tmp_path / "elsewhere", "2")):
+        (folder / "mine.py").write_text(script)
+        done = subprocess.run(
+            [sys.executable, "mine.py"],
+            cwd=folder,
+            env={**os.environ, "PYTHONHASHSEED": hash_seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        codes.add(done.stdout)
+    assert len(codes) == 1
+
+
+def test_a_task_that_cannot_be_compared_plays_in_its_workers_and_counts_for_no_other() -> None:
+    def made() -> ParallelTask:
+        lock = threading.RLock()
+
+        def make_env(n_robots: int) -> Lane:
+            with lock:
+                return Lane(n_robots)
+
+        return task_of(make_env=make_env)
+
+    task = made()
+    assert task.code() == task.code() != made().code()
+    assert only_run(task).play().error is None
+
+
+class Threaded(Walker):
+    """Walks where torch computes in one thread, and stays else."""
+
+    identity = "threaded"
+
+    def act(self, observations: Any) -> Any:
+        import torch
+
+        return super().act(observations) * (torch.get_num_threads() == 1)
+
+
+def test_torch_computes_in_one_thread() -> None:
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        whole, threaded = (
+            only_run(LANE, policies=[policy]).play().delivered for policy in ("walker", Threaded())
+        )
+        assert threaded == whole > 0
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)

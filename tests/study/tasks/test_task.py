@@ -1,0 +1,145 @@
+"""A study plays whatever keeps the protocol of a task, by policies with parameters of their own."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import swarm_logistics_env
+from swarm_logistics_env import Scenario, policies
+from swarm_logistics_env.core.errors import ScenarioError, StudyError
+from swarm_logistics_env.core.fingerprint import EPISODE_CODE
+from swarm_logistics_env.policies import PolicySpec, SwarmDT
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.task import Case
+from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
+from tests.study.tasks.lane import LANE
+
+PACKAGE = Path(swarm_logistics_env.__file__).parent
+
+
+def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_path: Path) -> None:
+    path, out = tmp_path / "lane.toml", tmp_path / "out"
+    path.write_text(
+        'task = "tests.study.tasks.lane:LANE"\nseeds = 2\nsizes = [{ values = [2, 4] }]\n'
+    )
+    with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
+        Study.from_file(path)
+    study = Study.from_file(path, out=out, trust_code=True, policies=["walker"])
+    assert study.run().failed == 0
+    with pytest.raises(StudyError, match=r"is code.*--trust-code"):
+        Study.stored(out)
+    again = Study.stored(out, trust_code=True)
+    assert again.specification == study.specification
+    assert again.run().played == 0
+    assert Study.stored(out, task=LANE).finished() == (4, 4)
+
+
+def test_the_warehouse_is_varied_by_presets_and_its_cases_are_its_own() -> None:
+    own, other = (Case(PolicySpec(name="x"), "x", Scenario(), task=t) for t in (WAREHOUSE, LANE))
+    assert own.key != other.key
+    assert WAREHOUSE.vary(Scenario(), {"preset": "dots"}) == Scenario.preset("dots")
+    with pytest.raises(ScenarioError, match="no scenario preset"):
+        WAREHOUSE.vary(Scenario(), {"preset": "dot"})
+
+
+def test_covers_all_that_an_episode_loads() -> None:
+    """A module that decides what a run gives must make stored runs stale when it changes."""
+    script = (
+        "import sys, swarm_logistics_env.policies.episode as e; "
+        "print(*(m.__file__ for n, m in sys.modules.items() "
+        "if n.startswith('swarm_logistics_env.')), sep='\\n')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    loaded = {Path(line).relative_to(PACKAGE).as_posix() for line in done.stdout.split()}
+    included, excluded = (
+        {path.relative_to(PACKAGE).as_posix() for p in patterns for path in PACKAGE.glob(p)}
+        for patterns in (
+            [p for p in EPISODE_CODE if p[0] != "!"],
+            [p[1:] for p in EPISODE_CODE if p[0] == "!"],
+        )
+    )
+    covered = included - excluded
+    # These hold messages, validation and names only.
+    assert loaded - covered <= {
+        "errors.py", "records.py", "code_files.py", "current_folder.py", "fingerprint.py",
+        "model_parts.py", "environment/registration.py", "policies/__init__.py",
+    }  # fmt: skip
+    assert {"world/warehouse/physics.py", "policies/homing.py", "kernels.py"} <= covered
+
+
+def test_clearing_is_a_rate_that_no_number_of_items_caps() -> None:
+    small = {"warehouse_width": 3.0, "warehouse_height": 3.0, "delivery_width": 1.0, "n_items": 6}
+    size = {"sizes": [{"values": [2, 4]}], "policies": ["homing"], "seeds": 3}
+    study = Study(out=None, task="clearing", scenario={**small, "n_robots": 4}, **size)
+    assert study.run().failed == 0
+    for cell in study.findings().cells:
+        assert not cell.saturated
+        assert cell.mean.high is not None
+        assert cell.mean.value > 6.0
+        assert cell.mean.high > cell.mean.value
+        for p, outcome in zip(cell.by_seed, cell.outcomes):
+            assert len(outcome.delivery_times) == 6
+            assert outcome.time_to_clear == pytest.approx(outcome.delivery_times[-1])
+            assert p == pytest.approx(60.0 * 6 / outcome.ended_at)
+    # A run that is not done in time has the rate until then, and no time.
+    short = Study(out=None, task="clearing", scenario={**small, "duration": 1.0}, **size)
+    outcome = short.plan().runs[0].play()
+    assert (outcome.time_to_clear, outcome.delivered) == (math.inf, 0.0)
+    with pytest.raises(StudyError, match="restock = True: should be False"):
+        Study(task="clearing", scenario={"restock": True})
+
+
+FILE = """
+seeds = 1
+scenario = { n_robots = 3, n_items = 4, warehouse_width = 3, warehouse_height = 3, duration = 2 }
+sizes = [{ values = [2, 3] }]
+policies = [
+    "swarm-dt",
+    { name = "swarm-dt", parameters = { taxis_gain = 0.5, diffusion = 0.7 } },
+    { name = "swarm-dt", parameters = { taxis_gain = 0.25 }, label = "half-hearted" },
+]
+"""
+
+
+def test_parameters_of_a_policy_are_part_of_what_a_run_is_and_are_kept(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(FILE)
+    study = Study.from_file(tmp_path / "mine.toml", out=tmp_path / "out")
+    plan = study.plan()
+    played = {case.policy.title: case.identity for case in plan.cases}
+    parameters = "swarm-dt (taxis_gain = 0.5, diffusion = 0.7)"
+    assert list(played) == ["swarm-dt", parameters, "half-hearted"]
+    assert len({*played.values()}) == 3
+    assert study.run().failed == 0
+    again = Study.stored(tmp_path / "out")
+    assert again.specification == study.specification
+    assert again.plan().cases == plan.cases
+
+
+class Silent(SwarmDT):
+    """A policy that tells nobody its parameters."""
+
+    def __init__(self, speed: float = 0.0) -> None:
+        super().__init__()
+        self.speed = speed
+
+
+def test_parameters_reach_the_policy_and_count_where_it_does_not_tell_them(tmp_path: Path) -> None:
+    chosen = PolicySpec(name="swarm-dt", parameters={"taxis_gain": 0.0})
+    # Swarm D-T without its taxis is the random walk.
+    assert policies.identity(chosen.load()) == PolicySpec.of("random-walk").identity()
+    tables = [{"name": f"{__name__}:Silent", "parameters": {"speed": s}} for s in (0.1, 0.2)]
+    one, other = map(PolicySpec.of, tables)
+    assert one.identity() != other.identity()
+    # A file may not name code by way of parameters.
+    table = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
+    (tmp_path / "mine.toml").write_text(FILE.replace('"swarm-dt",', f"{table},", 1))
+    with pytest.raises(StudyError, match="is code, which runs when it is loaded"):
+        Study.from_file(tmp_path / "mine.toml")
+    assert Study.from_file(tmp_path / "mine.toml", trust_code=True).plan().cases

@@ -1,0 +1,130 @@
+"""The search for the worst fault: against chance, killed, and refused."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Sequence
+from itertools import islice, product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, Scenario
+from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.study.attack import STORE, Attack, attack, search
+from swarm_logistics_env.study.runs.engines import serial
+from swarm_logistics_env.study.runs.store import Runs
+from swarm_logistics_env.study.tasks.task import Outcome, Run
+from swarm_logistics_env.world.warehouse.faults import ROLES
+from tests.made_up import delivered
+
+SCENARIO = Scenario(
+    n_robots=6, warehouse_width=5.0, warehouse_height=5.0, delivery_width=1.5, n_items=8,
+    restock=True, duration=30.0,
+)  # fmt: skip
+
+
+def test_the_search_comes_nearer_to_the_worst_fault_than_chance() -> None:
+    modes, roles = ("FM1", "FM2", "FM3", "FM4", "dead"), ("carrier", "searching")
+    kinds = list(product(modes, roles, (10.0, 30.0), (None, 15.0)))
+    faults = [Fault(mode, 2, onset=at, duration=t, role=role) for mode, role, at, t in kinds]
+
+    def regrets(seed: int) -> tuple[float, float]:
+        rng = np.random.default_rng(seed)
+        cost = np.zeros(len(kinds))
+        for n in (1, 2, 3):  # by mode, by role within it, by onset within that; and luck
+            alike = sorted({kind[:n] for kind in kinds})
+            effects = dict(zip(alike, rng.normal(size=len(alike))))
+            cost += [effects[kind[:n]] for kind in kinds]
+
+        def play(pairs: Sequence[tuple[int, int]]) -> list[float]:
+            return [float(cost[place] + rng.normal(0.0, 2.0)) for place, _ in pairs]
+
+        worst, tried = search(faults, play, 60, seed)
+        assert len(tried) == 60
+        chosen = rng.choice(len(kinds), 30, replace=False)  # two runs of each
+        at_random = chosen[(cost[chosen] + rng.normal(0.0, 2.0 / np.sqrt(2), 30)).argmin()]
+        return cost[worst] - cost.min(), cost[at_random] - cost.min()
+
+    by_search, by_chance = np.mean([regrets(seed) for seed in range(30)], axis=0)
+    assert by_search < 0.8 * by_chance
+
+
+def test_a_search_that_was_stopped_goes_on_and_ends_alike(tmp_path: Path) -> None:
+    asked = Attack("swarm-dt", SCENARIO, modes=("FM4", "dead"), budget=12, fresh=3)
+    whole = attack(asked, serial, tmp_path / "whole")
+
+    def stopped(runs: Any) -> Any:
+        yield from islice(serial(runs), 3)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        attack(asked, stopped, tmp_path / "stopped")
+    with Runs(tmp_path / "stopped" / STORE) as runs:
+        assert len(runs) == 3
+    assert attack(asked, serial, tmp_path / "stopped") == whole
+    assert [found.by for found in whole.found] == ["search", "named modes"]
+    assert {(one.robustness.n_seeds, one.robustness.paired) for one in whole.found} == {(3, True)}
+
+
+def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
+    short = SCENARIO.replace(duration=0.5)
+    for asked, said in (
+        (Attack("swarm-dt", SCENARIO, modes=("FM9",)), "no mode 'FM9'"),
+        (Attack("swarm-dt", SCENARIO, robots=6), "robots = 6"),
+        (Attack("swarm-dt", short, budget=10, fresh=3), "delivers nothing without faults"),
+    ):
+        with pytest.raises(SetupError, match=said):
+            attack(asked, serial, tmp_path)
+
+
+def test_a_cap_on_the_runs_without_faults_is_told(tmp_path: Path) -> None:
+    scenario = SCENARIO.replace(restock=False, n_items=3)  # all are delivered early
+    asked = Attack("homing", scenario, 1, modes=("FM2",), budget=10, fresh=12)
+    result = attack(asked, serial, tmp_path)
+    assert result.is_capped
+    assert "supported" not in {found.robustness.verdict for found in result.found}
+
+
+def test_a_fault_that_changes_no_run_is_no_evidence_and_seeds_of_estimates_are_fresh(
+    tmp_path: Path,
+) -> None:
+    asked = Attack("random-walk", SCENARIO, 1, modes=("FM3_hear",), budget=1, fresh=3)
+    result = attack(asked, serial, tmp_path)
+    assert all(found.robustness.identical for found in result.found)
+    assert not result.is_capped
+    with Runs(tmp_path / STORE) as runs:
+        rows = runs.frame().to_dict("records")
+    # Five for the choice among the named modes, and three that had no part in any choice.
+    assert sorted(row["seed"] for row in rows if row["faults"] == "[]") == list(range(8))
+
+
+def test_every_role_is_searched_at_every_time_at_which_robots_may_have_it() -> None:
+    faults = Attack("swarm-dt", SCENARIO, modes=("FM4",)).faults()
+    times = [(onset, lasts) for onset in (0.0, 6.0, 12.0, 18.0) for lasts in (None, 6.0, 12.0)]
+    assert {(fault.role, fault.onset, fault.duration) for fault in faults} == {
+        (role, *time)
+        for role, time in product((None, *ROLES), times)
+        if time[0] or role in (None, "searching")
+    }
+    assert len(faults) == 60
+
+
+def test_what_was_never_tried_is_not_named() -> None:
+    faults = Attack("swarm-dt", SCENARIO, modes=("FM1", "FM4")).faults()
+    for seed in range(10):
+        worst, tried = search(faults, lambda pairs: [-3.0] * len(pairs), 1, seed)
+        assert tried == [worst]
+
+
+def test_each_run_is_measured_against_that_of_its_seed_without_a_fault(tmp_path: Path) -> None:
+    costs = {"FM1": 4, "FM2": 10, "FM3": 6, "FM4": 8}
+
+    def engine(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
+        for run in runs:  # seeds differ far more than faults
+            cost = sum(costs[fault.mode] for fault in run.case.faults)
+            yield run, delivered(20 + 200 * (run.seed % 3 == 1) - cost, digest=run.key)
+
+    result = attack(Attack("swarm-dt", SCENARIO, modes=tuple(costs), budget=40), engine, tmp_path)
+    assert [found.fault.mode for found in result.found] == ["FM2", "FM2"]

@@ -1,0 +1,67 @@
+"""Conditions of two phases: which share of their runs collapsed, and when."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from swarm_logistics_env import judge
+from swarm_logistics_env.spi import Phases
+from swarm_logistics_env.study.report.answer import answer
+from swarm_logistics_env.study.report.collapse_tables import collapsed_in_words
+from swarm_logistics_env.study.verdicts.collapses import collapses
+
+
+def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
+    """20 runs of 500 s with a delivery in 5 s; of seven more three stop at 100 s, four are slow.
+
+    Two of these stop, too, so that their rate changes, but it never was that of the 20.
+    """
+    rng = np.random.default_rng(0)
+    rows = []
+    for run, (rate, end) in enumerate(
+        [(0.2, 500.0)] * 20 + [(0.2, 100.0)] * 3 + [(0.04, 500.0)] * 2 + [(0.05, 180.0)] * 2
+    ):
+        for robots in (4, 8):
+            times = np.sort(rng.uniform(0.0, end, rng.poisson(rate * end)))
+            rows += [(robots, run, time, 500.0) for time in times]
+    frame = pd.DataFrame(rows, columns=["robots", "run", "time", "duration"])
+    named = judge(frame).collapses
+    assert [collapse.cell.words for collapse in named] == ["N = 4", "N = 8"]
+    for collapse in named:
+        assert collapse.n_collapsed == 7
+        np.testing.assert_allclose(collapse.breaks, 100.0, atol=20.0)
+    words = collapsed_in_words(named, names_policies=False)
+    assert "26 % [11, 46] (of these 3 of 7 in mid-run, after 9" in words
+
+
+@pytest.mark.parametrize(
+    ("p_values", "n_named"), [((0.03, 0.04), 0), ((0.06, 0.02), 1), ((0.04, 0.02), 2)]
+)
+def test_conditions_are_named_by_holm(
+    monkeypatch: pytest.MonkeyPatch, p_values: tuple[float, float], n_named: int
+) -> None:
+    frame = pd.DataFrame({"robots": [4, 8] * 25, "delivered": np.repeat(np.arange(25), 2)})
+    cells = judge(frame).cells
+    for cell, p_value in zip(cells, p_values):
+        monkeypatch.setitem(vars(cell), "phases", Phases(p_value, 5.0))
+    assert len(collapses(cells)) == n_named
+
+
+def test_without_times_nothing_is_said_of_mid_run() -> None:
+    p = np.repeat([*range(90, 110), 3, 4, 5, 6, 7], 2)
+    frame = pd.DataFrame({"robots": [4, 8] * 25, "delivered": p})
+    collapse, _ = judge(frame).collapses
+    assert len(collapse.breaks) == 0
+    assert "mid-run" not in collapsed_in_words([collapse], names_policies=False)
+
+
+def test_counts_too_small_for_phases_are_untestable_in_answer_and_table() -> None:
+    p = [0] * 24 + [1] * 11 + [2] * 5
+    frame = pd.DataFrame({"robots": [4, 8] * 20, "delivered": p})
+    results = judge(frame)
+    reason = "counts are too small: fewer than 5 steps from least to most"
+    assert f"two phases untestable: N = 4 and 1 condition more ({reason})" in answer(results).notes
+    assert {*results.cell_table["phases_untestable"]} == {reason}
+    assert results.collapses == ()

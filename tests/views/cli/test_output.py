@@ -1,0 +1,128 @@
+"""Output to terminals and pipes of any encoding, and to nobody."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_logistics_env.views.cli import app
+from swarm_logistics_env.views.cli.output import prepare_output
+
+TRIALS = "robots,width,delivered\n" + "".join(
+    f"10,{width},{20 + width + k}\n" for width in (1, 2) for k in range(5 - width)
+)
+ENCODINGS = ["ascii", "cp1252", "cp437", "latin-1", "koi8-r", "shift_jis", "utf-8", "utf-16"]
+COMMAND = [sys.executable, "-c", "from swarm_logistics_env.views.cli import app; app()"]
+# Several commands of one process, then the last as the process itself ends.
+COMMANDS = """
+import sys
+from swarm_logistics_env.views.cli import app
+from swarm_logistics_env.views.cli.output import prepare_output
+
+prepare_output()
+*first, last = sys.argv[1:]
+for words in first:
+    if app.run(words.split()) != 0:
+        sys.exit(f"failed: {words}")
+sys.argv[1:] = last.split()
+app()
+"""
+
+
+@given(st.text(), st.sampled_from(ENCODINGS))
+def test_every_text_is_written_in_every_encoding(text: str, encoding: str) -> None:
+    written = io.BytesIO()
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sys, "stdout", io.TextIOWrapper(written, encoding))
+        patched.setattr(sys, "stderr", io.TextIOWrapper(io.BytesIO(), encoding))
+        prepare_output()
+        sys.stdout.write(f"{text}→")
+        sys.stdout.flush()
+        shown = written.getvalue().decode(encoding)
+    assert shown.endswith(("→", "->"))
+    if text.encode(encoding, "ignore").decode(encoding) == text:
+        assert shown[: len(text)] == text
+
+
+# The other charmaps are written as cp1252 is; the test above takes all of them.
+@pytest.mark.parametrize(
+    ("encoding", "is_terminal"),
+    [("ascii", False), ("cp1252", True), ("utf-16", False), ("utf-8", False), ("utf-8", True)],
+)
+def test_every_command_prints_in_every_encoding(
+    encoding: str, is_terminal: bool, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Path("ünï→.csv").write_text(TRIALS, encoding="utf-8")
+    if is_terminal:
+        monkeypatch.setenv("FORCE_COLOR", "1")  # tables, bars and rules of rich
+    for name in ("stdout", "stderr"):
+        buffer = io.BufferedWriter(io.FileIO(name, "w"))
+        monkeypatch.setattr(sys, name, io.TextIOWrapper(buffer, encoding))
+    prepare_output()
+    for words in (
+        "judge ünï→.csv --full --out o",
+        "study report o",
+        "study plan o",
+        "study compare o o",
+        "list scenario",
+        "list faults",
+        "judge --help",
+    ):
+        assert app.run(words.split()) == 0
+    assert app.run(["judge", "→\udc80.csv"]) == 2
+    for stream in (sys.stdout, sys.stderr):
+        stream.close()
+    printed = Path("stdout").read_bytes().decode(encoding)
+    assert "width 1→2" in printed or "width 1->2" in printed
+    assert "no such" in Path("stderr").read_bytes().decode(encoding).lower()
+
+
+def run(*commands: str, **how: Any) -> int:
+    done = subprocess.Popen([sys.executable, "-c", COMMANDS, *commands], **how)
+    if done.stdout is not None:
+        done.stdout.close()  # as `head` does that has read enough
+    if done.stderr is not None:
+        assert b"Traceback" not in done.stderr.read()
+        done.stderr.close()
+    return done.wait()
+
+
+def closing(*numbers: int) -> Any:
+    def close() -> None:
+        for number in numbers:
+            os.close(number)
+
+    return close
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="closes streams as a POSIX shell does")
+@pytest.mark.parametrize("closed", [(1,), (0, 1, 2), ()])
+def test_nothing_is_lost_where_nobody_reads(closed: Sequence[int], folder: Path) -> None:
+    Path("t.csv").write_text(TRIALS)
+    streams: dict[str, Any] = {"preexec_fn": closing(*closed)}
+    if not closed:
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    # If a text of ours was written into the store, no report can be made of it.
+    assert run("judge t.csv --out o", "study report o", "judge nosuch.csv", **streams) == 2
+    assert {"report.html", "report.md", "study.sqlite"} <= {one.name for one in Path("o").iterdir()}
+    assert run("list faults", **streams) == 0
+
+
+def test_output_that_cannot_be_written_is_still_told(folder: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no device that is always full")
+    with Path("/dev/full").open("w") as full:
+        told = subprocess.run(
+            [*COMMAND, "list", "faults"], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert told.returncode == 2
+    assert "No space left" in told.stderr

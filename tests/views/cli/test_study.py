@@ -1,0 +1,235 @@
+"""`study ...`: what it prints, writes and ends with, and what it leaves when it is stopped."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from swarm_logistics_env.compiler.numba_fence import QUIET
+from swarm_logistics_env.policies import read_card
+from swarm_logistics_env.policies.spec import WEIGHTS
+from swarm_logistics_env.study.questions.presets import PRESETS
+from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
+from swarm_logistics_env.study.studies import Study
+from tests.conftest import drawn_in_all_formats
+from tests.views.cli.conftest import Command
+
+FILE = """
+seeds = 2
+scenario = { warehouse_width = 4, warehouse_height = 3, n_robots = 4, n_items = 8, duration = 2 }
+
+[[sizes]]
+values = [2, 4]
+"""
+RUN = "study run mine.toml --engine local"
+EXAMPLES = Path(__file__).parents[3] / "examples"
+
+
+@pytest.fixture(autouse=True)
+def file(folder: Path) -> Path:
+    """The file of a study of 4 runs, in the current folder."""
+    Path("mine.toml").write_text(FILE)
+    return Path("mine.toml")
+
+
+def records(path: str) -> list[dict[str, str]]:
+    with Path(path).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def stored(directory: str) -> int:
+    if not Path(directory, FILE_NAME).is_file():
+        return 0
+    with Runs.existing(Path(directory)) as runs:
+        return len(runs.succeeded())
+
+
+def test_study_run_prints_and_writes_the_report(file: Path, command: Command) -> None:
+    # Nobody delivers in half a second: every ratio is undefined, and that is said.
+    short = FILE.replace("duration = 2", "duration = 0.5")
+    file.write_text(f"{short}\n[[faults]]\nmodes = ['FM1']\nrobots = [1]\n")
+    printed = command(f"{RUN} --out out --full")
+    for words in (
+        "4 conditions (1 shared) x 2 seeds = 8 runs",
+        "Scalability",
+        "Fault tolerance and robustness",
+        "undefined: it delivers nothing",
+    ):
+        assert words in printed
+    told = r"8 runs played in [\d.]+ s, [\d.]+ episodes/s; 0 were kept from before; "
+    assert re.fullmatch(told + "0 failed", printed.splitlines()[-1])
+    report = Path("out", "report.md").read_text()
+    assert "episodes/s" not in report
+    assert "| duration | 0.5 (default 500) |" in report
+    assert len(records("out/cells.csv")) == 5
+    assert len(records("out/claims.csv")) == 3
+    assert command("study export out --to rows.csv").startswith("8 runs")
+    rows = records("rows.csv")
+    assert [row["run"] for row in rows] == sorted(row["run"] for row in rows)
+    assert json.loads(rows[0]["scenario"])["duration"] == 0.5
+
+
+def test_figures_are_drawn_as_wide_and_in_the_letters_that_a_paper_needs(
+    command: Command,
+) -> None:
+    command(f"{RUN} --out out")
+    page = Path("out/report.html").read_text()
+    drawing, picture = Path("out/figures/answer.svg"), Path("out/figures/answer.png")
+    assert 'width="374.4pt"' in drawing.read_text()  # 72 a inch
+    with drawn_in_all_formats():
+        command("study report out --figure-width 3.5 --font serif")
+    assert 'width="252pt"' in drawing.read_text()
+    assert "font-family: 'STIXGeneral'" in drawing.read_text()
+    assert struct.unpack(">I", picture.read_bytes()[16:20]) == (1050,)  # 300 an inch
+    assert drawing.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+    # The page has drawings for a screen.
+    assert Path("out/report.html").read_text() == page
+
+
+def test_study_plan_prints_conditions_once_and_what_they_take(file: Path, command: Command) -> None:
+    file.write_text(f"{FILE}\n[[faults]]\nmodes = ['FM1']\nrobots = [1]\n")
+    printed = command("study plan mine.toml --policy swarm-dt --seeds 3 --first-seed 1000")
+    # N = 4 is the baseline of the faults as well.
+    assert "Scalability (N = 4); Fault tolerance and robustness (no fault)" in printed
+    assert "4 conditions (1 shared) x 3 seeds from 1000 on = 12 runs" in printed
+    assert list(Path().iterdir()) == [file]
+
+
+def test_every_study_that_is_shipped_or_an_example_is_planned(command: Command) -> None:
+    # Those in tasks/ need packages that nothing else does.
+    files = sorted(EXAMPLES.glob("*.toml")) + sorted(EXAMPLES.glob("study/questions/*.toml"))
+    assert len(files) > 10
+    for study in (*PRESETS, *map(str, files)):
+        assert " conditions" in command(f"study plan {study}"), study
+
+
+def test_of_all_trainings_each_has_its_conditions(command: Command) -> None:
+    printed = command("study plan mine.toml --policy ppo-robust@all")
+    for training in ("ppo-robust@0", "ppo-robust@5"):
+        (row,) = [row for row in printed.splitlines() if training in row and "(N = 2)" in row]
+        assert "Scalability" in row
+
+
+SLOW = """
+import signal
+from swarm_logistics_env.views.cli import app
+# Also where the gate itself was started to ignore it, as by nohup.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+app()
+"""
+
+
+WAITING = """
+import threading
+from swarm_logistics_env.policies import SwarmDT
+
+class Waiting(SwarmDT):
+    def reset(self, n_robots, seed):
+        super().reset(n_robots, seed)
+        if seed == 5:  # until it is ended
+            threading.Event().wait()
+"""
+
+
+def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
+    Path("waiting_policy.py").write_text(WAITING)
+    words = "study run mine.toml --seeds 30 --processes 2 --out out --policy waiting_policy:Waiting"
+    process = subprocess.Popen(
+        [sys.executable, "-c", SLOW, *words.split()],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, QUIET: "1"},
+        start_new_session=True,
+    )
+    while stored("out") == 0:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
+    _, errors = process.communicate(timeout=600)
+    assert process.returncode == 130
+    kept = stored("out")
+    assert 0 < kept < 60
+    assert errors.strip() == (
+        f"Stopped. {kept} of 60 runs are finished and kept in out; the same command goes "
+        f"on with the other {60 - kept}."
+    )
+
+
+def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says_so(
+    command: Command,
+) -> None:
+    assert "xploratory" not in command(f"{RUN} --out out")
+    printed = command(f"{RUN} --out out --seeds 4")
+    # It warns before it plays, so that one can still stop it.
+    warning = printed.index("This study declared other seeds before its first run: every verdict")
+    assert warning < printed.index("1 question, swarm-dt, 4 paired seeds.")
+    assert "exploratory: they are over other seeds" in Path("out", "report.md").read_text()
+    assert "holds the study 'mine'" in command("study run quick --out out", code=2)
+    # What it proposes is a study whose verdicts stand.
+    assert "xploratory" not in command(f"{RUN} --out new --first-seed 4")
+
+
+BROKEN = """
+class Broken:
+    def reset(self, n_robots, seed): raise RuntimeError('a wheel came off')
+    def act(self, observations): ...
+"""
+
+
+def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
+    file: Path, command: Command
+) -> None:
+    command(f"{RUN} --restock")
+    assert Study.stored("results/mine-restock").specification.scenario.restock  # type: ignore[attr-defined]
+    assert "did you mean 'mujoco'" in command(f"{RUN} --bodies mujoko", code=2)
+    command(f"{RUN} --bodies mujoco --seeds 1")
+    moved = Study.stored("results/mine-bodies-mujoco")
+    assert {case.scenario.bodies for case in moved.plan().cases} == {"mujoco"}  # type: ignore[attr-defined]
+    file.write_text(FILE.replace("n_items = 8, duration = 2", "n_items = 1, duration = 60"))
+    printed = command(f"{RUN} --policy homing --seeds 1")
+    assert "homing delivers every item before the end" in printed
+    # It stands beside the study of the file's own policies.
+    assert Path("results/mine-homing/report.html").exists()
+    Path("broken_policy.py").write_text(BROKEN)
+    printed = command(f"{RUN} --policy broken_policy:Broken --restock --out broken", code=1)
+    assert "3 failed, the first with RuntimeError: a wheel came off" in printed
+    assert "Stopped, as nothing works" in printed
+    assert "2 of 2 runs failed" in Path("broken", "report.md").read_text()
+
+
+def test_a_study_and_its_shards_are_kept_under_its_name_and_merged(command: Command) -> None:
+    merge = "study merge results/mine/shard-*-of-2 --out results/mine"
+    for number in (1, 2):
+        printed = command(f"{RUN} --shard {number}/2")
+        assert "2 runs played" in printed
+        assert merge in printed
+    shards = (f"results/mine/shard-{number}-of-2" for number in (1, 2))
+    printed = command(merge.replace("results/mine/shard-*-of-2", " ".join(shards)))
+    assert "study report results/mine" in printed
+    assert "0 runs played" in command(RUN)
+    assert stored("results/mine") == 4
+
+
+def test_a_trained_policy_is_called_by_the_name_on_its_card(file: Path, command: Command) -> None:
+    model = WEIGHTS / "ppo-delivery.safetensors"
+    name = read_card(model).name
+    shutil.copy(model, "first.safetensors")
+    printed = command("run --policy first.safetensors --set duration=1")
+    assert f"robots with {name}, seed 0" in printed
+    study = Study.from_file(file, out="out", policies=["first.safetensors"])
+    study.run()
+    Path("first.safetensors").unlink()  # the store knows the name, whatever became of the file
+    for found in (study, Study.stored("out")):
+        assert {cell.policy for cell in found.findings().cells} == {name}

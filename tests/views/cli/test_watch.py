@@ -1,0 +1,100 @@
+"""`watch`, and films of `run`."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import webbrowser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm_logistics_env.compiler.numba_fence import QUIET
+from swarm_logistics_env.views.cli import app
+from swarm_logistics_env.views.watch import server
+from tests.views.cli.conftest import Command
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["film.mp4 --policy swarm-dt --policy random-walk", "film.gif --fault FM4:2 --twin"],
+)
+def test_film_is_written(words: str, folder: Path, command: Command) -> None:
+    printed = command(f"run --film {words} --until 1 --set n_robots=4")
+    (film,) = folder.iterdir()
+    assert re.fullmatch(rf"{film.name}: \d+ frames, [\d.]+ s, [\d.]+ MB\n", printed)
+    assert film.stat().st_size > 1000
+    assert film.read_bytes()[:8].endswith(b"ftyp") == (film.suffix == ".mp4")
+
+
+SCRIPT = """
+import signal, sys
+# Also where the gate itself was started to ignore it, as by nohup.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.modules["pygame"] = None
+from swarm_logistics_env.views.cli import app
+from swarm_logistics_env.compiler.numba_fence import QUIET
+sys.exit(app.run(["watch", "--port", "0", "--set", "n_robots=5"]))
+"""
+
+
+def test_page_is_served_until_ctrl_c_without_pygame() -> None:
+    started = subprocess.Popen(
+        [sys.executable, "-u", "-c", SCRIPT],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONWARNINGS": "error", QUIET: "1"},
+    )
+    assert started.stdout
+    found = re.search(r"http://127\.0\.0\.1:(\d+)(/\S+/) in a browser", started.stdout.readline())
+    assert found
+    connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=600)
+    connection.request("GET", f"{found[2]}page.js")
+    answer = connection.getresponse()
+    assert answer.status == 200
+    assert answer.read()
+    with socket.create_connection(("127.0.0.1", int(found[1]))):  # must not keep it from ending
+        started.send_signal(signal.SIGINT)
+        _, errors = started.communicate(timeout=600)
+    connection.close()
+    assert (started.returncode, errors) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "at_terminal", "screen", "opens"),
+    [
+        ("watch", True, ":0", True),
+        ("watch", False, ":0", False),
+        ("watch", True, "", False),
+        ("watch --no-open", True, ":0", False),
+    ],
+)
+def test_the_browser_opens_at_a_terminal_with_a_screen(
+    words: str, at_terminal: bool, screen: str, opens: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served: list[Any] = []
+    monkeypatch.setattr(server, "serve", lambda *given, show: served.append((*given, show)))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: at_terminal)
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("DISPLAY", screen)
+    assert app.run(words.split()) == 0
+    ((session, port, _, show),) = served
+    assert (session.policy, port) == ("ppo-delivery", 8765)
+    assert show is (webbrowser.open if opens else None)
+
+
+def test_replay_is_written_without_a_server(command: Command) -> None:
+    assert ": 3 s, " in command("watch --set n_robots=5 --save run.html --until 3")
+    page = Path("run.html").read_text(encoding="utf-8")
+    assert "script-src 'sha256-" in page
+    assert "http://" not in page
+    assert "src=" not in page.replace("'none'; script-src", "")

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, Scenario, policies, run_episode
+from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.policies.episode import Play
+from swarm_logistics_env.world.rendering.renderer import Renderer, load_pygame
+
+load_pygame()
+
+from swarm_logistics_env.views.watch.film import Film, Take  # noqa: E402 - wants pygame
+
+SMALL = Scenario(n_robots=6, n_items=8, duration=12.0, warehouse_width=4, warehouse_height=4)
+
+
+def take(*faults: Fault) -> Take:
+    return Take("a", Play(SMALL, policies.load("swarm-dt"), 3, faults))
+
+
+def test_runs_go_on_one_clock_until_the_end() -> None:
+    faults = [Fault("FM4", 2, onset=5.0)]
+    takes = [take(), take(*faults)]
+    film = Film(takes, until=1e9, speed=3.0, frame_rate=7.0, size=100)
+    assert len(list(film.frames())) == film.n_frames == 28 + 1 + 14
+    for one, these in zip(takes, ([], faults)):
+        episode = run_episode(SMALL, policies.load("swarm-dt"), 3, these)
+        assert one.play.is_over
+        assert one.play.world.state.delivery_times == episode.delivery_times.tolist()
+
+
+def test_same_runs_give_the_same_frames_and_faults_show() -> None:
+    def frames(*takes: Take) -> list[np.ndarray[Any, Any]]:
+        return list(Film(takes, 3.0, 10.0, 10.0, 120).frames())
+
+    fault = Fault("FM1", 1, onset=2.0)
+    sound, broken = frames(take()), frames(take(fault))
+    np.testing.assert_equal(frames(take()), sound)
+    assert not np.array_equal(sound, broken)
+    # Below the name and P stands the picture of the state, at its place to the pixel.
+    at_start = take().play.world
+    picture = Renderer(SMALL, "rgb_array", 120).frame(at_start.state, SMALL)
+    head = len(sound[0]) - len(picture)
+    np.testing.assert_equal(sound[0][head:], picture)
+    assert 20 < head < 40
+    # Side by side each looks as it does alone.
+    wide = frames(take(), take(fault))
+    np.testing.assert_equal([np.hstack(pair) for pair in zip(sound, broken)], wide)
+
+
+def test_runs_in_wide_warehouses_stand_one_above_the_other() -> None:
+    wide = SMALL.replace(warehouse_width=16)
+    takes = [Take("a", Play(wide, policies.load("homing"), seed, [])) for seed in (0, 1)]
+    height, width, _ = next(Film(takes, 1.0, 1.0, 5.0, 300).frames()).shape
+    assert width == 600
+    assert height > 2 * 145
+
+
+def test_wrong_arguments() -> None:
+    right: dict[str, Any] = {"takes": [take()], "until": 5.0, "speed": 1.0, "frame_rate": 9.0}
+    for name, wrong, words in (
+        ("takes", [], "0 runs: should be 1 to 4"),
+        ("until", float("nan"), "until = nan"),
+        ("speed", 0.0, "speed = 0"),
+    ):
+        with pytest.raises(SetupError, match=words):
+            Film(**{**right, name: wrong})

@@ -1,0 +1,404 @@
+"""The server: what it serves, to whom, and what it refuses."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import http.client
+import json
+import os
+import random
+import signal
+import socket
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import aiohttp
+import pytest
+
+from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.views.watch import Session, server
+from swarm_logistics_env.views.watch.server import LOOPBACK, WatchServer, serve
+from tests.views.watch.conftest import SMALL, Served
+
+
+@pytest.fixture(scope="module")
+def asked() -> Iterator[Served]:
+    """One server for all tests that change nothing of its session."""
+    one = Served()
+    yield one
+    one.stop()
+
+
+LONG = 300.0  # [s]; ends what hangs
+
+
+def ask(served: Served, name: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
+    """Ask for a file below the token, or for a path that begins with /."""
+    path = name if name.startswith("/") else f"/{served.server.token}/{name}"
+    host = urlsplit(served.server.address).hostname or ""
+    connection = http.client.HTTPConnection(host, served.server.port, timeout=LONG)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse()
+    found = answer.status, answer.read(), dict(answer.getheaders())
+    connection.close()
+    return found
+
+
+def messages(
+    served: Served, orders: list[str], enough: int | Callable[[dict[str, Any]], bool]
+) -> list[dict[str, Any]]:
+    """Send orders and return the messages that come, until a problem or `enough` of them.
+
+    Args:
+        enough: how many, or whether a message is the last.
+    """
+
+    def is_last(got: list[dict[str, Any]]) -> bool:
+        if isinstance(enough, int):
+            return len(got) >= enough
+        return bool(got) and enough(got[-1])
+
+    async def talk() -> list[dict[str, Any]]:
+        got: list[dict[str, Any]] = []
+        live = f"{served.server.address}live"
+        async with aiohttp.ClientSession() as client, client.ws_connect(live) as page:
+            for order in orders:
+                await page.send_str(order)
+            while not is_last(got) and not (got and "problem" in got[-1]):
+                got.append(json.loads((await page.receive(LONG)).data))
+        return got
+
+    return asyncio.run(talk())
+
+
+def test_page_and_scripts_come_with_a_content_policy(asked: Served) -> None:
+    for name in ("", "page.css", "draw.js", "panel.js", "page.js"):
+        status, body, headers = ask(asked, name)
+        assert status == 200
+        assert body
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'; script-src 'self'" in policy
+        assert "frame-ancestors 'none'" in policy
+        assert headers.items() >= {
+            ("Cache-Control", "no-store"),
+            ("Referrer-Policy", "no-referrer"),
+            ("Cross-Origin-Resource-Policy", "same-origin"),
+            ("X-Content-Type-Options", "nosniff"),
+        }
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "swarm.example"},
+        {"Host": "192.168.0.7:8765"},
+        {"Host": "127.0.0.1.swarm.example:8765"},
+        {"Host": "127.0.0.1:8765.swarm.example"},
+        {"Host": ""},
+        {"Origin": "http://swarm.example"},
+        {"Origin": "null"},
+        {"Origin": "https://127.0.0.1"},
+    ],
+)
+def test_other_hosts_and_origins_are_refused(asked: Served, headers: dict[str, str]) -> None:
+    for name in ("", "live", "recording.html"):
+        assert ask(asked, name, **headers)[0] == 403
+
+
+def test_without_the_token_nothing_is_served(asked: Served) -> None:
+    token = asked.server.token
+    wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
+    for path in ("/", "/page.js", f"/{wrong}/", f"/{wrong}/live", "//", "/%ff/"):
+        status, body, _ = ask(asked, path)
+        assert status == 403, path
+        assert token.encode() not in body
+
+
+@pytest.mark.parametrize(
+    "name", ["server.py", "../server.py", "..%2fserver.py", "%2e%2e/session.py", "/etc/passwd"]
+)
+def test_serves_no_other_file(asked: Served, name: str) -> None:
+    status, body, _ = ask(asked, f"/{asked.server.token}/{name}")
+    assert status in (403, 404)
+    assert b"import" not in body
+
+
+def test_listens_on_loopback_only(asked: Served) -> None:
+    listening = asked.server._listening
+    assert listening is not None
+    assert listening.getsockname()[0] == "127.0.0.1"
+
+
+def test_the_page_is_shown_once_it_is_served() -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    pages = []
+
+    def show(address: str) -> None:
+        try:
+            with urllib.request.urlopen(address, timeout=LONG) as answer:
+                pages.append(answer.read())
+        finally:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    try:
+        serve(Session(SMALL), 0, lambda sentence: None, show=show)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert b"R, robustness: " in pages[0]
+
+
+def test_frames_hold_what_changed_and_orders_are_obeyed(served: Served) -> None:
+    assert served.server.session.run.world.state.step == 0  # no page was open
+    fixed, first, second = messages(served, [], 3)
+    assert "swarm-dt" in fixed["choices"]
+    assert len(first["poses0"]) == len(first["poses1"]) == 18
+    assert second["time"] > first["time"]
+    assert "scenario" not in second
+    orders = [
+        {"do": "choose", "mode": "FM1"},
+        {"do": "toggle", "robot": 3},
+        {"do": "pause"},
+        {"do": "no such order"},  # its refusal tells that the others are done
+    ]
+    assert "problem" in messages(served, [json.dumps(order) for order in orders], 99)[-1]
+    session = served.server.session
+    assert session.run.world.state.failure_modes[3] == ("FM1",)
+    assert not session.beside.world.state.failed.any()
+    assert session.paused
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        ('{"do":"toggle","robot":99}', "robot = 99"),
+        ('{"do":"select","robot":"3"}', "valid integer"),
+        ('{"do":"compare","policy":"os:abort"}', "no policy 'os:abort'"),
+        ('{"do":"widen","width":NaN}', "order"),
+        ("[]", "order"),
+        ("[" * 3000, "order"),
+    ],
+)
+def test_order_that_cannot_be_is_refused_in_a_sentence(
+    asked: Served, order: str, words: str
+) -> None:
+    assert words in messages(asked, [order], 10)[-1]["problem"]
+
+
+def test_a_message_that_is_too_long_ends_its_page_alone(served: Served) -> None:
+    async def talk() -> int | None:
+        live = f"{served.server.address}live"
+        async with aiohttp.ClientSession() as client, client.ws_connect(live) as page:
+            await page.send_str('{"do":"select","robot":' + " " * 5000 + "3}")
+            while (await page.receive(LONG)).type is aiohttp.WSMsgType.TEXT:
+                pass  # frames that are under way
+            return page.close_code
+
+    assert asyncio.run(talk()) == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
+    assert served.server.session.selected is None
+    assert messages(served, [], 1)
+
+
+def test_more_pages_than_there_may_be_are_refused(served: Served) -> None:
+    async def open_pages() -> int:
+        live = f"{served.server.address}live"
+        async with aiohttp.ClientSession() as client, contextlib.AsyncExitStack() as pages:
+            for _ in range(16):
+                await pages.enter_async_context(client.ws_connect(live))
+            with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+                await client.ws_connect(live)
+            async with client.get(live) as answer:
+                assert "16 pages are open" in await answer.text()
+                assert int(answer.headers["Retry-After"]) > 0
+        return refused.value.status
+
+    assert asyncio.run(open_pages()) == 503
+
+
+def test_malformed_requests_neither_stop_it_nor_leak_a_path(
+    served: Served, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rng = random.Random(7)
+    token = served.server.token.encode()
+    answered = 0
+    for _ in range(200):
+        line = rng.choice(
+            [b"GET / HTTP/1.1", b"GET /" + token + b"/../../x HTTP/1.1", b"POST /" + token,
+             b"\0", rng.randbytes(20), b"GET /" + b"a" * 70000 + b" HTTP/1.1"]
+        )  # fmt: skip
+        header = rng.choice([b"Host: evil", b"no colon", b"Content-Length: x", rng.randbytes(30)])
+        answer = b""
+        address = ("127.0.0.1", served.server.port)
+        with contextlib.suppress(OSError), socket.create_connection(address, timeout=LONG) as one:
+            one.sendall(line + b"\r\n" + header + b"\r\nConnection: close\r\n\r\n")
+            while part := one.recv(1 << 16):  # it is closed on a request that was too long
+                answer += part
+        answered += bool(answer)
+        assert not any(secret in answer for secret in (b"/usr/", b".py", b"Traceback"))
+    assert answered > 50
+    assert ask(served, "")[0] == 200
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_where_it_cannot_listen_is_told_in_a_sentence(asked: Served) -> None:
+    with pytest.raises(SetupError, match="in use; --port 0 takes any that is free"):
+        asyncio.run(WatchServer(Session(SMALL), asked.server.port).start())
+
+
+RAISING = """
+import numpy as np
+
+class Raising:
+    def reset(self, n_robots, seed): self.left = 5
+    def act(self, observations):
+        self.left -= 1
+        if not self.left: raise ValueError("boom in my controller")
+        return np.zeros((len(observations), 4))
+class Leaving(Raising):
+    def reset(self, n_robots, seed): raise SystemExit(3)
+"""
+
+
+def test_a_policy_that_fails_is_told_to_the_page_and_the_server_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "raising_policy.py").write_text(RAISING)
+    monkeypatch.syspath_prepend(tmp_path)
+    session = Session(SMALL, "raising_policy:Raising", speed=8.0)
+    session.choices = (*session.choices, "raising_policy:Leaving")
+    served = Served(session)
+    try:
+        got = messages(served, [], lambda message: bool(message.get("failure")))
+        said = "ValueError: boom in my controller, raising_policy.py line 8"
+        assert got[-1]["failure"] == said
+        order = json.dumps({"do": "compare", "policy": "raising_policy:Leaving"})
+        got = messages(served, [order], 99)
+        assert got[-1]["problem"] == "SystemExit: 3, raising_policy.py line 11"
+        order = json.dumps({"do": "compare", "policy": "homing"})
+        got = messages(served, [order], lambda message: message.get("time", 0.0) > 3.0)
+        assert {"policy": "homing", "failure": ""}.items() <= {
+            name: value for message in got[-20:] for name, value in message.items()
+        }.items()
+    finally:
+        served.stop()
+
+
+def silent(served: Served, request: str) -> socket.socket:
+    """Return a connection that asks once, and neither reads nor answers after that."""
+    one = socket.socket()
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    one.settimeout(LONG)
+    one.connect((LOOPBACK, served.server.port))
+    one.sendall(request.format(token=served.server.token, port=served.server.port).encode())
+    return one
+
+
+def n_open(served: Served) -> int:
+    """Return how many connections the server has."""
+    inner = served.server._runner.server
+    assert inner is not None
+    return len(inner.connections)
+
+
+PAGE = (
+    "GET /{token}/live HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\n"
+    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+)
+SILENT = {
+    "pages": PAGE,
+    "files": "GET /{token}/draw.js HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n" * 20,
+    "half a request": "GET /{token}/ HTTP/1.1\r\nHost: loc",
+    "nothing": "",
+}
+
+
+def wait_until(is_true: Callable[[], bool]) -> None:
+    """Wait for something that comes, however slow the machine is."""
+    is_over = time.monotonic() + LONG
+    while not is_true():
+        assert time.monotonic() < is_over
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("kind", SILENT)
+def test_connections_that_neither_read_nor_answer_end_and_shut_nobody_out(
+    kind: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(server, "_SHORTEST_SILENCE", 0.0)
+    if kind == "pages":
+        monkeypatch.setattr(server, "_HEARTBEAT", 0.5)
+    served = Served()
+    waiting = [silent(served, SILENT[kind]) for _ in range(16 if kind == "pages" else 100)]
+    try:
+        if kind == "pages":
+            for one in waiting:
+                with contextlib.suppress(ConnectionError):
+                    while one.recv(1 << 16):  # until it is closed
+                        pass
+            monkeypatch.setattr(server, "_HEARTBEAT", LONG)
+        else:
+            assert ask(served, "")[0] == 200
+            assert len(messages(served, [], 3)) == 3
+            with monkeypatch.context() as hurried:
+                hurried.setattr(server, "_LONGEST_SILENCE", 0.0)
+                wait_until(lambda: n_open(served) == 0)
+        assert len(messages(served, [], 3)) == 3
+    finally:
+        served.stop()
+        for one in waiting:
+            one.close()
+    assert len(capfd.readouterr().err) < 1000
+
+
+def test_of_pages_that_open_in_one_moment_all_are_answered(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "_SHORTEST_SILENCE", LONG)
+    request = "GET /{token}/ HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n"
+    asking = [silent(served, "") for _ in range(200)]
+    text = request.format(token=served.server.token, port=served.server.port).encode()
+    for one in asking:
+        one.sendall(text)
+    answers = []
+    for one in asking:
+        with one, one.makefile("rb") as answer:
+            answers.append(answer.read().partition(b"\r\n")[0])
+    assert answers == [b"HTTP/1.1 200 OK"] * 200
+
+
+def test_a_page_that_reads_nothing_is_dropped_and_holds_up_no_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(server, "_PATIENCE", LONG)
+    monkeypatch.setattr(
+        server, "frame_message", lambda session: {"long": f"{time.time()}" * 20_000}
+    )
+    served = Served()
+    slow = silent(served, PAGE)
+    try:
+        wait_until(lambda: len(served.server._pages) == 1)
+        (page,) = served.server._pages
+        wait_until(lambda: page._transport.get_write_buffer_size() > 0)
+        assert len(messages(served, [], 6)) == 6
+        assert page in served.server._pages
+        monkeypatch.setattr(server, "_PATIENCE", 0.0)
+        wait_until(lambda: not served.server._pages)
+    finally:
+        served.stop()
+        slow.close()
+
+
+def test_a_note_ends_and_who_opens_a_page_later_does_not_see_it(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "_NOTE_LASTS", LONG)
+    order = json.dumps({"do": "toggle", "robot": 3})
+    assert messages(served, [order], lambda message: bool(message.get("note")))
+    monkeypatch.setattr(server, "_NOTE_LASTS", 0.0)
+    wait_until(lambda: not served.server.session.note)
+    assert messages(served, [], 2)[-1]["note"] == ""

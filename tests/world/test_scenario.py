@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_logistics_env import Scenario, Warehouse, run_episode
+from swarm_logistics_env.core.errors import ScenarioError
+from swarm_logistics_env.policies import load
+from swarm_logistics_env.world.scenario import SOURCES
+
+
+@given(
+    n_robots=st.integers(1, 100),
+    n_items=st.integers(1, 100),
+    warehouse_width=st.floats(8.0, 40.0),
+    delivery_width=st.floats(0.01, 3.0),
+    duration=st.floats(0.1, 1e5),
+    restock=st.booleans(),
+    relay=st.sampled_from(["none", "gossip"]),
+    view_range=st.floats(1e-3, 50.0),
+)
+def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
+    scenario = Scenario(**fields)
+    back = Scenario.from_json(scenario.to_json())
+    assert (back, hash(back)) == (scenario, hash(scenario))
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"n_robots": 0}, "Scenario.n_robots = 0: should be .* equal to 1"),
+        ({"duration": math.nan}, "duration = nan: should be a finite number"),
+        ({"relay": "flood"}, "relay = 'flood': should be 'none' or 'gossip'"),
+        ({"n_robot": 3}, "no field 'n_robot'; did you mean 'n_robots'?"),
+        ({"n_robots": 0, "n_items": -1}, r"n_robots = 0: .*; .*n_items = -1: .*"),
+        # What cannot be built.
+        ({"warehouse_width": 0.5}, "delivery_width = 2.0 m leaves no storage: .* than .* 0.5 m"),
+        (
+            {"warehouse_width": 0.5, "warehouse_height": 0.5, "delivery_width": 0.1},
+            r"n_robots = 25 of radius 0.125 m do not fit .* 0.4 x 0.5 m: should be at most 1 ",
+        ),
+        ({"n_obstacles": 300}, "n_obstacles = 300 .* should be at most 113"),
+        ({"n_obstacles": 100, "n_items": 200}, r"n_items = 200 .* should be at most \d+ "),
+        ({"warehouse_width": 2.2}, r"width - delivery_width = 0.2 m is narrower .* least 0.25 m"),
+        ({"control_period": 0.05}, "control_period = 0.05 s should be a whole multiple of .* 0.02"),
+        ({"physics_period": 0.05}, "physics_period = 0.05 s: should be at most 0.02 s, or robots"),
+        ({"max_speed": 6.0}, r"lets a robot cross 0.12 m .* at most .* 0.0166667 s"),
+        ({"duration": 0.05}, "duration = 0.05 s should be at least one control_period"),
+        ({"n_requests": 61}, "n_requests = 61: should be at most n_items = 60"),
+        ({"dock_capacity": 10.1}, "dock_capacity = 10.1: should be at most .* 10 per second"),
+        # Numbers that no run survives.
+        ({"duration": 1e308}, "duration = 1e.308: should be .* equal to 1000000000"),
+        (
+            {"obstacle_radius": 1e-300},
+            "obstacle_radius = 1e-300: should be .* to 0.000000001",
+        ),
+        ({"physics_period": 1e-8}, "physics steps of a control_period: should be at most 1000"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_the_reason(fields: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ScenarioError, match=complaint):
+        Scenario(**fields)
+    with pytest.raises(ScenarioError, match=complaint):
+        Scenario().replace(**fields)
+
+
+@pytest.mark.parametrize(
+    ("field", "count"), [("n_robots", 651), ("n_items", 651), ("n_obstacles", 112)]
+)
+def test_as_many_as_it_says_fit_do_fit(field: str, count: int) -> None:
+    smallest = Scenario(n_robots=1, n_items=1)  # which need the room of one obstacle
+    Warehouse(smallest.replace(**{field: count})).reset(0)
+    with pytest.raises(ScenarioError, match=field):
+        smallest.replace(**{field: 652})
+
+
+def test_conditions_list_every_field_with_its_value_unit_and_source() -> None:
+    rows = {row[0]: row for row in Scenario(n_robots=7, max_speed=1.25).conditions()}
+    for name, field in Scenario.model_fields.items():
+        meaning = field.description or ""
+        assert rows[name][2] == meaning
+        # A length, a time and the like has its unit; the source comes last.
+        assert not isinstance(field.default, float) or "[" in meaning, name
+        kind, _, sources = meaning.rsplit("; ", 1)[-1].partition(": ")
+        assert kind in ("source", "fitted", "chosen", "off"), name
+        assert set(sources.split(", ")) <= (SOURCES.keys() if kind == "source" else {""}), name
+    assert rows["n_robots"][1] == "7 (default 25)"
+    assert rows["max_speed"][1] == "1.25 (default 2)"
+    assert rows["n_items"][1] == "60"
+
+
+def test_the_preset_of_dotbots_delivers_with_the_packages_own_bodies_too() -> None:
+    scenario = Scenario.preset("dotbots")
+    assert (scenario.bodies, scenario.drive, scenario.n_robots) == ("chipmunk", "differential", 20)
+    assert run_episode(scenario.replace(duration=60.0), load("homing"), seed=0).delivered > 0
+
+
+def test_presets_and_that_an_episode_has_enough_steps_for_its_duration() -> None:
+    paper = Scenario.preset("paper")
+    assert paper == Scenario()
+    assert (paper.warehouse_width, paper.warehouse_height, paper.storage_width) == (10.0, 10.0, 8.0)
+    assert (paper.n_robots, paper.n_items, paper.duration) == (25, 60, 500.0)
+    assert (paper.n_steps, paper.n_substeps) == (5000, 5)
+    assert Scenario.preset("paper_scalability") == Scenario(n_items=100)
+    realistic = Scenario.preset("realistic")
+    assert (realistic.handling_steps, realistic.dock_period) == (10, 1.0)
+    assert (realistic.max_speed, realistic.max_acceleration, realistic.max_turn_rate) == (1, 2, 6)
+    for duration, period, steps in ((0.7, 0.1, 7), (0.75, 0.1, 8), (2.0, 0.3, 7)):
+        assert Scenario(duration=duration, control_period=period).n_steps == steps
+    with pytest.raises(ScenarioError, match="no scenario preset 'papr'; did you mean 'paper'"):
+        Scenario.preset("papr")
