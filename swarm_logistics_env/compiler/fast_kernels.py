@@ -37,16 +37,9 @@ R = TypeVar("R")
 
 _CHECKSUM_SIZE = 16  # bytes
 _SILENCE = 1.0  # [s] of compiling that nobody is told of
-_HERE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 # Where kernels stand, and what they take from.
-_SOURCES = (
-    "*.py",
-    "world/floor/*.py",
-    "world/motion/*.py",
-    "policies/*.py",
-    "train/*.py",
-    "world/warehouse/*.py",
-)
+_SOURCES = ("compiler/*.py", "world/**/*.py", "policies/*.py", "train/*.py")
 _all_kernels: list[Any] = []
 _parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
 _config, _types = cast("tuple[Any, Any]", (config, types))  # without types
@@ -170,7 +163,7 @@ def _with_cache(compiled: Any) -> Iterator[None]:
         cache = compiled._cache
         cache.save_overload = functools.partial(_save_overload, cache)
         # numba looks at the kernel's own file alone, not at what it takes from others.
-        is_ours = Path(compiled.py_func.__code__.co_filename).is_relative_to(_HERE)
+        is_ours = Path(compiled.py_func.__code__.co_filename).is_relative_to(_PACKAGE)
         stamp = (_digest(), None if is_ours else cache._impl.locator.get_source_stamp())
         cache._cache_file = _CheckedFiles(  # type: ignore[no-untyped-call]  # numba's
             cache.cache_path, f"{cache._impl.filename_base}.checked", stamp
@@ -255,7 +248,7 @@ def _digest() -> str:
     """Return a digest of the files whose code kernels are made of."""
     digest = hashlib.blake2b(digest_size=8)
     for pattern in _SOURCES:
-        for file in sorted(_HERE.glob(pattern)):
+        for file in sorted(_PACKAGE.glob(pattern)):
             digest.update(file.read_bytes())
     return digest.hexdigest()
 

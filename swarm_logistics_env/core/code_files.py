@@ -38,7 +38,7 @@ from typing import Any
 from swarm_logistics_env.core.current_folder import allow_import
 from swarm_logistics_env.core.errors import RAISED_BY_OTHERS, SwarmLogisticsError, suggest
 
-PACKAGE = Path(__file__).parent
+PACKAGE = Path(__file__).parents[1]
 _lock = threading.RLock()
 _loaded: dict[Path, tuple[Mapping[Path, object], ModuleType]] = {}  # by file, with its sources
 

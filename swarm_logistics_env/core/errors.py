@@ -69,7 +69,7 @@ def users_line(traceback: str) -> tuple[str, str] | None:
     """
     frames: list[tuple[str, str]] = _FRAME.findall(traceback)
     libraries = (sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib"))
-    not_by_users = (str(Path(__file__).parent), "<", *libraries)
+    not_by_users = (str(Path(__file__).parents[1]), "<", *libraries)
     users_frames = [frame for frame in frames if not frame[0].startswith(not_by_users)]
     if users_frames:
         return users_frames[-1]
@@ -78,7 +78,7 @@ def users_line(traceback: str) -> tuple[str, str] | None:
 
 def how_to_install(extra: str) -> str:
     """Return the end of an error message about a package of one of the extras that is missing."""
-    if (Path(__file__).parents[1] / "constraints.txt").is_file():  # in a clone
+    if (Path(__file__).parents[2] / "constraints.txt").is_file():  # in a clone
         return f"pip install -c constraints.txt -e '.[{extra}]'"
     return f"pip install 'swarm-logistics-env[{extra}]'"
 

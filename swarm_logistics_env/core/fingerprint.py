@@ -24,16 +24,6 @@ from swarm_logistics_env.core.code_files import PACKAGE, is_users_own, names_in,
 from swarm_logistics_env.core.errors import RAISED_BY_OTHERS
 from swarm_logistics_env.core.model_parts import copy_of_part, model_parts
 
-# What decides an episode. The other files hold messages, validation, statistics and pictures, and
-# "!" excludes those that name and read policies: a policy's identity tells what was read.
-EPISODE_CODE = (
-    "episode.py", "fast_kernels.py", "kernels.py", "numba_fence.py", "observations.py",
-    "streams.py", "world/bodies/*.py", "world/scenario/*.py",
-    "world/floor/*.py", "world/floor/plans/*.txt", "world/motion/*.py", "policies/*.py", "!policies/__init__.py",
-    "!policies/spec.py", "!policies/files.py", "!policies/models.py", "!policies/model_spaces.py",
-    "!policies/networks.py", "!policies/normalizers.py", "!policies/sb3_files.py",
-    "world/warehouse/*.py",
-)  # fmt: skip
 UNSTABLE = "unstable "  # begins the fingerprint of a value that is another one each time
 
 
@@ -42,7 +32,7 @@ def package_code(*patterns: str) -> str:
     """Return 16 hexadecimal digits that change with files of this package.
 
     Args:
-        patterns: of paths in the package, as "world/warehouse/*.py"; one that begins with "!" excludes.
+        patterns: of paths in the package, as "warehouse/*.py"; one that begins with "!" excludes.
     """
     paths = sorted(
         _matching(p for p in patterns if p[0] != "!")

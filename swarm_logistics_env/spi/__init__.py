@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from swarm_logistics_env.study.trials import Trial, Trials, read_trials
 
 from .definitions import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .equivalence import Equivalence, equivalence
@@ -47,8 +46,6 @@ __all__ = [
     "Options",
     "Phases",
     "SurvivalCurve",
-    "Trial",
-    "Trials",
     "adaptability",
     "adjust",
     "adjusted_p_values",
@@ -67,7 +64,6 @@ __all__ = [
     "no_plan_because",
     "pairing_correlation",
     "prediction_interval",
-    "read_trials",
     "relative_change",
     "repair_times",
     "resilience_index",

@@ -45,7 +45,7 @@ from .task import Case, Fields, Outcome, TaskScenario, digest_of
 
 # These files decide what a run in somebody else's environment gives.
 ENVIRONMENT_CODE = (
-    "streams.py",
+    "core/streams.py",
     "study/tasks/parallel_policies.py",
     "study/tasks/parallel_task.py",
     "study/tasks/parallel_wrappers.py",

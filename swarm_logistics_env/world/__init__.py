@@ -1,0 +1,1 @@
+"""What is simulated: scenario, floor, warehouse, robots' bodies and senses, motion, pictures."""
