@@ -14,17 +14,17 @@ STABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "run_episode": (),
         "Episode": ("delivered",),
         "Fault": (),
-        "warehouse.failure_modes.FailureMode": (),
+        "world.warehouse.failure_modes.FailureMode": (),
         "Warehouse": ("reset", "step", "observe", "change", "set_faults"),
-        "observations.columns": (),
-        "observations.unflatten": (),
-        "streams.generator": (),
-        "streams.row_keys": (),
+        "world.observations.columns": (),
+        "world.observations.unflatten": (),
+        "core.streams.generator": (),
+        "core.streams.row_keys": (),
     },
     "Bodies of robots": {
-        "bodies.Placement": (),
-        "bodies.Orders": (),
-        "bodies.Poses": (),
+        "world.bodies.Placement": (),
+        "world.bodies.Orders": (),
+        "world.bodies.Poses": (),
     },
     "The environment": {
         "environment.parallel_env.SwarmLogisticsEnv": (
@@ -47,9 +47,9 @@ STABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "adapters.LogDeliveries": (),
         "adapters.SwarmRows": (),
         "adapters.CentralEnv": (),
-        "motion.MotionView": ("begin", "read", "command"),
+        "world.motion.MotionView": ("begin", "read", "command"),
         "record": (),
-        "demonstrations.Demonstrations": ("transitions", "to_parquet", "to_minari"),
+        "policies.demonstrations.Demonstrations": ("transitions", "to_parquet", "to_minari"),
     },
     "Policies": {
         "policies.load": (),
@@ -87,38 +87,38 @@ STABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "spi.repair_times": (),
     },
     "Studies": {
-        "studies.Study": (
+        "study.Study": (
             "plan", "run", "findings", "results", "indicators", "report", "preset", "from_file",
             "stored",
         ),
         "judge": (),
-        "verdicts.gate.Gate": (),
-        "verdicts.gate.answers": (),
+        "study.verdicts.gate.Gate": (),
+        "study.verdicts.gate.answers": (),
     },
     "Other swarms": {
-        "tasks.ParallelTask": (),
-        "tasks.SumOfRewards": (),
-        "tasks.SumOfInfos": (),
-        "tasks.PaddedAgents": (),
-        "tasks.ChangingAgents": (),
-        "tasks.FailingRobots": (),
-        "tasks.RobotFault": (),
-        "tasks.Task": (),
-        "tasks.TaskWorld": (),
+        "study.tasks.ParallelTask": (),
+        "study.tasks.SumOfRewards": (),
+        "study.tasks.SumOfInfos": (),
+        "study.tasks.PaddedAgents": (),
+        "study.tasks.ChangingAgents": (),
+        "study.tasks.FailingRobots": (),
+        "study.tasks.RobotFault": (),
+        "study.tasks.Task": (),
+        "study.tasks.TaskWorld": (),
     },
     "Tests of your code": {
-        "testing.check_policy": (),
-        "testing.check_wrapper": (),
+        "policies.testing.check_policy": (),
+        "policies.testing.check_wrapper": (),
         "film": (),
-        "errors.SwarmLogisticsError": (),
+        "core.errors.SwarmLogisticsError": (),
     },
 }  # fmt: skip
 # Values, which have no docstring.
 VALUES = {
     "swarm_logistics_v0": "The environment as PettingZoo has it: `parallel_env(**fields)`, `env`.",
     "FAILURE_MODES": "The failure modes by name; a `FailureMode` of yours goes into it.",
-    "motion.INPUTS": "The names of the inputs of a network behind `MotionFrame`, in order.",
-    "motion.OUTPUTS": "The names of its outputs, in order.",
+    "world.motion.INPUTS": "The names of the inputs of a network behind `MotionFrame`, in order.",
+    "world.motion.OUTPUTS": "The names of its outputs, in order.",
 }
 _HEADINGS = ("Args", "Attributes", "Returns", "Yields", "Raises", "Example", "Source")
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import gymnasium
 import pettingzoo
 
+from swarm_logistics_env.core import moved_names
+
 if TYPE_CHECKING:
-    from swarm_logistics_env import adapters, policies, spi, swarm_logistics_v0, wrappers
-    from swarm_logistics_env.policies import testing
+    from swarm_logistics_env import adapters, policies, spi, study, swarm_logistics_v0, wrappers
     from swarm_logistics_env.policies.demonstrations import record
     from swarm_logistics_env.policies.episode import Episode, run_episode
-    from swarm_logistics_env.study import studies
     from swarm_logistics_env.study.trial_study import judge
     from swarm_logistics_env.views.watch.embedded import film
     from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario
@@ -39,26 +39,27 @@ __all__ = [
     "record",
     "run_episode",
     "spi",
-    "studies",
+    "study",
     "swarm_logistics_v0",
-    "testing",
     "wrappers",
 ]
 
 # The module of each name, imported when the name is first asked for: the world imports the compiler
 # of its kernels, and a training script does not pay for a study's machinery.
 _MODULES = {
-    "Episode": "episode",
-    "FAILURE_MODES": "warehouse",
-    "Fault": "warehouse",
-    "SCENARIO_PRESETS": "scenario",
-    "Scenario": "scenario",
-    "Warehouse": "warehouse",
-    "film": "watch.embedded",
-    "judge": "trial_study",
-    "record": "demonstrations",
-    "run_episode": "episode",
+    "Episode": "policies.episode",
+    "FAILURE_MODES": "world.warehouse",
+    "Fault": "world.warehouse",
+    "SCENARIO_PRESETS": "world.scenario",
+    "Scenario": "world.scenario",
+    "Warehouse": "world.warehouse",
+    "film": "views.watch.embedded",
+    "judge": "study.trial_study",
+    "record": "policies.demonstrations",
+    "run_episode": "policies.episode",
 }
+
+moved_names.install()
 
 # Modules are imported when an environment is made.
 gymnasium.register("SwarmLogistics-v0", f"{__name__}.adapters.central_env:CentralEnv")
@@ -75,7 +76,7 @@ def __getattr__(name: str) -> object:
     if name == "__version__":
         return importlib.metadata.version("swarm-logistics-env")
     if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return moved_names.moved_attribute(__name__, name)
     module = importlib.import_module(f"{__name__}.{_MODULES.get(name, name)}")
     return getattr(module, name) if name in _MODULES else module
 

@@ -17,68 +17,28 @@ import pytest
 PACKAGE = "swarm_logistics_env"
 ROOT = Path(__file__).parents[1]
 
-FOUNDATION = {"errors", "records", "streams", "kernels", "numba_fence", "floor", "scenario"}
-WORLD = FOUNDATION | {"bodies", "warehouse", "observations"}
-RUNS = WORLD | {"motion", "policies", "episode"}
-ENVIRONMENT = WORLD | {"environment", "rendering", "swarm_logistics_v0"}
-
-# What each part of the package (a module or folder of its top level) may import besides itself.
-# A new part gets a row here; a row that had to grow is a change of the design.
+# What each room may import besides itself, from the ground up: a room sees those below it alone.
+# A new room gets a row here; a row that had to grow is a change of the design.
 MAY_IMPORT: dict[str, set[str]] = {
-    "errors": set(),
-    "streams": {"errors"},
-    "progress_bar": set(),
-    "numba_fence": set(),
-    "fast_kernels": {"numba_fence"},
-    "kernels": {"fast_kernels", "numba_fence"},
-    "csv_cells": set(),
-    "records": {"csv_cells", "errors"},
-    "floor": {"errors", "kernels"},
-    "scenario": {"errors", "floor", "records"},
-    "current_folder": set(),
-    "code_files": {"current_folder", "errors"},
-    "model_parts": set(),
-    "fingerprint": {"code_files", "errors", "model_parts"},
-    "observations": FOUNDATION,
-    "bodies": FOUNDATION | {"code_files"},
-    "warehouse": FOUNDATION | {"bodies", "observations"},
-    "rendering": FOUNDATION | {"warehouse"},
-    "environment": WORLD | {"code_files", "rendering"},  # a reward may be a function of the user's
-    "swarm_logistics_v0": WORLD | {"environment"},
-    "motion": FOUNDATION | {"observations"},
-    "wrappers": ENVIRONMENT | {"motion", "spi"},
-    "policies": WORLD | {"code_files", "current_folder", "fingerprint", "motion"},
-    "adapters": ENVIRONMENT | {"motion", "policies", "wrappers"},
-    "episode": WORLD | {"policies", "environment"},  # that a policy names
-    "spi": {"csv_cells", "errors"},
-    "watch": RUNS | {"rendering", "spi"},
-    "tasks": RUNS | {"code_files", "current_folder", "fingerprint"},
-    "questions": {"errors", "policies", "records", "spi", "tasks"},
-    # Neither knows the other: what was played, and what it says.
-    "runs": RUNS | {"current_folder", "fingerprint", "progress_bar", "questions", "spi", "tasks"},
-    "verdicts": {"errors", "questions", "records", "spi", "tasks"},
-    "report": {
-        "errors",
-        "questions",
-        "records",
-        "spi",
-        "tasks",
-        "verdicts",
-    },
-    "studies": {"errors", "questions", "report", "runs", "tasks", "verdicts"},
-    "trial_study": {"report", "runs", "spi", "verdicts"},
-    "attack": RUNS | {"questions", "runs", "spi", "tasks", "verdicts"},
-    "testing": RUNS | ENVIRONMENT | {"spi"},
-    "demonstrations": RUNS | ENVIRONMENT | {"progress_bar", "wrappers"},
+    "core": set(),
+    "compiler": set(),
+    "spi": {"core"},
+    "world": {"compiler", "core"},
+    "environment": {"core", "world"},
+    "swarm_logistics_v0": {"environment"},
+    "wrappers": {"core", "environment", "spi", "world"},
+    "policies": {"compiler", "core", "environment", "spi", "world", "wrappers"},
+    "adapters": {"core", "environment", "policies", "world", "wrappers"},
+    "study": {"compiler", "core", "policies", "spi", "world"},
 }
-MAY_IMPORT["train"] = RUNS | ENVIRONMENT | MAY_IMPORT["studies"] | MAY_IMPORT["report"]
-MAY_IMPORT["train"] |= {"adapters", "fingerprint", "progress_bar", "studies", "wrappers"}
-# The front doors import whatever they offer.
-MAY_IMPORT["cli"] = set(MAY_IMPORT)
-MAY_IMPORT["__init__"] = set(MAY_IMPORT)
-MAY_IMPORT["__main__"] = {"cli"}
+MAY_IMPORT["train"] = {*MAY_IMPORT} - {"swarm_logistics_v0"}
+MAY_IMPORT["views"] = {"core", "policies", "spi", "study", "train", "world"}
+MAY_IMPORT["__main__"] = {"views"}
+MAY_IMPORT["__init__"] = {*MAY_IMPORT}  # offers names of all rooms
+# What was played, and what it says.
+APART = {("study.runs", "study.verdicts"), ("study.verdicts", "study.runs")}
 
-HEAVY = {"torch", "pandas", "matplotlib", "pygame", "scipy.stats", f"{PACKAGE}.rendering"}
+HEAVY = {"torch", "pandas", "matplotlib", "pygame", "scipy.stats", f"{PACKAGE}.world.rendering"}
 MODULES = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
     for path in sorted((ROOT / PACKAGE).rglob("*.py"))
@@ -101,27 +61,42 @@ def all_imports() -> Iterator[tuple[str, int, str]]:
 IMPORTS = list(all_imports())
 
 
-def part(module: str) -> str:
-    """The part of the package a module belongs to: `warehouse` for `….warehouse.physics`."""
+def room(module: str) -> str:
+    """The room that a module lies in: `world` for `….world.warehouse.physics`."""
     return module.split(".")[1] if "." in module else "__init__"
 
 
+def inner_room(module: str) -> str:
+    """A folder or file of a room: `world.warehouse` for `….world.warehouse.physics`."""
+    return ".".join(module.split(".")[1:3])
+
+
 def test_imports_point_one_way_as_the_table_has_it() -> None:
-    assert {part(module) for module in MODULES} - set(MAY_IMPORT) == set()
+    assert {room(module) for module in MODULES} - set(MAY_IMPORT) == set()
     graph = {p: allowed for p, allowed in MAY_IMPORT.items() if p not in {"cli", "__init__"}}
     graphlib.TopologicalSorter(graph).prepare()  # raises CycleError
     uphill = [
         f"{importer}:{line} imports {imported}"
         for importer, line, imported in IMPORTS
         if imported.split(".")[0] == PACKAGE
-        and part(imported) not in MAY_IMPORT[part(importer)] | {part(importer)}
+        and room(imported) not in MAY_IMPORT[room(importer)] | {room(importer)}
     ]
     assert uphill == []
 
 
+def test_rooms_within_a_room_do_not_import_in_circles() -> None:
+    below: dict[str, set[str]] = {}
+    for importer, _, imported in IMPORTS:
+        rooms = (inner_room(importer), inner_room(imported))
+        if rooms[0] != rooms[1] and imported.startswith(PACKAGE):
+            below.setdefault(rooms[0], set()).add(rooms[1])
+    graphlib.TopologicalSorter(below).prepare()  # raises CycleError
+    assert not [pair for pair in APART if pair[1] in below[pair[0]]]
+
+
 def test_only_physics_knows_pymunk() -> None:
     users = {importer for importer, _, imported in IMPORTS if imported.split(".")[0] == "pymunk"}
-    assert users == {f"{PACKAGE}.warehouse.physics"}
+    assert users == {f"{PACKAGE}.world.warehouse.physics"}
 
 
 @pytest.mark.parametrize("module", [PACKAGE, f"{PACKAGE}.swarm_logistics_v0", f"{PACKAGE}.spi"])

@@ -1,1 +1,1 @@
-"""What all rooms use and none is about: errors, records, random streams, users' code and its identity."""
+"""What every room uses: errors, records, random streams, users' code and its identity."""

@@ -33,9 +33,9 @@ MOVED = {
     "report": "study.report",
     "runs": "study.runs",
     "scenario": "world.scenario",
-    "spi.Trial": "study.trials.Trial",
-    "spi.Trials": "study.trials.Trials",
-    "spi.read_trials": "study.trials.read_trials",
+    "spi.Trial": "study.Trial",
+    "spi.Trials": "study.Trials",
+    "spi.read_trials": "study.read_trials",
     "spi.trials": "study.trials",
     "streams": "core.streams",
     "studies": "study.studies",
@@ -70,10 +70,10 @@ def moved_attribute(module: str, name: str) -> Any:
     today = name_today(former_name)
     if today is None:
         raise AttributeError(f"module {module!r} has no attribute {name!r}")
-    if importlib.util.find_spec(today) is not None:
-        return importlib.import_module(former_name)
-    holder, _, attribute = today.rpartition(".")
     warnings.warn(f"{former_name} is now {today}", DeprecationWarning, stacklevel=3)
+    if importlib.util.find_spec(today) is not None:
+        return importlib.import_module(today)
+    holder, _, attribute = today.rpartition(".")
     return getattr(importlib.import_module(holder), attribute)
 
 
@@ -114,4 +114,3 @@ class _ModuleOfToday(Loader):
         """Return the code of the module, as `python -m` runs it."""
         loader: Any = self._spec.loader
         return loader.get_code(self._spec.name)  # type: ignore[no-any-return]
-

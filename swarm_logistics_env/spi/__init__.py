@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from swarm_logistics_env.core.moved_names import moved_attribute
+
 
 from .definitions import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .equivalence import Equivalence, equivalence
@@ -76,3 +80,8 @@ __all__ = [
     "trainings_against_collapses",
     "two_phases",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        return moved_attribute(__name__, name)

@@ -163,8 +163,8 @@ def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -
 def test_what_is_kept_is_used_until_a_file_of_kernels_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = shutil.copytree(fast_kernels._HERE, tmp_path / "package")
-    monkeypatch.setattr(fast_kernels, "_HERE", package)
+    package = shutil.copytree(fast_kernels._PACKAGE, tmp_path / "package")
+    monkeypatch.setattr(fast_kernels, "_PACKAGE", package)
     digest = fast_kernels._digest.__wrapped__  # which keeps no answer
     assert digest() == fast_kernels._digest()
     for file in package.rglob("*.py"):

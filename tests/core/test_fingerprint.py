@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 
 import swarm_logistics_env
 from swarm_logistics_env.core.fingerprint import (
-    EPISODE_CODE,
     UNSTABLE,
     changes,
     fingerprint,
     package_code,
 )
 from swarm_logistics_env.core.records import canonical_json
+from swarm_logistics_env.study.tasks.warehouse_task import EPISODE_CODE
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 
@@ -226,7 +226,7 @@ def test_changes_are_told_by_the_file() -> None:
         ("policies/spec.py", "import ", "import os\nimport ", False),
         ("policies/swarm_dt.py", "2.0 * uniform", "1.9 * uniform", True),
         ("world/motion/memory.py", "STANDS = 0.2", "STANDS = 0.3", True),
-        ("kernels.py", "2.0 * math.pi", "6.28", True),
+        ("compiler/kernels.py", "2.0 * math.pi", "6.28", True),
     ],
 )
 def test_the_code_version_is_that_of_what_decides_an_episode(

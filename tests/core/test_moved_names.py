@@ -1,0 +1,53 @@
+"""Former names of modules go on working, with a warning, and are not second copies."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+import swarm_logistics_env
+from swarm_logistics_env import spi
+from swarm_logistics_env.core.moved_names import MOVED, PACKAGE, name_today
+
+
+@pytest.fixture(autouse=True)
+def _forget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let each test import former names for the first time, and forget them afterwards."""
+    for name in [name for name in sys.modules if name_today(name)]:
+        monkeypatch.delitem(sys.modules, name)
+
+
+@pytest.mark.parametrize("former_name", MOVED)
+def test_a_former_name_is_what_it_is_called_today_with_a_warning(former_name: str) -> None:
+    module, _, attribute = f"{PACKAGE}.{former_name}".rpartition(".")
+    with pytest.warns(
+        DeprecationWarning, match=f"{former_name} is now {PACKAGE}.{MOVED[former_name]}"
+    ):
+        former = getattr(importlib.import_module(module), attribute)
+    holder, _, name = f"{PACKAGE}.{MOVED[former_name]}".rpartition(".")
+    assert former is getattr(importlib.import_module(holder), name)
+
+
+def test_what_lies_under_a_former_name_is_no_second_copy() -> None:
+    from swarm_logistics_env.world.warehouse.faults import Fault
+
+    with pytest.warns(DeprecationWarning):
+        module = importlib.import_module("swarm_logistics_env.warehouse.faults")
+    assert module.Fault is Fault
+    assert module.__spec__ is not None
+    assert module.__spec__.name == "swarm_logistics_env.world.warehouse.faults"
+
+
+def test_what_never_was_is_an_attribute_error() -> None:
+    for module in (swarm_logistics_env, spi):
+        assert not hasattr(module, "no_such_name")
+    with pytest.warns(DeprecationWarning), pytest.raises(ModuleNotFoundError):
+        importlib.import_module("swarm_logistics_env.warehouse.no_such_name")
+
+
+def test_the_command_line_starts_under_its_former_name() -> None:
+    command = [sys.executable, "-m", "swarm_logistics_env.cli", "--help"]
+    assert "judge" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
