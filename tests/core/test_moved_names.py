@@ -34,7 +34,7 @@ def test_a_former_name_is_what_it_is_called_today_with_a_warning(former_name: st
 def test_what_lies_under_a_former_name_is_no_second_copy() -> None:
     from swarm_logistics_env.world.warehouse.faults import Fault
 
-    with pytest.warns(DeprecationWarning):
+    with pytest.warns(DeprecationWarning, match="warehouse"):
         module = importlib.import_module("swarm_logistics_env.warehouse.faults")
     assert module.Fault is Fault
     assert module.__spec__ is not None
@@ -44,7 +44,7 @@ def test_what_lies_under_a_former_name_is_no_second_copy() -> None:
 def test_what_never_was_is_an_attribute_error() -> None:
     for module in (swarm_logistics_env, spi):
         assert not hasattr(module, "no_such_name")
-    with pytest.warns(DeprecationWarning), pytest.raises(ModuleNotFoundError):
+    with pytest.warns(DeprecationWarning, match="warehouse"), pytest.raises(ModuleNotFoundError):
         importlib.import_module("swarm_logistics_env.warehouse.no_such_name")
 
 
