@@ -3,8 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from swarm_logistics_env.core.errors import FaultError, suggest
+
+
+class Capabilities(NamedTuple):
+    """What each robot can do now; failures take from it."""
+
+    max_speed: Annotated[NDArray[np.float64], "N"]  # [m/s]
+    max_turn_rate: Annotated[NDArray[np.float64], "N"]  # [rad/s]
+    ranger_range: Annotated[NDArray[np.float64], "N"]  # [m], 0 when blind
+    view_range: Annotated[NDArray[np.float64], "N"]  # [m]
+    lifts: Annotated[NDArray[np.bool_], "N"]  # False: takes up no item
+    delivers: Annotated[NDArray[np.bool_], "N"]  # False: nothing that it brings counts
+    sends: Annotated[NDArray[np.bool_], "N"]  # False: nobody hears its timer and message
+    hears: Annotated[NDArray[np.bool_], "N"]  # False: it hears no timer and no message
+    hears_requests: Annotated[NDArray[np.bool_], "N"]  # False: is told of no request or delivery
+    honest: Annotated[NDArray[np.bool_], "N"]  # False: tells timer 0 always
+    obeys: Annotated[NDArray[np.bool_], "N"]  # False: ignores its commands, the gripper's too
+    releases_inside: Annotated[NDArray[np.bool_], "N"]  # False: lets nothing go inside the area
+    rangers_refresh: Annotated[NDArray[np.bool_], "N"]  # False: its rangers repeat one reading
+    ranger_bias: Annotated[NDArray[np.float64], "N"]  # [m] that its rangers read too far
+    radio_delay: Annotated[NDArray[np.int64], "N"]  # control steps that its broadcasts lag
 
 
 @dataclass(frozen=True)
@@ -24,7 +48,7 @@ class FailureMode:
         radio_delay: how late its broadcasts come [s].
         present: False: it is out of the arena.
         lifts, delivers, sends, hears, hears_requests, honest, obeys, releases_inside,
-            rangers_refresh: see `structs.Capabilities`.
+            rangers_refresh: see `Capabilities`.
     """
 
     description: str

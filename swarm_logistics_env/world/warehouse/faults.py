@@ -30,9 +30,8 @@ from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.core.streams import generator, row_keys
 from swarm_logistics_env.world.scenario import LARGEST, Scenario
 
-from .failure_modes import FAILURE_MODES, FailureMode, failure_mode
+from .failure_modes import FAILURE_MODES, Capabilities, FailureMode, failure_mode
 from .state import WarehouseState, robots_in_role
-from .structs import Capabilities
 
 Role = Literal[
     "carrier",  # carries a requested item

@@ -9,12 +9,12 @@ from swarm_logistics_env.compiler.packing import blank
 from swarm_logistics_env.world.scenario import Scenario
 
 from .contacts import ContactMeasures, contact_measures
+from .failure_modes import Capabilities
 from .structs import (
     CARRIED,
     DELIVERED,
     NOBODY,
     STORED,
-    Capabilities,
     ContactCounts,
     Flags,
     Integers,

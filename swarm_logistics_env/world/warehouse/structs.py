@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env.world.observations import N_BEAMS
 from swarm_logistics_env.world.scenario import Scenario
 
-from .failure_modes import FAILURE_MODES
+from .failure_modes import FAILURE_MODES, Capabilities
 
 STORED, CARRIED, DELIVERED = 0, 1, 2
 N_ACCELERATIONS = 1024  # bins that accelerations are counted in
@@ -89,26 +89,6 @@ class Robots(NamedTuple):
     message_before: Annotated[Numbers, "K N", "message_size"]  # of the same steps
     frozen_beams: Annotated[Numbers, "N", "beams"]  # [m] that frozen rangers repeat, or NaN
     sensor_key: Annotated[Keys, "N"]  # of the streams of its sensors' noise
-
-
-class Capabilities(NamedTuple):
-    """What each robot can do now; failures take from it."""
-
-    max_speed: Annotated[Numbers, "N"]  # [m/s]
-    max_turn_rate: Annotated[Numbers, "N"]  # [rad/s]
-    ranger_range: Annotated[Numbers, "N"]  # [m], 0 when blind
-    view_range: Annotated[Numbers, "N"]  # [m]
-    lifts: Annotated[Flags, "N"]  # False: takes up no item
-    delivers: Annotated[Flags, "N"]  # False: nothing that it brings counts
-    sends: Annotated[Flags, "N"]  # False: nobody hears its timer and message
-    hears: Annotated[Flags, "N"]  # False: it hears no timer and no message
-    hears_requests: Annotated[Flags, "N"]  # False: knows no request, and no delivery clears memory
-    honest: Annotated[Flags, "N"]  # False: tells timer 0 always
-    obeys: Annotated[Flags, "N"]  # False: ignores its commands, the gripper's too
-    releases_inside: Annotated[Flags, "N"]  # False: lets nothing go inside the delivery area
-    rangers_refresh: Annotated[Flags, "N"]  # False: its rangers repeat one reading
-    ranger_bias: Annotated[Numbers, "N"]  # [m] that its rangers read too far
-    radio_delay: Annotated[Integers, "N"]  # control steps that its broadcasts come too late
 
 
 class Items(NamedTuple):
