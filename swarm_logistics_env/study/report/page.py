@@ -81,7 +81,7 @@ def html(results: StudyResults, document: Document, drawings: Mapping[str, str],
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("swarm_logistics_env", "report"),
+        loader=PackageLoader("swarm_logistics_env", "study/report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
