@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from swarm_logistics_env.core.moved_names import moved_attribute
 
-
 from .definitions import adaptability, fault_tolerance, relative_change, robustness, scalability
 from .equivalence import Equivalence, equivalence
 from .estimate import DecisionWord, Estimate, Options
