@@ -58,6 +58,9 @@ CASES: dict[str, Callable[[], Any]] = {
     "R, trainings, other seeds": lambda: spi.robustness(
         TRAINED, TRAINED_LESS[:, :6], n=25, m=3, paired=False
     ),
+    "R, of a script": lambda: spi.robustness(
+        np.tile(counts(40, 8), (6, 1)), np.tile(counts(30, 8), (6, 1)), n=25, m=3
+    ),
     "R, collapsed": lambda: spi.robustness(TRAINED, COLLAPSED, n=25, m=3),
     "changes that stalls or collapses may hide": lambda: [SLIGHTLY_LESS, FIVE],
     "A": lambda: spi.adaptability(MANY, LESS, x_o=10.0, x_new=15.0),

@@ -80,7 +80,8 @@ def test_robot_breaks_and_is_repaired(mode: str) -> None:
             session.toggle_robot(3)
         return
     assert shown["robots0"][3][2] == FAILURE_MODES[mode].mark
-    assert shown["poses0"][9:11] == np.rint(1000 * state.robot_position[3]).tolist()
+    pose = [*state.robot_position[3], state.robot_heading[3]]
+    assert shown["poses0"][9:12] == np.rint(1000 * np.array(pose)).tolist()
     session.play(1.0)
     session.toggle_robot(3)
     assert not session.run.world.state.failed.any()

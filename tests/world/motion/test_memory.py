@@ -121,6 +121,7 @@ def test_its_memory_turns_as_its_gyro_tells_whatever_was_commanded(memory: Memor
 )
 def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(memory: Memory, rows: Any) -> None:
     hold(memory, rows, 20)
+    assert memory[0, column.IN_VAIN] == memory[0, column.CANNOT_LIFT] == 0.0
     hold(memory, LADEN, 1)
     remember_observation(sensed(item_at=0.1), 0.1, memory)  # it delivered, and holds on
     hold(memory, sensed(item_at=0.1), 9)
