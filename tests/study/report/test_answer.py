@@ -150,7 +150,7 @@ def test_a_claim_is_contradicted_by_what_holm_leaves(
 def test_p_of_no_delivery_has_the_limit_of_its_runs() -> None:
     study = Study(seeds=4, sizes=[{"values": [2, 3]}])
     nothing = judged(study, lambda *_: delivered(0))
-    assert ": 0 (at most 0.75 at 95 %, as none of 4 runs delivered" in answer(nothing).first_line
+    assert ": 0 (at most 0.75 at 95 %, as none of 4 runs delivered" in answer(nothing).performance
 
 
 def test_p_of_a_policy_is_that_of_its_first_table() -> None:
@@ -160,7 +160,7 @@ def test_p_of_a_policy_is_that_of_its_first_table() -> None:
         (run.case.key, run.seed): delivered(run.case.scenario.n_items + run.seed)  # type: ignore[attr-defined]
         for run in plan.runs
     }
-    assert ": 50.5 [" in answer(judge(plan, outcomes)).first_line
+    assert ": 50.5 [" in answer(judge(plan, outcomes)).performance
 
 
 def test_policies_stand_one_below_the_other_each_with_its_p(compared: StudyResults) -> None:
