@@ -14,16 +14,16 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
     parser.add_argument("--repeats", type=int, default=15, help="turns of everybody")
     parser.add_argument("--out", type=Path, help="folder for benchmark.json")
-    given = parser.parse_args()
-    found = contestants()
-    in_turns(found, 1)  # compiles and warms
-    for contestant in found:
+    args = parser.parse_args()
+    timed = contestants()
+    in_turns(timed, 1)  # compiles and warms
+    for contestant in timed:
         contestant.seconds.clear()
-    in_turns(found, given.repeats)
-    print(f"Medians of {given.repeats} interleaved runs; N = 25 unless said\n{shown(rows(found))}")
+    in_turns(timed, args.repeats)
+    print(f"Medians of {args.repeats} interleaved runs; N = 25 unless said\n{shown(rows(timed))}")
     seconds = {**start_up(), **judge_answers()}
     for what, took in seconds.items():
         print(f"{what}: {took:.2f} s")
-    if given.out:
-        save(given.out, rows(found), seconds)
-        print(f"written to {given.out}")
+    if args.out:
+        save(args.out, rows(timed), seconds)
+        print(f"written to {args.out}")

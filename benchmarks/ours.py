@@ -36,11 +36,11 @@ env.step({agent: env.action_space(agent).sample() for agent in env.agents})
 
 def contestants() -> list[Contestant]:
     """Return everything of this package that is timed."""
-    one, two = (vec_env(threads) for threads in (1, 2))
-    two.base = one.name
+    single, double = (vec_env(threads) for threads in (1, 2))
+    double.base = single.name
     many = [each for n_robots in (1_000, 10_000) for each in many_robots(n_robots)]
     one_world = paths(record(Scenario(restock=True), _STEPS))
-    return [*one_world, *on_plans(), *deciders(WORLD), one, two, *many]
+    return [*one_world, *on_plans(), *deciders(WORLD), single, double, *many]
 
 
 def paths(recording: Recording) -> Iterator[Contestant]:
@@ -102,9 +102,9 @@ def many_robots(n_robots: int) -> Iterator[Contestant]:
     size = {"warehouse_width": side, "warehouse_height": side, "delivery_width": side / 5.0}
     scenario = Scenario(n_robots=n_robots, n_items=round(60 * times), restock=True, **size)
     recording = record(scenario, max(_AGENT_STEPS_OF_MANY // n_robots, 4))
-    for one in paths(recording):
-        if one.name in (FLOOR, ARRAYS):
-            yield replace(one, name=f"{one.name}, N = {n_robots:,}", base=one.name)
+    for entry in paths(recording):
+        if entry.name in (FLOOR, ARRAYS):
+            yield replace(entry, name=f"{entry.name}, N = {n_robots:,}", base=entry.name)
 
 
 def vec_env(threads: int) -> Contestant:
@@ -113,11 +113,11 @@ def vec_env(threads: int) -> Contestant:
     env.reset()
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1.0, 1.0, (20, env.num_envs, 4)).astype(np.float32)
-    given = [actions[step % len(actions)] for step in range(_STEPS)]
+    commands = [actions[step % len(actions)] for step in range(_STEPS)]
     return Contestant(
         f"SwarmVecEnv, {threads} thread{'s' if threads > 1 else ''}",
         f"{_WORLDS} worlds: {SENSES}, rewards, resets; wall time",
-        lambda: _timed(env.step, given, time.perf_counter),
+        lambda: _timed(env.step, commands, time.perf_counter),
         env.num_envs * _STEPS,
         _STEPS,
         ARRAYS,
@@ -126,12 +126,12 @@ def vec_env(threads: int) -> Contestant:
 
 def _timed(
     step: Callable[[Any], object],
-    given: Iterable[Any],
+    arguments: Iterable[Any],
     clock: Callable[[], float] = time.process_time,
 ) -> float:
     began = clock()
-    for each in given:
-        step(each)
+    for argument in arguments:
+        step(argument)
     return clock() - began
 
 
@@ -155,7 +155,7 @@ def _seconds(
     script: str, repeats: int = 5, clock: str = "process_time", **environment: str
 ) -> float:
     command = [sys.executable, "-c", _TIMED.format(clock, script)]
-    told = [
+    printed = [
         subprocess.check_output(command, env={**os.environ, **environment}) for _ in range(repeats)
     ]
-    return statistics.median(map(float, told))
+    return statistics.median(map(float, printed))

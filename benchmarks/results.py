@@ -31,9 +31,9 @@ class Contestant:
 
     def ratio_to(self, base: "Contestant") -> float:
         """Return the median, over turns, of its cost per agent-step as a multiple of `base`'s."""
-        here = [seconds / self.agent_steps for seconds in self.seconds]
-        there = [seconds / base.agent_steps for seconds in base.seconds]
-        return statistics.median(mine / other for mine, other in zip(here, there))
+        costs = [seconds / self.agent_steps for seconds in self.seconds]
+        base_costs = [seconds / base.agent_steps for seconds in base.seconds]
+        return statistics.median(cost / base_cost for cost, base_cost in zip(costs, base_costs))
 
 
 def in_turns(contestants: Sequence[Contestant], repeats: int) -> None:
@@ -45,29 +45,29 @@ def in_turns(contestants: Sequence[Contestant], repeats: int) -> None:
 
 def rows(contestants: Sequence[Contestant]) -> list[dict[str, Any]]:
     """Return a row of each contestant, every repeat included."""
-    known = {one.name: one for one in contestants}
+    by_name = {entry.name: entry for entry in contestants}
     return [
         {
-            "name": one.name,
-            "includes": one.includes,
-            "agent_steps_per_second": one.agent_steps / statistics.median(one.seconds),
-            "microseconds_per_step": statistics.median(one.seconds) / one.control_steps * 1e6,
-            "base": one.base,
-            "cost_to_base": one.ratio_to(known[one.base]) if one.base else None,
-            "agent_steps": one.agent_steps,
-            "seconds": one.seconds,
+            "name": entry.name,
+            "includes": entry.includes,
+            "agent_steps_per_second": entry.agent_steps / statistics.median(entry.seconds),
+            "microseconds_per_step": statistics.median(entry.seconds) / entry.control_steps * 1e6,
+            "base": entry.base,
+            "cost_to_base": entry.ratio_to(by_name[entry.base]) if entry.base else None,
+            "agent_steps": entry.agent_steps,
+            "seconds": entry.seconds,
         }
-        for one in contestants
+        for entry in contestants
     ]
 
 
-def shown(found: Sequence[Mapping[str, Any]]) -> str:
+def shown(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return the rows as a table; cost: per agent-step, less is better."""
-    table = pd.DataFrame(found).set_index("name")[list(_SHOWN)]
+    table = pd.DataFrame(entries).set_index("name")[list(_SHOWN)]
     return table.to_string(float_format="{:,.2f}".format, na_rep="")
 
 
-def save(folder: Path, found: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) -> None:
+def save(folder: Path, entries: Sequence[Mapping[str, Any]], seconds: Mapping[str, float]) -> None:
     """Write benchmark.json: the rows, and where and with what they came about."""
     cpuinfo = Path("/proc/cpuinfo")
     text = cpuinfo.read_text(encoding="utf-8") if cpuinfo.exists() else ""
@@ -80,6 +80,6 @@ def save(folder: Path, found: Sequence[Mapping[str, Any]], seconds: Mapping[str,
         **{name: version(name) for name in ("numpy", "numba", "pymunk")},
         "when": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    record = {"machine": machine, "contestants": found, "seconds": seconds}
+    record = {"machine": machine, "contestants": entries, "seconds": seconds}
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "benchmark.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")

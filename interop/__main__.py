@@ -59,34 +59,34 @@ def main(processes: int = 1) -> None:
     reached = {name: np.mean([row["P"] for row in first(rows("small", name))]) for name in LEARNERS}
     best = sorted(reached, key=lambda name: -reached[name])[:BEST]
     train("paper", missing("paper", best), processes)
-    beside = references()
-    text = table(beside)
+    scripted = references()
+    text = table(scripted)
     (RESULTS / "table.md").write_text(text, encoding="utf-8")
-    picture = svg_image(lambda canvas: draw(canvas, beside), 5.2)
+    picture = svg_image(lambda canvas: draw(canvas, scripted), 5.2)
     (RESULTS / "learners.svg").write_text(picture, encoding="utf-8")
     print(text)
 
 
 def rows(world: str, learner: str) -> list[dict[str, Any]]:
     """Return the rows of a learner's whole trainings that are there, by seed."""
-    paths, whole = RESULTS.glob(f"{learner}-{world}@*.json"), Learning("", world, 0).agent_steps
-    found = [json.loads(path.read_text("utf-8")) for path in paths]
-    kept = [row for row in found if row["agent_steps"] == whole]
-    return sorted(kept, key=lambda row: int(row["seed"]))
+    paths, steps = RESULTS.glob(f"{learner}-{world}@*.json"), Learning("", world, 0).agent_steps
+    trainings = [json.loads(path.read_text("utf-8")) for path in paths]
+    complete = [row for row in trainings if row["agent_steps"] == steps]
+    return sorted(complete, key=lambda row: int(row["seed"]))
 
 
-def first(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def first(trainings: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return the rows that the table is about, without trainings that were run by hand."""
-    return [row for row in found if row["seed"] in TRAININGS]
+    return [row for row in trainings if row["seed"] in TRAININGS]
 
 
 def missing(world: str, learners: Iterable[str]) -> list[tuple[str, int]]:
     """Return learner and seed of the trainings that have no row yet."""
-    found = []
+    untrained = []
     for name in learners:
         done = {row["seed"] for row in rows(world, name)}
-        found += [(name, seed) for seed in TRAININGS if seed not in done]
-    return found
+        untrained += [(name, seed) for seed in TRAININGS if seed not in done]
+    return untrained
 
 
 def train(world: str, runs: list[tuple[str, int]], processes: int) -> None:
@@ -105,31 +105,31 @@ def train(world: str, runs: list[tuple[str, int]], processes: int) -> None:
 
 def references() -> Beside:
     """Return P of the shipped policies on the same seeds, by world."""
-    found: Beside = {world: {} for world in WORLDS}
+    p_by_world: Beside = {world: {} for world in WORLDS}
     for world, name in product(WORLDS, REFERENCES):
         p = performances(policies.load(name), WORLDS[world], [()], SEEDS)[0]
-        found[world][name] = p.tolist()
-    return found
+        p_by_world[world][name] = p.tolist()
+    return p_by_world
 
 
-def table(beside: Beside) -> str:
+def table(scripted: Beside) -> str:
     """Return the rows as Markdown: P and R over trainings and seeds, each with its interval."""
     head = ["learner", "world", "agent-steps", "CPU minutes", "P", "P of each training"]
     head += ["clear of Swarm D-T", *(f"R, {mode}, m = {FAULTY}" for mode in MODES)]
     lines = []
     for world, name in product(WORLDS, LEARNERS):
-        found = rows(world, name)
-        if kept := first(found):
-            p = [row["P"] for row in kept]
+        trainings = rows(world, name)
+        if counted := first(trainings):
+            p = [row["P"] for row in counted]
             lines.append((
-                name, world, f"{kept[0]['agent_steps']:,}",
-                f"{np.mean([row['cpu_minutes'] for row in kept]):.1f}",
-                bracketed(spi.mean_interval(p), 1), each_training(found),
-                f"{sum(is_clear(each, beside[world][REFERENCES[0]]) for each in p)} of {len(p)}",
-                *(robustness(p, [row["P_F"][mode] for row in kept], world) for mode in MODES),
+                name, world, f"{counted[0]['agent_steps']:,}",
+                f"{np.mean([row['cpu_minutes'] for row in counted]):.1f}",
+                bracketed(spi.mean_interval(p), 1), each_training(trainings),
+                f"{sum(is_clear(each, scripted[world][REFERENCES[0]]) for each in p)} of {len(p)}",
+                *(robustness(p, [row["P_F"][mode] for row in counted], world) for mode in MODES),
             ))  # fmt: skip
     for world, name in product(WORLDS, REFERENCES):
-        p_of = bracketed(spi.mean_interval(beside[world][name]), 1)
+        p_of = bracketed(spi.mean_interval(scripted[world][name]), 1)
         lines.append((name, world, "", "", p_of, *[""] * (len(head) - 5)))
     return section_markdown(Section("", tuple(head), tuple(lines)))
 
@@ -141,12 +141,12 @@ def robustness(p_o: list[list[float]], p_f: list[list[float]], world: str) -> st
     return bracketed(spi.robustness(p_o, p_f, n=WORLDS[world].n_robots, m=FAULTY), 2)
 
 
-def each_training(found: list[dict[str, Any]]) -> str:
+def each_training(trainings: list[dict[str, Any]]) -> str:
     """Return mean P of each training; one more stands beside the interval predicted for it."""
-    kept = [float(np.mean(row["P"])) for row in first(found)]
-    words = ", ".join(f"{mean:.1f}" for mean in kept)
-    predicted = bracketed(spi.prediction_interval(kept), 1)
-    for row in found[len(kept) :]:
+    means = [float(np.mean(row["P"])) for row in first(trainings)]
+    words = ", ".join(f"{mean:.1f}" for mean in means)
+    predicted = bracketed(spi.prediction_interval(means), 1)
+    for row in trainings[len(means) :]:
         words += f"; seed {row['seed']}: {np.mean(row['P']):.1f}, predicted {predicted}"
     return words
 
@@ -156,7 +156,7 @@ def is_clear(p: list[float], reference: list[float]) -> bool:
     return spi.relative_change(reference, p).verdict == "supported"
 
 
-def draw(canvas: Any, beside: Beside) -> None:
+def draw(canvas: Any, scripted: Beside) -> None:
     """Draw P over agent-steps of every training, a panel for each world."""
     for world, axes in zip(WORLDS, canvas.subplots(len(WORLDS))):
         for (name, colour), seed in product(zip(LEARNERS, COLOURS), TRAININGS):
@@ -164,7 +164,7 @@ def draw(canvas: Any, beside: Beside) -> None:
             if path.exists():
                 steps, _, p = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
                 axes.plot(steps / 1e6, p, color=colour, label=name if seed == 0 else None)
-        for (name, delivered), line in zip(beside[world].items(), LINES[1:]):
+        for (name, delivered), line in zip(scripted[world].items(), LINES[1:]):
             axes.axhline(np.mean(delivered), color=INK, linestyle=line, linewidth=1, label=name)
         axes.set(title=f"{world} world", ylim=(0, None))
         axes.set(xlabel="million agent-steps", ylabel="P [items]")

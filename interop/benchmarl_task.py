@@ -34,10 +34,10 @@ class SwarmLogisticsClass(TaskClass):  # type: ignore[misc]  # BenchMARL is not 
     ) -> Callable[[], TorchRLWorlds]:
         """Return a maker of `num_envs` worlds side by side, which refuses fields that cannot be."""
         config = dict(self.config)
-        given = {name: config.pop(name) for name in ("rewards", "faults") if name in config}
+        options = {name: config.pop(name) for name in ("rewards", "faults") if name in config}
 
         def make() -> MotionFrame:
-            return MotionFrame(swarm_logistics_v0.parallel_env(Scenario(**config), **given))
+            return MotionFrame(swarm_logistics_v0.parallel_env(Scenario(**config), **options))
 
         seeds = [key(seed or 0, "world", world) >> 1 for world in range(num_envs)]
         return lambda: TorchRLWorlds(make, seeds)
@@ -89,8 +89,8 @@ class SwarmLogisticsTask(Task):  # type: ignore[misc]  # as above
 
     def get_from_yaml(self, path: str | None = None) -> SwarmLogisticsClass:
         """Return the task as its YAML beside this file has it, or that of another path."""
-        own = Path(__file__).parent / self.env_name() / f"{self.name.lower()}.yaml"
-        return super().get_from_yaml(path or str(own))  # type: ignore[no-any-return]
+        default_path = Path(__file__).parent / self.env_name() / f"{self.name.lower()}.yaml"
+        return super().get_from_yaml(path or str(default_path))  # type: ignore[no-any-return]
 
 
 for _task in SwarmLogisticsTask.__members__.values():

@@ -91,8 +91,8 @@ def drive_ahead(parts: Sequence[torch.nn.Parameter]) -> None:
 def tensors_of(parts: Sequence[torch.Tensor], deviations: torch.Tensor) -> Tensors:
     """Return the tensors of a policy file, float32; of the last layer three outputs count."""
     named = {
-        f"layers.{place // 2}.{'bias' if place % 2 else 'weight'}": part
-        for place, part in enumerate(parts)
+        f"layers.{index // 2}.{'bias' if index % 2 else 'weight'}": part
+        for index, part in enumerate(parts)
     }
     for name in list(named)[-2:]:
         named[name] = named[name][: len(OUTPUTS)]
@@ -180,8 +180,8 @@ def main(learn: Callable[[Learning], Tensors], learners: Sequence[str]) -> None:
     parser.add_argument("--world", choices=list(WORLDS), default="small")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--agent-steps", type=int)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     torch.set_num_threads(1)
-    torch.manual_seed(asked.seed)
-    learning = Learning(asked.learner, asked.world, asked.seed, asked.agent_steps)
+    torch.manual_seed(options.seed)
+    learning = Learning(options.learner, options.world, options.seed, options.agent_steps)
     learning.end(learn(learning))

@@ -25,10 +25,10 @@ def learn(learning: Learning) -> Tensors:
     )  # fmt: skip
     parts, seen = list(layers.parameters()), [(GROUP, "observation")]
     drive_ahead(parts)
-    told = [(GROUP, "loc"), (GROUP, "scale")]
+    output_keys = [(GROUP, "loc"), (GROUP, "scale")]
     actor = ProbabilisticActor(
-        TensorDictModule(nn.Sequential(layers, noise), seen, told),
-        in_keys=told,
+        TensorDictModule(nn.Sequential(layers, noise), seen, output_keys),
+        in_keys=output_keys,
         out_keys=[(GROUP, "action")],
         distribution_class=IndependentNormal,
         return_log_prob=True,

@@ -58,21 +58,21 @@ class TorchRLWorlds(EnvBase):  # type: ignore[misc]  # TorchRL is not in the gat
         self.worlds.give(tensordict[GROUP, "action"].flatten(0, 1).numpy())
         step = self.worlds.step()
         self._rows = step.observations
-        told = self._told()
-        told[GROUP, "reward"] = self._shaped(step.rewards).unsqueeze(-1)
-        told["done"] = torch.tensor(self.worlds.is_over).unsqueeze(-1)
-        told["truncated"] = told["done"] & self._shaped(step.truncated).any(1, keepdim=True)
-        told["terminated"] = told["done"] & ~told["truncated"]
-        return told
+        result = self._told()
+        result[GROUP, "reward"] = self._shaped(step.rewards).unsqueeze(-1)
+        result["done"] = torch.tensor(self.worlds.is_over).unsqueeze(-1)
+        result["truncated"] = result["done"] & self._shaped(step.truncated).any(1, keepdim=True)
+        result["terminated"] = result["done"] & ~result["truncated"]
+        return result
 
     def _set_seed(self, seed: int | None) -> None:
         """The seeds are given when it is made."""
 
     def _told(self) -> TensorDict:
-        told = TensorDict({}, self.batch_size)
+        result = TensorDict({}, self.batch_size)
         robots = self._shaped(self._rows)
-        told[GROUP] = TensorDict({"observation": robots}, robots.shape[:2])
-        return told
+        result[GROUP] = TensorDict({"observation": robots}, robots.shape[:2])
+        return result
 
     def _shaped(self, rows: np.ndarray[Any, Any]) -> torch.Tensor:
         each = (len(self._seeds), len(self.group_map[GROUP]))

@@ -73,21 +73,21 @@ def paper(
     seeds: int = 10,
     noise: float = 1.0,
     full: Setting | None = None,
-    same: frozenset[str] = frozenset(),
+    unaffected: frozenset[str] = frozenset(),
     **fields: Any,
 ) -> StudyResults:
     """The paper's study if every cell gave p(policy, setting), with noise at several seeds.
 
     Args:
         full: the setting whose runs deliver every item, on one seed.
-        same: failure modes whose runs are those without a fault.
+        unaffected: failure modes whose runs are those without a fault.
     """
     rng = np.random.default_rng(0)
 
     def play(policy: str, setting: Setting, seed: int) -> Outcome:
         count = round(p(policy, setting) + (rng.normal(0.0, noise) if seeds > 1 else 0.0))
         digest = f"{policy} {setting} {seed}"
-        if setting.name in same or setting == NO_FAULT:
+        if setting.name in unaffected or setting == NO_FAULT:
             count, digest = round(p(policy, NO_FAULT)) + seed % 3, f"{policy} no fault {seed}"
         return delivered(max(0, count), all_delivered=setting == full and seed == 0, digest=digest)
 

@@ -14,7 +14,7 @@ from swarm_logistics_env import Scenario, Warehouse, policies, swarm_logistics_v
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 
 
-def trajectory(beside: bool) -> str:
+def trajectory(with_another: bool) -> str:
     """Play 1,500 steps; every step's state and all that it returns go into the hash."""
     env: Any = swarm_logistics_v0.parallel_env(duration=150.0, restock=True, radio_loss=0.1)
     drawn: dict[str, Any] = {"onset": lambda rng: rng.uniform(10.0, 100.0, size=3)}
@@ -25,7 +25,7 @@ def trajectory(beside: bool) -> str:
     rows = env.reset_arrays(0)
     policy.reset(len(rows), 0)
     other = Warehouse(Scenario(n_robots=9, n_items=30, n_obstacles=3, relay="gossip"))
-    others, state = other.reset(1), env.warehouse.state
+    other_rows, state = other.reset(1), env.warehouse.state
     digest = hashlib.blake2b(rows.tobytes())
     while env.agents:
         rows, *outcome = env.step_arrays(policy.act(rows))
@@ -35,12 +35,12 @@ def trajectory(beside: bool) -> str:
             state.robot_contact, state.item_position, state.item_status, state.item_carrier,
         ):  # fmt: skip
             digest.update(np.ascontiguousarray(part).tobytes())
-        told = (env.agents, state.failure_modes, state.requested, state.delivery_times)
-        digest.update(repr((*told, state.delivered_by)).encode())
-        if beside:
-            others = other.step(0.5 * others[:, :4])
+        record = (env.agents, state.failure_modes, state.requested, state.delivery_times)
+        digest.update(repr((*record, state.delivered_by)).encode())
+        if with_another:
+            other_rows = other.step(0.5 * other_rows[:, :4])
             if state.step % 500 == 499:
-                others = other.reset(state.step)
+                other_rows = other.reset(state.step)
     return f"{digest.hexdigest()} {state.delivered} {state.step} {len(env.failed_robots)}"
 
 
@@ -52,5 +52,5 @@ def test_a_trajectory_is_the_same_in_another_process_and_beside_another_world() 
     script = "from tests.test_determinism import trajectory; print(trajectory(True))"
     paths = {"PYTHONHASHSEED": "20240229", "PYTHONPATH": os.pathsep.join(sys.path)}
     command, environment = [sys.executable, "-c", script], {**os.environ, **paths}
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == first
+    process = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert process.stdout.strip() == first

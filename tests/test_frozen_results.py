@@ -76,11 +76,14 @@ def played(study: Study, *, times: bool, processes: int = 1) -> dict[str, list[d
     runs: dict[str, list[dict[str, Any]]] = {}
     for words, case in conditions(study):
         for seed in study.plan().seeds:
-            found = outcomes[case, seed]
-            run: dict[str, Any] = {"seed": seed, "P": found.delivered}
-            run |= {"all_delivered": found.all_delivered, "equal_runs": (found.digest or "")[:8]}
+            outcome = outcomes[case, seed]
+            run: dict[str, Any] = {"seed": seed, "P": outcome.delivered}
+            run |= {
+                "all_delivered": outcome.all_delivered,
+                "equal_runs": (outcome.digest or "")[:8],
+            }
             if times:
-                run["times"] = found.delivery_times.round(6).tolist()
+                run["times"] = outcome.delivery_times.round(6).tolist()
             runs.setdefault(words, []).append(run)
     return runs
 
@@ -98,11 +101,17 @@ def test_verdicts_follow_from_the_frozen_runs(name: str) -> None:
                 all_delivered=run["all_delivered"],
                 digest=run["equal_runs"],
             )
-    found = verdicts(judge(study.plan(), outcomes))
-    for one, known in zip(found, expected["verdicts"], strict=True):
-        assert {name: one[name] for name in WORDS} == {name: known[name] for name in WORDS}
-        numbers = [np.array([row[n] for n in NUMBERS], dtype=float) for row in (one, known)]
-        assert numbers[0] == pytest.approx(numbers[1], rel=1e-7, abs=1e-12, nan_ok=True), known
+    judged = verdicts(judge(study.plan(), outcomes))
+    for verdict, expected_row in zip(judged, expected["verdicts"], strict=True):
+        assert {name: verdict[name] for name in WORDS} == {
+            name: expected_row[name] for name in WORDS
+        }
+        numbers = [
+            np.array([row[n] for n in NUMBERS], dtype=float) for row in (verdict, expected_row)
+        ]
+        assert numbers[0] == pytest.approx(numbers[1], rel=1e-7, abs=1e-12, nan_ok=True), (
+            expected_row
+        )
 
 
 def test_runs_played_anew_equal_the_frozen_ones() -> None:
@@ -114,9 +123,9 @@ def test_runs_played_anew_equal_the_frozen_ones() -> None:
     for name, study in {"quick": Study.preset("quick", seeds=1), "shipped_policies": few}.items():
         expected = frozen(name)["runs"]
         for words, runs in played(study, times=name == "quick").items():
-            for run, known in zip(runs, expected[words]):
-                assert (run["seed"], run["P"]) == (known["seed"], known["P"]), words
-                assert run.get("times") == pytest.approx(known.get("times")), words
+            for run, frozen_run in zip(runs, expected[words]):
+                assert (run["seed"], run["P"]) == (frozen_run["seed"], frozen_run["P"]), words
+                assert run.get("times") == pytest.approx(frozen_run.get("times")), words
 
 
 if __name__ == "__main__":

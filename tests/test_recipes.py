@@ -195,12 +195,12 @@ def run(folder: Path, recipes: Iterable[str], script: str) -> str:
     package = folder / PACKAGE.name
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("*.lock", "*.tmp.*"))
     for file, mark, lines in itertools.chain(*(EDITS[recipe] for recipe in recipes)):
-        place = package / file
-        assert place.exists() == bool(mark)
-        text = f"\n{place.read_text('utf-8') if mark else ''}"
-        before, found, after = text.partition(f"\n{mark}")
-        assert found, f"{file}: {mark}"
-        place.write_text(f"{before}\n{lines}{found[1:]}{after}", encoding="utf-8")
+        path = package / file
+        assert path.exists() == bool(mark)
+        text = f"\n{path.read_text('utf-8') if mark else ''}"
+        before, mark_text, after = text.partition(f"\n{mark}")
+        assert mark_text, f"{file}: {mark}"
+        path.write_text(f"{before}\n{lines}{mark_text[1:]}{after}", encoding="utf-8")
     paths = {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)])}
     settings = {**os.environ, **paths, "PYTHONWARNINGS": "error", "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-c", INTERPRETED + script]
@@ -214,9 +214,9 @@ def run(folder: Path, recipes: Iterable[str], script: str) -> str:
 @pytest.mark.parametrize("recipe", EDITS)
 def test_a_recipe_names_the_files_that_it_changes(recipe: str) -> None:
     heading, *open_names = re.split(r" (?=[A-Z]+=)", recipe)
-    found = re.search(rf"### {heading}\n\nFiles: (.*)\n", PAGE)
-    assert found
-    files = found[1]
+    match = re.search(rf"### {heading}\n\nFiles: (.*)\n", PAGE)
+    assert match
+    files = match[1]
     for name in open_names:
         files = files.replace(*name.split("="))
     # The page tells of a third file where compiled code reads a parameter.
@@ -225,13 +225,13 @@ def test_a_recipe_names_the_files_that_it_changes(recipe: str) -> None:
 
 
 def test_what_the_recipes_add_works(tmp_path: Path) -> None:
-    said = run(
+    printed = run(
         tmp_path,
         [name for name in EDITS if not name.startswith(KERNEL_RECIPES)],
         CHECK_POLICIES_AND_STUDIES,
     )
     # Whoever adds a policy leaves the identities of the others, and with them stored runs, alone.
-    assert said.strip() == policies.identity(policies.load("swarm-dt"))
+    assert printed.strip() == policies.identity(policies.load("swarm-dt"))
 
 
 def test_what_the_recipes_add_to_kernels_works(tmp_path: Path) -> None:

@@ -21,8 +21,8 @@ def test_functions_are_short_and_take_few_parameters(path: Path) -> None:
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     too_big = []
     for function in functions:
-        given = function.args
-        n_parameters = len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs)
+        arguments = function.args
+        n_parameters = len(arguments.posonlyargs) + len(arguments.args) + len(arguments.kwonlyargs)
         n_lines = (function.end_lineno or function.lineno) - function.lineno + 1
         if path.parent.name == "cli" and function.name.endswith("_command"):
             n_parameters = 0  # they are the options of a command line

@@ -94,9 +94,9 @@ class Browser:
 
     def click(self, x: float, y: float) -> None:
         """Click at a place of the window [px]."""
-        place = {"x": x, "y": y, "button": "left", "clickCount": 1}
+        event = {"x": x, "y": y, "button": "left", "clickCount": 1}
         for kind in ("mousePressed", "mouseReleased"):
-            self.call("Input.dispatchMouseEvent", type=kind, **place)
+            self.call("Input.dispatchMouseEvent", type=kind, **event)
 
     def click_on(self, selector: str) -> None:
         """Click the middle of the element that a CSS selector finds."""

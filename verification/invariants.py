@@ -87,8 +87,8 @@ class Watch:
         state, scenario = self.world.state, self.world.scenario
         status = state.item_status
         self._demand(len(status) == scenario.n_items, f"there are {len(status)} items")
-        known = np.isin(status, (STORED, CARRIED, DELIVERED))
-        self._demand(known, "an item is neither stored nor carried nor delivered")
+        is_known = np.isin(status, (STORED, CARRIED, DELIVERED))
+        self._demand(is_known, "an item is neither stored nor carried nor delivered")
         self._demand(np.isfinite(state.item_position), "an item is nowhere")
         carriers = np.flatnonzero(state.robot_item != NOBODY)
         carried = state.robot_item[carriers]
@@ -101,20 +101,20 @@ class Watch:
         if state.requested == NOBODY:
             self._demand(status == DELIVERED, "nothing is asked for")
         else:
-            asked = state.open_requests[state.open_requests != NOBODY]
-            self._demand((asked >= 0) & (asked < scenario.n_items), f"{asked} is asked")
-            is_there = np.isin(status[asked], (STORED, CARRIED))
+            requested = state.open_requests[state.open_requests != NOBODY]
+            self._demand((requested >= 0) & (requested < scenario.n_items), f"{requested} is asked")
+            is_there = np.isin(status[requested], (STORED, CARRIED))
             self._demand(is_there, "the requested item is delivered")
-            first = state.open_requests[: len(asked)]
-            self._demand(np.array_equal(first, asked), "there is a gap among the requests")
+            first = state.open_requests[: len(requested)]
+            self._demand(np.array_equal(first, requested), "there is a gap among the requests")
         gaps = np.diff(np.array(state.delivery_times))
         self._demand(gaps >= 0.0, "delivery times fall")
         if scenario.dock_capacity is not None and scenario.dock_capacity == self._dock:
             self._demand(gaps >= 1.0 / self._dock - 1e-6, "the dock takes too many")
-        here = state.item_position[status == STORED]
-        self._demand((here > 0.0) & (here < self._far), "an item lies outside")
-        self._demand(self.world.floor.is_free(here), "an item lies inside a rack")
-        self._demand(np.isfinite(self.world.floor.along(here)), "no way leads to an item")
+        stored_at = state.item_position[status == STORED]
+        self._demand((stored_at > 0.0) & (stored_at < self._far), "an item lies outside")
+        self._demand(self.world.floor.is_free(stored_at), "an item lies inside a rack")
+        self._demand(np.isfinite(self.world.floor.along(stored_at)), "no way leads to an item")
 
     def _deliveries(self) -> None:
         state, before = self.world.state, self._before
@@ -176,9 +176,9 @@ class Watch:
 
     def _bodies(self) -> None:
         scenario, state = self.world.scenario, self.world.state
-        here, at, radius = state.robot_present, state.robot_position, scenario.robot_radius
+        present, at, radius = state.robot_present, state.robot_position, scenario.robot_radius
         in_robots = 2.0 * radius - _distances(at, at)
-        in_robots[~(here[:, None] & here[None]) | np.eye(len(at), dtype=bool)] = -np.inf
+        in_robots[~(present[:, None] & present[None]) | np.eye(len(at), dtype=bool)] = -np.inf
         to_obstacles = _distances(at, state.obstacle_position)
         to_walls = np.hstack([at, self._far - at])
         in_items = radius + scenario.item_radius - _distances(at, state.item_position)
@@ -188,7 +188,7 @@ class Watch:
         in_racks = radius - self._to_racks(at)
         depths = [in_robots, in_obstacles, radius - to_walls, in_racks, in_items]
         self.depth = depth = np.hstack(depths)
-        depth[~here] = -np.inf
+        depth[~present] = -np.inf
         # The speed of the last step is that before or after a change.
         fastest = max(self._scenario.max_speed, scenario.max_speed)
         closing = 2.0 * fastest * scenario.physics_period
@@ -198,8 +198,8 @@ class Watch:
             f"bodies overlap by {deepest:.4f} m: should be at most {closing:.4f} m, what they "
             "close in one substep, beyond the depth of a jam",
         )
-        self._demand(to_walls[here] > 0.0, "a robot is outside the walls")
-        self._demand(self.world.floor.is_free(at[here]), "a robot is inside a rack")
+        self._demand(to_walls[present] > 0.0, "a robot is outside the walls")
+        self._demand(self.world.floor.is_free(at[present]), "a robot is inside a rack")
         self.deepest = max(self.deepest, deepest)
         # A crowd presses deeper in where robots drive far between two collision checks.
         allowed = max(SUSTAINED, 0.25 * closing)
@@ -232,44 +232,44 @@ class Watch:
     def _exercised(self) -> None:
         """Check that nobody has what its modes take."""
         state, scenario, rows = self.world.state, self.world.scenario, self.world.observe()
-        here, modes = state.robot_present, state.failure_modes
-        self._each(_lack(modes, "present"), ~here, "robot {}, removed, is there")
-        self._each(~here, ~rows.any(axis=1), "robot {} is gone and senses")
-        self._each(~here, state.robot_item == NOBODY, "robot {} is gone and carries")
-        self._each(~here, np.isnan(state.robot_told), "robot {} tells, gone")
-        lies = here & _lack(modes, "honest")
+        present, modes = state.robot_present, state.failure_modes
+        self._each(_lack(modes, "present"), ~present, "robot {}, removed, is there")
+        self._each(~present, ~rows.any(axis=1), "robot {} is gone and senses")
+        self._each(~present, state.robot_item == NOBODY, "robot {} is gone and carries")
+        self._each(~present, np.isnan(state.robot_told), "robot {} tells, gone")
+        lies = present & _lack(modes, "honest")
         self._each(lies, state.robot_told == 0.0, "robot {} is in FM1, tells no 0")
         if scenario.ranger_noise == 0.0:
             scans = rows[:, : 3 * row.N_BEAMS]
             sees_nothing = (scans == np.float32(scenario.ranger_range)).all(axis=1)
-            blind = here & _lack(modes, "rangers") & ~_lack(modes, "rangers_refresh")
+            blind = present & _lack(modes, "rangers") & ~_lack(modes, "rangers_refresh")
             self._each(blind, sees_nothing, "robot {}'s blind rangers see")
         items = rows[:, row.ITEMS : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
-        unseeing = here & _lack(modes, "view")
+        unseeing = present & _lack(modes, "view")
         self._each(unseeing, ~items.any(axis=1), "robot {} sees items without cameras")
 
     def _did(self) -> None:
         """Check that nobody did what its modes take: those before and after the step."""
         state, before = self.world.state, self._before
-        here, modes, delivered = state.robot_present, _in_both(state, before), self._delivered()
-        kept = (before.robot_item == NOBODY) | (before.robot_item == state.robot_item)
+        present, modes, delivered = state.robot_present, _in_both(state, before), self._delivered()
+        keeps_item = (before.robot_item == NOBODY) | (before.robot_item == state.robot_item)
         is_still = state.robot_heading == before.robot_heading
         self._each(_lack(modes, "lifts"), ~self._took(), "robot {} lifts items, and cannot")
         self._each(_lack(modes, "delivers"), ~delivered, "robot {} delivers, and cannot")
-        self._each(here & _lack(modes, "speed"), is_still, "robot {} turns, and cannot")
-        jammed = here & state.robot_in_delivery & _lack(modes, "releases_inside")
-        self._each(jammed, kept, "robot {}, jammed inside, lets its item go")
+        self._each(present & _lack(modes, "speed"), is_still, "robot {} turns, and cannot")
+        jammed = present & state.robot_in_delivery & _lack(modes, "releases_inside")
+        self._each(jammed, keeps_item, "robot {}, jammed inside, lets its item go")
         # What cannot move may be above the delivery area's border when its item is asked for.
-        dead = here & _lack(modes, "obeys")
-        self._each(dead, kept | delivered, "robot {} is dead and lets its item go")
+        dead = present & _lack(modes, "obeys")
+        self._each(dead, keeps_item | delivered, "robot {} is dead and lets its item go")
 
     def _heard(self) -> None:
-        state, told = self.world.state, self.world.state.robot_told
-        tells = state.robot_present & state.sends & ~np.isnan(told)
+        state, timers = self.world.state, self.world.state.robot_told
+        tells = state.robot_present & state.sends & ~np.isnan(timers)
         away = _distances(state.robot_position, state.robot_position)
         reached = (away**2 <= self.world.scenario.radio_range**2 * (1 + 1e-12)) & tells[None]
         np.fill_diagonal(reached, False)
-        lowest = np.where(reached, told[None], np.inf).min(axis=1, initial=np.inf)
+        lowest = np.where(reached, timers[None], np.inf).min(axis=1, initial=np.inf)
         heard = np.where(np.isnan(state.robot_heard), np.inf, state.robot_heard)
         deaf = ~(state.hears & state.robot_present)
         self._demand(np.isinf(heard[deaf]), "a robot that does not hear has heard a timer")
@@ -278,24 +278,24 @@ class Watch:
     def _rows(self) -> None:
         rows, scenario = self.world.observe(), self.world.scenario
         low, high = row.bounds(scenario)
-        here = self.world.state.robot_present
-        fits = (rows[here] >= low) & (rows[here] <= high)
+        present = self.world.state.robot_present
+        fits = (rows[present] >= low) & (rows[present] <= high)
         names = [c.name for c in row.columns(scenario) if not fits[:, c.columns].all()]
         self._demand(not names, f"observations leave their ranges: {', '.join(names)}")
-        asked = row.ITEMS + row.ITEM_FEATURES.index("requested")
-        flags = rows[:, asked : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
+        first_flag = row.ITEMS + row.ITEM_FEATURES.index("requested")
+        flags = rows[:, first_flag : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
         self._demand(flags.sum(axis=1) <= scenario.n_requests, "a robot sees too many requests")
 
 
-def _distances(places: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distances(places: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how far each is from each other one [m], (N, M)."""
-    return np.asarray(np.linalg.norm(places[:, None] - others[None], axis=2))
+    return np.asarray(np.linalg.norm(places[:, None] - points[None], axis=2))
 
 
 def _in_both(state: WarehouseState, other: WarehouseState) -> Names:
     """Return the modes of each robot that it has in both states."""
     pairs = zip(state.failure_modes, other.failure_modes)
-    return [[name for name in names if name in others] for names, others in pairs]
+    return [[name for name in names if name in other_names] for names, other_names in pairs]
 
 
 def _lack(modes: Names, what: str) -> Flags:

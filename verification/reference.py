@@ -60,31 +60,31 @@ class Faults:
     def plan(self, planned: Sequence[Planned]) -> None:
         """Let these faults hold from now on; who is gone stays gone."""
         self._planned = list(planned)
-        for one in self._planned:
-            one.struck = None
-            if isinstance(one.robots, tuple):
-                one.struck = sorted(one.robots)
-            elif one.role is None:  # whatever the mode, the seed chooses the same robots
-                like = Fault("FM1", one.robots)
-                one.struck = failed_robots(like, self._seed, self._scenario.n_robots).tolist()
+        for fault in self._planned:
+            fault.struck = None
+            if isinstance(fault.robots, tuple):
+                fault.struck = sorted(fault.robots)
+            elif fault.role is None:  # whatever the mode, the seed chooses the same robots
+                like = Fault("FM1", fault.robots)
+                fault.struck = failed_robots(like, self._seed, self._scenario.n_robots).tolist()
 
     def expected(self, world: Warehouse, before: State) -> list[Able]:
         """Return of each robot what it can do now, its modes and whether it is there."""
         now = world.state
         left = [self._sound(robot) for robot in range(self._scenario.n_robots)]
-        for number, one in enumerate(self._planned):
-            if not one.holds(now.step):
+        for number, fault in enumerate(self._planned):
+            if not fault.holds(now.step):
                 continue
-            if one.struck is None:
+            if fault.struck is None:
                 is_whole = now.robot_present.tolist() == before.robot_present.tolist()
                 # All that begins at one moment strikes whom it would by itself.
                 views = before.view_range.tolist()
                 # Who is removed in this very step no longer stands where it was struck.
                 chosen = world._occurrences[number].robots.tolist()
-                one.struck = self._in_role(one, now, views) if is_whole else chosen
-            for robot in one.struck:
-                if one.breaks is None or self._is_broken(one, robot, now.step):
-                    self._take(one, left[robot], now.step)
+                fault.struck = self._in_role(fault, now, views) if is_whole else chosen
+            for robot in fault.struck:
+                if fault.breaks is None or self._is_broken(fault, robot, now.step):
+                    self._take(fault, left[robot], now.step)
         for robot, able in enumerate(left):
             self.gone[robot] |= not able.pop("there")
             able["present"] = not self.gone[robot]
@@ -106,14 +106,14 @@ class Faults:
             "there": True,
         }
 
-    def _take(self, one: Planned, able: Able, step: int) -> None:
+    def _take(self, fault: Planned, able: Able, step: int) -> None:
         """Take from a robot what a fault of its takes; several faults add up."""
-        s, lost = self._scenario, failure_mode(one.mode)
+        s, lost = self._scenario, failure_mode(fault.mode)
         speed, view = lost.speed, lost.view
-        if one.factor is not None:
-            speed, view = (one.factor, view) if lost.factor == "speed" else (speed, one.factor)
+        if fault.factor is not None:
+            speed, view = (fault.factor, view) if lost.factor == "speed" else (speed, fault.factor)
         if lost.wears:  # linearly, from all at the onset
-            begins = 0.5 * one.begins * s.control_period
+            begins = 0.5 * fault.begins * s.control_period
             share = (step * s.control_period - begins) / (s.duration - begins)
             speed = 1.0 - (1.0 - speed) * min(share, 1.0)
         able["max_speed"] *= speed
@@ -125,37 +125,39 @@ class Faults:
         able["radio_delay"] = max(able["radio_delay"], delay)
         for name in LOST_AS_A_WHOLE:
             able[name] = able[name] and getattr(lost, name)
-        able["modes"] = (*able["modes"], one.mode)
+        able["modes"] = (*able["modes"], fault.mode)
         able["there"] = able["there"] and lost.present
 
-    def _is_broken(self, one: Planned, robot: int, step: int) -> bool:
+    def _is_broken(self, fault: Planned, robot: int, step: int) -> bool:
         """Return whether an intermittent fault holds, by the robot's own stream of both times."""
-        assert one.breaks is not None
+        assert fault.breaks is not None
         period = self._scenario.control_period
         n_switches = 0
-        until = 0.5 * period * one.begins
+        until = 0.5 * period * fault.begins
         while until <= step * period + GRACE:
             if n_switches % BLOCK == 0:
                 block = n_switches // BLOCK
-                rng = generator(self._seed, f"intermittent {one.mode}", robot, block)
-            until += rng.exponential(one.breaks[n_switches % 2])
+                rng = generator(self._seed, f"intermittent {fault.mode}", robot, block)
+            until += rng.exponential(fault.breaks[n_switches % 2])
             n_switches += 1
         return n_switches % 2 == 1
 
-    def _in_role(self, one: Planned, now: State, views: list[float]) -> list[int]:
+    def _in_role(self, fault: Planned, now: State, views: list[float]) -> list[int]:
         """Return the robots that a fault by role strikes: those in it, then those nearest."""
-        asked = _asked(now)
-        carriers = [now.item_carrier[item] for item in asked if now.item_carrier[item] != NOBODY]
+        items = _asked(now)
+        carriers = [now.item_carrier[item] for item in items if now.item_carrier[item] != NOBODY]
 
         def away(robot: int) -> float:
-            here = now.robot_position[robot]
-            return min((math.dist(here, now.item_position[item]) for item in asked), default=0.0)
+            position = now.robot_position[robot]
+            return min(
+                (math.dist(position, now.item_position[item]) for item in items), default=0.0
+            )
 
         def role(robot: int) -> str:
             if robot in carriers:
                 return "carrier"
-            here = now.robot_position[robot]
-            if any(math.dist(here, now.robot_position[c]) <= views[c] for c in carriers):
+            position = now.robot_position[robot]
+            if any(math.dist(position, now.robot_position[c]) <= views[c] for c in carriers):
                 return "neighbour"
             if now.robot_in_delivery[robot]:
                 return "in_area"
@@ -163,10 +165,10 @@ class Faults:
 
         ranked = sorted(
             range(now.n_robots),
-            key=lambda r: (not now.robot_present[r], role(r) != one.role, away(r), r),
+            key=lambda r: (not now.robot_present[r], role(r) != fault.role, away(r), r),
         )
-        assert isinstance(one.robots, int)
-        return sorted(ranked[: one.robots])
+        assert isinstance(fault.robots, int)
+        return sorted(ranked[: fault.robots])
 
 
 class Radio:
@@ -180,23 +182,23 @@ class Radio:
 
     def told(self, now: State, before: State, able: list[Able]) -> list[float]:
         """Return the timer that each robot tells [s], NaN: none; to be asked once a step."""
-        s, told, own = self._scenario, [], list[float]()
-        self._own.append(own)
+        s, timers, own_timers = self._scenario, [], list[float]()
+        self._own.append(own_timers)
         limit, period = s.timer_limit - 1e-9, s.control_period
-        for robot, one in enumerate(able):
+        for robot, can in enumerate(able):
             if now.robot_in_delivery[robot]:
                 self._last_inside[robot] = now.step
             timer = math.nan
-            if one["present"] and robot in self._last_inside:
+            if can["present"] and robot in self._last_inside:
                 timer = (now.step - self._last_inside[robot]) * period
-            passes_on = s.is_gossip and one["present"]
+            passes_on = s.is_gossip and can["present"]
             heard = before.robot_heard[robot] + period if passes_on else math.nan
-            own.append(min((t for t in (timer, heard) if t < limit), default=math.nan))
-            then = now.step - one["radio_delay"]
+            own_timers.append(min((t for t in (timer, heard) if t < limit), default=math.nan))
+            then = now.step - can["radio_delay"]
             late = self._own[then][robot] if then >= 0 else math.nan
             late = late if late < limit else math.nan
-            told.append((late if one["honest"] else 0.0) if one["present"] else math.nan)
-        return told
+            timers.append((late if can["honest"] else 0.0) if can["present"] else math.nan)
+        return timers
 
     def messages(self, commands: Sequence[Sequence[float]], able: list[Able]) -> list[list[float]]:
         """Return the message of each robot after a step; what it could do as the step began."""
@@ -204,14 +206,14 @@ class Radio:
         self._given.append(
             [
                 [min(max(word, -1.0), 1.0) for word in command[4:]]
-                if one["present"] and one["obeys"]
+                if can["present"] and can["obeys"]
                 else nothing
-                for command, one in zip(commands, able)
+                for command, can in zip(commands, able)
             ]
         )
         step = len(self._given) - 1
         return [
-            self._given[max(step - one["radio_delay"], 0)][robot] for robot, one in enumerate(able)
+            self._given[max(step - can["radio_delay"], 0)][robot] for robot, can in enumerate(able)
         ]
 
 
@@ -222,23 +224,23 @@ def rewards(
     period, edge, total = scenario.control_period, scenario.storage_width, []
     new = now.delivered_by[len(before.delivered_by) :]
     nearest = edge - 1.5  # what is stocked nearer would be in the way
-    asked = _asked(before) & _asked(now)  # what a step takes up, brings nearer or lets go of
+    requested = _asked(before) & _asked(now)  # what a step takes up, brings nearer or lets go of
     for robot in range(now.n_robots):
         x, x_before = (moment.robot_position[robot, 0] for moment in (now, before))
         was, is_ = (moment.robot_item[robot] for moment in (before, now))
-        carries_on = is_ in asked and is_ == was
-        lifts = is_ in asked and is_ != was
-        lies = was in asked and now.item_carrier[was] == NOBODY and new
+        carries_on = is_ in requested and is_ == was
+        lifts = is_ in requested and is_ != was
+        lies = was in requested and now.item_carrier[was] == NOBODY and new
         # What was delivered and is asked for again lies elsewhere than its carrier stands.
         is_back = lies and list(now.item_position[was]) != list(now.robot_position[robot])
-        drops = was in asked and is_ != was and not is_back
-        way = 0.0
+        drops = was in requested and is_ != was and not is_back
+        stocked = 0.0
         for item, after in enumerate(now.item_carrier):
             who = before.item_carrier[item] if after == NOBODY else after
             is_delivered = before.item_carrier[item] != NOBODY and before.item_carrier[item] in new
             if who == robot and not is_delivered:
-                way += min(now.item_position[item, 0], nearest)
-                way -= min(before.item_position[item, 0], nearest)
+                stocked += min(now.item_position[item, 0], nearest)
+                stocked -= min(before.item_position[item, 0], nearest)
         delivers = now.delivers[robot]
         deeper = 2.0 * (max(x, edge) - max(x_before, edge)) if carries_on else 0.0
         nearer = min(x, edge) - min(x_before, edge) if carries_on else 0.0
@@ -247,7 +249,7 @@ def rewards(
             "own_delivery": new.count(robot),
             "lift_requested": (int(lifts) - int(drops)) * delivers,
             "approach": nearer,
-            "stocking": way,
+            "stocking": stocked,
             "contact": period * now.robot_contact[robot],
             "collision": _closing(scenario, before, now, robot),
             "blocked_request": (period + deeper) * (is_ in _asked(now) and not delivers),

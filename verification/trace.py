@@ -53,11 +53,11 @@ class Trace:
     def _held(self, value: object) -> str | None:
         """Return the name of the kind that a value is or has among its elements."""
         inside = list(value.values()) if isinstance(value, dict) else value
-        found = [value, *(inside if isinstance(inside, list | tuple) else ())]
-        pairs = [one for one in found[1:] if isinstance(one, tuple)]
-        for each in (*found, *(part for pair in pairs for part in pair)):
-            if isinstance(each, self._kinds):
-                return next(kind.__name__ for kind in self._kinds if isinstance(each, kind))
+        elements = [value, *(inside if isinstance(inside, list | tuple) else ())]
+        pairs = [element for element in elements[1:] if isinstance(element, tuple)]
+        for member in (*elements, *(part for pair in pairs for part in pair)):
+            if isinstance(member, self._kinds):
+                return next(kind.__name__ for kind in self._kinds if isinstance(member, kind))
         return None
 
     def _note(self, frame: FrameType, event: str, argument: object) -> None:
@@ -68,9 +68,9 @@ class Trace:
             self._entered.append(False)
             return
         below = self._entered.pop() if self._entered else False
-        given = [frame.f_locals.get(n) for n in code.co_varnames[: code.co_argcount]]
-        own = code.co_varnames[:1] in (("self",), ("cls",))
-        received = [kind for value in given[own:] if (kind := self._held(value))]
+        arguments = [frame.f_locals.get(n) for n in code.co_varnames[: code.co_argcount]]
+        n_bound = code.co_varnames[:1] in (("self",), ("cls",))
+        received = [kind for value in arguments[n_bound:] if (kind := self._held(value))]
         returned = self._held(argument)
         self.containers |= dict.fromkeys(filter(None, [*received, returned]))
         is_hop = returned is not None or bool(received and below)
@@ -86,7 +86,7 @@ def episode_to_table(out: Path) -> Trace:
     Study(out=out / "study", **SMALL).run()  # compiled, and kept away from what is traced
     traced = Study(out=out / "traced", **SMALL)
     trace.of(traced.run)
-    trace.of(lambda: [section_markdown(one) for one in tables(traced.findings())])
+    trace.of(lambda: [section_markdown(section) for section in tables(traced.findings())])
     trace.containers["the table `runs` of the store"] = None
     return trace
 

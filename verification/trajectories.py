@@ -61,11 +61,11 @@ class GoldenTrajectory(NamedTuple):
 
 def _small(*faults: Fault, **fields: Any) -> GoldenTrajectory:
     """Return one of a warehouse in which six robots deliver within seconds."""
-    told = {
+    story = {
         name: fields.pop(name) for name in ("steps", "policy", "seed", "events") if name in fields
     }
     size = {"n_robots": 6, "n_items": 10, "warehouse_width": 4.0, "warehouse_height": 3.0}
-    return GoldenTrajectory(Scenario(**{**size, "delivery_width": 1.0, **fields}), faults, **told)
+    return GoldenTrajectory(Scenario(**{**size, "delivery_width": 1.0, **fields}), faults, **story)
 
 
 def _in_aisles(policy: str) -> GoldenTrajectory:
@@ -251,9 +251,9 @@ def main(record: bool = False) -> None:
         RECORD.write_text(json.dumps(written, indent=1) + "\n", encoding="utf-8")
         print(f"{len(GOLDEN)} golden trajectories written to {RECORD.name}")
         return
-    found = explained(played)
-    print(found or f"all {len(GOLDEN)} golden trajectories are as recorded")
-    raise SystemExit(int(found is not None))
+    difference = explained(played)
+    print(difference or f"all {len(GOLDEN)} golden trajectories are as recorded")
+    raise SystemExit(int(difference is not None))
 
 
 if __name__ == "__main__":

@@ -105,8 +105,8 @@ def _p_values(
     p[p_o.mean(axis=-1) <= half] = 1.0
     if not only_seen:
         # p with what may be hidden is larger still, so that only these are asked for it.
-        asked = np.flatnonzero(p < most)
-        p[asked] = judged(p_o[asked], p_new[asked], threshold, paired=paired).p_value
+        unclear = np.flatnonzero(p < most)
+        p[unclear] = judged(p_o[unclear], p_new[unclear], threshold, paired=paired).p_value
     return p, side
 
 
@@ -172,9 +172,9 @@ def share_supported(
     p: float, robustness: float, n: int, studies: int = STUDIES, *, paired: bool = True
 ) -> float:
     """Return the share of studies that support R > 0, at a true R and Poisson counts of mean P."""
-    rng, kept = np.random.default_rng(n), 1.0 - REMOVED / ROBOTS
-    p_o, p_f = (rng.poisson(mean, (studies, n)) * 1.0 for mean in (p, p * (robustness + kept)))
-    p_values, side = _p_values(p_o, p_f, kept - 1.0, 0.05, paired=paired, only_seen=False)
+    rng, left = np.random.default_rng(n), 1.0 - REMOVED / ROBOTS
+    p_o, p_f = (rng.poisson(mean, (studies, n)) * 1.0 for mean in (p, p * (robustness + left)))
+    p_values, side = _p_values(p_o, p_f, left - 1.0, 0.05, paired=paired, only_seen=False)
     return float(((p_values < 0.05) & (side > 0.0)).mean())
 
 
@@ -203,8 +203,8 @@ def over_trainings(
         threshold: That R is tested against; None: the true R, where each verdict is wrong.
     """
     world, rng = WORLDS[name], np.random.default_rng([trainings, seeds])
-    kept = 1.0 + robustness - REMOVED / ROBOTS
-    working = kept / (1.0 - world.collapse * (1.0 - LEFT))
+    ratio = 1.0 + robustness - REMOVED / ROBOTS
+    working = ratio / (1.0 - world.collapse * (1.0 - LEFT))
 
     def factor(shape: Shape, sd: float) -> Floats:
         return np.asarray(np.exp(sd * rng.standard_normal(shape) - sd**2 / 2))
@@ -274,8 +274,8 @@ def trainings_rows() -> Iterator[Row]:
     for world, trainings, seeds in product(WORLDS, (5, 7, 10, 20), (6, 20)):
         row: Row = {"world": world, "trainings": trainings, "seeds": seeds}
         row |= over_trainings(world, trainings, seeds)._asdict()
-        found = over_trainings(world, trainings, seeds, robustness=0.3, threshold=0.0)
-        yield {**row, "supported_at_r_0.3": found.supported}
+        shares = over_trainings(world, trainings, seeds, robustness=0.3, threshold=0.0)
+        yield {**row, "supported_at_r_0.3": shares.supported}
 
 
 TABLES = {

@@ -74,7 +74,8 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.metadata = self.env.metadata
         self.render_mode = self.env.render_mode
         robot = self.env.possible_agents[0]
-        row, command = self.env.observation_space(robot), self.env.action_space(robot)
+        row = self.env.observation_space(robot)
+        command = self.env.action_space(robot)
         if not isinstance(command, Box):
             raise SetupError(
                 f"env = {self.env}: its commands are {command}, should be a Box; put no "
@@ -128,7 +129,8 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         commands[: state.n_robots] = mask_unreachable_commands(commands[: state.n_robots], state)
         observations, rewards, terminations, truncations = self._rows.step_arrays(commands)
         reward = float(rewards.sum() / max(n_present, 1))
-        is_over, is_cut = bool(terminations.any()), bool(truncations.any())
+        is_over = bool(terminations.any())
+        is_cut = bool(truncations.any())
         return self._reshape(observations), reward, is_over, is_cut, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:

@@ -176,7 +176,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             ScenarioError, FaultError, SetupError: options that a world refuses; none has begun one.
         """
         for env, rows in zip(self.worlds, self._worlds.rows):
-            seed, options = self._seeds[rows.start], self._options[rows.start]
+            seed = self._seeds[rows.start]
+            options = self._options[rows.start]
             env.conditions_of(env.next_seed if seed is None else seed, options)
         observations = self._worlds.blank()
         self._returns[:] = 0.0
@@ -292,7 +293,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
 
     def _note(self, world: int) -> None:
         """Note what there is to say of a world's rows, until it has something to tell again."""
-        env, rows = self.worlds[world], self._worlds.rows[world]
+        env = self.worlds[world]
+        rows = self._worlds.rows[world]
         state = env.warehouse.state
         info = {
             "TimeLimit.truncated": False,

@@ -134,7 +134,8 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             seed = checked_count("seed", seed, least=0)
             seeds = {world: key(seed, "world", world) >> 1 for world in worlds}
         for world in worlds:
-            env, world_seed = self.worlds[world], seeds[world]
+            env = self.worlds[world]
+            world_seed = seeds[world]
             env.conditions_of(env.next_seed if world_seed is None else world_seed, options)
         for world in worlds:
             self._worlds.begin(world, self._observations, seeds[world], options)

@@ -184,7 +184,8 @@ class Worlds:
         robots = self._robots(world)
         _, rewards, terminated, truncated = step
         outcome.rewards[robots] = rewards
-        outcome.terminated[robots], outcome.truncated[robots] = terminated, truncated
+        outcome.terminated[robots] = terminated
+        outcome.truncated[robots] = truncated
         self.is_over[world] = not self.envs[world].agents
         self.reported.append(world)
 

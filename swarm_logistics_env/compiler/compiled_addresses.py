@@ -26,7 +26,8 @@ from .packing import field_kinds
 
 S = TypeVar("S", bound=tuple[Any, ...])
 cgutils: Any = core.cgutils  # without types
-_WORD, _BYTES = ir.IntType(64), 8
+_WORD = ir.IntType(64)
+_BYTES = 8
 # System V on x86-64 and AAPCS64 on arm64 pass a structure of two words, all integers or all
 # doubles, exactly as two arguments; Windows on x86-64 passes its address.
 _BY_REFERENCE = sys.platform == "win32" and "ARM" not in sys.version.upper()
@@ -65,7 +66,8 @@ def _calling(kind: Any) -> Callable[..., int]:
 # Both call the C function at an address with a tuple of arguments. Each is an integer (of any width
 # up to 64 bits, or a pointer), a double, or a tuple of two of the same kind: a structure of 16
 # bytes passed by value. The first returns nothing, the second the pointer that it is given.
-call_at, made_at = _calling(types.void), _calling(types.int64)
+call_at = _calling(types.void)
+made_at = _calling(types.int64)
 
 
 @_generated
@@ -108,7 +110,8 @@ def _changed_by(operation: str) -> Callable[..., int]:
 
 # Both take an address, the index of a word there, and an integer, which is stored in it or added
 # to it; they return the old value.
-exchange, add = _changed_by("xchg"), _changed_by("add")
+exchange = _changed_by("xchg")
+add = _changed_by("add")
 
 
 @_generated
@@ -178,7 +181,8 @@ def _field(context: Any, builder: Any, kind: StructureAt, address: Any, name: st
 @functools.cache
 def _places(structure: type) -> dict[str, tuple[Any, int]]:
     """Return of each field its type in compiled code, and how many words stand before it."""
-    places, before = {}, 0
+    places = {}
+    before = 0
     for name, kind in field_kinds(structure).items():
         places[name] = (_compiled_type(kind), before)
         before += _n_words(kind)

@@ -99,7 +99,8 @@ def _import_without_blas() -> None:
 
 def _compile_as_part(compiled: Any, compile_now: Callable[[], Any]) -> None:
     """Compile what another kernel calls: LLVM is to optimise it there alone, not before as well."""
-    compiler, cache = compiled._compiler, compiled._cache
+    compiler = compiled._compiler
+    cache = compiled._cache
     signatures_before = set(compiled.overloads)
     compiler.pipeline_class = _PartCompiler
     compiled._insert = lambda *_: None

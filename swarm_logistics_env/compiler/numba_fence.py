@@ -17,7 +17,8 @@ from typing import Any, cast
 
 import numba
 
-FIRST_TESTED, LAST_TESTED = (0, 61), (0, 68)  # versions of numba; pyproject.toml has them, too
+FIRST_TESTED = (0, 61)  # versions of numba; pyproject.toml has them, too
+LAST_TESTED = (0, 68)
 WAY = "SWARM_LOGISTICS_KERNELS"  # environment variable: "plain" or "fast", whatever the version
 QUIET = "SWARM_LOGISTICS_QUIET"  # environment variable of workers: nobody reads what they say
 

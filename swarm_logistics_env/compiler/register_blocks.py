@@ -24,7 +24,8 @@ Floats = NDArray[np.float32]
 SumBlock = Callable[[Floats, int, int, int, Floats, int, Floats, int, Floats, int, int], None]
 
 ROWS = 2
-WIDE, NARROW = 32, 8  # outputs of a block
+WIDE = 32  # outputs of a block
+NARROW = 8
 _LANES = 8  # floats in a register
 _ARRAYS = (0, 4, 6, 8)  # which of the arguments are arrays
 make_array: Any = arrayobj.make_array  # without types
@@ -109,8 +110,8 @@ def _in_registers(width: int) -> SumBlock:
         def in_all_lanes(value: Any) -> Any:
             first_lane = ir.Constant(ir.IntType(32), 0)
             lane = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), value, first_lane)
-            same = ir.Constant(ir.VectorType(ir.IntType(32), _LANES), [0] * _LANES)
-            return builder.shuffle_vector(lane, ir.Constant(_VECTOR, ir.Undefined), same)
+            zeros = ir.Constant(ir.VectorType(ir.IntType(32), _LANES), [0] * _LANES)
+            return builder.shuffle_vector(lane, ir.Constant(_VECTOR, ir.Undefined), zeros)
 
         initial = [load(pointer) for pointer in vectors_at(biases, first_bias)]
         before = builder.block
@@ -148,4 +149,5 @@ def _in_registers(width: int) -> SumBlock:
 
 
 _sum_block = _by_loops if IS_INTERPRETED else _in_registers
-sum_wide_block, sum_narrow_block = _sum_block(WIDE), _sum_block(NARROW)
+sum_wide_block = _sum_block(WIDE)
+sum_narrow_block = _sum_block(NARROW)

@@ -305,7 +305,8 @@ class _Folder:
     def _enable_import(self, top_module: str | None) -> Iterator[None]:
         """Let a module be found in this folder; None: nothing, as for an installed module."""
         with _lock:
-            outer, self._top_module = self._top_module, top_module
+            outer = self._top_module
+            self._top_module = top_module
             self._depth += 1
             if self._depth == 1:
                 displaced_modules = self._exchange(self._modules)

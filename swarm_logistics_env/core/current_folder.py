@@ -84,7 +84,8 @@ def current_folder_modules() -> tuple[str, ...] | None:
 @contextmanager
 def allow_all_imports() -> Iterator[None]:
     """Let everything be found, as a file needs whose code somebody trusts."""
-    before, _current_folder.allows_all = _current_folder.allows_all, True
+    before = _current_folder.allows_all
+    _current_folder.allows_all = True
     try:
         yield
     finally:

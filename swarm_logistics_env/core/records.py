@@ -298,7 +298,8 @@ def _in_plain_words(problem: dict[str, Any]) -> str:
         return "should be a list"
     if problem["type"] == "too_short":
         least = problem["ctx"]["min_length"]
-        return f"should have at least {least} item{'' if least == 1 else 's'}"
+        noun = "item" if least == 1 else "items"
+        return f"should have at least {least} {noun}"
     message = str(problem["msg"]).removeprefix("Value error, ")
     return re.sub("^(Input|String) should", "should", message)
 

@@ -228,7 +228,8 @@ class SwarmLogisticsEnv(DictView):
         world = self.warehouse
         was_present = self._present
         n = len(was_present)
-        terminations, truncations = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+        terminations = np.zeros(n, np.bool_)
+        truncations = np.zeros(n, np.bool_)
         if not (world.is_eventful or self.is_watched):
             return observations, np.zeros(n), terminations, truncations
         rewards = self._rewards.pay(world)

@@ -68,7 +68,8 @@ class RewardTerms:
         Raises:
             SetupError: a term of one's own returned what is not finite.
         """
-        before, after = self._before, Moment(world)
+        before = self._before
+        after = Moment(world)
         total = np.zeros(world.state.n_robots)
         for name, term, weight in self._terms:
             earned = term(world, before, after)
@@ -135,14 +136,16 @@ def lift_requested(world: Warehouse, before: Moment, after: Moment) -> Earned:
 
     Nothing to one that cannot deliver (privileged: as `approach`).
     """
-    state, carriers = world.state, after.carriers
+    state = world.state
+    carriers = after.carriers
     items = np.flatnonzero(before.requested & after.requested & (carriers != before.carriers))
     if not items.size:
         return None
     reward = np.zeros(state.n_robots)
     delivers = state.delivers
     for item in items.tolist():
-        carrier, previous_carrier = int(carriers[item]), int(before.carriers[item])
+        carrier = int(carriers[item])
+        previous_carrier = int(before.carriers[item])
         # One that was delivered and is asked for again does not lie where its carrier stands.
         is_back = after.delivered != before.delivered and carrier == NOBODY
         if is_back and (state.item_position[item] != state.robot_position[previous_carrier]).any():
@@ -161,7 +164,8 @@ def approach(world: Warehouse, before: Moment, after: Moment) -> Earned:
 
     Privileged: no robot can sense it, so it may shape a reward but not an observation.
     """
-    state, floor = world.state, world.floor
+    state = world.state
+    floor = world.floor
     robots = np.flatnonzero(after.carries_requested(state))
     robots = robots[before.keeps(state, robots)]
     if not robots.size:
@@ -180,7 +184,8 @@ def stocking(world: Warehouse, before: Moment, after: Moment) -> Earned:
     What lies nearer is delivered sooner once it is requested; nearer than `STOCK_DISTANCE` it
     would be in the way. Privileged: as `approach`.
     """
-    state, floor = world.state, world.floor
+    state = world.state
+    floor = world.floor
     # The step in which a robot lets go still moves the item; one that was delivered lies elsewhere.
     carriers = np.where(after.carriers == NOBODY, before.carriers, after.carriers)
     if after.delivered != before.delivered:
@@ -214,7 +219,8 @@ def blocked_request(world: Warehouse, before: Moment, after: Moment) -> Earned:
     A metre into the delivery area counts `SECONDS_A_METRE`, and the way out gives them back: an
     item that is let go there is found by nobody. Privileged: as `approach`.
     """
-    state, floor = world.state, world.floor
+    state = world.state
+    floor = world.floor
     robots = np.flatnonzero(after.carries_requested(state) & ~state.delivers)
     if not robots.size:
         return None

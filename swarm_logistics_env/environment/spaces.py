@@ -175,7 +175,8 @@ class Spaces:
 
     def _bounds(self, features: Mapping[str, Feature]) -> tuple[list[float], list[float]]:
         """Return the lowest and the highest values of a row with these features."""
-        low, high = [], []
+        low = []
+        high = []
         for feature in features.values():
             most = 1.0 if feature.most is None else self.most[feature.most]
             low.append(-most if feature.is_signed else 0.0)

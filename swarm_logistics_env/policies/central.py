@@ -244,8 +244,10 @@ class Central(Scripted):
         is_stuck = self._task[1] and state.time > self._least_distance_at + STUCK
         has_tried = worker == self._stepping and math.dist(position, self._stepped_from) < 0.1
         if is_stuck and not has_tried:
-            self._stepping, self._stepped_from = worker, position.copy()
-            self._stepped_at, self._step_velocity = state.time, velocity[worker].copy()
+            self._stepping = worker
+            self._stepped_from = position.copy()
+            self._stepped_at = state.time
+            self._step_velocity = velocity[worker].copy()
             gripper[worker] = -1.0
         elif worker == self._stepping and state.time < self._stepped_at + STEP - 1e-6:
             velocity[worker] = self._step_velocity
@@ -278,8 +280,11 @@ class Central(Scripted):
         heading = state.robot_heading
         commands = commands_of(velocity, np.cos(heading), np.sin(heading), gripper)
         if self._scenario.drive == "differential":
-            forward, left, turn = commands[:, 0], commands[:, 1], commands[:, 2]
+            forward = commands[:, 0]
+            left = commands[:, 1]
+            turn = commands[:, 2]
             full_turn = self._scenario.max_turn_rate * self._scenario.control_period
             turn[:] = np.clip(np.arctan2(left, forward) / full_turn, -1.0, 1.0)
-            forward[:], left[:] = np.maximum(forward, 0.0), 0.0
+            forward[:] = np.maximum(forward, 0.0)
+            left[:] = 0.0
         return commands

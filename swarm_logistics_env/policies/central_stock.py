@@ -112,7 +112,8 @@ def find_laden(
         slot: of each robot (N,), or `NOBODY`; those of the others are given back.
     """
     is_laden = np.empty(len(is_idle), np.bool_)
-    n_laden, n_held = 0, 0
+    n_laden = 0
+    n_held = 0
     for robot in range(len(is_idle)):
         item = robot_item[robot]
         is_laden[robot] = is_idle[robot] and item != NOBODY and item != requested
@@ -174,11 +175,13 @@ def send_to_slots(
             return
         if not laden[robot] or slot[robot] != NOBODY:
             continue
-        nearest, least = NOBODY, math.inf
+        nearest = NOBODY
+        least = math.inf
         for number in range(len(slots)):
             distance = distance_to(slots[number, 0], slots[number, 1], position[robot])
             if is_free[number] and distance < least:
-                nearest, least = number, distance
+                nearest = number
+                least = distance
         if nearest == NOBODY:
             return
         slot[robot] = nearest

@@ -38,9 +38,11 @@ def drift(
     velocity = np.empty((n_robots, 2))
     for robot in range(n_robots):
         x, y = position[robot]
-        shove_x, shove_y = 0.0, 0.0
+        shove_x = 0.0
+        shove_y = 0.0
         for other in range(n_robots):
-            from_x, from_y = x - position[other, 0], y - position[other, 1]
+            from_x = x - position[other, 0]
+            from_y = y - position[other, 1]
             distance = math.sqrt(from_x * from_x + from_y * from_y)
             if other == robot or not present[other] or distance >= PERSONAL_SPACE:
                 continue
@@ -49,11 +51,13 @@ def drift(
                 push *= 3.0
             shove_x += push * from_x
             shove_y += push * from_y
-        to_x, to_y = goals[robot, 0] - x, goals[robot, 1] - y
+        to_x = goals[robot, 0] - x
+        to_y = goals[robot, 1] - y
         is_at_goal = math.sqrt(to_x * to_x + to_y * to_y) < AT_GOAL
         # A robot that waits under an item blocks nobody whom the item does not block as well.
         if is_at_goal and waits_under[robot] != NOBODY:
-            shove_x, shove_y = 0.0, 0.0
+            shove_x = 0.0
+            shove_y = 0.0
         velocity_x, velocity_y = at_most_1(to_x / stride, to_y / stride)
         # Pass on the right, so that two who meet get past each other.
         velocity_x += shove_x + 0.5 * shove_y
@@ -149,7 +153,8 @@ def loneliest(
 
     The nearest one if none is taken; `NOBODY` if none is free.
     """
-    best, most = NOBODY, -np.inf
+    best = NOBODY
+    most = -np.inf
     any_taken = is_taken.any()
     for item in range(len(is_free)):
         if not is_free[item] or is_taken[item]:
@@ -162,12 +167,14 @@ def loneliest(
         distance = distance_to(x, y, position)
         worth = gap - 0.5 * distance if any_taken else -distance
         if worth > most:
-            best, most = item, worth
+            best = item
+            most = worth
     return best
 
 
 @kernel
 def distance_to(x: float, y: float, position: Numbers) -> float:
     """Return how far (x, y) is from a position (2,)."""
-    away_x, away_y = x - position[0], y - position[1]
+    away_x = x - position[0]
+    away_y = y - position[1]
     return math.sqrt(away_x * away_x + away_y * away_y)

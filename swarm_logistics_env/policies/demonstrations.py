@@ -243,7 +243,10 @@ def _play(
     world = env.unwrapped.warehouse
     observations = [env.reset_arrays(seed)]
     start(policy, world.scenario, seed)
-    actions, rewards, failed, ends = [], [], [], []
+    actions = []
+    rewards = []
+    failed = []
+    ends = []
     while env.agents:
         commands = np.asarray(decide(policy, world.observe(), world.state), np.float64)
         if isinstance(env, MotionFrame):
@@ -255,8 +258,10 @@ def _play(
         actions.append(action)
         rewards.append(earned)
         ends.append((terminations, truncations))
-    seen, done = np.stack(observations), np.stack(actions)
-    paid, broken = np.stack(rewards), np.stack(failed)
+    seen = np.stack(observations)
+    done = np.stack(actions)
+    paid = np.stack(rewards)
+    broken = np.stack(failed)
     terminated, truncated = np.stack(ends, axis=1)
     for robot in range(seen.shape[1]):
         is_end = terminated[:, robot] | truncated[:, robot]
@@ -291,8 +296,10 @@ def _outputs_of(
         angle = np.minimum(0.5 * np.abs(turned_by) + off, most) * np.sign(turn)
         angle = np.where(np.abs(turn) < 1.0, turned_by, angle)
         speed = forward / np.cos(angle - 0.5 * turned_by)
-        forward, left = speed * np.cos(angle), speed * np.sin(angle)
-    cosine, sine = np.cos(turned), np.sin(turned)
+        forward = speed * np.cos(angle)
+        left = speed * np.sin(angle)
+    cosine = np.cos(turned)
+    sine = np.sin(turned)
     return np.stack([cosine * forward + sine * left, cosine * left - sine * forward, gripper], 1)
 
 

@@ -137,7 +137,8 @@ class Play:
             self._advance()
             n_steps = 1
         else:
-            world, rows = self.world, self._rows
+            world = self.world
+            rows = self._rows
             n_steps, is_eventful = self._play_steps(world.address, rows, positions)
             try:
                 world.take(rows, is_eventful)

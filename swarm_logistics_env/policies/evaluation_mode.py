@@ -14,7 +14,8 @@ from typing import Any
 from swarm_logistics_env.core.code_files import is_users_own, names_in
 
 # A policy holds its networks near its surface; what lies deeper is a world or a store of rows.
-_DEEPEST, _MOST_PARTS = 6, 1000
+_DEEPEST = 6
+_MOST_PARTS = 1000
 
 
 @contextlib.contextmanager

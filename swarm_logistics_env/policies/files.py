@@ -136,7 +136,8 @@ def file_content(card: str, tensors: Mapping[str, NDArray[Any]]) -> bytes:
 
 
 # Both are old enough for the runtimes of 2022.
-OPERATORS, FORMAT = 17, 8
+OPERATORS = 17
+FORMAT = 8
 DEVIATIONS = "deviations"  # in the metadata
 
 
@@ -168,7 +169,8 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
         raise PolicyError(
             f"to write ONNX needs the package onnx ({error}): {how_to_install('onnx')}"
         ) from error
-    network, tensors = policy.card.network, dict(policy.tensors)
+    network = policy.card.network
+    tensors = dict(policy.tensors)
     deviations = tensors.pop(DEVIATIONS) * np.float32(network.exploration)
     if not network.listens:
         # Such a policy reads zeros there. Without their weights it may be given anything.
@@ -178,7 +180,8 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
     layer_input = "inputs"
     for layer in range(len(network.hidden) + 1):
         is_last = layer == len(network.hidden)
-        weight, bias = f"layers.{layer}.weight", f"layers.{layer}.bias"
+        weight = f"layers.{layer}.weight"
+        bias = f"layers.{layer}.bias"
         total = "outputs" if is_last else f"layers.{layer}.sum"
         nodes.append(helper.make_node("Gemm", [layer_input, weight, bias], [total], transB=1))
         if not is_last:

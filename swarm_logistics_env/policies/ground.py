@@ -83,7 +83,8 @@ def head_inside(
     for robot in range(len(position)):
         x, y = position[robot]
         if x >= edge:
-            points[robot, 0], points[robot, 1] = deepest, y
+            points[robot, 0] = deepest
+            points[robot, 1] = y
         else:
             next_x, next_y = lookahead(cost, far, x, y)
             points[robot, 0] = next_x + (depth if next_x > edge - CELL else 0.0)
@@ -102,7 +103,8 @@ class OpenGround:
     def costs(self, discs: Numbers) -> Numbers:
         """Return the cost of each cell among discs."""
         scenario = self._scenario
-        width, height = scenario.warehouse_width, scenario.warehouse_height
+        width = scenario.warehouse_width
+        height = scenario.warehouse_height
         return costmap(width, height, scenario.robot_radius, discs)
 
     def dock_cells(self, dock: int) -> Mask:

@@ -34,7 +34,9 @@ from swarm_logistics_env.world.scenario import Scenario
 
 N_DIRECTIONS = 32
 KNOWN = 0.5  # entries lately; with fewer a robot knows no direction home
-LIFT, HOLD, LET_GO = 1.0, 0.0, -1.0  # commands of the gripper
+LIFT = 1.0  # commands of the gripper
+HOLD = 0.0
+LET_GO = -1.0
 
 
 class HomingParameters(ScriptParameters):
@@ -114,11 +116,14 @@ def decide_homing(
     `counts` (N,) are the decisions of each robot, this one among them.
     """
     for robot in range(rows.shape[0]):
-        observation, memory = rows[robot], memories[robot]
+        observation = rows[robot]
+        memory = memories[robot]
         is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
-        x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
+        x = memory[MEMORY.heading_x]
+        y = memory[MEMORY.heading_y]
         push_x, push_y = avoid_neighbours(observation, parameters)
-        speed, gripper = 1.0, LET_GO
+        speed = 1.0
+        gripper = LET_GO
         if observation[row.CARRYING_REQUESTED] > 0.5:
             # Inside it stands, and lets go only once it takes its delivery for broken.
             if not is_inside or not has_failed(memory):
@@ -126,7 +131,8 @@ def decide_homing(
             speed = 0.0 if is_inside and gripper == LIFT else 1.0
             if memory[MEMORY.stuck] > 0.0:
                 angle = random_heading(keys[robot], counts[robot] - 1, period)
-                x, y = math.cos(angle), math.sin(angle)
+                x = math.cos(angle)
+                y = math.sin(angle)
             elif not is_inside:
                 x, y = home_direction(observation, memory, x, y, parameters)
             x, y = freest_direction(observation, memory, x + push_x, y + push_y, parameters)
@@ -136,7 +142,8 @@ def decide_homing(
                 x, y, speed, gripper = fetch(observation, item, push_x, push_y, period, parameters)
             else:
                 x, y = search_direction(observation, memory, x, y, is_inside, parameters)
-                x, y = x + push_x, y + push_y
+                x = x + push_x
+                y = y + push_y
                 speed = min(1.0, max(length_of(x, y), 0.3))
         set_velocity(x, y, speed, gripper, commands[robot])
 
@@ -154,10 +161,12 @@ def away_from_neighbours(
     observation: NDArray[np.float32], reach: float, gain: float
 ) -> tuple[float, float]:
     """Return the sum of directions away from neighbours, `gain` .. 0 at distance 0 .. `reach`."""
-    push_x, push_y = 0.0, 0.0
+    push_x = 0.0
+    push_y = 0.0
     for neighbour in range(row.N_NEIGHBOURS):
         start = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * neighbour
-        x, y = observation[start + row.NEIGHBOUR.x], observation[start + row.NEIGHBOUR.y]
+        x = observation[start + row.NEIGHBOUR.x]
+        y = observation[start + row.NEIGHBOUR.y]
         distance = length_of(x, y)
         if 0.0 < distance < reach:
             push_x -= (1.0 - distance / reach) * x / distance
@@ -195,7 +204,8 @@ def fetch(
     parameters: HomingParameters,
 ) -> tuple[float, float, float, float]:
     """Return the direction, speed and gripper of a robot on its way to the item in a column."""
-    x, y = observation[item + row.ITEM.x], observation[item + row.ITEM.y]
+    x = observation[item + row.ITEM.x]
+    y = observation[item + row.ITEM.y]
     distance = max(length_of(x, y), 1e-6)
     speed = min(1.0, distance / (2.0 * period))
     gripper = LIFT if distance < parameters.grip_range else LET_GO
@@ -214,17 +224,21 @@ def search_direction(
     """Return the direction in which a robot searches that drives in direction (x, y)."""
     walls = observation[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
     nearest = np.argmin(walls)
-    wall_x, wall_y = 0.0, 0.0
+    wall_x = 0.0
+    wall_y = 0.0
     if walls[nearest] < parameters.wall_range:
         angle = 2.0 * math.pi * nearest / row.N_BEAMS
-        towards_x, towards_y = math.cos(angle), math.sin(angle)
+        towards_x = math.cos(angle)
+        towards_y = math.sin(angle)
         approach = x * towards_x + y * towards_y
         if walls[nearest] < parameters.mirror_range and approach > 0.0:
             x -= 2.0 * approach * towards_x
             y -= 2.0 * approach * towards_y
         push = parameters.wall_gain * (1.0 - walls[nearest] / parameters.wall_range)
-        wall_x, wall_y = -push * towards_x, -push * towards_y
-    reach, gain = parameters.spread_range, parameters.spread_gain
+        wall_x = -push * towards_x
+        wall_y = -push * towards_y
+    reach = parameters.spread_range
+    gain = parameters.spread_gain
     spread_x, spread_y = away_from_neighbours(observation, reach, gain)
     x += wall_x + spread_x
     y += wall_y + spread_y
@@ -252,7 +266,8 @@ def home_direction(
         y = share * memory[MEMORY.home_y] / home + (1.0 - share) * y
         trust = 1.0 / home if home < parameters.sure else 0.0
     if observation[row.LOWEST_TIMER] > 0.5:
-        lead_x, lead_y = observation[row.LOWEST_TIMER_X], observation[row.LOWEST_TIMER_Y]
+        lead_x = observation[row.LOWEST_TIMER_X]
+        lead_y = observation[row.LOWEST_TIMER_Y]
         distance = length_of(lead_x, lead_y)
         if distance > 0.0:
             x += trust * lead_x / distance
@@ -270,18 +285,23 @@ def freest_direction(
 ) -> tuple[float, float]:
     """Return the direction that is nearest to (x, y) and meets no item or wall."""
     length = max(length_of(x, y), 1e-9)
-    x, y = x / length, y / length
-    best_worth, best_x, best_y = -1e9, x, y
+    x = x / length
+    y = y / length
+    best_worth = -1e9
+    best_x = x
+    best_y = y
     for direction in range(N_DIRECTIONS):
         angle = 2.0 * math.pi * direction / N_DIRECTIONS
-        go_x, go_y = math.cos(angle), math.sin(angle)
+        go_x = math.cos(angle)
+        go_y = math.sin(angle)
         worth = go_x * x + go_y * y
         worth += 0.3 * (go_x * memory[MEMORY.heading_x] + go_y * memory[MEMORY.heading_y])
         for item in range(row.N_ITEMS_IN_VIEW):
             start = row.ITEMS + row.ITEM_WIDTH * item
             if observation[start + row.ITEM.present] < 0.5:
                 break
-            item_x, item_y = observation[start + row.ITEM.x], observation[start + row.ITEM.y]
+            item_x = observation[start + row.ITEM.x]
+            item_y = observation[start + row.ITEM.y]
             along = item_x * go_x + item_y * go_y
             aside = abs(item_x * go_y - item_y * go_x)
             if aside < parameters.clearance and 0.0 < along < parameters.obstacle_range + 0.25:
@@ -294,7 +314,9 @@ def freest_direction(
         if wall < 0.35:
             worth -= 2.0 * (1.0 - max(0.0, wall - 0.13) / 0.22)
         if worth > best_worth:
-            best_worth, best_x, best_y = worth, go_x, go_y
+            best_worth = worth
+            best_x = go_x
+            best_y = go_y
     return best_x, best_y
 
 

@@ -60,7 +60,8 @@ FIRST_ROLE = 2_000_003  # number in the robot's stream
 CARRIED_OFF = 1.0  # where an item is put down for which there is no gap
 ITEM_SPACING = 0.6  # between the centres of items, so that laden robots get through
 DEPTH = 0.3  # of robots that hold items inside
-SPREAD_GAIN, SPREAD_RANGE = 0.3, 1.5  # along the border, away from neighbours
+SPREAD_GAIN = 0.3  # along the border, away from neighbours
+SPREAD_RANGE = 1.5
 LOST = 0.8  # that a reckoned distance may be wrong
 LEAST_CERTAINTY = 0.3  # of a direction home that was taken once, after 72 s
 STUCK = 0.4  # a robot tries a random direction until the memory's 1 has fallen to this
@@ -123,7 +124,8 @@ def decide_homing_stock(
 ) -> None:
     """Fill the commands (N, 4) from rows (N, D), memories and counts, see `decide_homing`."""
     for robot in range(rows.shape[0]):
-        observation, memory = rows[robot], memories[robot]
+        observation = rows[robot]
+        memory = memories[robot]
         is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
         carries = observation[row.CARRYING] > 0.5
         carries_requested = observation[row.CARRYING_REQUESTED] > 0.5
@@ -176,7 +178,8 @@ def break_free(
     parameters: HomingStockParameters,
 ) -> Motion:
     """Return the motion of a laden robot that is stuck: in a random direction, not from home."""
-    x, y = math.cos(angle) + PULL * home[0], math.sin(angle) + PULL * home[1]
+    x = math.cos(angle) + PULL * home[0]
+    y = math.sin(angle) + PULL * home[1]
     x, y = freest_direction(observation, memory, x + push[0], y + push[1], parameters)
     return x, y, 1.0, HOLD
 
@@ -192,13 +195,15 @@ def drive_home(
 ) -> Motion:
     """Return the motion of a robot with the requested item: home, and to a stand inside."""
     home_x, home_y, certainty = home
-    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
+    x = memory[MEMORY.heading_x]
+    y = memory[MEMORY.heading_y]
     # Inside it lets go only once it takes its delivery for broken.
     lets_go = is_inside and has_failed(memory)
     gripper = LET_GO if lets_go else LIFT
     speed = 0.0 if is_inside and not lets_go else 1.0
     if not is_inside and certainty > 0.0:
-        x, y = home_x, home_y
+        x = home_x
+        y = home_y
     elif not is_inside:
         x, y = home_direction(observation, memory, x, y, parameters)
     x, y = freest_direction(observation, memory, x + push[0], y + push[1], parameters)
@@ -218,7 +223,8 @@ def carry_stock(
 ) -> Motion:
     """Return the motion of a robot with an item that nobody asks for: to hold or to stock it."""
     home_x, home_y, certainty = home
-    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
+    x = memory[MEMORY.heading_x]
+    y = memory[MEMORY.heading_y]
     item = requested_item(observation, memory, False)
     if item >= 0:  # it lets go outside, and lifts that one
         return observation[item + row.ITEM.x], observation[item + row.ITEM.y], 1.0, LET_GO
@@ -263,11 +269,13 @@ def search_items(
         item = item_to_stock(observation, memory, home_x, home_y, least)
     if item >= 0:
         return fetch(observation, item, push[0], push[1], period, parameters)
-    x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
+    x = memory[MEMORY.heading_x]
+    y = memory[MEMORY.heading_y]
     if certainty == 0.0 and observation[row.LOWEST_TIMER] > 0.5:
         x, y = home_direction(observation, memory, x, y, parameters)
     x, y = search_direction(observation, memory, x, y, is_inside, parameters)
-    x, y = x + push[0], y + push[1]
+    x = x + push[0]
+    y = y + push[1]
     return x, y, min(1.0, max(length_of(x, y), 0.3)), LET_GO
 
 
@@ -276,7 +284,9 @@ def forget_if_lost(memory: NDArray[np.float64], is_inside: bool) -> None:
     """Forget the kept direction home if the distance reckoned with it cannot be."""
     is_lost = memory[MEMORY.away] > LOST if is_inside else memory[MEMORY.away] < -LOST
     if is_lost:
-        memory[MEMORY.kept_x], memory[MEMORY.kept_y], memory[MEMORY.away] = 0.0, 0.0, 0.0
+        memory[MEMORY.kept_x] = 0.0
+        memory[MEMORY.kept_y] = 0.0
+        memory[MEMORY.away] = 0.0
 
 
 @kernel
@@ -292,7 +302,8 @@ def is_gap(
     """
     if is_inside or memory[MEMORY.away] >= parameters.near:
         return False
-    x, y = observation[row.ITEMS + row.ITEM.x], observation[row.ITEMS + row.ITEM.y]
+    x = observation[row.ITEMS + row.ITEM.x]
+    y = observation[row.ITEMS + row.ITEM.y]
     return bool(observation[row.ITEMS + row.ITEM.present] < 0.5 or length_of(x, y) > ITEM_SPACING)
 
 
@@ -326,7 +337,8 @@ def item_to_stock(
         start = row.ITEMS + row.ITEM_WIDTH * item
         if observation[start + row.ITEM.present] < 0.5:
             break
-        x, y = observation[start + row.ITEM.x], observation[start + row.ITEM.y]
+        x = observation[start + row.ITEM.x]
+        y = observation[start + row.ITEM.y]
         distance = memory[MEMORY.away] - x * home_x - y * home_y
         if observation[start + row.ITEM.recently_held] < 0.5 and distance > least:
             return start

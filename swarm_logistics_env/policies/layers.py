@@ -79,13 +79,17 @@ def hyperbolic_tangent(x: np.float32) -> np.float32:
 def run_network(inputs: Floats, layers: Layers, outputs: Floats) -> None:
     """Fill `outputs` (N, widths[-1]) from `inputs` (N, widths[0])."""
     weights, biases, widths = layers
-    n_rows, n_layers = inputs.shape[0], len(widths) - 1
+    n_rows = inputs.shape[0]
+    n_layers = len(widths) - 1
     most = n_rows * -(-widths.max() // NARROW) * NARROW
-    sums, hidden = np.empty(most, np.float32), np.empty(most, np.float32)
-    values, width_in = inputs.reshape(-1), widths[0]
+    sums = np.empty(most, np.float32)
+    hidden = np.empty(most, np.float32)
+    values = inputs.reshape(-1)
+    width_in = widths[0]
     weight = bias = width_out = 0
     for layer in range(n_layers):
-        n_in, width_out = widths[layer], -(-widths[layer + 1] // NARROW) * NARROW
+        n_in = widths[layer]
+        width_out = -(-widths[layer + 1] // NARROW) * NARROW
         output = 0
         while output < width_out:
             is_wide = output + WIDE <= width_out
@@ -93,7 +97,8 @@ def run_network(inputs: Floats, layers: Layers, outputs: Floats) -> None:
                 # The last of an odd number of rows is summed twice.
                 is_last = row + 1 == n_rows
                 next_value, next_sum = (0, 0) if is_last else (width_in, width_out)
-                value, total = row * width_in, row * width_out + output
+                value = row * width_in
+                total = row * width_out + output
                 if is_wide:
                     sum_wide_block(
                         values, value, next_value, n_in, weights, weight,
@@ -111,7 +116,8 @@ def run_network(inputs: Floats, layers: Layers, outputs: Floats) -> None:
         if layer < n_layers - 1:
             for index in range(n_rows * width_out):
                 hidden[index] = hyperbolic_tangent(sums[index])
-            values, width_in = hidden, width_out
+            values = hidden
+            width_in = width_out
     for row in range(n_rows):
         for output in range(widths[n_layers]):
             outputs[row, output] = sums[row * width_out + output]

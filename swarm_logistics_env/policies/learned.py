@@ -179,7 +179,8 @@ class LearnedPolicy(Described):
             np.concatenate([padded(tensors[f"layers.{n}.bias"]) for n in numbers]),
             np.array(network.widths),
         )
-        self._decides_every, self._listens = network.decides_every, network.listens
+        self._decides_every = network.decides_every
+        self._listens = network.listens
         self._deviations = tensors["deviations"] * np.float32(network.exploration)
         self.parameters = LearnedParameters(network=network, weights=digest(tensors))
         self.configure(Scenario.preset("paper"))

@@ -76,7 +76,8 @@ def check_spaces(about: str, model: Any, frame: bool) -> None:
     Raises:
         PolicyError: it does not.
     """
-    rows, commands = model.observation_space.shape, model.action_space.shape
+    rows = model.observation_space.shape
+    commands = model.action_space.shape
     if rows is not None and len(rows) == 1:
         check_width(about, rows[0], frame)
     if rows is None or commands is None:

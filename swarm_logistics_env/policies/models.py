@@ -83,7 +83,8 @@ def of(
         >>> policy.act(np.zeros((2, 141), np.float32)).shape
         (2, 4)
     """
-    decide, prepare = decider_of(network), normalizer_of(normalize)
+    decide = decider_of(network)
+    prepare = normalizer_of(normalize)
     about = type(network).__name__
     return ModelPolicy(decide, prepare, about=about, frame=frame, listens=listens)
 
@@ -135,7 +136,8 @@ class _BareModel(_Model):
     """A network whose outputs are actions as they are."""
 
     def __init__(self, network: Any, normalize: Any) -> None:
-        self._decide, self._prepare = decider_of(network), normalizer_of(normalize)
+        self._decide = decider_of(network)
+        self._prepare = normalizer_of(normalize)
         self._about = type(network).__name__
         self._tried = None if isinstance(self._decide, _OF_LIBRARIES) else self._decide
 
@@ -161,7 +163,8 @@ class Within(Holding):
     """
 
     def __init__(self, policy: Policy, wrap: Callable[[Any], Any]) -> None:
-        self._policy, self.wrap = policy, wrap
+        self._policy = policy
+        self.wrap = wrap
         self.needs_state = getattr(policy, "needs_state", False)
 
     def __repr__(self) -> str:
@@ -218,8 +221,11 @@ class ModelPolicy(_Model):
         frame: bool,
         listens: bool,
     ) -> None:
-        self._decide, self._prepare = decide, prepare
-        self._has_frame, self._listens, self._about = frame, listens, about
+        self._decide = decide
+        self._prepare = prepare
+        self._has_frame = frame
+        self._listens = listens
+        self._about = about
         if hasattr(decide, "policy") and hasattr(decide.policy, "observation_space"):
             check_spaces(about, decide.policy, frame)
         check_width(about, width_of(decide), frame)

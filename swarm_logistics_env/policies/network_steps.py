@@ -45,16 +45,16 @@ def act_at(
     Args:
         decides: whether the network decides; if not, its last outputs keep their direction.
     """
-    own = unpacked_at(StepArrays, address)
+    pack = unpacked_at(StepArrays, address)
     if decides:
-        layers = Layers(own.layers.weights, own.layers.biases, own.layers.widths)
+        layers = Layers(pack.layers.weights, pack.layers.biases, pack.layers.widths)
         decide(
-            rows, own.period, own.memories, own.counts, own.turned, own.keys, own.listens,
-            layers, own.deviations, own.outputs,
+            rows, pack.period, pack.memories, pack.counts, pack.turned, pack.keys, pack.listens,
+            layers, pack.deviations, pack.outputs,
         )  # fmt: skip
     else:
-        hold_rows(rows, own.period, own.memories, own.counts, own.turned)
-    command_rows(own.outputs, own.turned, rows, own.memories, commands)
+        hold_rows(rows, pack.period, pack.memories, pack.counts, pack.turned)
+    command_rows(pack.outputs, pack.turned, rows, pack.memories, commands)
 
 
 @engine_kernel
@@ -72,7 +72,8 @@ def play_at(
         n_before: steps since the reset of the policy.
     """
     world = unpacked_at(World, world_address)
-    commands, now = np.empty((rows.shape[0], MESSAGE)), world.commands.now
+    commands = np.empty((rows.shape[0], MESSAGE))
+    now = world.commands.now
     now[:, MESSAGE:] = 0.0  # it broadcasts no messages
     for number in range(positions.shape[0]):
         act_at(address, (n_before + number) % decides_every == 0, rows, commands)

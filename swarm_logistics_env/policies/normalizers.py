@@ -104,7 +104,8 @@ class Scaled:
     """
 
     def __init__(self, statistics: _Fixed | _Running, limit: float) -> None:
-        self._statistics, self._limit = statistics, limit
+        self._statistics = statistics
+        self._limit = limit
         mean, deviation = self._numbers()
         shapes = {mean.shape, deviation.shape} - {()}
         if len(shapes) > 1 or any(len(shape) > 1 for shape in shapes):

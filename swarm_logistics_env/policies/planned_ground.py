@@ -74,7 +74,8 @@ class PlannedGround:
     def costs(self, discs: Numbers) -> Numbers:
         """Return the cost of each cell among discs."""
         scenario = self._scenario
-        width, height = scenario.warehouse_width, scenario.warehouse_height
+        width = scenario.warehouse_width
+        height = scenario.warehouse_height
         among_discs = costmap(width, height, scenario.robot_radius, discs)
         return np.asarray(np.maximum(among_discs, self._cells.cost))
 
@@ -150,7 +151,8 @@ class PlannedGround:
         _, dock, along, centres = self._cells
         scenario = self._scenario
         clearance = scenario.item_radius + 2.0 * scenario.robot_radius + CLEARANCE
-        floor, places = floor_of(scenario), np.zeros((0, 2))
+        floor = floor_of(scenario)
+        places = np.zeros((0, 2))
         for row in rows:
             is_in_row = (dock == NOBODY) & (np.abs(along + row) <= 0.5 * CELL)
             is_clear = [is_clear_of_sides(floor, x, y, clearance) for x, y in centres[is_in_row]]
@@ -189,7 +191,8 @@ def _plan_cells(scenario: Scenario) -> _PlanCells:
     floor = floor_of(scenario)
     n_rows = math.ceil(scenario.warehouse_height / CELL)
     n_columns = math.ceil(scenario.warehouse_width / CELL)
-    cost, dock = np.ones((n_rows, n_columns)), np.full((n_rows, n_columns), NOBODY, np.int8)
+    cost = np.ones((n_rows, n_columns))
+    dock = np.full((n_rows, n_columns), NOBODY, np.int8)
     fill_cells(floor, scenario.robot_radius, cost, dock)
     rows, columns = np.mgrid[:n_rows, :n_columns]
     centres = CELL * (np.stack([columns, rows], axis=2) + 0.5)

@@ -34,20 +34,24 @@ def discs_among(
         stands, lies: which robots and items count (K,).
     """
     discs = np.empty((len(robots) + len(obstacles) + len(items), 4))
-    n_discs, reach = 0, robot_radius + CLEARANCE
+    n_discs = 0
+    reach = robot_radius + CLEARANCE
     for robot in range(len(robots)):
         if stands[robot]:
             discs[n_discs, :2] = robots[robot]
-            discs[n_discs, 2], discs[n_discs, 3] = robot_radius + reach, CROWDED
+            discs[n_discs, 2] = robot_radius + reach
+            discs[n_discs, 3] = CROWDED
             n_discs += 1
     for obstacle in range(len(obstacles)):
         discs[n_discs, :2] = obstacles[obstacle]
-        discs[n_discs, 2], discs[n_discs, 3] = obstacle_radius + reach, BLOCKED
+        discs[n_discs, 2] = obstacle_radius + reach
+        discs[n_discs, 3] = BLOCKED
         n_discs += 1
     for item in range(len(items)):
         if lies[item]:
             discs[n_discs, :2] = items[item]
-            discs[n_discs, 2], discs[n_discs, 3] = item_radius + reach, BLOCKED
+            discs[n_discs, 2] = item_radius + reach
+            discs[n_discs, 3] = BLOCKED
             n_discs += 1
     return discs[:n_discs]
 
@@ -61,19 +65,24 @@ def costmap(
     The cost is 1 in the open and `BLOCKED` along the walls. `discs` (S, 4) are x, y and radius
     [m] and the cost within.
     """
-    rows, columns = math.ceil(height / CELL), math.ceil(width / CELL)
+    rows = math.ceil(height / CELL)
+    columns = math.ceil(width / CELL)
     cost = np.ones((rows, columns))
     for disc in range(discs.shape[0]):
-        x, y, reach = discs[disc, 0], discs[disc, 1], discs[disc, 2]
+        x = discs[disc, 0]
+        y = discs[disc, 1]
+        reach = discs[disc, 2]
         for row in range(max(int((y - reach) / CELL), 0), min(int((y + reach) / CELL) + 1, rows)):
             for column in range(
                 max(int((x - reach) / CELL), 0), min(int((x + reach) / CELL) + 1, columns)
             ):
-                dx, dy = (column + 0.5) * CELL - x, (row + 0.5) * CELL - y
+                dx = (column + 0.5) * CELL - x
+                dy = (row + 0.5) * CELL - y
                 if dx * dx + dy * dy < reach * reach:
                     cost[row, column] = max(cost[row, column], discs[disc, 3])
     # How many columns lie too near to the left wall, and to the right one.
-    n_left, n_right = 0, 0
+    n_left = 0
+    n_right = 0
     while n_left < columns and (n_left + 0.5) * CELL < radius:
         n_left += 1
     while n_right < columns and (columns - n_right - 0.5) * CELL > width - radius:
@@ -112,7 +121,8 @@ def cost_to_go(cost: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np
         if n_goals > 0:
             may_change[row : row + 3] = True
     goal_is_left = right_of_middle < 0
-    limits, costs = np.empty(columns), np.empty(columns)
+    limits = np.empty(columns)
+    costs = np.empty(columns)
     while may_change[1:-1].any():
         for order in range(4):
             for i in range(rows):
@@ -145,15 +155,18 @@ def cheapen_row(
         limits, costs: scratch (columns,): the cell visited before makes a cell cheaper if the way
             through it costs less than the limit; otherwise the cell's cost is that in `costs`.
     """
-    above, here, below = far[row - 1], far[row], far[row + 1]
+    above = far[row - 1]
+    middle = far[row]
+    below = far[row + 1]
     columns = len(steps)
-    ahead = 2 if is_forwards else 0  # columns from the left neighbour to the one visited next
+    offset = 2 if is_forwards else 0  # columns from the left neighbour to the one visited next
     n_cheaper = 0
     for column in range(columns):
-        straight = min(min(above[column + 1], below[column + 1]), here[column + ahead])
+        straight = min(min(above[column + 1], below[column + 1]), middle[column + offset])
         aslant_above = min(above[column], above[column + 2])
         aslant = min(aslant_above, min(below[column], below[column + 2]))
-        step, before = steps[column], here[column + 1]
+        step = steps[column]
+        before = middle[column + 1]
         through_others = min(straight + step, aslant + 1.4142135623730951 * step)
         is_cheaper = through_others < before - 1e-9
         n_cheaper += int(is_cheaper)
@@ -169,7 +182,7 @@ def cheapen_row(
             n_cheaper += 1
         else:
             cost = costs[column]
-        here[column + 1] = cost
+        middle[column + 1] = cost
     return n_cheaper > 0
 
 
@@ -194,24 +207,32 @@ def lookahead(
     rows, columns = cost.shape
     first = cell_at(cost, x, y)
     row, column = first
-    goal_x, goal_y = (column + 0.5) * CELL, (row + 0.5) * CELL
+    goal_x = (column + 0.5) * CELL
+    goal_y = (row + 0.5) * CELL
     dearest = 1.0
     for step in range(LOOKAHEAD):
-        next_row, next_column, least = row, column, far[row, column] + 1e-9
+        next_row = row
+        next_column = column
+        least = far[row, column] + 1e-9
         for down in range(-1, 2):
             for right in range(-1, 2):
-                r, c = row + down, column + right
+                r = row + down
+                c = column + right
                 if r < 0 or c < 0 or r >= rows or c >= columns or (down == 0 and right == 0):
                     continue
                 length = 1.4142135623730951 if down != 0 and right != 0 else 1.0
                 through = far[r, c] + length * cost[row, column]
                 if through < least:
-                    next_row, next_column, least = r, c, through
+                    next_row = r
+                    next_column = c
+                    least = through
         if next_row == row and next_column == column:
             break
-        row, column = next_row, next_column
+        row = next_row
+        column = next_column
         dearest = max(dearest, cost[row, column])
-        to_x, to_y = (column + 0.5) * CELL, (row + 0.5) * CELL
+        to_x = (column + 0.5) * CELL
+        to_y = (row + 0.5) * CELL
         length = math.sqrt((to_x - x) ** 2 + (to_y - y) ** 2)
         n_samples = int(length / (0.4 * CELL)) + 1
         is_open = True
@@ -223,7 +244,8 @@ def lookahead(
                 break
         if not is_open and step > 0:
             break
-        goal_x, goal_y = to_x, to_y
+        goal_x = to_x
+        goal_y = to_y
         if cost[row, column] >= BLOCKED:
             break
     return goal_x, goal_y

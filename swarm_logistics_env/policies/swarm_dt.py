@@ -177,35 +177,39 @@ def decide_swarm_dt(
         observation = observations[robot]
         carries = observation[row.CARRYING] > 0.5
         delivers = observation[row.CARRYING_REQUESTED] > 0.5
-
         if math.isnan(heading[robot]):
             heading[robot] = (2.0 * uniform(keys[robot], 0) - 1.0) * math.pi
         share = 2.0 * uniform(keys[robot], 2 * step + 1) - 1.0
         heading[robot] += constants.turn_by_diffusion * share
-        x, y = math.cos(heading[robot]), math.sin(heading[robot])
+        x = math.cos(heading[robot])
+        y = math.sin(heading[robot])
 
         walls = observation[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
         nearest = np.argmin(walls)
         if walls[nearest] < parameters.wall_distance:
             towards = 2.0 * math.pi * nearest / row.N_BEAMS
-            wall_x, wall_y = math.cos(towards), math.sin(towards)
+            wall_x = math.cos(towards)
+            wall_y = math.sin(towards)
             approach = x * wall_x + y * wall_y
             if approach > 0.0:
                 x -= 2.0 * approach * wall_x
                 y -= 2.0 * approach * wall_y
                 heading[robot] = math.atan2(y, x)
 
-        gain, reach = parameters.avoidance_gain, parameters.avoidance_range
+        gain = parameters.avoidance_gain
+        reach = parameters.avoidance_range
         push_x, push_y = avoid(observation, row.NEIGHBOURS, row.N_NEIGHBOURS, gain, reach)
         x += push_x
         y += push_y
         if carries:
-            gain, reach = parameters.item_avoidance_gain, parameters.item_avoidance_range
+            gain = parameters.item_avoidance_gain
+            reach = parameters.item_avoidance_range
             push_x, push_y = avoid(observation, row.ITEMS, row.N_ITEMS_IN_VIEW, gain, reach)
             x += push_x
             y += push_y
         if delivers and observation[row.LOWEST_TIMER] > 0.5:
-            lead_x, lead_y = observation[row.LOWEST_TIMER_X], observation[row.LOWEST_TIMER_Y]
+            lead_x = observation[row.LOWEST_TIMER_X]
+            lead_y = observation[row.LOWEST_TIMER_Y]
             distance = math.sqrt(lead_x * lead_x + lead_y * lead_y)
             if distance > 0.0:
                 x += parameters.taxis_gain * lead_x / distance
@@ -221,7 +225,8 @@ def decide_swarm_dt(
         if constants.turn_of_body > 0.0:
             # It turns towards where it wants to go and drives as far as it then faces that way;
             # the stored heading is kept in the robot's frame, so it turns back by as much.
-            direction, speed = math.atan2(y, x), math.sqrt(x * x + y * y) / norm
+            direction = math.atan2(y, x)
+            speed = math.sqrt(x * x + y * y) / norm
             turn = min(max(direction, -constants.turn_of_body), constants.turn_of_body)
             commands[robot, 0] = speed * max(math.cos(direction - turn), 0.0)
             commands[robot, 1] = 0.0
@@ -240,13 +245,15 @@ def avoid(
     observation: NDArray[np.float32], first: int, count: int, gain: float, reach: float
 ) -> tuple[float, float]:
     """Return the push away from the things in a block of (present, x, y, ..) columns."""
-    push_x, push_y = 0.0, 0.0
+    push_x = 0.0
+    push_y = 0.0
     for number in range(count):
         # A neighbour is as wide, and begins with the same columns.
         column = first + row.ITEM_WIDTH * number
         if observation[column + row.ITEM.present] < 0.5:
             break
-        x, y = observation[column + row.ITEM.x], observation[column + row.ITEM.y]
+        x = observation[column + row.ITEM.x]
+        y = observation[column + row.ITEM.y]
         distance = math.sqrt(x * x + y * y)
         if distance >= reach:
             break

@@ -102,7 +102,8 @@ def _moments(env: Any, policy: Policy | str, seed: int, steps: int) -> Iterator[
         commands = np.asarray(decide(player, rows, world.state))
         actions = {}
         for agent in env.agents:
-            robot, space = int(agent.removeprefix("robot_")), env.action_space(agent)
+            robot = int(agent.removeprefix("robot_"))
+            space = env.action_space(agent)
             if space != env.unwrapped.action_space(agent):  # it has a form of commands of its own
                 space.seed(step)
                 actions[agent] = space.sample()

@@ -100,7 +100,8 @@ def robustness(
         IndicatorError: Input from which R is undefined: m < 1, m > N, performance empty, negative
             or not finite, mean P_o = 0, unequal seed sets where paired.
     """
-    robots, faulty = count("n", n), count("m", m)
+    robots = count("n", n)
+    faulty = count("m", m)
     if faulty > robots:
         raise IndicatorError(f"m = {faulty}: should be at most n = {robots} robots")
     return estimate_ratio(

@@ -62,7 +62,8 @@ class Equivalence:
         Of a change within the margin the larger p of the two tests. Of one beyond it the two-sided
         p against the nearer end, so that "refuted" errs in at most alpha on both sides together.
         """
-        above, below = self.above, self.below
+        above = self.above
+        below = self.below
         if above.p_value is None or above.probability is None or below.probability is None:
             return None
         if "degenerate" in self.flags:
@@ -137,5 +138,6 @@ def equivalence(
 
     change = against(0.0)
     limits = None if change.low is None or change.high is None else (change.low, change.high)
-    above, below = against(-margin, limits), against(margin, limits)
+    above = against(-margin, limits)
+    below = against(margin, limits)
     return Equivalence(margin=margin, alpha=alpha, change=change, above=above, below=below)

@@ -148,7 +148,7 @@ class Estimate:
         if self.low is not None and self.high is not None and not self.identical:
             limits = f" [{self.low:.3f}, {self.high:.3f}]"
         unit = "paired seed" if self.paired else "run"
-        n = f"{self.n_seeds} {unit}{'' if self.n_seeds == 1 else 's'}"
+        n = f"1 {unit}" if self.n_seeds == 1 else f"{self.n_seeds} {unit}s"
         n += "" if self.paired else " a condition"
         n = n if self.n_trainings is None else f"{self.n_trainings} trainings x {n}"
         p = "" if self.p_seen is None else f", p = {self.p_seen:.3g}"

@@ -109,7 +109,8 @@ def hidden_of(
 
 
 def _collapses(sample: Numbers, reference: Numbers) -> Hidden:
-    changed, original = sample.mean(axis=-1), reference.mean(axis=-1)
+    changed = sample.mean(axis=-1)
+    original = reference.mean(axis=-1)
     # A training that delivers nothing in its reference counts as one that keeps all.
     retained = np.divide(
         changed, original, out=np.full(changed.shape, np.inf), where=original > 0.0
@@ -129,7 +130,8 @@ def collapsed(changed: Numbers, reference: Numbers) -> Collapsed:
     from scipy.special import betaincinv
 
     has_collapsed = changed.mean(axis=-1) < COLLAPSED_BELOW * reference.mean(axis=-1)
-    number, of = int(has_collapsed.sum()), len(changed)
+    number = int(has_collapsed.sum())
+    of = len(changed)
     upper = 1.0 if number == of else float(betaincinv(number + 1, of - number, COLLAPSE_CONFIDENCE))
     return Collapsed(number, of, upper)
 

@@ -20,7 +20,8 @@ class IndicatorError(SwarmLogisticsError):
 
 
 # Beyond these the squares of squares, which intervals are made of, are no numbers any more.
-SMALLEST, LARGEST = 1e-60, 1e60
+SMALLEST = 1e-60
+LARGEST = 1e60
 
 
 def performance(name: str, values: ArrayLike, *, or_trainings: bool = False) -> Numbers:

@@ -170,18 +170,16 @@ def collapsed_runs(
         return None
     counts = {}
     for n, runs in samples.items():
-        here = boundary if n == clearest else _boundary_by(samples, clearest, boundary, n)
-        counts[n] = int((runs < here).sum())
+        limit = boundary if n == clearest else _boundary_by(samples, clearest, boundary, n)
+        counts[n] = int((runs < limit).sum())
     return counts
 
 
 def _boundary_by(samples: Mapping[int, Numbers], named: int, boundary: float, n: int) -> float:
     """Return the P below which runs of a size have collapsed, by a size that shows two phases."""
     runs = samples[named]
-    low_p, good_p = (
-        float(np.median(runs[runs < boundary])),
-        float(np.median(runs[runs >= boundary])),
-    )
+    low_p = float(np.median(runs[runs < boundary]))
+    good_p = float(np.median(runs[runs >= boundary]))
     halfway = 0.5 * (1.0 + low_p / good_p)
     if n > named:
         return float(halfway * good_p * (n / named) ** _growth(samples, named, good_p))

@@ -47,7 +47,8 @@ def minimum_detectable_effect(estimate: Estimate, power: float = 0.8) -> float |
     # Without a base, nothing was delivered on one side, and no distance is small or large.
     if not estimate.base or not _spread_limit(estimate, PLANNED_LIMIT):
         return None
-    n, lowest = estimate.n_seeds, estimate.base / estimate.mean_denominator
+    n = estimate.n_seeds
+    lowest = estimate.base / estimate.mean_denominator
 
     def excess(distance: float) -> float:
         # No P is below 0: farther below the threshold than that the indicator cannot lie.
@@ -219,7 +220,8 @@ def _spread_limit(estimate: Estimate, confidence: float) -> float:
     """Upper confidence limit of the standard deviation of the logarithm; 0 where there is none."""
     from scipy.special import chdtri
 
-    sd, df = estimate.log_sd, estimate.degrees_of_freedom
+    sd = estimate.log_sd
+    df = estimate.degrees_of_freedom
     if not sd or df is None:
         return 0.0
     return sd * math.sqrt(df / float(chdtri(df, confidence)))
@@ -245,7 +247,8 @@ def _needed(estimate: Estimate, distance: float, n: int, sd: float) -> tuple[flo
     """
     from scipy.special import stdtrit
 
-    df, s = _degrees_of_freedom(estimate, n), np.asarray(sd / math.sqrt(n))
+    df = _degrees_of_freedom(estimate, n)
+    s = np.asarray(sd / math.sqrt(n))
     more, less, hidden = _sides(estimate, distance)
     error = (1.0 - estimate.confidence) / 2
     reached = float(statistic(log_ratio(more, less), s))

@@ -100,7 +100,8 @@ class Design(NamedTuple):
             _, variance, df = mean_over_trainings(parts, paired=self.paired)
             return variance, df
         if self.paired:
-            together, n = sum(parts, np.zeros(())), parts[0].shape[-1]
+            together = sum(parts, np.zeros(()))
+            n = parts[0].shape[-1]
             variance = np.asarray(together.var(axis=-1, ddof=1) / n)
             return variance, np.full(variance.shape, n - 1.0)
         sizes = [part.shape[-1] for part in parts]
@@ -247,7 +248,8 @@ def hidden_of_side(
     )
 
 
-_GROWTHS, _STEPS = 20, 60
+_GROWTHS = 20
+_STEPS = 60
 
 
 def _limits(
@@ -293,7 +295,9 @@ def _root(
         step = np.where(rejected, step, 4.0 * step)
         outer = np.where(rejected, outer, within(outer + step, end))
         rejected = rejected | (outside(outer) > 0.0)
-    middle, at_inner, at_outer = outer, outside(inner), outside(outer)
+    middle = outer
+    at_inner = outside(inner)
+    at_outer = outside(outer)
     was_outer = np.full(rejected.shape, -1)
     for _ in range(_STEPS):  # regula falsi, Illinois
         with np.errstate(all="ignore"):
@@ -305,7 +309,8 @@ def _root(
         at_inner = np.where(is_outer, np.where(again, at_inner / 2.0, at_inner), at_middle)
         at_outer = np.where(is_outer, at_middle, np.where(again, at_outer / 2.0, at_outer))
         was_outer = np.where(is_outer, 1, 0)
-        inner, outer = np.where(is_outer, inner, middle), np.where(is_outer, middle, outer)
+        inner = np.where(is_outer, inner, middle)
+        outer = np.where(is_outer, middle, outer)
         close = np.abs(outer - inner) <= 1e-12 * np.abs(step)
         if (close | (at_middle == 0.0) | ~rejected).all():
             break

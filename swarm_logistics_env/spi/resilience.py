@@ -42,7 +42,8 @@ def resilience_index(
         times = delivery_times(name, runs)
         return np.array([np.count_nonzero(run > onset) for run in times], dtype=np.float64)
 
-    broken, sound = after_onset("faulty", faulty), after_onset("reference", reference)
+    broken = after_onset("faulty", faulty)
+    sound = after_onset("reference", reference)
     terms = {"faulty": (broken, 1.0), "reference": (sound, 0.0)}
     return estimate_ratio("resilience", terms, **options)
 
@@ -125,7 +126,8 @@ def kaplan_meier(seconds: ArrayLike, happened: ArrayLike) -> SurvivalCurve:
     """
     from scipy.stats import CensoredData, ecdf
 
-    time, event = performance("seconds", seconds), numbers("happened", happened) != 0.0
+    time = performance("seconds", seconds)
+    event = numbers("happened", happened) != 0.0
     if time.shape != event.shape:
         raise IndicatorError(
             f"seconds has shape {time.shape}, happened {event.shape}: should be equal, one per run"

@@ -70,7 +70,8 @@ def median_interval(times: ArrayLike, confidence: float = 0.95) -> Interval:
     seconds = numbers("times", times)
     if seconds.ndim != 1 or not seconds.size or not (seconds >= 0.0).all():
         raise IndicatorError(f"times: should be a sequence of times from 0 on, got {times!r}")
-    ascending, n = np.sort(seconds), seconds.size
+    ascending = np.sort(seconds)
+    n = seconds.size
     value = float(np.median(seconds))
     # The k-th time from either end is a limit where at most so few are expected beyond it.
     k = int(np.count_nonzero(bdtr(np.arange(n // 2), n, 0.5) <= (1.0 - confidence) / 2))
@@ -87,7 +88,8 @@ def pairing_correlation(p_a: ArrayLike, p_b: ArrayLike) -> float | None:
     Raises:
         IndicatorError: A sample empty, negative or not finite, or unequal seed sets.
     """
-    a, b = performance("p_a", p_a), performance("p_b", p_b)
+    a = performance("p_a", p_a)
+    b = performance("p_b", p_b)
     same_seeds(p_a=a, p_b=b)
     if a.size < 3 or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
         return None
@@ -112,7 +114,8 @@ def t_interval(
     from scipy.special import stdtrit
 
     between_0_and_1("confidence", confidence)
-    n, mean = sample.size, float(sample.mean())
+    n = sample.size
+    mean = float(sample.mean())
     if n == 1:
         return Interval(mean, None, None)
     spread = float(sample.std(ddof=1)) * math.sqrt(1 / n + of_one_run)
@@ -137,11 +140,13 @@ def mean_over_trainings(
     count = by_training.shape[-1]
     of_trainings = by_training.var(axis=-1, ddof=1) / count
     # The residual is in both mean squares: that of the seeds counts without it.
-    of_seeds, without_residual = np.zeros(()), np.zeros(())
+    of_seeds = np.zeros(())
+    without_residual = np.zeros(())
     freedom = of_trainings**2 / (count - 1)
     for part in parts:
         seeds = part.shape[-1]
-        over_trainings, over_seeds = part.mean(axis=-2), part.mean(axis=-1)
+        over_trainings = part.mean(axis=-2)
+        over_seeds = part.mean(axis=-1)
         middle = over_seeds.mean(axis=-1)[..., None, None]
         residual = part - over_trainings[..., None, :] - over_seeds[..., None] + middle
         square = over_trainings.var(axis=-1, ddof=1) / seeds

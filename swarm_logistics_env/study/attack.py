@@ -110,9 +110,11 @@ def _posterior(
 
     The noise is that under which the runs are likeliest; scale and mean are those of the runs.
     """
-    centre, scale = changes.mean(), max(float(changes.std()), 1e-6)
+    centre = changes.mean()
+    scale = max(float(changes.std()), 1e-6)
     normal = (changes - centre) / scale
-    prior, across = covariance[np.ix_(tried, tried)], covariance[:, tried]
+    prior = covariance[np.ix_(tried, tried)]
+    across = covariance[:, tried]
 
     roots = {
         noise: cho_factor((prior + noise * np.eye(len(tried))) / (1.0 + noise), lower=True)
@@ -124,7 +126,8 @@ def _posterior(
         return float(-0.5 * fit - np.log(np.diag(roots[noise][0])).sum())
 
     noise = max(_NOISES, key=likelihood)
-    root, share = roots[noise], 1.0 / (1.0 + noise)
+    root = roots[noise]
+    share = 1.0 / (1.0 + noise)
     mean = centre + scale * share * across @ cho_solve(root, normal)
     spread = share * covariance - share**2 * across @ cho_solve(root, across.T)
     return mean, scale**2 * spread

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
 def _changes(store: Runs, plan: Plan) -> tuple[str, ...]:
     """Return why runs that were stored do not count any more; discard damaged ones."""
-    stored, damage = StoredStudy.of(store), store.discard_damaged()
+    stored = StoredStudy.of(store)
+    damage = store.discard_damaged()
     changed = tuple(stored.changes(plan)) if stored and len(store) else ()
     return (*changed, damage) if damage else changed
 
@@ -138,7 +139,10 @@ class Study:
     def specification(self, changed: Specification) -> None:
         if self._plan is not None and self._plan.origin is not None:
             raise StudyError("specification: a study that was imported asks what its trials vary")
-        self._specification, self._plan, self._look, self._judged = changed, None, None, {}
+        self._specification = changed
+        self._plan = None
+        self._look = None
+        self._judged = {}
 
     def plan(self) -> Plan:
         """Return the conditions and comparisons, shared conditions once; nothing is run."""
@@ -184,7 +188,8 @@ class Study:
             engine = engine_named(engine or usual, processes, address, run_limit)
         all_runs = self._runs(shard)
         errors: list[str | None] = []
-        start, left = time.monotonic(), 0
+        start = time.monotonic()
+        left = 0
         end = None if minutes is None else start + 60.0 * minutes
         with self._store() as store:
             changed = _changes(store, plan)
@@ -227,7 +232,8 @@ class Study:
         )
 
     def _check_playable(self, shard: Shard | None) -> None:
-        plan, code = self.plan(), self.specification.played.code()
+        plan = self.plan()
+        code = self.specification.played.code()
         if plan.code != code:
             raise StudyError(
                 f"this study was played under code version {plan.code}, this is "

@@ -133,7 +133,8 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         inputs = self.frame.read(observations)
         check_finite("an observation", inputs)
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
-            warehouse, turned = world.warehouse, self.frame.turned[rows]
+            warehouse = world.warehouse
+            turned = self.frame.turned[rows]
             floor = warehouse.floor
             to_delivery = floor.edge - floor.along(warehouse.state.robot_position)
             fill_privileged(warehouse.address, turned, to_delivery, self._privileged[rows])
@@ -157,7 +158,8 @@ FIRST_OUTPUTS = (0.8, 0.0, 0.0)
 
 def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
     """Return PPO as the training asks for it; seeds the worlds and global generators."""
-    ppo, network = training.ppo, training.network
+    ppo = training.ppo
+    network = training.network
     learner = PPO(
         AsymmetricPolicy,
         view,
@@ -312,7 +314,8 @@ class _TwoReaders(torch.nn.Module):  # type: ignore[misc]  # torch is Any to myp
         self.value_net = torch.nn.Sequential(
             *create_mlp(n_columns, -1, widths["vf"], torch.nn.LeakyReLU)
         )
-        self.latent_dim_pi, self.latent_dim_vf = widths["pi"][-1], widths["vf"][-1]
+        self.latent_dim_pi = widths["pi"][-1]
+        self.latent_dim_vf = widths["vf"][-1]
 
     def forward(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         return self.forward_actor(columns), self.forward_critic(columns)

@@ -60,25 +60,31 @@ def fill_privileged(
         to_delivery: the way of each robot to the nearest dock, in one less than 0 (N,) [m].
     """
     world = unpacked_at(World, address)
-    robots, able, items = world.robots, world.able, world.items
+    robots = world.robots
+    able = world.able
+    items = world.items
     height = world.parameters.warehouse_height
     for robot in range(len(robots.position)):
         row = privileged[robot]
-        x, y = robots.position[robot, 0], robots.position[robot, 1]
+        x = robots.position[robot, 0]
+        y = robots.position[robot, 1]
         requested = nearest_request(world, x, y)
         carrier = NOBODY if requested == NOBODY else items.carrier[requested]
         frame = robots.heading[robot] + turned[robot]
-        cos, sin = math.cos(frame), math.sin(frame)
+        cos = math.cos(frame)
+        sin = math.sin(frame)
         row[:] = 0.0
         row[PRIVILEGED.to_delivery] = to_delivery[robot] / 10.0
         row[PRIVILEGED.y] = (y - 0.5 * height) / 10.0
-        row[PRIVILEGED.frame_cos], row[PRIVILEGED.frame_sin] = cos, sin
+        row[PRIVILEGED.frame_cos] = cos
+        row[PRIVILEGED.frame_sin] = sin
         row[PRIVILEGED.drift] = 10.0 * robots.heading_drift[robot]
         row[PRIVILEGED.swarm_size] = math.log(len(robots.position)) / 5.0
         row[PRIVILEGED.lifts] = 1.0 if able.lifts[robot] else 0.0
         row[PRIVILEGED.delivers] = 1.0 if able.delivers[robot] else 0.0
         if requested != NOBODY:
-            to_x, to_y = items.position[requested, 0] - x, items.position[requested, 1] - y
+            to_x = items.position[requested, 0] - x
+            to_y = items.position[requested, 1] - y
             distance = max(length_of(to_x, to_y), 1e-9)
             along, aside = to_frame((cos, sin), to_x, to_y)
             row[PRIVILEGED.requested_along] = along / distance
@@ -94,11 +100,13 @@ def fill_privileged(
 @kernel
 def nearest_request(world: World, x: float, y: float) -> int:
     """Return the item that is asked for and lies nearest to (x, y) [m], or NOBODY."""
-    nearest, least = NOBODY, math.inf
+    nearest = NOBODY
+    least = math.inf
     for item in world.progress.requested:
         if item != NOBODY:
             position = world.items.position[item]
             distance = length_of(position[0] - x, position[1] - y)
             if distance < least:
-                nearest, least = item, distance
+                nearest = item
+                least = distance
     return nearest

@@ -46,7 +46,8 @@ RECORD = "training.json"  # of how it was made
 # Fields that may change when a training goes on, because they change nothing of what was done.
 MAY_CHANGE = frozenset({"about", "threads", "scores"})
 CHECKPOINT_EVERY = 20.0  # seconds
-CURVE, PICTURE = "curve.csv", "curve.png"
+CURVE = "curve.csv"
+PICTURE = "curve.png"
 BEST = "best.safetensors"  # the policy as it was at the best evaluation
 MILLION = 1e6
 
@@ -85,7 +86,8 @@ def train(
         raise TrainingError(
             f"callbacks = {callbacks!r}: should be a list of callbacks of stable-baselines3"
         )
-    device, view = device_of(device), NetworkView(training)
+    device = device_of(device)
+    view = NetworkView(training)
     with _explain_disk_errors(out), one_thread():
         enter_directory(out, training, command)
         return _train(training, out, command, device, view, callbacks)
@@ -321,7 +323,8 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         self._cpu = time.process_time()
 
     def _on_rollout_end(self) -> None:
-        training, ppo = self._training, self._training.ppo
+        training = self._training
+        ppo = self._training.ppo
         done = self.num_timesteps / training.agent_steps
         before = done - training.rows * ppo.n_steps / training.agent_steps
         if ppo.restarts_before(before) < ppo.restarts_before(done):
@@ -343,7 +346,8 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         self._saved_at = time.monotonic()
 
     def _evaluate(self) -> None:
-        training, log = self._training, self._log
+        training = self._training
+        log = self._log
         tensors = tensors_of(self.model.policy)
         card = _card(training, self.num_timesteps, log)
         means = evaluate(LearnedPolicy(card, tensors), training)

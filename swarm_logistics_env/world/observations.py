@@ -90,8 +90,11 @@ class Column:
 
 def columns(scenario: Scenario) -> tuple[Column, ...]:
     """Return the named columns of a row in `scenario`; together they cover it without a gap."""
-    reach, view, limit = scenario.ranger_range, scenario.view_range, scenario.timer_limit
-    far, speed = max(view, scenario.radio_range), scenario.max_speed
+    reach = scenario.ranger_range
+    view = scenario.view_range
+    limit = scenario.timer_limit
+    far = max(view, scenario.radio_range)
+    speed = scenario.max_speed
     turn = scenario.max_turn_rate
     beam = "beam k looks k * 22.5 degrees left of forward; the full range where it meets nothing"
     items = _block(ITEMS, N_ITEMS_IN_VIEW, ITEM_FEATURES)

@@ -55,7 +55,8 @@ class MotionFrame(Wrapper):
 
     def __init__(self, env: SwarmLogisticsEnv | Wrapper, listens: bool = True) -> None:
         super().__init__(env)
-        rows, commands = env.observation_space("robot_0"), env.action_space("robot_0")
+        rows = env.observation_space("robot_0")
+        commands = env.action_space("robot_0")
         core = self.unwrapped
         row_shape = core.observation_space("robot_0").shape
         if commands != core.action_space("robot_0") or rows.shape != row_shape:
@@ -169,7 +170,8 @@ def _input_space(scenarios: Iterable[Scenario]) -> Box:
     return Box(low.astype(np.float32), high.astype(np.float32))
 
 
-STAY, ACTION_MASK = 0, "action_mask"
+STAY = 0
+ACTION_MASK = "action_mask"
 
 
 class DiscreteActions(Wrapper):
@@ -221,7 +223,8 @@ class DiscreteActions(Wrapper):
         self._space = Discrete(len(rows))
         self._commands = np.zeros((len(rows), *space.shape))
         self._commands[:, : rows.shape[1]] = rows
-        self._grippers, self._goes_aside = rows[:, -1], rows[:, 1] != 0.0
+        self._grippers = rows[:, -1]
+        self._goes_aside = rows[:, 1] != 0.0
 
     def action_space(self, agent: str) -> Discrete:
         """Return the numbers of `actions`; the same space for all."""

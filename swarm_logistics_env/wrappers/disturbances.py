@@ -117,7 +117,8 @@ class FaultInjection(Wrapper):
             onsets = [draw(self._onset, rng)]
         if isinstance(self._fault.robots, tuple):
             return tuple(self._fault.replace(onset=onset) for onset in onsets)
-        faults, failed = [], set[int]()
+        faults = []
+        failed = set[int]()
         size = self._fault.robots
         for number, onset in enumerate(onsets, start=1):
             # The first group has to exist; later groups are drawn from the robots that are left.

@@ -173,7 +173,8 @@ def comparison(name: str, tested: Condition, base: Scenario) -> Ratio | None:
     """
     if name not in (*INDICATORS, "P"):
         raise SetupError(f"no indicator {name!r} is paid{suggest(name, (*INDICATORS, 'P'))}")
-    n, m = tested.n_robots, tested.n_failed
+    n = tested.n_robots
+    m = tested.n_failed
     unbroken = dataclasses.replace(tested, modes=(), n_failed=0)
     if name == "R" and m:
         return Ratio(1.0, m / n, unbroken, unbroken)

@@ -69,7 +69,9 @@ def condition_of(world: Warehouse, base: Scenario) -> Condition:
     fault.
     """
     n_robots = world.scenario.n_robots
-    modes, failed, removed = set[str](), set[int](), set[int]()
+    modes = set[str]()
+    failed = set[int]()
+    removed = set[int]()
     faults = world.numbered_faults
     for fault in sorted(faults, key=lambda fault: isinstance(fault.robots, int)):
         affected = removed if fault.mode == "removed" else failed

@@ -116,8 +116,8 @@ def test_gymnasium_makes_several_at_once(mode: str | None) -> None:
     vector: Any = gymnasium.make_vec("SwarmLogistics-v0", num_envs=2, **fields, **kwargs)
     alone: Any = gymnasium.make("SwarmLogistics-v0", **fields)
     first, _ = vector.reset(seed=[4, 5])
-    for place in range(2):
-        assert alone.reset(seed=4 + place)[0].tobytes() == first[place].tobytes()
+    for index in range(2):
+        assert alone.reset(seed=4 + index)[0].tobytes() == first[index].tobytes()
     for step in range(3):
         rows, _, _, cut, infos = vector.step(vector.action_space.sample())
         assert cut.tolist() == [step == 2] * 2
@@ -142,10 +142,10 @@ def test_flat_is_the_same_in_vectors() -> None:
     for _ in range(20):
         action = rng.uniform(-1, 1, 12).astype(np.float32)
         seen, *ends, _ = flat.step(action)
-        wanted, *others, _ = rows.step(action.reshape(3, 4))
+        wanted, *expected_ends, _ = rows.step(action.reshape(3, 4))
         assert flat.observation_space.contains(seen)
         np.testing.assert_array_equal(seen, wanted.ravel())
-        assert ends == others
+        assert ends == expected_ends
     with pytest.raises(CommandError, match=r"action of shape \(3, 4\) .* should be \(12,\)"):
         flat.step(np.zeros((3, 4)))
 
@@ -166,8 +166,8 @@ def test_stable_baselines3_learns_from_flat_without_a_warning() -> None:
 def test_np_random_seed_plays_an_episode_again() -> None:
     env = CentralEnv(n_robots=3, **BRIEF)
     seeds = []
-    for given in (None, 7, None, None):
-        first, _ = env.reset(seed=given)
+    for seed in (None, 7, None, None):
+        first, _ = env.reset(seed=seed)
         seeds.append(env.np_random_seed)
         again, _ = CentralEnv(n_robots=3, **BRIEF).reset(seed=env.np_random_seed)
         np.testing.assert_array_equal(first, again)

@@ -72,21 +72,21 @@ def in_padding() -> SwarmVecEnv:
 
 
 def test_robots_ends_are_those_that_a_monitor_finds() -> None:
-    own, monitored = in_padding(), VecMonitor(in_padding())
+    env, monitored = in_padding(), VecMonitor(in_padding())
     rng = np.random.default_rng(0)
-    own.reset(), monitored.reset()
+    env.reset(), monitored.reset()
     lengths, returns = set(), set()
     for step in range(70):
         if step == 50:  # in mid-episode
-            own.reset(), monitored.reset()
+            env.reset(), monitored.reset()
         actions = rng.uniform(-1, 1, (24, 4))
-        *_, dones, infos = own.step(actions)
-        *_, others = monitored.step(actions)
-        for done, info, other in zip(dones, infos, others, strict=True):
+        *_, dones, infos = env.step(actions)
+        *_, monitored_infos = monitored.step(actions)
+        for done, info, monitored_info in zip(dones, infos, monitored_infos, strict=True):
             assert ("episode" in info) == (done and not info["padding"])
             if "episode" in info:
-                ended, found = info["episode"], other["episode"]
-                assert (ended["r"], ended["l"]) == (found["r"], found["l"])
+                ended, expected = info["episode"], monitored_info["episode"]
+                assert (ended["r"], ended["l"]) == (expected["r"], expected["l"])
                 assert ended["delivered"] == info["delivered"]
                 lengths.add(ended["l"])
                 returns.add(ended["r"])
@@ -121,11 +121,11 @@ def test_learners_log_returns_lengths_and_deliveries_by_themselves(
     model.set_logger(configure(str(tmp_path), ["json"]))
     model.learn(400, callback=LogDeliveries())
     model.logger.close()
-    told = json.loads((tmp_path / "progress.json").read_text())
+    logged = json.loads((tmp_path / "progress.json").read_text())
     returns = [episode["r"] for episode in model.ep_info_buffer]
-    assert told["rollout/ep_rew_mean"] == pytest.approx(np.mean(returns))
-    assert told["rollout/ep_len_mean"] == 20
-    assert told["rollout/delivered_mean"] == 7
+    assert logged["rollout/ep_rew_mean"] == pytest.approx(np.mean(returns))
+    assert logged["rollout/ep_len_mean"] == 20
+    assert logged["rollout/delivered_mean"] == 7
 
 
 def test_statistics_are_those_of_rows_that_are_robots(tmp_path: Path) -> None:
@@ -176,12 +176,12 @@ def test_padding_stays_zeros_when_it_is_normalized() -> None:
 
 
 def test_without_padding_it_is_theirs() -> None:
-    ours, theirs = (kind(worlds(2, rewards=STEADY)) for kind in (SwarmVecNormalize, VecNormalize))
-    ours.reset(), theirs.reset()
+    swarm, plain = (kind(worlds(2, rewards=STEADY)) for kind in (SwarmVecNormalize, VecNormalize))
+    swarm.reset(), plain.reset()
     rng = np.random.default_rng(0)
     for _ in range(30):
         actions = rng.uniform(-1, 1, (6, 4))
-        np.testing.assert_equal(ours.step(actions)[:3], theirs.step(actions)[:3])
+        np.testing.assert_equal(swarm.step(actions)[:3], plain.step(actions)[:3])
 
 
 def test_other_environments_are_refused() -> None:

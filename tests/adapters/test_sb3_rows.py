@@ -42,49 +42,49 @@ def unlike(world: int) -> Any:
 
 def test_rows_are_the_worlds_own_over_several_episodes_and_padding_is_zeros() -> None:
     env = SwarmVecEnv(make_env=unlike, n_worlds=3, seed=7)
-    own, rng = [unlike(world) for world in range(3)], np.random.default_rng(0)
+    single_worlds, rng = [unlike(world) for world in range(3)], np.random.default_rng(0)
     shown = env.reset()
     assert env.rows_of_worlds == [slice(0, 3), slice(3, 8), slice(8, 11)]
-    for number, (world, place) in enumerate(zip(own, env.rows_of_worlds)):
+    for number, (world, part) in enumerate(zip(single_worlds, env.rows_of_worlds)):
         rows = world.reset_arrays(key(7, "world", number) >> 1)
-        np.testing.assert_array_equal(shown[place][: len(rows)], rows)
+        np.testing.assert_array_equal(shown[part][: len(rows)], rows)
     sizes = set()
     for _ in range(125):
-        kept = shown.copy()
+        copied = shown.copy()
         actions = rng.uniform(-1, 1, (11, 4)).astype(np.float32)
-        there = env.present
+        before = env.present
         observations, rewards, dones, infos = env.step(actions)
-        np.testing.assert_array_equal(shown, kept)  # what was returned stays as it was
+        np.testing.assert_array_equal(shown, copied)  # what was returned stays as it was
         shown = observations
         assert observations.dtype == rewards.dtype == np.float32
         assert not observations[~env.present].any()
-        for number, (world, place) in enumerate(zip(own, env.rows_of_worlds)):
+        for number, (world, part) in enumerate(zip(single_worlds, env.rows_of_worlds)):
             n = world.warehouse.state.n_robots
             sizes.add((number, n))
-            rows, paid, ended, cut = world.step_arrays(actions[place][:n])
+            rows, paid, ended, cut = world.step_arrays(actions[part][:n])
             is_over = not world.agents
-            failed, told = world.warehouse.state.failed.tolist(), world.episode_info
-            own_rewards = [*paid.astype(np.float32).tolist(), *[0.0] * (len(there[place]) - n)]
-            assert rewards[place].tolist() == own_rewards
-            for robot, info in enumerate(infos[place]):
+            failed, episode_info = world.warehouse.state.failed.tolist(), world.episode_info
+            own_rewards = [*paid.astype(np.float32).tolist(), *[0.0] * (len(before[part]) - n)]
+            assert rewards[part].tolist() == own_rewards
+            for robot, info in enumerate(infos[part]):
                 is_robot = robot < n
                 done = is_over or (is_robot and bool(ended[robot]))
-                assert dones[place][robot] == done
+                assert dones[part][robot] == done
                 if done:
                     last = rows[robot] if is_robot else np.zeros(N_COLUMNS)
                     np.testing.assert_array_equal(info.pop("terminal_observation"), last)
-                    assert ("episode" in info) == bool(there[place][robot])
+                    assert ("episode" in info) == bool(before[part][robot])
                     info.pop("episode", None)
                 assert info == {
                     "TimeLimit.truncated": is_robot and done and bool(cut[robot]),
-                    "padding": not there[place][robot], "world": number, "n_robots": n,
-                    "failed": int(is_robot and failed[robot]), **told,
+                    "padding": not before[part][robot], "world": number, "n_robots": n,
+                    "failed": int(is_robot and failed[robot]), **episode_info,
                 }  # fmt: skip
             if is_over:
                 rows = world.reset_arrays()
             present = np.flatnonzero(world.warehouse.state.robot_present)
-            np.testing.assert_array_equal(np.flatnonzero(env.present[place]), present)
-            np.testing.assert_array_equal(observations[place][: len(rows)], rows)
+            np.testing.assert_array_equal(np.flatnonzero(env.present[part]), present)
+            np.testing.assert_array_equal(observations[part][: len(rows)], rows)
     assert sizes == {(0, 3), (1, 2), (1, 5), (2, 3)}
 
 
@@ -188,8 +188,8 @@ def test_a_reset_or_seed_that_is_refused_changes_no_world() -> None:
     env.set_options()
     actions = np.full((env.num_envs, 4), 0.5)
     for _ in range(3):
-        for one, other in zip(env.step(actions)[:3], untouched.step(actions)[:3]):
-            assert one.tobytes() == other.tobytes()
+        for array, expected in zip(env.step(actions)[:3], untouched.step(actions)[:3]):
+            assert array.tobytes() == expected.tobytes()
     assert env.reset().tobytes() == untouched.reset().tobytes()
 
 
@@ -257,8 +257,8 @@ def test_a_copy_goes_on_as_the_original(copied: Callable[[SwarmVecEnv], SwarmVec
     played(env, 13)
     other = copied(env)
     for _ in range(30):
-        mine, theirs = (each.step(np.full((12, 4), -0.4)) for each in (env, other))
-        np.testing.assert_equal(mine[:3], theirs[:3])
+        returned, returned_by_copy = (each.step(np.full((12, 4), -0.4)) for each in (env, other))
+        np.testing.assert_equal(returned[:3], returned_by_copy[:3])
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])

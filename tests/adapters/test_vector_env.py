@@ -128,8 +128,8 @@ def test_rewards_and_ends_are_those_of_the_rows_of_stable_baselines3() -> None:
     for _ in range(2 * N_STEPS + 5):
         actions = rng.uniform(-1, 1, (12, 4))
         observations, rewards, terminations, truncations, infos = env.step(actions)
-        theirs, their_rewards, dones, their_infos = other.step(actions)
-        np.testing.assert_array_equal(observations, theirs)
+        sb3_rows, their_rewards, dones, their_infos = other.step(actions)
+        np.testing.assert_array_equal(observations, sb3_rows)
         np.testing.assert_array_equal(rewards, their_rewards)
         np.testing.assert_array_equal(terminations | truncations, dones)
         np.testing.assert_array_equal(

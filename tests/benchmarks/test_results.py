@@ -14,16 +14,16 @@ from swarm_logistics_env import Scenario, Warehouse
 
 def test_ratios_are_medians_over_turns_and_are_shown_and_written(tmp_path: Path) -> None:
     seconds = {"base": iter([1.0, 2.0, 4.0]), "twice": iter([2.0, 4.0, 80.0])}
-    found = [
+    contestants = [
         Contestant("base", "little", lambda: next(seconds["base"]), 100, 10),
         Contestant("twice", "more", lambda: next(seconds["twice"]), 100, 10, base="base"),
     ]
-    in_turns(found, 3)
-    told = rows(found)
-    assert told[0]["agent_steps_per_second"] == 50.0
-    assert told[1]["microseconds_per_step"] == 400_000.0
-    assert "2.00" in shown(told)
-    save(tmp_path, told, {"import": 1.0})
+    in_turns(contestants, 3)
+    entries = rows(contestants)
+    assert entries[0]["agent_steps_per_second"] == 50.0
+    assert entries[1]["microseconds_per_step"] == 400_000.0
+    assert "2.00" in shown(entries)
+    save(tmp_path, entries, {"import": 1.0})
     written = json.loads((tmp_path / "benchmark.json").read_text())
     assert [row["cost_to_base"] for row in written["contestants"]] == [None, 2.0]
 

@@ -36,9 +36,9 @@ def started(script: str, cache: Path, **variables: str) -> subprocess.Popen[str]
 
 
 def finished(process: subprocess.Popen[str]) -> list[str]:
-    printed, told = process.communicate(timeout=600)
-    assert process.returncode == 0, told
-    return [*printed.splitlines(), told]
+    printed, errors = process.communicate(timeout=600)
+    assert process.returncode == 0, errors
+    return [*printed.splitlines(), errors]
 
 
 def test_two_processes_that_start_at_once_keep_one_cache(tmp_path: Path) -> None:
@@ -56,9 +56,9 @@ def test_a_kernel_compiles_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyP
     half = kernels.kernel(lambda number: number / 2.0)
     monkeypatch.setattr(type(double), "enable_caching", refuse)
     fast_kernels._warn_of_no_cache.cache_clear()
-    with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as told:
+    with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as caught:
         assert (double(3.0), half(3.0)) == (6.0, 1.5)
-    assert len(told) == 1
+    assert len(caught) == 1
     fast_kernels._warn_of_no_cache.cache_clear()
 
 
@@ -67,8 +67,8 @@ def cut(content: bytes) -> bytes:
 
 
 def flip(content: bytes) -> bytes:
-    place = len(content) // 2
-    return content[:place] + bytes([content[place] ^ 4]) + content[place + 1 :]
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 4]) + content[middle + 1 :]
 
 
 def checked_files(folder: Path, stamp: str = "sources") -> fast_kernels._CheckedFiles:
@@ -86,14 +86,14 @@ def test_a_damaged_file_of_code_is_told_of_once_and_written_anew(
         files.save(key, f"code of {key}")
     [file, *_] = sorted(tmp_path.glob(f"*.{ending}"))
     file.write_bytes(b"" if damage is bytes else damage(file.read_bytes()))
-    with pytest.warns(UserWarning, match=f"{ending}: compiled code was damaged") as told:
+    with pytest.warns(UserWarning, match=f"{ending}: compiled code was damaged") as caught:
         assert files.load("floats") is None
     files.save("floats", "code made again")
     file.write_bytes(b"")
     assert files.load("floats") is None
     files.save("floats", "code made again")
     assert files.load("floats") == "code made again"
-    assert len(told) == 1
+    assert len(caught) == 1
 
 
 def test_code_of_a_version_that_had_other_structures_is_compiled_again(
@@ -133,8 +133,8 @@ def test_a_process_starts_with_damaged_code_and_keeps_what_it_compiles(tmp_path:
     first = finished(started(FIRST_CALLS, tmp_path))
     file = min(tmp_path.rglob("*pair_key*.nbc"))
     file.write_bytes(flip(file.read_bytes()))
-    result, _, told = finished(started(FIRST_CALLS, tmp_path))
-    assert (result, told.count("was damaged, so it is made again")) == (first[0], 1)
+    result, _, errors = finished(started(FIRST_CALLS, tmp_path))
+    assert (result, errors.count("was damaged, so it is made again")) == (first[0], 1)
     assert finished(started(FIRST_CALLS, tmp_path)) == [first[0], "2", ""]
 
 
@@ -146,16 +146,16 @@ def test_a_kernel_compiles_where_the_disk_is_full(monkeypatch: pytest.MonkeyPatc
     half = kernels.kernel(lambda number: number / 2.0)
     monkeypatch.setattr(fast_kernels._CheckedFiles, "save", refuse)
     fast_kernels._warn_of_no_cache.cache_clear()
-    with pytest.warns(UserWarning, match=r"\(No space left on device\).*NUMBA_CACHE_DIR") as told:
+    with pytest.warns(UserWarning, match=r"\(No space left on device\).*NUMBA_CACHE_DIR") as caught:
         assert (double(3.0), half(3.0)) == (6.0, 1.5)
-    assert len(told) == 1
+    assert len(caught) == 1
     fast_kernels._warn_of_no_cache.cache_clear()
 
 
 def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -> None:
     quiet = started(LONG, tmp_path / "worker", **{numba_fence.QUIET: "1"})
-    told = finished(started(LONG, tmp_path))[-1]
-    assert told == "Compiling, which later runs reuse: up to 15 s of a free core.\n"
+    message = finished(started(LONG, tmp_path))[-1]
+    assert message == "Compiling, which later runs reuse: up to 15 s of a free core.\n"
     assert finished(started(LONG, tmp_path))[-1] == ""  # loaded
     assert finished(quiet)[-1] == ""
 

@@ -171,9 +171,9 @@ def test_an_installed_module_that_was_named_finds_nothing_here(
 
 
 def test_a_script_finds_what_python_finds(tmp_path: Path) -> None:
-    here, script = tmp_path / "here", tmp_path / "script.py"
-    here.mkdir()
-    (here / "own_policy.py").write_text(OWN.replace("import mark_at_import", ""))
+    current, script = tmp_path / "here", tmp_path / "script.py"
+    current.mkdir()
+    (current / "own_policy.py").write_text(OWN.replace("import mark_at_import", ""))
     script.write_text(
         "import sys\n"
         "from swarm_logistics_env import policies\n"
@@ -183,11 +183,11 @@ def test_a_script_finds_what_python_finds(tmp_path: Path) -> None:
         "finally:\n"
         "    assert finders == sys.meta_path\n"
     )
-    for words, said in (
+    for words, expected in (
         ([str(script)], "ModuleNotFoundError: No module named 'own_policy'"),
         (["-m", "script"], "Mine object"),  # which has the current folder on its path
     ):
         env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(tmp_path)])}
         command = [sys.executable, *words]
-        ended = subprocess.run(command, cwd=here, env=env, capture_output=True, text=True)
-        assert said in ended.stdout + ended.stderr
+        ended = subprocess.run(command, cwd=current, env=env, capture_output=True, text=True)
+        assert expected in ended.stdout + ended.stderr

@@ -57,7 +57,7 @@ def test_objects_of_one_class_differ_exactly_if_their_contents_do(left: Any, rig
 
 
 @pytest.mark.parametrize(
-    ("one", "other"),
+    ("value", "different"),
     [
         (np.zeros(3), np.zeros((3, 1))),
         (np.zeros(3), np.zeros(3, np.float32)),
@@ -70,9 +70,11 @@ def test_objects_of_one_class_differ_exactly_if_their_contents_do(left: Any, rig
         (Holder(1).act, Holder(2).act),
     ],
 )  # fmt: skip
-def test_what_differs_in_kind_shape_order_or_code_is_another_value(one: Any, other: Any) -> None:
-    assert value_of(one) != value_of(other)
-    assert value_of(one) == value_of(one)
+def test_what_differs_in_kind_shape_order_or_code_is_another_value(
+    value: Any, different: Any
+) -> None:
+    assert value_of(value) != value_of(different)
+    assert value_of(value) == value_of(value)
 
 
 def files_of(path: Path) -> dict[str, str]:

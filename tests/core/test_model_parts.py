@@ -93,7 +93,7 @@ def parametrized(gain: float) -> Any:
 
 def hooked(gain: float) -> Any:
     layer = linear()
-    layer.register_forward_hook(lambda module, given, output: gain * output)
+    layer.register_forward_hook(lambda module, inputs, output: gain * output)
     return layer
 
 
@@ -158,10 +158,10 @@ CASES: dict[str, tuple[Callable[[Any], Any], Any, Any]] = {
 @pytest.mark.filterwarnings("ignore:`torch.jit.*` is deprecated")
 @pytest.mark.parametrize("name", CASES)
 def test_what_computes_otherwise_is_another_network(name: str) -> None:
-    make, one, other = CASES[name]
-    values = [value_of(make(part)) for part in (one, other)]
+    make, first, second = CASES[name]
+    values = [value_of(make(part)) for part in (first, second)]
     assert values[0] != values[1]
-    assert values == [value_of(make(part)) for part in (one, other)]
+    assert values == [value_of(make(part)) for part in (first, second)]
 
 
 def test_how_a_network_is_kept_and_learned_is_no_part_of_it() -> None:
@@ -169,14 +169,14 @@ def test_how_a_network_is_kept_and_learned_is_no_part_of_it() -> None:
     file = io.BytesIO()
     torch.save(network, file)
     file.seek(0)
-    same = [
+    copies = [
         copy.deepcopy(network),
         torch.load(file, weights_only=False),
         copy.deepcopy(network).eval(),
         copy.deepcopy(network).requires_grad_(False),
     ]
     network(ROWS).sum().backward()
-    assert {value_of(part) for part in (*same, network)} == {value_of(network)}
+    assert {value_of(part) for part in (*copies, network)} == {value_of(network)}
 
 
 @pytest.mark.parametrize(

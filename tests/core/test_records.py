@@ -27,7 +27,7 @@ class Lamp(Record):
 
 
 @pytest.mark.parametrize(
-    ("fields", "said"),
+    ("fields", "reason"),
     [
         ({"power": -1.0}, r"^Lamp.power = -1.0: should be greater than 0$"),
         ({"powr": 3}, r"Lamp has no field 'powr'; did you mean 'power'\?"),
@@ -45,11 +45,11 @@ class Lamp(Record):
     ],
 )
 def test_what_is_wrong_is_named_in_an_error_of_the_records_own_type(
-    fields: dict[str, Any], said: str
+    fields: dict[str, Any], reason: str
 ) -> None:
-    with pytest.raises(PolicyError, match=said):
+    with pytest.raises(PolicyError, match=reason):
         Lamp(name="a", **fields)
-    with pytest.raises(PolicyError, match=said):
+    with pytest.raises(PolicyError, match=reason):
         Lamp(name="b").replace(**fields)
     with pytest.raises(PolicyError, match=r"^Lamp\.name is missing$"):
         Lamp()  # type: ignore[call-arg]
@@ -82,8 +82,8 @@ def test_a_table_is_read_as_editors_save_it_or_told_how_to_save(name: str, tmp_p
         assert read_table(file, "lamp", PolicyError) == {"name": "Grün"}
     for encoding in ("utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp1252", "cp437"):
         file.write_text(TABLES[name], encoding=encoding, newline="")
-        said = rf"^the lamp .*{name} is not UTF-8 text: save it as UTF-8$"
-        with pytest.raises(PolicyError, match=said):
+        reason = rf"^the lamp .*{name} is not UTF-8 text: save it as UTF-8$"
+        with pytest.raises(PolicyError, match=reason):
             read_table(file, "lamp", PolicyError)
 
 
@@ -104,9 +104,9 @@ for number in range(200):
 def test_processes_that_write_one_file_at_once_all_succeed(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WRITE]
     writing = [subprocess.Popen([*command, sign], cwd=tmp_path) for sign in "abcd"]
-    assert [one.wait() for one in writing] == [0] * 4
+    assert [process.wait() for process in writing] == [0] * 4
     assert (tmp_path / "x.csv").read_text() in [100 * sign for sign in "abcd"]
-    assert [one.name for one in tmp_path.iterdir()] == ["x.csv"]
+    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
 
 
 WRITE_AND_DIE = """
@@ -127,8 +127,8 @@ def test_what_a_killed_writer_left_is_removed_once_nobody_writes(tmp_path: Path)
         command = [sys.executable, "-c", WRITE_AND_DIE, name]
         assert subprocess.run(command, cwd=tmp_path, check=False).returncode == -signal.SIGKILL
     assert len([*tmp_path.iterdir()]) == 4
-    mine = tmp_path / ".mine.csv"
-    mine.touch()
+    own_file = tmp_path / ".mine.csv"
+    own_file.touch()
     with atomic_write(tmp_path / "x.csv", PolicyError) as part:
         assert {path.name[:5] for path in tmp_path.iterdir()} == {".x[1]", ".mine", part.name[:5]}
         with atomic_write(tmp_path / "x[1].csv", PolicyError), remove_parts(tmp_path):
@@ -175,4 +175,4 @@ def test_a_block_that_fails_leaves_nothing_beside_the_older_file(tmp_path: Path)
 
     with pytest.raises(KeyError):
         fail()
-    assert [one.read_text() for one in tmp_path.iterdir()] == ["older"]
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["older"]

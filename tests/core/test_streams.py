@@ -12,9 +12,9 @@ from swarm_logistics_env.core.streams import generator, key, row_keys
 
 def test_a_stream_is_the_same_whenever_it_is_asked_for_and_others_differ() -> None:
     first = generator(3, "places", 7).random(5)
-    others = (4, "places", 7), (3, "place", 7), (3, "places", 8), (3, "places"), (37, "places")
-    for other in others:
-        assert first[0] != generator(*other).random()
+    other_keys = (4, "places", 7), (3, "place", 7), (3, "places", 8), (3, "places"), (37, "places")
+    for other_key in other_keys:
+        assert first[0] != generator(*other_key).random()
     np.testing.assert_array_equal(first, generator(3, "places", 7).random(5))
     seeds = (0, 1, -1, 2**63, 2**64, 2**200)
     assert len({key(seed, "a") for seed in seeds}) == len(seeds)
@@ -40,5 +40,5 @@ def test_numbers_of_a_kernel_stream_are_uniform_and_independent() -> None:
     n = numbers.size
     counts = np.histogram(numbers, 20, (0.0, 1.0))[0]
     assert ((counts - n / 20) ** 2 / (n / 20)).sum() < 50.0  # chi square, 19 degrees of freedom
-    for one, next_ in ((numbers[:, :-1], numbers[:, 1:]), (numbers[:-1], numbers[1:])):
-        assert abs(np.corrcoef(one.ravel(), next_.ravel())[0, 1]) < 5 / np.sqrt(n)
+    for part, shifted in ((numbers[:, :-1], numbers[:, 1:]), (numbers[:-1], numbers[1:])):
+        assert abs(np.corrcoef(part.ravel(), shifted.ravel())[0, 1]) < 5 / np.sqrt(n)

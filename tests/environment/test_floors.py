@@ -28,10 +28,10 @@ def test_an_approach_counts_along_the_free_floor() -> None:
     driven = float(np.linalg.norm(world.state.robot_position - position))
     assert driven > 0.05
     assert rewards[0] == pytest.approx(driven, rel=0.1)
-    way = world.floor.edge - world.floor.along(world.state.robot_position)
-    assert way[0] > 2.0
+    distance = world.floor.edge - world.floor.along(world.state.robot_position)
+    assert distance[0] > 2.0
     robot = env.state()[: len(ROBOT_FEATURES)]
-    assert robot[list(ROBOT_FEATURES).index("to_delivery")] == pytest.approx(way[0])
+    assert robot[list(ROBOT_FEATURES).index("to_delivery")] == pytest.approx(distance[0])
     assert env.state_space.contains(env.state())
 
 

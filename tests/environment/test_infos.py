@@ -22,19 +22,19 @@ def test_they_are_numbers_with_the_same_keys_at_every_step_and_share_nothing() -
     keys = list(next(iter(env.reset(seed=0)[1].values())))
     assert {"failed", "delivered", "FT"} <= set(keys)
     for seed in range(4):
-        (observations, infos), (_, others) = env.reset(seed=seed), other.reset(seed=seed)
+        (observations, infos), (_, other_infos) = env.reset(seed=seed), other.reset(seed=seed)
         while True:
             assert infos.keys() == observations.keys()
-            assert others == infos
+            assert other_infos == infos
             for number, info in enumerate(infos.values()):
                 assert list(info) == keys
                 assert all(isinstance(value, numbers.Real) for value in info.values())
                 assert all(np.isfinite(value) for value in info.values())
                 info["mine"] = number
             assert [info["mine"] for info in infos.values()] == list(range(len(infos)))
-            assert not any("mine" in info for info in others.values())
+            assert not any("mine" in info for info in other_infos.values())
             if not env.agents:
                 break
             actions = {agent: np.zeros(4) for agent in env.agents}
             observations, *_, infos = env.step(actions)
-            *_, others = other.step(actions)
+            *_, other_infos = other.step(actions)

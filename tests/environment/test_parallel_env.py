@@ -96,25 +96,25 @@ def tensor(dtype: str = "float32", **arguments: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "reason"),
     [
         (lambda: tensor("bfloat16"), "Tensor cannot be read.* BFloat16"),
         (lambda: tensor(requires_grad=True), "Tensor cannot be read.* requires grad"),
         (OnGPU, "OnGPU cannot be read.* cuda:0"),
     ],
 )
-def test_what_cannot_be_read_is_refused(make: Callable[[], Any], said: str) -> None:
+def test_what_cannot_be_read_is_refused(make: Callable[[], Any], reason: str) -> None:
     env, central = parallel_env(n_robots=2), CentralEnv(n_robots=1)
     env.reset(seed=0)
     central.reset(seed=0)
     actions: dict[str, Any] = {"robot_0": np.zeros(4), "robot_1": make()}
-    with pytest.raises(CommandError, match=f"command of 'robot_1' of type {said}"):
+    with pytest.raises(CommandError, match=f"command of 'robot_1' of type {reason}"):
         list(map(env.step, [actions] * 3))
     with pytest.raises(CommandError, match="cannot be read"):
         list(env.step(actions) for _ in range(3))  # noqa: C400  # no loop swallows it
-    with pytest.raises(CommandError, match=f"commands of type {said}"):
+    with pytest.raises(CommandError, match=f"commands of type {reason}"):
         env.step_arrays(make())
-    with pytest.raises(CommandError, match=f"action of type {said}"):
+    with pytest.raises(CommandError, match=f"action of type {reason}"):
         central.step(make())
     assert env.warehouse.state.step == 0
 

@@ -39,19 +39,19 @@ requests = st.one_of(
 
 def later(env: Any, steps: int) -> list[Any]:
     """Return all that an environment tells in some steps and in the episode after them."""
-    told: list[Any] = [env.state().tobytes(), list(getattr(env, "agents", ()))]
+    record: list[Any] = [env.state().tobytes(), list(getattr(env, "agents", ()))]
     world: Any = env.env if isinstance(env, CentralEnv) else env
     for step in range(steps):
         if isinstance(env, CentralEnv):
             seen, *_ = env.step(np.full(env.action_space.shape, 0.1 * step, np.float32))
-            told.append(seen.tobytes())
+            record.append(seen.tobytes())
         else:
             actions = {agent: np.full(4, 0.1 * step, np.float32) for agent in env.agents}
             seen, *_ = env.step(actions)
-            told.append({agent: row.tobytes() for agent, row in seen.items()})
-    told.append(world.next_seed)
+            record.append({agent: row.tobytes() for agent, row in seen.items()})
+    record.append(world.next_seed)
     env.reset()
-    return [*told, env.state().tobytes(), getattr(env, "np_random_seed", None)]
+    return [*record, env.state().tobytes(), getattr(env, "np_random_seed", None)]
 
 
 @pytest.mark.parametrize("kind", MAKERS)

@@ -38,7 +38,7 @@ def test_dicts_and_texts_are_the_faults_they_describe_wherever_faults_are_given(
 
 
 @pytest.mark.parametrize(
-    ("faults", "said"),
+    ("faults", "reason"),
     [
         ([{"mode": "FM1", "robot": 2}], "argument 'robot'.*; known: mode, robots"),
         ([{"robots": 2}], "missing .*: 'mode'"),
@@ -47,10 +47,10 @@ def test_dicts_and_texts_are_the_faults_they_describe_wherever_faults_are_given(
         ([3], "should be a list of faults"),
     ],
 )
-def test_what_is_no_fault_or_no_list_of_them_is_refused(faults: Any, said: str) -> None:
-    with pytest.raises((FaultError, SetupError), match=said):
+def test_what_is_no_fault_or_no_list_of_them_is_refused(faults: Any, reason: str) -> None:
+    with pytest.raises((FaultError, SetupError), match=reason):
         SwarmLogisticsEnv(faults=faults)
-    with pytest.raises((FaultError, SetupError), match=said):
+    with pytest.raises((FaultError, SetupError), match=reason):
         SwarmLogisticsEnv(n_robots=2).reset(options={"faults": faults})
 
 

@@ -24,12 +24,12 @@ def test_the_state_tells_what_the_world_holds_and_zeros_of_what_is_gone(n_reques
     start(policy, env.scenario, 3)
     world, carried, n_shown = env.warehouse.state, 0, 12 * len(ROBOT_FEATURES)
     while env.agents:
-        told = env.state()
-        robots = dict(zip(ROBOT_FEATURES, told[:n_shown].reshape(12, -1).T))
-        items = dict(zip(ITEM_COLUMNS, told[n_shown:-1].reshape(14, -1).T))
+        state = env.state()
+        robots = dict(zip(ROBOT_FEATURES, state[:n_shown].reshape(12, -1).T))
+        items = dict(zip(ITEM_COLUMNS, state[n_shown:-1].reshape(14, -1).T))
         present = world.robot_present
         assert robots["present"].tolist() == present.tolist()
-        assert not told[:n_shown].reshape(12, -1)[~present].any()
+        assert not state[:n_shown].reshape(12, -1)[~present].any()
         for name, column in (
             ("carrying", row.CARRYING),
             ("carrying_requested", row.CARRYING_REQUESTED),
@@ -44,7 +44,7 @@ def test_the_state_tells_what_the_world_holds_and_zeros_of_what_is_gone(n_reques
             np.testing.assert_allclose(items[name], places, atol=1e-6)
         assert items["stored"].tolist() == (world.item_status == STORED).tolist()
         assert items["carried"].tolist() == (world.item_status == CARRIED).tolist()
-        asked = set(np.flatnonzero(items["requested"]).tolist())
-        assert asked == set(world.open_requests.tolist()) - {NOBODY}
+        requested = set(np.flatnonzero(items["requested"]).tolist())
+        assert requested == set(world.open_requests.tolist()) - {NOBODY}
         rows, *_ = env.step_arrays(decide(policy, rows, world))
     assert (world.delivered > 3, carried > 10, (~world.robot_present).sum()) == (True, True, 3)

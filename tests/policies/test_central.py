@@ -59,8 +59,8 @@ def test_it_needs_the_state_alone_and_does_not_know_who_fails() -> None:
     assert (np.abs(commands) <= 1.0).all()
     # A robot that has failed is told the same as one that has not, until it shows.
     faulty, other = begun(Fault("FM2", 2), Fault("FM4", (0,)), Fault("motor_dead", (1,)))
-    told = decide(other, np.full_like(observations, np.nan), faulty.state)
-    np.testing.assert_array_equal(told, commands)
+    commands_with_faults = decide(other, np.full_like(observations, np.nan), faulty.state)
+    np.testing.assert_array_equal(commands_with_faults, commands)
     with pytest.raises(PolicyError, match="state = None"):
         policy.act(observations)
     policy.reset(5, 0)
@@ -129,6 +129,6 @@ def test_only_who_hears_gets_the_command_of_others(
     commands = decide(sender, rows, world.state)
     np.testing.assert_array_equal(commands[[0, 2, 4, 5]], [sender.command] * 4)
     np.testing.assert_array_equal(commands[[1, 3]], [sender.command * arrives] * 2)
-    given = np.ones((6, 6))
-    mask_unreachable_commands(given, world.state)
-    assert given.all()
+    ones = np.ones((6, 6))
+    mask_unreachable_commands(ones, world.state)
+    assert ones.all()

@@ -29,9 +29,9 @@ class Courier:
         self, observations: NDArray[np.float32], state: WarehouseState | None = None
     ) -> NDArray[np.float64]:
         assert state is not None
-        way = np.where(state.robot_item == state.requested, 1.0, -1.0)
+        sign = np.where(state.robot_item == state.requested, 1.0, -1.0)
         heading = state.robot_heading
-        return np.array([way * np.cos(heading), -way * np.sin(heading), 0 * way, way * way]).T
+        return np.array([sign * np.cos(heading), -sign * np.sin(heading), 0 * sign, sign * sign]).T
 
 
 def test_an_episode_of_swarm_dt_is_what_it_says() -> None:

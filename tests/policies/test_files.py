@@ -36,10 +36,10 @@ def test_what_is_written_is_read_back(card: PolicyCard, tensors: Tensors, file: 
 def test_a_file_has_equal_bytes_each_time_and_says_when_it_is_not_what_was_written(
     card: PolicyCard, tensors: Tensors, file: Path
 ) -> None:
-    whole, identity_before = file.read_bytes(), identity(policies.load(str(file)))
+    content, identity_before = file.read_bytes(), identity(policies.load(str(file)))
     for _ in range(8):
         write_policy(file, card, tensors)
-        assert file.read_bytes() == whole
+        assert file.read_bytes() == content
     other = {**tensors, "layers.0.bias": tensors["layers.0.bias"] + 1}
     for held, text in (
         (other, card.to_json()),
@@ -56,7 +56,7 @@ def test_a_file_has_equal_bytes_each_time_and_says_when_it_is_not_what_was_writt
         policy: Any = policies.load(str(file))
     assert identity(policy) == identity_before
     policies.files.write_policy(file, policy.card, policy.tensors)
-    assert file.read_bytes() == whole
+    assert file.read_bytes() == content
 
 
 @pytest.mark.parametrize("wrap", ["pickle", "zip"])
@@ -77,13 +77,13 @@ def test_a_pickle_is_refused_and_not_executed(file: Path, tmp_path: Path, wrap: 
 def test_a_file_that_is_too_large_or_cut_short_is_refused(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = file.read_bytes()
-    monkeypatch.setattr(files, "LARGEST_FILE", len(whole))
+    content = file.read_bytes()
+    monkeypatch.setattr(files, "LARGEST_FILE", len(content))
     policies.load(str(file))
-    file.write_bytes(whole + b" ")
-    refused(file, f"has {len(whole) + 1} bytes")
-    for length in (0, 5, len(whole) // 2, len(whole) - 1):
-        file.write_bytes(whole[:length])
+    file.write_bytes(content + b" ")
+    refused(file, f"has {len(content) + 1} bytes")
+    for length in (0, 5, len(content) // 2, len(content) - 1):
+        file.write_bytes(content[:length])
         refused(file, "is cut short or no safetensors file")
 
 

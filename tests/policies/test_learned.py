@@ -126,14 +126,14 @@ def test_noise_is_of_each_robot_and_output_alone_and_of_its_deviation() -> None:
 
 def test_identity_follows_weights_and_network_alone(card: PolicyCard, tensors: Tensors) -> None:
     policy = LearnedPolicy(card, tensors)
-    told = identity(policy)
+    identity_before = identity(policy)
     run_episode(Scenario(n_robots=2, duration=1.0), policy, seed=3, faults=[Fault("FM1", 1)])
-    assert identity(policy) == told
-    assert identity(LearnedPolicy(card.replace(name="other", seed=7), tensors)) == told
+    assert identity(policy) == identity_before
+    assert identity(LearnedPolicy(card.replace(name="other", seed=7), tensors)) == identity_before
     bolder = card.replace(network=card.network.replace(exploration=1.0))
-    assert identity(LearnedPolicy(bolder, tensors)) != told
+    assert identity(LearnedPolicy(bolder, tensors)) != identity_before
     moved = {**tensors, "layers.0.bias": tensors["layers.0.bias"] + np.float32(1e-3)}
-    assert identity(LearnedPolicy(card, moved)) != told
+    assert identity(LearnedPolicy(card, moved)) != identity_before
 
 
 def test_it_is_the_network_of_its_layers(card: PolicyCard, tensors: Tensors) -> None:
@@ -149,8 +149,8 @@ def test_it_is_the_network_of_its_layers(card: PolicyCard, tensors: Tensors) -> 
 
 def test_the_hyperbolic_tangent_is_one() -> None:
     values = np.linspace(-12.0, 12.0, 20_001, dtype=np.float32)
-    ours = [hyperbolic_tangent(value) for value in values]
-    np.testing.assert_allclose(ours, np.tanh(values.astype(np.float64)), rtol=0, atol=5e-7)
+    computed = [hyperbolic_tangent(value) for value in values]
+    np.testing.assert_allclose(computed, np.tanh(values.astype(np.float64)), rtol=0, atol=5e-7)
 
 
 def test_it_steers_the_body_that_the_robots_of_a_scenario_have(

@@ -38,14 +38,14 @@ def test_a_trained_network_plays_as_its_policy_file_does() -> None:
     card = learned.card.replace(
         network=learned.card.network.replace(exploration=0.0, decides_every=1)
     )
-    same: Any = type(learned)(card, learned.tensors)
-    policy = policies.of(same.outputs_of, frame=True)
+    steady: Any = type(learned)(card, learned.tensors)
+    policy = policies.of(steady.outputs_of, frame=True)
     rows = np.random.default_rng(0).normal(size=(40, 5, N_COLUMNS)).astype(np.float32)
     policy.reset(5, 3)
-    same.reset(5, 3)
-    same._frame.begin_rows(np.arange(5), policy._view.keys)
+    steady.reset(5, 3)
+    steady._frame.begin_rows(np.arange(5), policy._view.keys)
     for step in rows:
-        np.testing.assert_array_equal(policy.act(step), same.act(step))
+        np.testing.assert_array_equal(policy.act(step), steady.act(step))
 
 
 def test_torch_onnx_and_a_function_of_one_network_give_the_same_commands() -> None:

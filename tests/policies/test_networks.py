@@ -241,8 +241,8 @@ def matrix_of(width: int) -> Any:
 def test_a_session_plays_whatever_its_precision_and_its_batch(kind: str) -> None:
     for shape in (["n", N_COLUMNS], [1, N_COLUMNS]):
         policy: Any = policies.of(session(shape, kind, ("other", "action")))
-        for same in (policy, pickle.loads(pickle.dumps(policy)), copy.deepcopy(policy)):
-            commands = same.act(ROWS)
+        for player in (policy, pickle.loads(pickle.dumps(policy)), copy.deepcopy(policy)):
+            commands = player.act(ROWS)
             assert commands.dtype == np.float32
             np.testing.assert_allclose(commands, ROWS @ matrix_of(N_COLUMNS), atol=0.01)
 

@@ -54,10 +54,10 @@ def test_rows_of_zeros_stay_zeros_and_statistics_go_on_with_their_training() -> 
 
 def test_a_policy_is_known_by_its_statistics_and_their_limit() -> None:
     normalizers = [None, vec_normalize(), vec_normalize(clip_obs=5.0), vec_normalize(epsilon=2.0)]
-    known = [policies.identity(policies.of(first_columns, normalize=n)) for n in normalizers]
-    assert len(set(known)) == len(known)
+    identities = [policies.identity(policies.of(first_columns, normalize=n)) for n in normalizers]
+    assert len(set(identities)) == len(identities)
     off = policies.of(first_columns, normalize=vec_normalize(norm_obs=False))
-    assert policies.identity(off) == known[0]
+    assert policies.identity(off) == identities[0]
 
 
 @pytest.mark.parametrize(

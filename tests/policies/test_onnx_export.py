@@ -47,9 +47,9 @@ def test_it_says_what_the_network_says_on_every_row_of_an_episode(tmp_path: Path
     frame.begin(row_keys(3, STREAM, 25))
     while not world.is_over_time:
         inputs = frame.read(rows)
-        [said] = session.run(None, {"inputs": inputs})
-        np.testing.assert_allclose(said, policy.outputs_of(inputs), rtol=0, atol=1e-5)
-        rows = world.step(frame.command(said))
+        [outputs] = session.run(None, {"inputs": inputs})
+        np.testing.assert_allclose(outputs, policy.outputs_of(inputs), rtol=0, atol=1e-5)
+        rows = world.step(frame.command(outputs))
 
 
 def test_one_that_does_not_listen_ignores_timers(
@@ -59,7 +59,7 @@ def test_one_that_does_not_listen_ignores_timers(
     session = session_of(LearnedPolicy(deaf, tensors), tmp_path / "p.onnx")
     rng = np.random.default_rng(0)
     inputs = rng.normal(size=(5, len(INPUTS))).astype(np.float32)
-    told = inputs.copy()
-    lead = [place for place, name in enumerate(INPUTS) if name.startswith("lead_")]
-    told[:, lead] = rng.normal(size=(5, len(lead)))
-    np.testing.assert_array_equal(*(session.run(None, {"inputs": x})[0] for x in (inputs, told)))
+    changed = inputs.copy()
+    lead = [index for index, name in enumerate(INPUTS) if name.startswith("lead_")]
+    changed[:, lead] = rng.normal(size=(5, len(lead)))
+    np.testing.assert_array_equal(*(session.run(None, {"inputs": x})[0] for x in (inputs, changed)))

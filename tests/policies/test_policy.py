@@ -68,8 +68,8 @@ def test_every_argument_of_a_trained_policy_changes_its_identity() -> None:
     }
     met.add(identity(LearnedPolicy(trained.card.replace(network=narrow), tensors)))
     for name, tensor in tensors.items():
-        others = {**tensors, name: tensor + np.float32(0.1)}
-        met.add(identity(LearnedPolicy(trained.card.replace(network=narrow), others)))
+        changed_tensors = {**tensors, name: tensor + np.float32(0.1)}
+        met.add(identity(LearnedPolicy(trained.card.replace(network=narrow), changed_tensors)))
     assert len(met) == 5 + len(tensors)
 
 

@@ -21,8 +21,8 @@ NOTHING = np.zeros((0, 2))
 
 
 def grid(solid: NDArray[np.float64], crowd: NDArray[np.float64] = NOTHING) -> NDArray[np.float64]:
-    discs = [[*place, 0.25, BLOCKED] for place in solid.tolist()]
-    discs += [[*place, 0.25, CROWDED] for place in crowd.tolist()]
+    discs = [[*centre, 0.25, BLOCKED] for centre in solid.tolist()]
+    discs += [[*centre, 0.25, CROWDED] for centre in crowd.tolist()]
     return costmap(4.0, 2.0, 0.1, np.array(discs).reshape(-1, 4))
 
 
@@ -67,7 +67,7 @@ def test_it_goes_straight_around_what_is_in_the_way_and_through_where_there_is_n
     straight = travelled(grid(NOTHING), 0.35, 0.95)
     assert sum(math.dist(*pair) for pair in itertools.pairwise(straight)) < 3.45
     around = travelled(grid(wall(1.3)), 0.35, 0.35)
-    assert min(math.dist(place, disc) for place in around for disc in wall(1.3).tolist()) > 0.2
+    assert min(math.dist(point, disc) for point in around for disc in wall(1.3).tolist()) > 0.2
     assert max(y for _, y in around) > 1.4
     assert travelled(grid(wall(2.1)), 0.35, 0.35)
 

@@ -49,12 +49,12 @@ def test_a_trusted_model_plays_and_is_known_by_its_content(model: Path, tmp_path
     rows = np.random.default_rng(0).normal(size=(4, N_COLUMNS)).astype(np.float32)
     from stable_baselines3 import PPO
 
-    told, _ = PPO.load(model, device="cpu").predict(rows, deterministic=True)
-    assert (policy.act(rows) == told).all()
+    actions, _ = PPO.load(model, device="cpu").predict(rows, deterministic=True)
+    assert (policy.act(rows) == actions).all()
     other = tmp_path / "other.zip"
     other.write_bytes(model.read_bytes())
-    same = policies.load(str(other), trust_code=True)
-    assert policies.identity(same) == policies.identity(policy)
+    policy_of_copy = policies.load(str(other), trust_code=True)
+    assert policies.identity(policy_of_copy) == policies.identity(policy)
 
 
 def test_the_command_line_asks_too(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -185,10 +185,10 @@ def test_a_policy_class_of_ones_own_is_read_by_its_algorithm(
     def make_env(world: int) -> Any:
         return DiscreteActions(brief(n_robots=2)) if algorithm == "DQN" else brief(n_robots=2)
 
-    own = {"features_extractor_class": own_code.Features, "activation_fn": own_code.Activation}
+    classes = {"features_extractor_class": own_code.Features, "activation_fn": own_code.Activation}
     learned = getattr(stable_baselines3, algorithm)(
         getattr(own_code, f"Of{algorithm}"), SwarmVecEnv(make_env=make_env, n_worlds=1),
-        policy_kwargs={"net_arch": [4], **own}, buffer_size=8, seed=0, device="cpu",
+        policy_kwargs={"net_arch": [4], **classes}, buffer_size=8, seed=0, device="cpu",
     )  # fmt: skip
     learned.save(tmp_path / "model.zip")
     rows = np.random.default_rng(0).normal(size=(4, N_COLUMNS)).astype(np.float32)

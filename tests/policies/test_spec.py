@@ -64,11 +64,11 @@ def fresh(name: str, n_robots: int) -> Any:
 def test_a_command_follows_from_its_own_row_alone_and_stays_within_bounds(name: str) -> None:
     rng, n = np.random.default_rng(0), 20
     world = Warehouse(Scenario(n_robots=n, n_items=20, warehouse_width=5, warehouse_height=4))
-    rows, whole, disturbed, few = world.reset(0), fresh(name, n), fresh(name, n), fresh(name, 5)
+    rows, plain, disturbed, few = world.reset(0), fresh(name, n), fresh(name, n), fresh(name, 5)
     for _ in range(30):
         scrambled = rng.permutation(rows)
         scrambled[4] = rows[4]
-        commands = whole.act(rows)
+        commands = plain.act(rows)
         assert (np.abs(commands) <= 1.0).all()
         assert (np.hypot(commands[:, 0], commands[:, 1]) <= 1.0 + 1e-6).all()
         np.testing.assert_array_equal(disturbed.act(scrambled)[4], commands[4])

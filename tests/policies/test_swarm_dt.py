@@ -115,8 +115,8 @@ def test_items_are_avoided_by_constants_of_their_own() -> None:
 
 def test_at_full_speed_it_keeps_the_direction_and_no_push_slows_it() -> None:
     plain = straight().act(NOTHING)
-    ahead = neighbour(*(0.3 * plain[0, :2]))  # pushes it straight back, by 0.8 top speeds
-    slowed, fast = straight().act(sensing(ahead)), straight(full_speed=True).act(sensing(ahead))
+    robot = neighbour(*(0.3 * plain[0, :2]))  # pushes it straight back, by 0.8 top speeds
+    slowed, fast = straight().act(sensing(robot)), straight(full_speed=True).act(sensing(robot))
     assert np.hypot(*slowed[0, :2]) == pytest.approx(0.2)
     assert np.hypot(*fast[0, :2]) == pytest.approx(1.0)
     assert heading_of(fast) == pytest.approx(heading_of(slowed))
@@ -152,10 +152,10 @@ def test_other_items_are_dropped_at_the_drop_rate_and_the_requested_one_never(
     period: float,
 ) -> None:
     n = 3000
-    policy, kept = swarm(n, period), np.ones(n, np.bool_)
+    policy, holds_item = swarm(n, period), np.ones(n, np.bool_)
     for _ in range(round(0.5 / period)):
-        kept &= policy.act(sensing(CARRYING, n_robots=n))[:, 3] > -0.5
-    assert kept.mean() == pytest.approx(math.exp(-1.5 * 0.5), abs=0.04)
+        holds_item &= policy.act(sensing(CARRYING, n_robots=n))[:, 3] > -0.5
+    assert holds_item.mean() == pytest.approx(math.exp(-1.5 * 0.5), abs=0.04)
     for _ in range(20):
         assert (policy.act(sensing(CARRYING_REQUESTED, n_robots=n))[:, 3] == 1.0).all()
 

@@ -36,8 +36,8 @@ def test_a_cell_is_the_run_of_its_scenario_with_these_constants() -> None:
     cell = next(s for s in fit.FAULTY if (s.name, s.value) == ("FM2", 2))
     scenario, _ = fit.conditions(cell, constants["radio_range"])
     assert scenario.radio_range == constants["radio_range"]
-    own = {k: v for k, v in constants.items() if k not in ("radio_range", "full_speed")}
-    episode = run_episode(scenario, SwarmDT(full_speed=True, **own), 7, [Fault("FM2", 2)])
+    chosen = {k: v for k, v in constants.items() if k not in ("radio_range", "full_speed")}
+    episode = run_episode(scenario, SwarmDT(full_speed=True, **chosen), 7, [Fault("FM2", 2)])
     assert fit.play([cell], constants, 7) == {"FM2 = 2": episode.delivered}
 
 
@@ -68,8 +68,8 @@ def test_what_was_tried_is_read_again_but_for_a_line_that_was_cut_short(
     ]
     for row in rows:
         fit.append(row, path)
-    whole = path.read_text()
-    path.write_text(whole + whole.splitlines()[-1][:60])
+    text = path.read_text()
+    path.write_text(text + text.splitlines()[-1][:60])
     assert fit.read_tried(path) == rows
     assert [fit.is_full(row) for row in rows] == [False, True]
 
@@ -81,8 +81,8 @@ def test_every_claim_holds_for_the_papers_own_values() -> None:
         if question.indicator != "A":
             assert confirmed.holds(question, cells), confirmed.claim_text(question)
     poor = {**cells, "FM2 = 1": 5}
-    asked = confirmed.questions()
-    failing = [confirmed.claim_text(q) for q in asked if not confirmed.holds(q, poor)]
+    questions = confirmed.questions()
+    failing = [confirmed.claim_text(q) for q in questions if not confirmed.holds(q, poor)]
     assert {"FM2, m = 1: FT > 0", "FM2, m = 1: R > 0"} <= set(failing)
 
 
@@ -116,5 +116,5 @@ def test_the_preset_plays_the_fit_without_failed_robots() -> None:
     (policy,) = preset.policies
     for fields in (preset.scenario.model_dump(), preset.sizes[0].scenario):
         assert fields["radio_range"] == constants["radio_range"]
-    own = {name: value for name, value in constants.items() if name != "radio_range"}
-    assert policy.parameters == own
+    chosen = {name: value for name, value in constants.items() if name != "radio_range"}
+    assert policy.parameters == chosen

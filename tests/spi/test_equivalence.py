@@ -35,18 +35,20 @@ def test_the_planned_seeds_have_the_promised_power() -> None:
 def test_it_is_the_two_tests_of_the_indicators() -> None:
     # Of so many seeds no share of hidden stalls matters, so that verdict and interval agree.
     p_o, p_f = poisson(3, -0.02, 400)
-    found: Any = spi.equivalence(p_o, p_f)
-    for test, edge in ((found.above, -0.1), (found.below, 0.1)):
+    equivalence: Any = spi.equivalence(p_o, p_f)
+    for test, edge in ((equivalence.above, -0.1), (equivalence.below, 0.1)):
         assert test == spi.relative_change(p_o, p_f, threshold=edge, confidence=0.9)
-    assert found.p_value == max(1 - found.above.probability, found.below.probability)
-    assert found.verdict == "equivalent"
-    assert -0.1 < found.change.low < found.change.high < 0.1
+    assert equivalence.p_value == max(
+        1 - equivalence.above.probability, equivalence.below.probability
+    )
+    assert equivalence.verdict == "equivalent"
+    assert -0.1 < equivalence.change.low < equivalence.change.high < 0.1
 
 
 # Where P is capped: of equal P either may truly be larger, so that the change may lie beyond the
 # margin. P_new that truly is larger still would only lie further above it.
 @pytest.mark.parametrize(
-    ("change", "asked", "verdict"),
+    ("change", "options", "verdict"),
     [
         (0.0, {}, "equivalent"),
         (0.0, {"paired": False}, "equivalent"),
@@ -59,28 +61,28 @@ def test_it_is_the_two_tests_of_the_indicators() -> None:
     ],
 )
 def test_clear_changes_have_their_verdict_unless_a_cap_could_turn_it(
-    change: float, asked: dict[str, Any], verdict: str
+    change: float, options: dict[str, Any], verdict: str
 ) -> None:
-    found = spi.equivalence(*poisson(1, change), **asked)
-    assert (found.verdict, "capped" in found.flags) == (verdict, verdict == "open")
+    equivalence = spi.equivalence(*poisson(1, change), **options)
+    assert (equivalence.verdict, "capped" in equivalence.flags) == (verdict, verdict == "open")
 
 
 def test_fault_tolerance_compares_with_the_robots_removed() -> None:
     (p_o, p_f), (_, p_s) = poisson(4, -0.5), poisson(5, -0.5)
-    found = spi.equivalence(p_o, p_f, p_s)
-    assert (found.verdict, spi.equivalence(p_o, p_f).verdict) == ("equivalent", "refuted")
-    assert found.change.value == pytest.approx(spi.fault_tolerance(p_o, p_f, p_s).value)
+    equivalence = spi.equivalence(p_o, p_f, p_s)
+    assert (equivalence.verdict, spi.equivalence(p_o, p_f).verdict) == ("equivalent", "refuted")
+    assert equivalence.change.value == pytest.approx(spi.fault_tolerance(p_o, p_f, p_s).value)
 
 
 def test_equal_runs_are_equivalent_exactly_and_equal_counts_or_one_seed_are_not() -> None:
     p = [30.0, 41.0, 36.0]
-    same, by_chance = spi.equivalence(p, p, identical=True), spi.equivalence(p, p)
-    assert (same.verdict, same.p_value) == ("equivalent", None)
+    exact, by_chance = spi.equivalence(p, p, identical=True), spi.equivalence(p, p)
+    assert (exact.verdict, exact.p_value) == ("equivalent", None)
     assert by_chance.verdict == "open"
     assert "degenerate" in by_chance.flags
-    one = spi.equivalence([39], [38])
-    assert (one.p_value, one.verdict) == (None, "open")
-    assert spi.seeds_for_equivalence(one) is None
+    of_one_seed = spi.equivalence([39], [38])
+    assert (of_one_seed.p_value, of_one_seed.verdict) == (None, "open")
+    assert spi.seeds_for_equivalence(of_one_seed) is None
 
 
 @pytest.mark.parametrize("field", [{"margin": 0.0}, {"margin": 1.0}, {"alpha": 0.5}])

@@ -36,8 +36,8 @@ def test_a_run_below_a_quarter_of_the_median_stalled() -> None:
 def test_what_may_be_hidden_is_what_was_not_seen() -> None:
     none_seen = stalls(np.full(20, 40.0))
     assert (float(none_seen.seen), none_seen.of, none_seen.most) == (0.0, 20, STALL_SHARE)
-    kept, chance = remainder_and_chance(0.05, none_seen)
-    assert (float(kept), float(chance)) == pytest.approx((0.95, 1.25 * 0.95**20))
+    remainder, chance = remainder_and_chance(0.05, none_seen)
+    assert (float(remainder), float(chance)) == pytest.approx((0.95, 1.25 * 0.95**20))
     # One of ten stalled: the assumed share is in the mean already.
     _, chance = remainder_and_chance(0.05, stalls(np.array([2.0, *[40.0] * 9])))
     assert chance == 0.0
@@ -82,9 +82,9 @@ def test_studies_until_clear_hold_their_level_though_some_runs_stall(stalled: st
 
 @pytest.mark.parametrize(("k", "n", "upper"), [(0, 3, 0.63), (0, 5, 0.45), (0, 10, 0.26)])
 def test_the_share_that_collapses_has_an_exact_limit(k: int, n: int, upper: float) -> None:
-    found = collapsed(np.full((n, 2), 40.0), np.full((n, 2), 40.0))
-    assert found[:2] == (k, n)
-    assert found.upper == pytest.approx(upper, abs=0.005)
+    none_collapsed = collapsed(np.full((n, 2), 40.0), np.full((n, 2), 40.0))
+    assert none_collapsed[:2] == (k, n)
+    assert none_collapsed.upper == pytest.approx(upper, abs=0.005)
     some = collapsed(np.array([[1.0]] + [[40.0]] * 9), np.full((10, 1), 40.0))
     assert some.upper == pytest.approx(beta.ppf(0.95, 2, 9))
 
@@ -130,5 +130,5 @@ def test_verdicts_over_trainings_hold_their_level_and_tell(world: str, k: int) -
     wrong = over_trainings(world, k, 6, 400)
     assert max(wrong.supported, wrong.refuted) <= 0.06
     if k == 20 and "collapses" not in world:
-        found = over_trainings(world, k, 6, 400, robustness=0.3, threshold=0.0)
-        assert found.supported > 0.8
+        shares = over_trainings(world, k, 6, 400, robustness=0.3, threshold=0.0)
+        assert shares.supported > 0.8

@@ -39,9 +39,9 @@ def test_values_are_ratios_of_means_by_the_table_of_indicators() -> None:
     }
     for symbol, row in DEFINITIONS.items():
         change, value = expected[symbol]
-        found = row.function(**dict(zip(row.performances, samples)), **row.arguments(change))
-        assert found.indicator == symbol
-        assert found.value == pytest.approx(value)
+        estimate = row.function(**dict(zip(row.performances, samples)), **row.arguments(change))
+        assert estimate.indicator == symbol
+        assert estimate.value == pytest.approx(value)
 
 
 def test_adaptability_uses_the_size_of_the_change_only() -> None:
@@ -52,11 +52,11 @@ def test_adaptability_uses_the_size_of_the_change_only() -> None:
 
 @over_indicators
 def test_one_seed_gives_the_value_and_nothing_else(name: str) -> None:
-    found = INDICATORS[name]([39], [35], **({"p_s": [30]} if name == "FT" else {}))
-    assert (found.verdict, found.flags) == ("open", ("single_seed",))
-    assert (found.n_seeds, found.threshold, found.mean_denominator) == (1, 0.0, 39)
-    assert {found.low, found.high, found.p_value, found.probability} == {None}
-    assert {found.log_sd, found.degrees_of_freedom, found.pairing_correlation} == {None}
+    estimate = INDICATORS[name]([39], [35], **({"p_s": [30]} if name == "FT" else {}))
+    assert (estimate.verdict, estimate.flags) == ("open", ("single_seed",))
+    assert (estimate.n_seeds, estimate.threshold, estimate.mean_denominator) == (1, 0.0, 39)
+    assert {estimate.low, estimate.high, estimate.p_value, estimate.probability} == {None}
+    assert {estimate.log_sd, estimate.degrees_of_freedom, estimate.pairing_correlation} == {None}
 
 
 @over_indicators
@@ -132,18 +132,18 @@ def test_what_no_performance_can_refute_has_no_verdict_and_all_else_can_be_eithe
         return row.function(**named, **row.arguments(change), threshold=threshold, paired=False)
 
     p_o, p_new, p_s = samples
-    found = judged([*p_o, 1], p_new, p_s)
+    estimate = judged([*p_o, 1], p_new, p_s)
     nothing, much = [0] * 4, [10**6] * 4
     least = judged([40] * 4, nothing, much).value  # the worst that can happen
-    assert ("cannot_fail" in found.flags) == (least >= threshold - 1e-12)
+    assert ("cannot_fail" in estimate.flags) == (least >= threshold - 1e-12)
     assert judged([40] * 4, much, nothing).value > threshold  # every indicator can succeed
-    if "cannot_fail" in found.flags:
-        assert found.untestable
-        assert found.value >= threshold - 1e-9
-        assert (found.verdict, found.p_value, found.probability) == ("open", None, None)
-        assert f"above {threshold:g}: untestable" in str(found)
-        assert spi.adjusted_p_values([found, judged([5, 6, 7], [3, 4, 9], [1, 2, 2])])[0] is None
-        assert spi.minimum_detectable_effect(found) is spi.seeds_for_power(found, 9.0) is None
+    if "cannot_fail" in estimate.flags:
+        assert estimate.untestable
+        assert estimate.value >= threshold - 1e-9
+        assert (estimate.verdict, estimate.p_value, estimate.probability) == ("open", None, None)
+        assert f"above {threshold:g}: untestable" in str(estimate)
+        assert spi.adjusted_p_values([estimate, judged([5, 6, 7], [3, 4, 9], [1, 2, 2])])[0] is None
+        assert spi.minimum_detectable_effect(estimate) is spi.seeds_for_power(estimate, 9.0) is None
 
 
 def test_what_cannot_fail_leaves_holms_family_to_the_others() -> None:
@@ -211,9 +211,9 @@ def test_a_cap_blocks_the_side_on_which_it_can_move_the_indicator(
     name: str, samples: Any, threshold: float, saturated: tuple[str, ...], verdict: str
 ) -> None:
     x: dict[str, float] = {"x_new": 30} if name == "A" else {}
-    found = INDICATORS[name](*samples, threshold=threshold, saturated=saturated, **x)
-    assert (found.verdict, *spi.adjust([found])) == (verdict, verdict)
-    assert ("capped" in found.flags, found.p_value == 1.0) == ((verdict == "open",) * 2)
+    estimate = INDICATORS[name](*samples, threshold=threshold, saturated=saturated, **x)
+    assert (estimate.verdict, *spi.adjust([estimate])) == (verdict, verdict)
+    assert ("capped" in estimate.flags, estimate.p_value == 1.0) == ((verdict == "open",) * 2)
 
 
 def test_the_same_runs_have_an_exact_value_that_is_no_evidence() -> None:

@@ -50,9 +50,9 @@ def test_a_unit_as_large_or_small_as_is_taken_changes_no_indicator(
 ) -> None:
     before, after = np.array([1.0, 0.9, 0.8, 0.95] * 4), np.array([0.7, 0.5, 0.72, 0.6] * 4)
     usual = spi.robustness(before, after, n=10, m=2, paired=paired)
-    found = spi.robustness(size * before, size * after, n=10, m=2, paired=paired)
+    scaled = spi.robustness(size * before, size * after, n=10, m=2, paired=paired)
     for name in ("value", "low", "high", "p_value"):
-        assert getattr(found, name) == pytest.approx(getattr(usual, name), rel=1e-9)
+        assert getattr(scaled, name) == pytest.approx(getattr(usual, name), rel=1e-9)
 
 
 def test_times_and_events_are_read_the_same_way() -> None:

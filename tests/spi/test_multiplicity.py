@@ -75,7 +75,7 @@ def test_looks_keep_the_error_that_peeking_inflates() -> None:
 
 
 @pytest.mark.parametrize(
-    ("function", "asked", "words"),
+    ("function", "argument", "words"),
     [
         (spi.holm, [0.5, 1.1], "p_values"),
         (spi.holm, [float("nan")], "p_values"),
@@ -87,6 +87,6 @@ def test_looks_keep_the_error_that_peeking_inflates() -> None:
         (lambda alpha: spi.look_alphas((10,), alpha=alpha), 5, "alpha = 5"),
     ],
 )
-def test_what_cannot_be_is_named(function: Any, asked: Any, words: str) -> None:
+def test_what_cannot_be_is_named(function: Any, argument: Any, words: str) -> None:
     with pytest.raises(spi.IndicatorError, match=words):
-        function(asked)
+        function(argument)

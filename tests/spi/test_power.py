@@ -30,8 +30,8 @@ def planned_spread(pilot: Any) -> float:
 
 def share_supported(effect: float, n: int) -> float:
     """Share of simulated studies of n seeds, with the planned spread, that find the effect."""
-    found = PILOT.base + (effect - PILOT.threshold) * PILOT.mean_denominator
-    loc = float(log_ratio(np.asarray(found), np.asarray(PILOT.base)))
+    performance = PILOT.base + (effect - PILOT.threshold) * PILOT.mean_denominator
+    loc = float(log_ratio(np.asarray(performance), np.asarray(PILOT.base)))
     draws = np.random.default_rng(1).normal(loc, planned_spread(PILOT), (20_000, n))
     s = draws.std(axis=1, ddof=1) / math.sqrt(n)
     return float(np.mean(t.sf(statistic(draws.mean(axis=1), s), n - 1) < 0.025))
@@ -48,11 +48,11 @@ def test_planned_seeds_reach_80_percent_and_one_fewer_does_not(effect: float) ->
 
 def test_equivalence_is_planned_for_both_of_its_tests() -> None:
     p_o = np.full(10, 40.0)
-    asked = spi.equivalence(p_o, p_o + np.array([3, -2, 1, 4, -5, 2, 0, -3, 1, -1]))
+    result = spi.equivalence(p_o, p_o + np.array([3, -2, 1, 4, -5, 2, 0, -3, 1, -1]))
     # Both reject with .8 at least where each does with .9.
-    each = [spi.seeds_for_power(test, 0.0, power=0.9) for test in (asked.above, asked.below)]
-    n = spi.seeds_for_equivalence(asked, power=0.8) or 0
-    assert min(n or 10**6 for n in each) <= n <= max(n or 10**6 for n in each)
+    counts = [spi.seeds_for_power(test, 0.0, power=0.9) for test in (result.above, result.below)]
+    n = spi.seeds_for_equivalence(result, power=0.8) or 0
+    assert min(n or 10**6 for n in counts) <= n <= max(n or 10**6 for n in counts)
 
 
 def test_minimum_detectable_effect_is_found_in_80_percent() -> None:

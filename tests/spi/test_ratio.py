@@ -33,9 +33,9 @@ def test_tests_at_the_limits_have_one_minus_confidence_as_p(
     confidence: float, paired: bool
 ) -> None:
     p_f = P_F if paired else FEWER_F
-    found: Any = spi.relative_change(P_O, p_f, confidence=confidence, paired=paired)
-    assert found.low < found.value < found.high
-    for limit, word in ((found.low, "supported"), (found.high, "refuted")):
+    estimate: Any = spi.relative_change(P_O, p_f, confidence=confidence, paired=paired)
+    assert estimate.low < estimate.value < estimate.high
+    for limit, word in ((estimate.low, "supported"), (estimate.high, "refuted")):
         # Just outside it is decided, where nothing is hidden; just inside it is open.
         for farther, decided in ((-1e-6, word == "supported"), (1e-6, word == "refuted")):
             at = spi.relative_change(
@@ -51,8 +51,8 @@ def test_statistic_is_students_of_the_logarithm_of_raised_means(threshold: float
     in_units = [p / (p.mean() + raised) for p in (P_F, less)]
     s = np.std(in_units[0] - in_units[1], ddof=1) / math.sqrt(7)
     logarithm = abs(math.log((P_F.mean() + raised) / (less.mean() + raised)))
-    found = change(P_O, P_F, threshold=threshold)
-    assert found.p_seen == pytest.approx(
+    test = change(P_O, P_F, threshold=threshold)
+    assert test.p_seen == pytest.approx(
         2 * t.sf((logarithm - s**2 / 2) / (s * (1 + 4 * s**2)), 6), rel=1e-9
     )
     # Of runs that scatter little it is the t test of the differences.
@@ -90,7 +90,7 @@ def test_verdict_and_interval_agree(pairs: list[tuple[int, int]], threshold: flo
 
 
 @pytest.mark.parametrize(
-    ("p_o", "p_f", "asked", "flags"),
+    ("p_o", "p_f", "options", "flags"),
     [
         ([25] * 5, [30] * 5, {}, ("degenerate",)),
         ([25] * 5, [20] * 5, {"paired": False}, ("degenerate",)),
@@ -104,9 +104,9 @@ def test_verdict_and_interval_agree(pairs: list[tuple[int, int]], threshold: flo
     ],
 )
 def test_no_spread_two_seeds_and_rounding_errors_are_no_evidence(
-    p_o: list[float], p_f: list[float], asked: dict[str, Any], flags: tuple[str, ...]
+    p_o: list[float], p_f: list[float], options: dict[str, Any], flags: tuple[str, ...]
 ) -> None:
-    r = spi.robustness(p_o, p_f, n=25, m=7, **asked)
+    r = spi.robustness(p_o, p_f, n=25, m=7, **options)
     assert (r.verdict, r.probability, r.p_value) == ("open", 0.5, 1.0)
     assert r.flags == flags
     assert ((r.low, r.high) == (None, None)) == ("degenerate" in flags)
@@ -115,10 +115,10 @@ def test_no_spread_two_seeds_and_rounding_errors_are_no_evidence(
 def test_unclear_denominator_gives_no_interval() -> None:
     p_new = np.array([5.0, 6.0, 5.0, 4.0, 5.0])
     for paired in (True, False):
-        found = spi.relative_change([0.0, 0.0, 30.0, 0.0, 0.0], p_new, paired=paired)
-        assert (found.low, found.high) == (-math.inf, math.inf)
-        assert found.flags == ("reference_near_0", "unbounded")
-        assert (found.verdict, found.p_value, found.untestable) == ("open", None, True)
+        estimate = spi.relative_change([0.0, 0.0, 30.0, 0.0, 0.0], p_new, paired=paired)
+        assert (estimate.low, estimate.high) == (-math.inf, math.inf)
+        assert estimate.flags == ("reference_near_0", "unbounded")
+        assert (estimate.verdict, estimate.p_value, estimate.untestable) == ("open", None, True)
 
 
 def test_where_next_to_nothing_is_delivered_it_is_refuted() -> None:

@@ -74,7 +74,7 @@ TO_THE_END = {**RUNS, "end": 2_000.0}
 
 
 @pytest.mark.parametrize(
-    ("function", "asked", "message"),
+    ("function", "arguments", "message"),
     [
         (spi.mean_interval, {"p": []}, "empty"),
         (spi.mean_interval, {"p": [1, -1]}, "negative"),
@@ -90,6 +90,6 @@ TO_THE_END = {**RUNS, "end": 2_000.0}
         (spi.kaplan_meier, {"seconds": [float("nan")], "happened": [True]}, "seconds"),
     ],
 )
-def test_what_cannot_be_is_named(function: Any, asked: dict[str, Any], message: str) -> None:
+def test_what_cannot_be_is_named(function: Any, arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(spi.IndicatorError, match=message):
-        function(**asked)
+        function(**arguments)

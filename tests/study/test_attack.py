@@ -39,7 +39,7 @@ def test_the_search_comes_nearer_to_the_worst_fault_than_chance() -> None:
             cost += [effects[kind[:n]] for kind in kinds]
 
         def play(pairs: Sequence[tuple[int, int]]) -> list[float]:
-            return [float(cost[place] + rng.normal(0.0, 2.0)) for place, _ in pairs]
+            return [float(cost[number] + rng.normal(0.0, 2.0)) for number, _ in pairs]
 
         worst, tried = search(faults, play, 60, seed)
         assert len(tried) == 60
@@ -52,47 +52,49 @@ def test_the_search_comes_nearer_to_the_worst_fault_than_chance() -> None:
 
 
 def test_a_search_that_was_stopped_goes_on_and_ends_alike(tmp_path: Path) -> None:
-    asked = Attack("swarm-dt", SCENARIO, modes=("FM4", "dead"), budget=12, fresh=3)
-    whole = attack(asked, serial, tmp_path / "whole")
+    settings = Attack("swarm-dt", SCENARIO, modes=("FM4", "dead"), budget=12, fresh=3)
+    uninterrupted = attack(settings, serial, tmp_path / "whole")
 
     def stopped(runs: Any) -> Any:
         yield from islice(serial(runs), 3)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        attack(asked, stopped, tmp_path / "stopped")
+        attack(settings, stopped, tmp_path / "stopped")
     with Runs(tmp_path / "stopped" / STORE) as runs:
         assert len(runs) == 3
-    assert attack(asked, serial, tmp_path / "stopped") == whole
-    assert [found.by for found in whole.found] == ["search", "named modes"]
-    assert {(one.robustness.n_seeds, one.robustness.paired) for one in whole.found} == {(3, True)}
+    assert attack(settings, serial, tmp_path / "stopped") == uninterrupted
+    assert [worst.by for worst in uninterrupted.found] == ["search", "named modes"]
+    assert {
+        (worst.robustness.n_seeds, worst.robustness.paired) for worst in uninterrupted.found
+    } == {(3, True)}
 
 
 def test_what_cannot_be_searched_is_refused(tmp_path: Path) -> None:
     short = SCENARIO.replace(duration=0.5)
-    for asked, said in (
+    for settings, reason in (
         (Attack("swarm-dt", SCENARIO, modes=("FM9",)), "no mode 'FM9'"),
         (Attack("swarm-dt", SCENARIO, robots=6), "robots = 6"),
         (Attack("swarm-dt", short, budget=10, fresh=3), "delivers nothing without faults"),
     ):
-        with pytest.raises(SetupError, match=said):
-            attack(asked, serial, tmp_path)
+        with pytest.raises(SetupError, match=reason):
+            attack(settings, serial, tmp_path)
 
 
 def test_a_cap_on_the_runs_without_faults_is_told(tmp_path: Path) -> None:
     scenario = SCENARIO.replace(restock=False, n_items=3)  # all are delivered early
-    asked = Attack("homing", scenario, 1, modes=("FM2",), budget=10, fresh=12)
-    result = attack(asked, serial, tmp_path)
+    settings = Attack("homing", scenario, 1, modes=("FM2",), budget=10, fresh=12)
+    result = attack(settings, serial, tmp_path)
     assert result.is_capped
-    assert "supported" not in {found.robustness.verdict for found in result.found}
+    assert "supported" not in {worst.robustness.verdict for worst in result.found}
 
 
 def test_a_fault_that_changes_no_run_is_no_evidence_and_seeds_of_estimates_are_fresh(
     tmp_path: Path,
 ) -> None:
-    asked = Attack("random-walk", SCENARIO, 1, modes=("FM3_hear",), budget=1, fresh=3)
-    result = attack(asked, serial, tmp_path)
-    assert all(found.robustness.identical for found in result.found)
+    settings = Attack("random-walk", SCENARIO, 1, modes=("FM3_hear",), budget=1, fresh=3)
+    result = attack(settings, serial, tmp_path)
+    assert all(worst.robustness.identical for worst in result.found)
     assert not result.is_capped
     with Runs(tmp_path / STORE) as runs:
         rows = runs.frame().to_dict("records")
@@ -127,4 +129,4 @@ def test_each_run_is_measured_against_that_of_its_seed_without_a_fault(tmp_path:
             yield run, delivered(20 + 200 * (run.seed % 3 == 1) - cost, digest=run.key)
 
     result = attack(Attack("swarm-dt", SCENARIO, modes=tuple(costs), budget=40), engine, tmp_path)
-    assert [found.fault.mode for found in result.found] == ["FM2", "FM2"]
+    assert [worst.fault.mode for worst in result.found] == ["FM2", "FM2"]

@@ -113,7 +113,7 @@ def test_another_thread_may_ask_a_study_and_play_it(tmp_path: Path) -> None:
 
 
 def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path) -> None:
-    out, total, kept = tmp_path / "out", stored(played), 0
+    out, total, n_stored = tmp_path / "out", stored(played), 0
     moments = random.Random(0)
     with subprocess.Popen(
         [sys.executable, "-c", SEVERAL_TIMES, str(out), json.dumps(SMALL)],
@@ -126,21 +126,23 @@ def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path
         for kill in range(10):
             print(2 if kill == 5 else 1, file=warm.stdin, flush=True)
             group = int(warm.stdout.readline())
-            while stored(out) == kept:
+            while stored(out) == n_stored:
                 os.kill(group, 0)  # it still runs
                 time.sleep(0.002)
             time.sleep(moments.uniform(0, 0.01))
             os.killpg(group, signal.SIGKILL)
-            assert kept < stored(out) < total
-            kept = stored(out)
+            assert n_stored < stored(out) < total
+            n_stored = stored(out)
     Study(out=out, **SMALL).run()
     assert digest(out, tmp_path) == digest(played, tmp_path)
-    one, other = (markdown(document(Study.stored(where).findings())) for where in (out, played))
-    assert one == other
+    report, undisturbed_report = (
+        markdown(document(Study.stored(where).findings())) for where in (out, played)
+    )
+    assert report == undisturbed_report
 
 
 @pytest.mark.parametrize(
-    ("first_seed", "seeds", "kept", "exploratory"),
+    ("first_seed", "seeds", "n_reused", "exploratory"),
     [
         (1000, 2, 4, False),
         (1000, 3, 4, True),
@@ -149,17 +151,22 @@ def test_study_killed_at_ten_random_moments_goes_on(played: Path, tmp_path: Path
     ],
 )
 def test_verdicts_over_others_than_the_declared_seeds_are_exploratory(
-    sizes: dict[str, Any], first_seed: int, seeds: int, kept: int, exploratory: bool, tmp_path: Path
+    sizes: dict[str, Any],
+    first_seed: int,
+    seeds: int,
+    n_reused: int,
+    exploratory: bool,
+    tmp_path: Path,
 ) -> None:
     fields = {**sizes, "sizes": [{"values": [2, 4]}]}
     declared = Study(out=tmp_path, **{**fields, "seeds": 2}, first_seed=1000)
     declared.run()
-    asked = Study(out=tmp_path, **{**fields, "seeds": seeds}, first_seed=first_seed)
-    assert asked.is_exploratory() == exploratory
-    tally = asked.run()
-    assert (tally.kept, tally.played) == (kept, 2 * seeds - kept)
-    assert asked.findings().exploratory == exploratory
-    assert sorted(set(asked.results()["seed"])) == list(range(first_seed, first_seed + seeds))
+    study = Study(out=tmp_path, **{**fields, "seeds": seeds}, first_seed=first_seed)
+    assert study.is_exploratory() == exploratory
+    tally = study.run()
+    assert (tally.kept, tally.played) == (n_reused, 2 * seeds - n_reused)
+    assert study.findings().exploratory == exploratory
+    assert sorted(set(study.results()["seed"])) == list(range(first_seed, first_seed + seeds))
     assert declared.run().played == 0
     assert not declared.findings().exploratory
 
@@ -167,12 +174,12 @@ def test_verdicts_over_others_than_the_declared_seeds_are_exploratory(
 def test_another_study_does_not_enter_the_directory_of_this_one(
     small: dict[str, Any], tmp_path: Path
 ) -> None:
-    others = {"name": "second", "policies": ["random-walk"], "faults": [], "indicators": ["S"]}
+    edits = {"name": "second", "policies": ["random-walk"], "faults": [], "indicators": ["S"]}
     declared = Study(out=tmp_path, **small)
     with Runs(tmp_path / FILE_NAME) as runs:
         note(runs, declared.plan(), Declaration.model_validate(declared.specification))
         notes = runs.notes()
-    for field, value in others.items():
+    for field, value in edits.items():
         other = Study(out=tmp_path, **{**small, field: value})
         for ask in (other.run, other.is_exploratory, other.findings):
             with pytest.raises(StudyError, match=f"holds the study 'small' with other {field}: "):

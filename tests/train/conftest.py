@@ -17,7 +17,7 @@ def small() -> Any:
     """Return a maker of trainings that take a second."""
 
     def made(**fields: Any) -> Training:
-        given: dict[str, Any] = {
+        defaults: dict[str, Any] = {
             "name": "small",
             "scenario": Scenario(
                 warehouse_width=5.0, warehouse_height=4.0, n_items=8, duration=6.0, restock=True
@@ -31,6 +31,6 @@ def small() -> Any:
             "scores": Scores(seeds=0),
             "rewards": {"delivery": 1.0, "contact": -0.1},
         }
-        return Training(**{**given, **fields})
+        return Training(**{**defaults, **fields})
 
     return made

@@ -38,10 +38,10 @@ class Remembering(SwarmDT):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_episode_follows_from_its_seed_alone(threads: int) -> None:
     kinds, seeds = [(), (Fault("FM2", 1),), ()], [5, 6, 5, 6, 5]
-    found = evaluation.performances(Remembering(), SCENARIO, kinds, seeds, threads)
-    np.testing.assert_array_equal(found[0], found[2])
-    np.testing.assert_array_equal(found[:, 2:4], found[:, :2])
-    assert found.any()
+    measured = evaluation.performances(Remembering(), SCENARIO, kinds, seeds, threads)
+    np.testing.assert_array_equal(measured[0], measured[2])
+    np.testing.assert_array_equal(measured[:, 2:4], measured[:, :2])
+    assert measured.any()
 
 
 def test_no_seed_of_a_score_is_measured_on_the_way(
@@ -54,8 +54,8 @@ def test_no_seed_of_a_score_is_measured_on_the_way(
         return run_episode(scenario.replace(duration=0.5), policy, seed, faults)
 
     monkeypatch.setattr(evaluation, "run_episode", noted)
-    asked = Evaluation(seeds=3, n_robots=6, faults={"FM1": 1})
-    evaluation.evaluate(policies.load("swarm-dt"), small(scenario=SCENARIO, evaluation=asked))
+    settings = Evaluation(seeds=3, n_robots=6, faults={"FM1": 1})
+    evaluation.evaluate(policies.load("swarm-dt"), small(scenario=SCENARIO, evaluation=settings))
     assert len(seeds) == 3
     assert seeds.isdisjoint(range(MOST_SEEDS))
 
@@ -66,8 +66,8 @@ def test_the_best_evaluation_is_the_highest_and_the_curve_is_written(tmp_path: P
         [{"agent_steps": steps, "P": p} for steps, p in rows],
         {"swarm-dt": {"P": 37.0}, "homing": {"P": 146.0}},
     )
-    told = log.sentence({"P": 49.5, "R_FM4": 0.25})
-    assert told == "P = 49.5 (swarm-dt 37, homing 146), R_FM4 = 0.25"
+    sentence = log.sentence({"P": 49.5, "R_FM4": 0.25})
+    assert sentence == "P = 49.5 (swarm-dt 37, homing 146), R_FM4 = 0.25"
     assert log.best["agent_steps"] == 1000
     log.write(tmp_path)
     with (tmp_path / "curve.csv").open(newline="") as file:

@@ -67,8 +67,8 @@ def test_the_actor_sees_nothing_of_it(small: Any) -> None:
     changed = columns.clone()
     changed[:, len(INPUTS) :] += 1.0
     with torch.no_grad():
-        one, other = (policy.get_distribution(given).mode() for given in (columns, changed))
-        assert (one == other).all()
+        before, after = (policy.get_distribution(rows).mode() for rows in (columns, changed))
+        assert (before == after).all()
         assert (policy.predict_values(columns) != policy.predict_values(changed)).all()
 
 

@@ -109,12 +109,12 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
         for parameter in learner.policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
     card = PolicyCard(name="x", network=training.network)
-    ours = LearnedPolicy(card, tensors_of(learner.policy)).outputs_of
+    outputs_of = LearnedPolicy(card, tensors_of(learner.policy)).outputs_of
     inputs = np.random.default_rng(0).normal(size=(300, len(INPUTS) + len(PRIVILEGED)))
     # What PPO takes for the most likely action.
     likely, _ = learner.predict(inputs.astype(np.float32), deterministic=True)
-    said = ours(inputs[:, : len(INPUTS)].astype(np.float32))
-    np.testing.assert_allclose(np.clip(said, -1.0, 1.0), likely, rtol=0, atol=1e-5)
+    outputs = outputs_of(inputs[:, : len(INPUTS)].astype(np.float32))
+    np.testing.assert_allclose(np.clip(outputs, -1.0, 1.0), likely, rtol=0, atol=1e-5)
 
 
 def test_the_view_trains_what_the_policy_plays_and_goes_on_from_a_checkpoint(small: Any) -> None:
@@ -133,8 +133,8 @@ def test_the_view_trains_what_the_policy_plays_and_goes_on_from_a_checkpoint(sma
     other = pickle.loads(pickle.dumps(view))
     for _ in range(70):  # beyond the ends of episodes
         outputs = rng.uniform(-1, 1, (3, 3)).astype(np.float32)
-        for one, two in zip(view.step(outputs)[:2], other.step(outputs)[:2]):
-            assert one.tobytes() == two.tobytes()
+        for array, array_of_copy in zip(view.step(outputs)[:2], other.step(outputs)[:2]):
+            assert array.tobytes() == array_of_copy.tobytes()
 
 
 def test_a_checkpoint_of_worlds_with_removed_robots_goes_on_to_the_same_bits(
@@ -152,8 +152,10 @@ def test_a_checkpoint_of_worlds_with_removed_robots_goes_on_to_the_same_bits(
     rng = np.random.default_rng(0)
     for _ in range(300):
         outputs = rng.uniform((0.5, -0.5, -1), (1, 0.5, 1), (48, 3)).astype(np.float32)
-        for one, two in zip(learner.env.step(outputs)[:2], saved["view"].step(outputs)[:2]):
-            assert one.tobytes() == two.tobytes()
+        for array, saved_array in zip(
+            learner.env.step(outputs)[:2], saved["view"].step(outputs)[:2]
+        ):
+            assert array.tobytes() == saved_array.tobytes()
 
 
 def test_a_policy_follows_from_its_seed_whatever_callbacks_see_or_stop(
@@ -194,9 +196,9 @@ def test_nothing_is_begun_that_cannot_be(
 def test_what_cannot_be_gone_on_with_is_refused(small: Any, done: Path, tmp_path: Path) -> None:
     with pytest.raises(TrainingError, match="holds a training with another seed, worlds"):
         train(small(seed=1, worlds=[{"n_robots": 5}, {"n_robots": 3}]), done.parent)
-    for text, said in (("{}", "holds a training with another agent_steps"), ("", "is not JSON")):
+    for text, reason in (("{}", "holds a training with another agent_steps"), ("", "is not JSON")):
         (tmp_path / "training.json").write_text(text)
-        with pytest.raises(TrainingError, match=said):
+        with pytest.raises(TrainingError, match=reason):
             train(small(), tmp_path)
     for name, end in (("training.json", None), ("checkpoint.pt", 1000)):
         (tmp_path / name).write_bytes((done.parent / name).read_bytes()[:end])
@@ -291,8 +293,8 @@ def test_a_training_on_a_full_disk_ends_in_a_sentence_and_goes_on_when_there_is_
     save, saved = save_checkpoint, list[bytes]()
     with monkeypatch.context() as changed:
 
-        def save_and_fill(*given: Any) -> None:
-            save(*given)
+        def save_and_fill(*arguments: Any) -> None:
+            save(*arguments)
             saved.append((tmp_path / CHECKPOINT).read_bytes())
             changed.setattr(pkgutil.resolve_name(writer), name, full)
 
@@ -314,9 +316,9 @@ def test_a_missing_library_is_told_before_anything_is_written(
     monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.delitem(sys.modules, "swarm_logistics_env.train.trainer")
     assert app.run(["train", "delivery", "--out", str(tmp_path / "out")]) == 2
-    told = capsys.readouterr().err
-    assert package in told
-    assert "pip install -c constraints.txt -e '.[train]'" in told
+    printed = capsys.readouterr().err
+    assert package in printed
+    assert "pip install -c constraints.txt -e '.[train]'" in printed
     assert not (tmp_path / "out").exists()
 
 

@@ -123,8 +123,8 @@ def test_kinds_of_worlds_play_their_own_conditions_or_else_those_of_the_training
     small: Any,
 ) -> None:
     pytest.importorskip("stable_baselines3")
-    own = [{"modes": ["FM2"], "robots": [1]}]
-    kinds = [{"n_robots": 3, "conditions": own}, {"n_robots": 5}]
+    own_conditions = [{"modes": ["FM2"], "robots": [1]}]
+    kinds = [{"n_robots": 3, "conditions": own_conditions}, {"n_robots": 5}]
     env = make_worlds(small(worlds=kinds, conditions=[{"modes": ["FM4"], "robots": [2]}]))
     env.seed(0)
     env.reset()

@@ -93,12 +93,12 @@ def commands_of(world: Warehouse, source: random.Random) -> list[list[float]]:
         to_x, to_y = (2.4, y) if state.robot_item[robot] >= 0 else (0.3, 0.8)
         if state.robot_item[robot] < 0 and state.requested >= 0:
             to_x, to_y = state.item_position[state.requested].tolist()
-        way = math.atan2(to_y - y, to_x - x) - float(state.robot_heading[robot])
+        aim = math.atan2(to_y - y, to_x - x) - float(state.robot_heading[robot])
         if source.random() < 0.3:
-            way = source.uniform(-math.pi, math.pi)
+            aim = source.uniform(-math.pi, math.pi)
         gripper = source.choice([1.0, 1.0, 1.0, 1.0, 0.0, -1.0])
-        turn = max(-1.0, min(1.0, math.remainder(way, 2.0 * math.pi)))
-        commands.append([math.cos(way), math.sin(way), turn, gripper, source.uniform(-1.5, 1.5)])
+        turn = max(-1.0, min(1.0, math.remainder(aim, 2.0 * math.pi)))
+        commands.append([math.cos(aim), math.sin(aim), turn, gripper, source.uniform(-1.5, 1.5)])
     return commands
 
 
@@ -106,7 +106,7 @@ def play(case: Case, last: int) -> list[int]:
     """Play a case against the reference; return the steps with deliveries."""
     scenario, period, source = case.scenario, case.scenario.control_period, case.number % 2**31
     env = SwarmLogisticsEnv(
-        scenario, faults=[one.fault(period) for one in case.planned], rewards=case.weights,
+        scenario, faults=[fault.fault(period) for fault in case.planned], rewards=case.weights,
         max_cycles=last,
     )  # fmt: skip
     env.reset_arrays(case.number)
@@ -119,7 +119,7 @@ def play(case: Case, last: int) -> list[int]:
     deaf.robot_heard[:] = math.nan  # nobody has heard anything yet
     assert_told(world, radio.told(before, deaf, able))
     watch.look()
-    found = []
+    delivery_steps = []
     while env.agents:
         if before.step == STEPS // 3:
             world.change(**case.changes)
@@ -127,7 +127,7 @@ def play(case: Case, last: int) -> list[int]:
             able = check_able(world, faults, before)
         if before.step == STEPS // 2:
             if case.later is not None:
-                world.set_faults([one.fault(period) for one in case.later])
+                world.set_faults([fault.fault(period) for fault in case.later])
                 watch.faults_changed()
                 faults.plan(case.later)
                 able = check_able(world, faults, before)
@@ -155,9 +155,9 @@ def play(case: Case, last: int) -> list[int]:
         assert env.state_space.contains(env.state())
         watch.look()
         if len(now.delivered_by) > len(before.delivered_by):
-            found.append(now.step)
+            delivery_steps.append(now.step)
         before = now
-    return found
+    return delivery_steps
 
 
 def check_able(world: Warehouse, faults: Faults, before: WarehouseState) -> list[dict[str, Any]]:
@@ -175,8 +175,8 @@ def check_able(world: Warehouse, faults: Faults, before: WarehouseState) -> list
     return expected
 
 
-def assert_told(world: Warehouse, told: list[float]) -> None:
-    assert world.state.robot_told.tolist() == pytest.approx(told, nan_ok=True)
+def assert_told(world: Warehouse, expected: list[float]) -> None:
+    assert world.state.robot_told.tolist() == pytest.approx(expected, nan_ok=True)
 
 
 @pytest.mark.parametrize("first", sorted(FAILURE_MODES))
@@ -211,7 +211,7 @@ def test_faults_that_meet_leave_pay_and_end_as_the_reference_says(case: Case) ->
 @settings(max_examples=EXAMPLES, report_multiple_bugs=False)
 def test_many_steps_in_one_call_pass_over_no_beginning_or_end_of_a_fault(case: Case) -> None:
     scenario, period = case.scenario, case.scenario.control_period
-    planned = [one.fault(period) for one in case.planned]
+    planned = [fault.fault(period) for fault in case.planned]
     by_step = Play(scenario, policies.load("ppo-delivery"), case.number, planned)
     by_event = Play(scenario, policies.load("ppo-delivery"), case.number, planned)
     faults = Faults(scenario, case.number, case.planned)

@@ -55,14 +55,14 @@ def scenarios(draw: st.DrawFn) -> Scenario:
 
 @st.composite
 def fault_lists(draw: st.DrawFn, n_robots: int) -> list[Fault]:
-    found = []
+    faults = []
     for _ in range(draw(st.integers(0, 3))):
         mode = draw(st.sampled_from(["removed", *FAILURE_MODES]))  # half of them are removed
         onset = draw(st.sampled_from([0.0, 0.1, 0.1, 20.0, 60.0]) | st.floats(0.0, 100.0))
         lasts = None if mode == "removed" else draw(st.sampled_from([None, 5.0, 30.0]))
         role = draw(st.sampled_from([None, *ROLES]))
-        found.append(Fault(mode, draw(st.integers(1, n_robots)), onset, lasts, role=role))
-    return found
+        faults.append(Fault(mode, draw(st.integers(1, n_robots)), onset, lasts, role=role))
+    return faults
 
 
 @st.composite
@@ -75,27 +75,27 @@ def changes(draw: st.DrawFn, n_robots: int, last: int) -> list[Change]:
         "view_range": st.floats(0.3, 2.0),
         "radio_loss": st.floats(0.0, 0.5),
     }
-    found: list[Change] = []
+    drawn_changes: list[Change] = []
     for _ in range(draw(st.integers(0, 2))):
         at = draw(st.integers(0, last))
         if draw(st.booleans()):
             name = draw(st.sampled_from(sorted(fields)))
             changed = {name: draw(fields[name])}
-            found.append((at, functools.partial(Warehouse.change, **changed)))
+            drawn_changes.append((at, functools.partial(Warehouse.change, **changed)))
         else:
             faults = draw(fault_lists(n_robots))
-            found.append((at, functools.partial(Warehouse.set_faults, faults=faults)))
-    return found
+            drawn_changes.append((at, functools.partial(Warehouse.set_faults, faults=faults)))
+    return drawn_changes
 
 
 def crowded(world: Warehouse, rng: np.random.Generator) -> NDArray[np.float64]:
     """Return commands that crowd robots to one point after another and lift, drop and deliver."""
     state, scenario = world.state, world.scenario
     places = ((1.0, 0.5), (0.2, 0.2), (0.3, 0.8), (1.0, 1.0))
-    place = np.array(places[state.step // 60 % len(places)])
-    goal = place * (scenario.warehouse_width, scenario.warehouse_height)
-    way = goal - state.robot_position
-    angle = np.arctan2(way[:, 1], way[:, 0]) - state.robot_heading
+    point = np.array(places[state.step // 60 % len(places)])
+    goal = point * (scenario.warehouse_width, scenario.warehouse_height)
+    to_goal = goal - state.robot_position
+    angle = np.arctan2(to_goal[:, 1], to_goal[:, 0]) - state.robot_heading
     n = state.n_robots
     commands = rng.uniform(-1.0, 1.0, (n, 4 + scenario.message_size))
     pushes = rng.random(n) < 0.8

@@ -25,7 +25,7 @@ from tests.made_up import made_old
 FLIPS = max(40, settings().max_examples // 10)  # 200 at night
 
 
-def flipped(whole: bytes, first: int = 0) -> Iterator[bytes]:
+def flipped(data: bytes, first: int = 0) -> Iterator[bytes]:
     """Yield the content with one bit flipped, at places that are the same every time.
 
     Args:
@@ -33,32 +33,30 @@ def flipped(whole: bytes, first: int = 0) -> Iterator[bytes]:
     """
     source = random.Random(51)
     for number in range(FLIPS):
-        place = source.randrange(first if number % 4 else 0, len(whole))
-        yield (
-            whole[:place] + bytes([whole[place] ^ (1 << source.randrange(8))]) + whole[place + 1 :]
-        )
+        at = source.randrange(first if number % 4 else 0, len(data))
+        yield (data[:at] + bytes([data[at] ^ (1 << source.randrange(8))]) + data[at + 1 :])
 
 
 @pytest.mark.parametrize("part", ["header", "numbers"])
 def test_a_policy_file_with_a_flipped_bit_is_refused_or_the_same(part: str, tmp_path: Path) -> None:
     file = WEIGHTS / "ppo-robust.safetensors"
-    whole, sound = file.read_bytes(), read_policy(file)
-    end = 8 + int.from_bytes(whole[:8], "little")
+    valid, sound = file.read_bytes(), read_policy(file)
+    end = 8 + int.from_bytes(valid[:8], "little")
     path, refused = tmp_path / "mine.safetensors", 0
-    changed, rest = (whole[:end], whole[end:]) if part == "header" else (whole, b"")
+    changed, rest = (valid[:end], valid[end:]) if part == "header" else (valid, b"")
     for content in flipped(changed, 0 if part == "header" else end):
         path.write_bytes(content + rest)
-        said = None
+        problem = None
         try:
-            found: Any = policies.load(str(path))
+            policy: Any = policies.load(str(path))
         except PolicyError as error:
-            said = str(error)
-        if said is None:
-            assert found.card == sound.card
-            assert policies.identity(found) == policies.identity(sound)
+            problem = str(error)
+        if problem is None:
+            assert policy.card == sound.card
+            assert policies.identity(policy) == policies.identity(sound)
         else:
-            assert str(path) in said
-            assert len(said.splitlines()) == 1
+            assert str(path) in problem
+            assert len(problem.splitlines()) == 1
             refused += 1
     assert refused > 0.9 * FLIPS
 
@@ -81,10 +79,10 @@ def test_a_checkpoint_with_a_flipped_bit_is_refused_before_it_is_unpickled(
     trained.env.reset()
     learner.save_checkpoint(tmp_path, trained, log={})
     path = tmp_path / learner.CHECKPOINT
-    whole, unpickled = path.read_bytes(), []
+    valid, unpickled = path.read_bytes(), []
     assert learner.read_checkpoint(tmp_path) is not None
     monkeypatch.setattr("torch.load", lambda *_, **__: unpickled.append(1))
-    for content in (*flipped(whole), *flipped(whole[:100]), whole[:-1], b"", whole + b"x"):
+    for content in (*flipped(valid), *flipped(valid[:100]), valid[:-1], b"", valid + b"x"):
         path.write_bytes(content)
         with pytest.raises(TrainingError, match=r"checkpoint.pt is damaged .*begin anew"):
             learner.read_checkpoint(tmp_path)
@@ -108,25 +106,25 @@ def test_a_store_with_a_flipped_bit_is_refused_or_the_same_but_for_rows_that_are
         sound, notes = content_of(store), store.notes()
     if old:
         made_old(path)
-    whole = path.read_bytes()
-    for content in flipped(whole):
+    valid = path.read_bytes()
+    for content in flipped(valid):
         path.write_bytes(content)
         try:
             with Runs.existing(tmp_path) as store:
-                found, damage = content_of(store), store.damage()
+                rows, damage = content_of(store), store.damage()
                 assert len(store) == len(sound)
                 if not old:
                     assert store.notes() == notes
         except StudyError as error:
-            said = str(error)
+            problem = str(error)
         else:
-            said = damage or ""
+            problem = damage or ""
             if not old:
-                assert all(sound[key] == row for key, row in found.items())
-            assert (len(found) < len(sound)) == bool(damage)
+                assert all(sound[key] == row for key, row in rows.items())
+            assert (len(rows) < len(sound)) == bool(damage)
             seen["rows" if damage else "same"] += 1
-        assert not said or str(path) in said
-        assert len(said.splitlines()) <= 1
+        assert not problem or str(path) in problem
+        assert len(problem.splitlines()) <= 1
     assert old or seen["rows"] > 0.5 * FLIPS
 
 
@@ -142,23 +140,23 @@ def test_a_damaged_run_is_told_everywhere_and_played_again(
         database.execute("UPDATE runs SET outcome = '{}' WHERE key = ?", (first,))
         database.execute("UPDATE runs SET run = '{}' WHERE key = ?", (second,))
         database.execute("UPDATE runs SET key = 'x' WHERE key = ?", (second,))
-    told = f"2 runs of {path} are damaged and left out ({first[:12]}, x)"
+    warning = f"2 runs of {path} are damaged and left out ({first[:12]}, x)"
     out, to = str(tmp_path), tmp_path / "rows.csv"
     assert app.run(["study", "export", out, "--to", str(to)]) == 1
-    assert told in capsys.readouterr().err
+    assert warning in capsys.readouterr().err
     assert len(to.read_text().splitlines()) == len(sound) - 1
     for words in (["report", out], ["plan", out], ["compare", out, str(played)]):
         assert app.run(["study", *words]) == 0
         # A terminal folds a long path at its hyphens.
-        assert "".join(told.split()) in "".join(capsys.readouterr().out.split())
-    assert told in (tmp_path / "report.md").read_text()
+        assert "".join(warning.split()) in "".join(capsys.readouterr().out.split())
+    assert warning in (tmp_path / "report.md").read_text()
     assert app.run(["study", "merge", out, "--out", str(tmp_path / "merged")]) == 0
-    assert told in capsys.readouterr().err
+    assert warning in capsys.readouterr().err
     study = Study(out=tmp_path, **small)
     with pytest.warns(UserWarning, match="2 runs of"):
         assert len(study.results()) == len(sound) - 2
     tally = study.run()
-    assert (tally.played, tally.kept, tally.changes) == (2, len(sound) - 2, (told,))
+    assert (tally.played, tally.kept, tally.changes) == (2, len(sound) - 2, (warning,))
     with Runs.existing(tmp_path) as store:
         assert (content_of(store), store.damage()) == (sound, None)
 

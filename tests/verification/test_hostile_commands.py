@@ -33,8 +33,8 @@ PRESETS = ["paper", "quick"]
 @settings(max_examples=max(60, settings().max_examples // 2))
 def test_any_command_line_runs_or_is_refused_in_one_sentence(source: random.Random) -> None:
     command = source.choice(COMMANDS)
-    known = WORDS if command in ("study run", "study plan") else WORDS + PRESETS
-    words = [source.choice(known) for _ in range(source.randint(0, 5))]
+    vocabulary = WORDS if command in ("study run", "study plan") else WORDS + PRESETS
+    words = [source.choice(vocabulary) for _ in range(source.randint(0, 5))]
     out, err = io.StringIO(), io.StringIO()
     with (
         tempfile.TemporaryDirectory() as folder,

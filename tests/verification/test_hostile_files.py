@@ -89,12 +89,12 @@ def mangled(source: random.Random, content: bytes) -> bytes:
 
 
 def refused_or_done(call: Callable[[], object]) -> None:
-    said = None
+    sentence = None
     try:
         call()
     except SwarmLogisticsError as error:
-        said = str(error)
-    assert said is None or (len(said) > 15 and len(said.splitlines()) == 1), said
+        sentence = str(error)
+    assert sentence is None or (len(sentence) > 15 and len(sentence.splitlines()) == 1), sentence
 
 
 def listing(directory: str | Path) -> set[str]:
@@ -124,9 +124,9 @@ def test_a_study_file_runs_no_code_unless_it_is_allowed_to(
     Path("mine.toml").write_text(f"seeds = 1\n{field}\n")
     for words in ("plan mine.toml", "run mine.toml --out out"):
         assert app.run(["study", *words.split()]) == 2
-        (said,) = capsys.readouterr().err.splitlines()
-        assert "canary:B" in said
-        assert "--trust-code" in said
+        (sentence,) = capsys.readouterr().err.splitlines()
+        assert "canary:B" in sentence
+        assert "--trust-code" in sentence
         assert listing(tmp_path) == {"canary.py", "mine.toml"}
     assert app.run(["study", "plan", "mine.toml", "--trust-code"]) == 2  # there is no policy B
     assert Path("it-was-run").exists()
@@ -146,12 +146,12 @@ def test_any_table_is_imported_or_refused(source: random.Random, table: str) -> 
             if table == TABLE and header == table.splitlines()[0].split(","):
                 # What is kept is each row's number, as plain CSV reads it: nothing is guessed.
                 with Runs.existing(out) as store:
-                    kept = sorted(store.frame()["delivered"])
-                place = header.index("delivered")
-                assert kept == sorted(float(row[place]) for row in rows if any(row))
+                    stored = sorted(store.frame()["delivered"])
+                index = header.index("delivered")
+                assert stored == sorted(float(row[index]) for row in rows if any(row))
 
 
-def check_spoilt(whole: Path, spoil: Callable[[Path], object]) -> None:
+def check_spoilt(original: Path, spoil: Callable[[Path], object]) -> None:
     """Read a copy of the study's store that was spoilt in every way; it stays where it is."""
 
     def exported(out: Path) -> None:
@@ -161,9 +161,9 @@ def check_spoilt(whole: Path, spoil: Callable[[Path], object]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         out, store = Path(folder) / "out", Path(folder) / "out" / FILE_NAME
         out.mkdir()
-        store.write_bytes((whole / FILE_NAME).read_bytes())
+        store.write_bytes((original / FILE_NAME).read_bytes())
         spoil(store)
-        refused_or_done(lambda: assert_same_or_missing(whole, out))
+        refused_or_done(lambda: assert_same_or_missing(original, out))
         refused_or_done(lambda: exported(out))
         refused_or_done(lambda: merge([out], out / "merged"))
         ends = ("", "-wal", "-shm", "-journal")
@@ -173,18 +173,18 @@ def check_spoilt(whole: Path, spoil: Callable[[Path], object]) -> None:
 
 
 @functools.cache
-def cells_of(whole: Path) -> Sequence[Cell]:
+def cells_of(original: Path) -> Sequence[Cell]:
     """Return what the runs of a study say that nobody spoilt."""
-    return Study.stored(whole).findings().cells
+    return Study.stored(original).findings().cells
 
 
-def assert_same_or_missing(whole: Path, out: Path) -> None:
+def assert_same_or_missing(original: Path, out: Path) -> None:
     """P of a damaged store is that of the whole one, seed by seed, or is told to be missing."""
-    damaged, sound = Study.stored(out).findings().cells, cells_of(whole)
+    damaged, sound = Study.stored(out).findings().cells, cells_of(original)
     if [cell.words for cell in damaged] == [cell.words for cell in sound]:  # not another study
-        for here, there in zip(damaged, sound, strict=True):
-            if here.n_seeds == there.n_seeds:
-                assert list(here.by_seed) == list(there.by_seed)
+        for damaged_cell, sound_cell in zip(damaged, sound, strict=True):
+            if damaged_cell.n_seeds == sound_cell.n_seeds:
+                assert list(damaged_cell.by_seed) == list(sound_cell.by_seed)
 
 
 @given(source=st.randoms(use_true_random=False))
@@ -201,18 +201,18 @@ NOTES = ["", "x", "null", "{}", "[]", "-1", '{"a": 1}', "[[1]]", "1e9", b"\xff",
 @given(
     column=st.sampled_from(COLUMNS),
     value=st.sampled_from(VALUES),
-    place=st.integers(0, 7),
+    index=st.integers(0, 7),
     source=st.randoms(use_true_random=False),
 )
 @store_examples
 def test_a_store_of_wrong_contents_is_read_or_refused(
-    played: Path, column: str, value: Any, place: int, source: random.Random
+    played: Path, column: str, value: Any, index: int, source: random.Random
 ) -> None:
     def spoil(store: Path) -> None:
         with contextlib.closing(sqlite3.connect(store)) as database, database:
             keys = [key for (key,) in database.execute("SELECT key FROM runs ORDER BY key")]
             change = f"UPDATE OR IGNORE runs SET {column} = ? WHERE key = ?"
-            database.execute(change, (value, keys[place]))
+            database.execute(change, (value, keys[index]))
         if source.random() < 0.5:  # in a store that has no digests
             made_old(store)
 
@@ -232,12 +232,12 @@ def test_a_store_of_wrong_notes_is_read_or_refused(
         with contextlib.closing(sqlite3.connect(store)) as database, database:
             ((note,),) = database.execute("SELECT value FROM notes")
             database.execute("DELETE FROM notes")
-            told: Any = value
+            spoilt_note: Any = value
             if name:
                 text = value.decode("latin-1") if isinstance(value, bytes) else value
-                told = json.dumps({**json.loads(note), name: text})
-            if told is not None:
-                database.execute("INSERT INTO notes VALUES (?, ?, '')", (NOTE, told))
+                spoilt_note = json.dumps({**json.loads(note), name: text})
+            if spoilt_note is not None:
+                database.execute("INSERT INTO notes VALUES (?, ?, '')", (NOTE, spoilt_note))
         if source.random() < 0.5:  # as if that had been written
             alter(store, "DELETE FROM notes WHERE value IS NULL")
 
@@ -247,9 +247,9 @@ def test_a_store_of_wrong_notes_is_read_or_refused(
 # A file that carries a pickle is refused unread, see tests/policies/test_files.py.
 @given(source=st.randoms(use_true_random=False))
 def test_any_policy_file_is_refused_or_plays(source: random.Random) -> None:
-    whole = (WEIGHTS / "ppo-delivery.safetensors").read_bytes()
+    original = (WEIGHTS / "ppo-delivery.safetensors").read_bytes()
     # Mostly where the header is, whose length the first eight bytes tell.
-    end = 8 + int.from_bytes(whole[:8], "little") if source.random() < 0.8 else len(whole)
+    end = 8 + int.from_bytes(original[:8], "little") if source.random() < 0.8 else len(original)
 
     def play(path: Path) -> None:
         policy = policies.load(str(path))
@@ -258,6 +258,6 @@ def test_any_policy_file_is_refused_or_plays(source: random.Random) -> None:
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "mine.safetensors"
-        path.write_bytes(mangled(source, whole[:end]) + whole[end:])
+        path.write_bytes(mangled(source, original[:end]) + original[end:])
         refused_or_done(lambda: play(path))
         assert listing(folder) == {path.name}

@@ -54,18 +54,18 @@ def check_report(out: Path) -> None:
 def test_a_study_file_is_refused_before_anything_is_played(
     field: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    here = tmp_path / "a" / "b"
-    here.mkdir(parents=True)
-    monkeypatch.chdir(here)
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
     good = ("x" * 80, "con", "-rf", "0") if field == "name" else ()
     for name in (name for name in WRITTEN if name not in good):
         text = f"{field} = {json.dumps(name)}\n[[sizes]]\nvalues = [2, 3]\n"
         Path("evil.toml").write_text(text)
         assert app.run(["study", "run", "evil.toml", "--processes", "1"]) == 2, name
-        said = capsys.readouterr()
-        assert field in said.err
-        assert not has_control_signs((said.out + said.err).replace("\n", "")), name
-        assert [path for path in tmp_path.rglob("*") if path.is_file()] == [here / "evil.toml"]
+        printed = capsys.readouterr()
+        assert field in printed.err
+        assert not has_control_signs((printed.out + printed.err).replace("\n", "")), name
+        assert [path for path in tmp_path.rglob("*") if path.is_file()] == [folder / "evil.toml"]
 
 
 def test_labels_are_refused_or_reported() -> None:
@@ -88,8 +88,8 @@ def table(column: str, names: list[str]) -> str:
     if column == "header":
         # The first condition has most trials, so that A is relative to it.
         rows = [["robots", "delivered", *names], [8, 4, *(1 for _ in names)]]
-        for trial, place in itertools.product(range(3), range(-1, len(names))):
-            rows.append([8, trial + 5, *(1 + (n == place) for n in range(len(names)))])
+        for trial, index in itertools.product(range(3), range(-1, len(names))):
+            rows.append([8, trial + 5, *(1 + (n == index) for n in range(len(names)))])
     elif column == "fault":
         rows = [["robots", "delivered", "faulty", "fault"]]
         for trial, name in itertools.product(range(3), ["none", *names]):
@@ -111,7 +111,7 @@ def test_cells_of_trials_are_refused_or_reported(
     column: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, out = tmp_path / "one.csv", tmp_path / "out"
-    kept: list[str] = []
+    accepted: list[str] = []
     # Each name in one of the columns.
     for number, name in enumerate(WRITTEN[COLUMNS.index(column) :: len(COLUMNS)]):
         file.write_text(table(column, [name]), encoding="utf-8", newline="")
@@ -119,9 +119,9 @@ def test_cells_of_trials_are_refused_or_reported(
             RecordedStudy.of(read_trials(file)).keep(tmp_path / "tried" / str(number))
         except SwarmLogisticsError:
             continue
-        kept.append(name.strip())
-    assert len(kept) >= 4
-    file.write_text(table(column, list(dict.fromkeys(kept))), encoding="utf-8", newline="")
+        accepted.append(name.strip())
+    assert len(accepted) >= 4
+    file.write_text(table(column, list(dict.fromkeys(accepted))), encoding="utf-8", newline="")
     capsys.readouterr()
     assert app.run(["judge", str(file), "--out", str(out), "--full"]) == 0
     assert not has_control_signs(capsys.readouterr().out.replace("\n", ""))

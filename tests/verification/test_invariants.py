@@ -71,9 +71,9 @@ def test_a_jam_keeps_bodies_apart(n_robots: int, target: tuple[float, float]) ->
 Spoil = Callable[[Any], None]
 
 
-def put(field: str, place: Any, value: Any) -> Spoil:
+def put(field: str, index: Any, value: Any) -> Spoil:
     """Return what puts a value into the state."""
-    return lambda state: getattr(state, field).__setitem__(place, value)
+    return lambda state: getattr(state, field).__setitem__(index, value)
 
 
 def two_hands(state: Any) -> None:
@@ -138,5 +138,5 @@ def test_the_peak_memory_of_a_world_is_flat_over_its_second_half() -> None:
     done = subprocess.run(
         [sys.executable, "-c", MEMORY], cwd=root, capture_output=True, text=True, check=True
     )
-    half, whole = map(int, done.stdout.split())
-    assert whole <= 1.01 * half
+    at_half, at_end = map(int, done.stdout.split())
+    assert at_end <= 1.01 * at_half

@@ -85,19 +85,19 @@ def test_a_disk_that_is_full_keeps_what_is_finished_and_the_study_goes_on(
     file.write_text(FILE)
     run = f"study run {file} --out {out} --processes 1"
     assert str(out / FILE_NAME) in complaint(command(run, limit=150_000))
-    kept, _ = exported(out)
-    assert 0 < kept < N_RUNS
-    told = command(f"study report {out}", limit=0)
-    assert "missing" in told.stdout  # the answer, though no file of it can be written
-    said = complaint(told)
-    assert str(out) in said
-    assert os.strerror(errno.EFBIG) in said
+    n_stored, _ = exported(out)
+    assert 0 < n_stored < N_RUNS
+    reported = command(f"study report {out}", limit=0)
+    assert "missing" in reported.stdout  # the answer, though no file of it can be written
+    sentence = complaint(reported)
+    assert str(out) in sentence
+    assert os.strerror(errno.EFBIG) in sentence
     table = tmp_path / "x.csv"
     assert str(table) in complaint(command(f"study export {out} --to {table}", limit=0))
     assert str(out / FILE_NAME) in complaint(command(run, limit=0))
-    assert exported(out)[0] == kept
+    assert exported(out)[0] == n_stored
     assert not list(tmp_path.glob("*.csv")) + list(tmp_path.glob(".*"))
-    assert Study.from_file(file, out=out).run().played == N_RUNS - kept
+    assert Study.from_file(file, out=out).run().played == N_RUNS - n_stored
     assert exported(out)[1] == undisturbed
 
 

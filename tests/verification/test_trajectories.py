@@ -24,9 +24,9 @@ print(explained({name: digests(GOLDEN[name]) for name in names}))
 """
 
 
-def complain(found: str | None) -> None:
-    if found:
-        pytest.fail(found, pytrace=False)
+def complain(difference: str | None) -> None:
+    if difference:
+        pytest.fail(difference, pytrace=False)
 
 
 def test_every_golden_trajectory_is_as_recorded_also_beside_others_in_threads() -> None:
@@ -38,7 +38,7 @@ def test_every_golden_trajectory_is_as_recorded_also_beside_others_in_threads() 
 
 def test_every_golden_trajectory_is_as_recorded_when_a_copy_goes_on() -> None:
     halves = {name: max(golden.steps // 2, 1) for name, golden in GOLDEN.items()}
-    complain(explained({n: digests(one, copied_at=halves[n]) for n, one in GOLDEN.items()}))
+    complain(explained({n: digests(golden, copied_at=halves[n]) for n, golden in GOLDEN.items()}))
 
 
 def test_another_process_plays_them_as_recorded() -> None:
@@ -65,6 +65,6 @@ def test_a_difference_is_told_with_its_step_and_its_platform(
     digest = played["25"].split()
     played["25"] = " ".join([digest[0], "0" * 10, *digest[2:]])
     monkeypatch.setattr(trajectories, "here", lambda: {"platform": "Plan9-vax"})
-    found = explained({"seed 1": played}) or ""
-    assert "seed 1: robots differ at step 25, nothing did up to step 10" in found
-    assert "Plan9-vax here" in found
+    explanation = explained({"seed 1": played}) or ""
+    assert "seed 1: robots differ at step 25, nothing did up to step 10" in explanation
+    assert "Plan9-vax here" in explanation

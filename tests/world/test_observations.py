@@ -11,7 +11,7 @@ from swarm_logistics_env.world.observations import N_COLUMNS, bounds, columns, u
 @pytest.mark.parametrize("scenario", [Scenario(), Scenario(view_range=7.0, timer_limit=3.0)])
 def test_the_named_columns_cover_a_row_without_gap_or_overlap(scenario: Scenario) -> None:
     named = columns(scenario)
-    covered = [place for one in named for place in range(*one.columns.indices(N_COLUMNS))]
+    covered = [index for part in named for index in range(*part.columns.indices(N_COLUMNS))]
     assert sorted(covered) == list(range(N_COLUMNS))
     assert len({column.name for column in named}) == len(named)
     assert all(column.unit and column.meaning for column in named)

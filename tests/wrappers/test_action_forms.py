@@ -49,7 +49,7 @@ def test_a_robot_fetches_an_item_by_numbers_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    ("form", "given", "said"),
+    ("form", "action", "reason"),
     [
         (DiscreteActions, [0, 1, 2, 13], "robot_3 = 13: should be a whole number from 0 to 12"),
         (DiscreteActions, [0.5, 1, 2, 3], "robot_0 = 0.5"),
@@ -59,14 +59,14 @@ def test_a_robot_fetches_an_item_by_numbers_alone() -> None:
     ],
 )
 def test_what_is_no_action_is_refused_before_anything_moves(
-    form: Callable[[Any], Any], given: Any, said: str
+    form: Callable[[Any], Any], action: Any, reason: str
 ) -> None:
     env = form(small(n_robots=4))
     env.reset(seed=0)
-    with pytest.raises(CommandError, match=said):
-        env.step_arrays(given)
+    with pytest.raises(CommandError, match=reason):
+        env.step_arrays(action)
     with pytest.raises(CommandError):
-        env.step(dict(zip(env.agents, given)))
+        env.step(dict(zip(env.agents, action)))
     assert env.warehouse.state.step == 0
 
 
@@ -130,14 +130,14 @@ def test_it_reads_and_commands_as_the_frame_of_the_shipped_networks_does() -> No
         read, rows = env.reset_arrays(seed), inner.reset_arrays(seed)
         frame.begin(row_keys(seed, "motion frame", 4))
         while env.agents:
-            there = inner.warehouse.state.robot_present
-            np.testing.assert_array_equal(read[there], frame.read(rows)[there])
-            assert not read[~there].any()
+            present = inner.warehouse.state.robot_present
+            np.testing.assert_array_equal(read[present], frame.read(rows)[present])
+            assert not read[~present].any()
             outputs = rng.uniform(-1.0, 1.0, (4, 3))
-            rows, *others = inner.step_arrays(frame.command(outputs))
+            rows, *expected = inner.step_arrays(frame.command(outputs))
             read, *rest = env.step_arrays(outputs)
-            np.testing.assert_equal(rest, others)
-        assert there.sum() == 2
+            np.testing.assert_equal(rest, expected)
+        assert present.sum() == 2
 
 
 @pytest.mark.parametrize("form", [DiscreteActions, MotionFrame])
@@ -154,10 +154,10 @@ def test_stable_baselines3_takes_either_for_every_row(form: Any) -> None:
 
 
 def test_the_motion_frame_steers_the_bodies_that_robots_have_in_the_episode() -> None:
-    given = MotionFrame(ParameterChange(small(), "drive", "differential"))
+    changed = MotionFrame(ParameterChange(small(), "drive", "differential"))
     always = MotionFrame(small(drive="differential"))
     rng = np.random.default_rng(0)
-    np.testing.assert_array_equal(given.reset_arrays(0), always.reset_arrays(0))
+    np.testing.assert_array_equal(changed.reset_arrays(0), always.reset_arrays(0))
     for _ in range(10):
         outputs = rng.uniform(-1.0, 1.0, (6, 3))
-        np.testing.assert_equal(given.step_arrays(outputs), always.step_arrays(outputs))
+        np.testing.assert_equal(changed.step_arrays(outputs), always.step_arrays(outputs))

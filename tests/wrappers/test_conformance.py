@@ -55,8 +55,8 @@ each_stack = pytest.mark.parametrize("stack", STACKS)
 
 
 def stacked(stack: str, n_robots: int = 4, **fields: Any) -> Any:
-    given = {"n_robots": n_robots, "warehouse_width": 6.0, "warehouse_height": 5.0, "duration": 4.0}
-    return STACKS[stack](small(**{**given, "n_items": 10, **fields}))
+    usual = {"n_robots": n_robots, "warehouse_width": 6.0, "warehouse_height": 5.0, "duration": 4.0}
+    return STACKS[stack](small(**{**usual, "n_items": 10, **fields}))
 
 
 @pytest.fixture

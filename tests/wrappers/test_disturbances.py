@@ -140,9 +140,9 @@ def test_in_mid_run_it_is_a_change_of_the_warehouse_at_that_time(name: str) -> N
             assert getattr(wrapped.warehouse.scenario, name) == getattr(plain.scenario, name)
             plain.warehouse.change(**{name: OTHER[name]})
         commands = rng.uniform(-1, 1, (6, 4))
-        mine, theirs = wrapped.step_arrays(commands), plain.step_arrays(commands)
-        np.testing.assert_equal(mine, theirs)
-        assert all(wrapped.observation_space("robot_0").contains(row) for row in mine[0])
+        step_result, expected = wrapped.step_arrays(commands), plain.step_arrays(commands)
+        np.testing.assert_equal(step_result, expected)
+        assert all(wrapped.observation_space("robot_0").contains(row) for row in step_result[0])
         assert wrapped.state_space.contains(wrapped.state())
     assert getattr(wrapped.warehouse.scenario, name) == OTHER[name]
     wrapped.reset_arrays(3)
@@ -195,10 +195,10 @@ def test_the_size_of_an_episode_decides_who_of_it_fails() -> None:
 
 def test_a_change_to_the_value_that_holds_already_changes_no_run() -> None:
     plain = small(n_robots=14, warehouse_width=2.5, warehouse_height=1.5, delivery_width=0.5)
-    same = ParameterChange(copy.deepcopy(plain), "max_speed", plain.scenario.max_speed, at=2.0)
+    changed = ParameterChange(copy.deepcopy(plain), "max_speed", plain.scenario.max_speed, at=2.0)
     rng = np.random.default_rng(0)
     plain.reset_arrays(3)
-    same.reset_arrays(3)
+    changed.reset_arrays(3)
     while plain.agents:  # they push each other, which bodies remember
         commands = rng.uniform(-1.0, 1.0, (14, 4))
-        np.testing.assert_equal(same.step_arrays(commands), plain.step_arrays(commands))
+        np.testing.assert_equal(changed.step_arrays(commands), plain.step_arrays(commands))

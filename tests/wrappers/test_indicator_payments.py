@@ -79,8 +79,8 @@ def test_reference_episodes_are_paid_the_derivative(name: str) -> None:
         up, down = (float(estimate({**played, condition: value + e}).value) for e in (h, -h))
         paid = env.payments_of(condition)[name]
         assert paid.share == pytest.approx((up - down) / (2 * h), rel=1e-6)
-        own = float(estimate({**played}).value) if condition == tested else 0.0
-        assert paid.share * value + paid.constant == pytest.approx(own, **CLOSE)
+        value_of_tested = float(estimate({**played}).value) if condition == tested else 0.0
+        assert paid.share * value + paid.constant == pytest.approx(value_of_tested, **CLOSE)
 
 
 def test_a_reference_episode_stands_for_as_many_as_it_serves() -> None:

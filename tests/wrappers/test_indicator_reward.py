@@ -210,10 +210,10 @@ def test_where_the_deliverer_is_paid_all_returns_sum_up_to_the_indicator() -> No
     assert rewards[0] == pytest.approx([(-1 + 2 / N) / N] * N)
 
 
-@pytest.mark.parametrize(("credit", "own"), [("team", "delivery"), ("deliverer", "own_delivery")])
-def test_a_delivery_is_paid_as_the_environment_pays_it(credit: Any, own: str) -> None:
+@pytest.mark.parametrize(("credit", "term"), [("team", "delivery"), ("deliverer", "own_delivery")])
+def test_a_delivery_is_paid_as_the_environment_pays_it(credit: Any, term: str) -> None:
     """P at reference 1 is the environment's own reward, in the step of a removal too."""
-    plain = busy(rewards={own: 1.0})
+    plain = busy(rewards={term: 1.0})
     play(plain, 3)
     first = plain.warehouse.state.delivery_times[0]
     options = {"faults": [Fault("removed", 2, onset=first)]}
@@ -225,8 +225,8 @@ def test_a_delivery_is_paid_as_the_environment_pays_it(credit: Any, own: str) ->
 def test_the_environments_own_reward_can_be_kept_for_shaping() -> None:
     rewards, _ = play(busy(rewards={"contact": -1.0}), 0)
     assert rewards.any()
-    kept, _ = play(rewarded("R", 33.0, busy(rewards={"contact": -1.0}), own_reward=0.1), 0)
-    np.testing.assert_allclose(kept, 0.1 * rewards)
+    shaped, _ = play(rewarded("R", 33.0, busy(rewards={"contact": -1.0}), own_reward=0.1), 0)
+    np.testing.assert_allclose(shaped, 0.1 * rewards)
 
 
 CHANGED = ParameterChange(busy(), "max_speed", 1.0)

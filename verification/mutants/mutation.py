@@ -55,15 +55,15 @@ def mutated(mutant: Mutant, source: str) -> str:
         _check_once(mutant, source.count(mutant.node))
         return source.replace(mutant.node, mutant.becomes)
     tree = ast.parse(source)
-    place = _definition(tree, mutant)
+    definition = _definition(tree, mutant)
     wanted, new = ast.dump(_node(mutant.node)), _node(mutant.becomes)
-    found = [node for node in ast.walk(place) if ast.dump(node) == wanted]
-    _check_once(mutant, len(found))
-    if isinstance(found[0], ast.expr) and isinstance(new, ast.Pass):
+    matches = [node for node in ast.walk(definition) if ast.dump(node) == wanted]
+    _check_once(mutant, len(matches))
+    if isinstance(matches[0], ast.expr) and isinstance(new, ast.Pass):
         new = ast.Constant(None)
-    if isinstance(found[0], ast.stmt) and isinstance(new, ast.expr):
+    if isinstance(matches[0], ast.stmt) and isinstance(new, ast.expr):
         new = ast.Expr(new)
-    return replaced(tree, found[0], new)
+    return replaced(tree, matches[0], new)
 
 
 def replaced(tree: ast.Module, old: ast.AST, new: ast.AST) -> str:
@@ -95,16 +95,16 @@ def _node(source: str) -> ast.AST:
 
 
 def _definition(tree: ast.Module, mutant: Mutant) -> ast.AST:
-    place: ast.Module | ast.ClassDef = tree
+    definition: ast.Module | ast.ClassDef = tree
     for name in mutant.where.split("."):
-        found = [node for node in place.body if name in _names(node)]
-        if len(found) != 1:
+        matches = [node for node in definition.body if name in _names(node)]
+        if len(matches) != 1:
             raise MutantError(
-                f"{mutant.name}: {mutant.file} defines `{mutant.where}` {len(found)} times: "
+                f"{mutant.name}: {mutant.file} defines `{mutant.where}` {len(matches)} times: "
                 "should be once, so adapt the mutant to the code"
             )
-        place = found[0]  # type: ignore[assignment]  # a name that is no class ends the path
-    return place
+        definition = matches[0]  # type: ignore[assignment]  # a name that is no class ends the path
+    return definition
 
 
 def _names(node: ast.stmt) -> list[str]:

@@ -129,7 +129,8 @@ class Comparison:
     @property
     def label(self) -> str:
         """The step in words, e.g. "N 5 -> 10" or "FM1, m = 2"."""
-        before, after = self.original.setting, self.changed.setting
+        before = self.original.setting
+        after = self.changed.setting
         if after.kind == "size":
             return f"N {before.value:g} -> {after.value:g}"
         if after.kind == "parameter":
@@ -154,8 +155,10 @@ class Comparison:
         Raises:
             IndicatorError: the indicator is undefined, e.g. because mean P_o is 0.
         """
-        definition, named = self.definition, self.arguments
-        before, after = self.original.setting.value, self.changed.setting.value
+        definition = self.definition
+        named = self.arguments
+        before = self.original.setting.value
+        after = self.changed.setting.value
         return definition.function(
             **{name: performance[arm] for name, arm in named.items()},
             **definition.arguments(Change(before, after, self.n_robots)),
@@ -176,7 +179,8 @@ def compared(table: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
         arms: the original one first.
     """
     original, *changed = arms
-    kind, removed = original.setting.kind, original.case.task.removed
+    kind = original.setting.kind
+    removed = original.case.task.removed
     by_setting = {arm.setting: arm for arm in arms}
     for before, after in zip(arms, changed) if kind == "size" else ((original, x) for x in changed):
         setting = after.setting

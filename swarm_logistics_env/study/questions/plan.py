@@ -111,7 +111,8 @@ class Plan:
         return tuple(Run(case, self.code, seed) for seed in self.seeds for case in self.cases)
 
     def __str__(self) -> str:
-        n_cells, n_cases = len(self.cells), len(self.cases)
+        n_cells = len(self.cells)
+        n_cases = len(self.cases)
         # Of several trainings each has its conditions.
         shared = f" ({n_cells - n_cases} shared)" if n_cells >= n_cases else ""
         start = self.specification.first_seed

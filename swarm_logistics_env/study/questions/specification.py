@@ -44,7 +44,8 @@ MOST_SEEDS = 100_000
 # Every seed stays below 2**31: policies hand it to generators of all kinds.
 HIGHEST_FIRST_SEED = 2**31 - MOST_SEEDS
 # A first look at 10 errs no more often than one at 20: `verification/verdict_errors.py`.
-FIRST_LOOK, SEEDS_BETWEEN_LOOKS = 10, 10
+FIRST_LOOK = 10
+SEEDS_BETWEEN_LOOKS = 10
 
 
 def _with_distinct_labels(policies: tuple[PolicySpec, ...]) -> tuple[PolicySpec, ...]:
@@ -286,7 +287,8 @@ class Specification(Record):
 
     @model_validator(mode="after")
     def _names_are_known(self) -> Self:
-        task, parameters = self.played, [factor.name for factor in self.parameters]
+        task = self.played
+        parameters = [factor.name for factor in self.parameters]
         modes = (
             mode for factor in self.faults for modes in factor.modes for mode in modes.split(BOTH)
         )

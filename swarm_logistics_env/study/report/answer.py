@@ -133,7 +133,8 @@ class Line(NamedTuple):
             )
             n_needed = spi.seeds_for_power(estimate, effect, POWER)
             if n_needed is not None and n_needed > estimate.n_seeds:
-                n_more, threshold = n_needed - estimate.n_seeds, estimate.threshold
+                n_more = n_needed - estimate.n_seeds
+                threshold = estimate.threshold
                 return "more_runs", {"n_more": n_more, "effect": effect, "threshold": threshold}
         return "words", {"words": words}
 
@@ -290,7 +291,8 @@ def _question(verdicts: Sequence[Verdict]) -> tuple[str, Slots]:
 
 
 def _scope(results: StudyResults) -> str:
-    policies, origin = results.policies, results.plan.origin
+    policies = results.policies
+    origin = results.plan.origin
     policies_text = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
     if origin and policies == (results.plan.specification.name,):  # nobody named it
         policies_text = f"trials of {origin.file}"

@@ -87,7 +87,8 @@ def table(results: StudyResults, references: Mapping[str, float]) -> Section:
             indicators = [f"{symbol} {ratio(v, level)}" for symbol, v in by_symbol.items()]
             cell = results.cells_of(of_arm[0].compared)[changed]
             ft = NOTHING if tolerance is None else ratio(tolerance, level)
-            p, contacts = mean_p(cell), contacts_text(cell)
+            p = mean_p(cell)
+            contacts = contacts_text(cell)
             rows.append((f"  {changed.setting}", p, contacts, "; ".join(indicators), ft))
     return Section(
         f"{results.policies[0]}: benchmark of robustness",
@@ -168,7 +169,8 @@ def best_scripts(studies: Sequence[StudyResults]) -> dict[str, tuple[str, Cell]]
     best: dict[str, tuple[str, Cell]] = {}
     for results in studies:
         for comparison in _held_out(results):
-            world, cells = _world_of(comparison), results.cells_of(comparison)
+            world = _world_of(comparison)
+            cells = results.cells_of(comparison)
             cell = cells[_sound_arm(comparison)]
             if world not in best or cell.mean.value > best[world][1].mean.value:
                 best[world] = results.policies[0], cell

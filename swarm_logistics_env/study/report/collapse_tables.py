@@ -28,13 +28,16 @@ def collapsed_in_words(
         most: how many conditions are named, those with the largest shares; None: all.
     """
     ordered = sorted(named, key=lambda collapse: collapse.share.value, reverse=True)
-    words = [
-        f"{f'of {collapse.cell.policy} ' * names_policies}at {collapse.cell.words} in "
-        f"{share_in_words(collapse.share)}{_breaks_in_words(collapse)}"
-        for collapse in ordered[:most]
-    ]
+    words = []
+    for collapse in ordered[:most]:
+        policy = f"of {collapse.cell.policy} " if names_policies else ""
+        words.append(
+            f"{policy}at {collapse.cell.words} in "
+            f"{share_in_words(collapse.share)}{_breaks_in_words(collapse)}"
+        )
     left = len(ordered) - len(words)
-    return ", ".join(words) + f" and {left} conditions more (--full)" * (left > 0)
+    listed = ", ".join(words)
+    return f"{listed} and {left} conditions more (--full)" if left > 0 else listed
 
 
 def untestable_in_words(by_reason: Mapping[str, Sequence[Cell]], *, names_policies: bool) -> str:

@@ -125,7 +125,8 @@ def document(results: StudyResults) -> Document:
 
 def _title(results: StudyResults) -> str:
     """Return the study's name with its policies in front of it, e.g. "homing: study 'paper'"."""
-    policies, name = results.policies, results.plan.specification.name
+    policies = results.policies
+    name = results.plan.specification.name
     if policies == (name,):  # of trials: nobody named it
         return f"Study {name!r}"
     names = join_names(policies) if len(policies) < 4 else f"{len(policies)} policies"
@@ -195,7 +196,9 @@ def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:
     """Return what is known of the trials, the set-up that the user states, and the methods."""
     shared = "Unpaired: it names no seeds"
     if origin.paired:
-        shared = f"Paired by the {'blocks' if origin.blocks else 'seeds'} that it names"
+        shared = "Paired by the seeds that it names"
+    if origin.paired and origin.blocks:
+        shared = "Paired by the blocks that it names"
     text = (
         f"Study {plan.specification.name!r}: {len(plan.cases)} conditions, imported from "
         f"{origin.file}. {shared}. Their conditions are known as far as the file tells them "

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 Draw: TypeAlias = "Callable[[Canvas], None]"
 
-INK, PAPER = "#1b1b1b", "#ffffff"
+INK = "#1b1b1b"
+PAPER = "#ffffff"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LINES = ("-", "--", "-.", ":")
@@ -241,7 +242,9 @@ def _dots(axes: Axes, x: float, reach: float, point: Point) -> None:
 
 def _mark(axes: Axes, at: float, point: Point, marker: str = "", shrink: float = 1.0) -> None:
     """Draw a value, if there is one, with its interval: upright, or level with a marker named."""
-    value, low, high = point.value, point.low, point.high
+    value = point.value
+    low = point.low
+    high = point.high
     if value is None:
         return
     sizes = _matplotlib().rcParams

@@ -200,7 +200,8 @@ def parameter_label(verdict: Verdict) -> str:
     name = verdict.after.name
     description = verdict.compared.original.case.task.fields.get(name, "")
     unit = re.search(r"\[.+?\]", description)
-    return f"{name.replace('_', ' ')} {unit[0] if unit else ''}".rstrip()
+    words = name.replace("_", " ")
+    return f"{words} {unit[0]}" if unit else words
 
 
 def _category(verdict: Verdict) -> str:

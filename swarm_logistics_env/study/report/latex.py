@@ -138,9 +138,11 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     columns = [_aligned(column) for column in zip(*section.rows)]
     columns[0] = [_escape(row[0]) for row in section.rows]
     widths = [max(map(len, column)) for column in zip(section.columns, *section.rows)]
-    first, *others = widths  # names of policies cannot be broken
-    layout = "l" + "".join("l" if width <= _LONG else r"p{0.16\linewidth}" for width in others)
-    n_letters = first + sum(min(width, _LONG) + _LETTERS_BETWEEN for width in others)
+    first, *other_widths = widths  # names of policies cannot be broken
+    layout = "l" + "".join(
+        "l" if width <= _LONG else r"p{0.16\linewidth}" for width in other_widths
+    )
+    n_letters = first + sum(min(width, _LONG) + _LETTERS_BETWEEN for width in other_widths)
     # Over both columns of a page that has two, if it needs them.
     environment = "table*" if n_letters > _LETTERS_OF_A_COLUMN else "table"
     yield rf"\begin{{{environment}}}"
@@ -178,6 +180,11 @@ def _aligned(cells: Texts) -> list[str]:
         row = re.sub(rf"\[\$({_ROOM})", r"$\1$[$", row)
         aligned.append(re.sub(rf"({_ROOM})\$([],])", r"$\2$\1$", row))
     return aligned
+
+
+def _phantom(text: str) -> str:
+    """Return room as wide as a text."""
+    return rf"\phantom{{{text}}}" if text else ""
 
 
 def _padded(number: str, column: Sequence[str]) -> str:

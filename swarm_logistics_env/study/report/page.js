@@ -3,7 +3,7 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const repeat = data.paired ? "seed" : "trial";
 const at = (id) => document.getElementById(id);
-const colour = (place) => `var(--p${place % 6})`;
+const colour = (index) => `var(--p${index % 6})`;
 const escaped = (text) => String(text).replace(/[&<>"]/g, (sign) => `&#${sign.charCodeAt(0)};`);
 // No line ends within an option, as at its hyphens.
 const unbroken = (text) => text.replace(/--[a-z][\w-]*/g, '<span class="option">$&</span>');
@@ -15,9 +15,9 @@ function ticks(low, high, count) {
   const rough = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 2.5, 5, 10].map((n) => n * power).find((n) => n >= rough);
-  const found = [];
-  for (let x = Math.ceil(low / step) * step; x <= high + step * 1e-9; x += step) found.push(x);
-  return found;
+  const values = [];
+  for (let x = Math.ceil(low / step) * step; x <= high + step * 1e-9; x += step) values.push(x);
+  return values;
 }
 
 function axes(box, yLabel) {
@@ -32,11 +32,11 @@ function axes(box, yLabel) {
   return [drawn, y];
 }
 
-function put(place, width, height, drawn, name) {
-  place.innerHTML = `<svg viewBox="0 0 ${width} ${height}" role="img" aria-label="${escaped(name)}">${drawn}</svg>`;
+function put(container, width, height, drawn, name) {
+  container.innerHTML = `<svg viewBox="0 0 ${width} ${height}" role="img" aria-label="${escaped(name)}">${drawn}</svg>`;
 }
 
-const known = (values) => values.filter((value) => value !== null && value !== undefined);
+const recorded = (values) => values.filter((value) => value !== null && value !== undefined);
 
 // The comparison: one drawing of several, each dot of which is a run
 
@@ -59,20 +59,20 @@ function titleDots() {
 let chosen = { question: null, arms: [], seed: 0 };
 
 function choose(question, seed) {
-  const asked = data.questions[question];
-  chosen = { question, arms: asked.arms, seed: seed ?? 0 };
-  at("question").querySelector("h2").textContent = asked.head;
-  at("question").querySelector("p").textContent = asked.text;
+  const details = data.questions[question];
+  chosen = { question, arms: details.arms, seed: seed ?? 0 };
+  at("question").querySelector("h2").textContent = details.head;
+  at("question").querySelector("p").textContent = details.text;
   showQuestion();
 }
 
 function chooseCondition(condition, seed) {
   // A question about this condition, of the table that is shown, has something to compare it with.
-  const here = at("views").selectedOptions[0].textContent.slice("P: ".length);
-  const about = [(one) => one.arms[1][2] === condition, (one) => one.arms.some((arm) => arm[2] === condition)];
-  const found = about.flatMap((fits) => [
-    data.questions.findIndex((one) => one.table === here && fits(one)), data.questions.findIndex(fits)]);
-  choose(found.find((question) => question >= 0), seed);
+  const table = at("views").selectedOptions[0].textContent.slice("P: ".length);
+  const about = [(entry) => entry.arms[1][2] === condition, (entry) => entry.arms.some((arm) => arm[2] === condition)];
+  const candidates = about.flatMap((fits) => [
+    data.questions.findIndex((entry) => entry.table === table && fits(entry)), data.questions.findIndex(fits)]);
+  choose(candidates.find((question) => question >= 0), seed);
 }
 
 function showQuestion() {
@@ -89,15 +89,15 @@ function showQuestion() {
 }
 
 function drawSlopes() {
-  const place = at("slopes"), width = Math.max(280, place.clientWidth), height = 220;
+  const container = at("slopes"), width = Math.max(280, container.clientWidth), height = 220;
   const samples = chosen.arms.map((arm) => data.conditions[arm[2]].p);
-  const box = { left: 42, right: width - 12, top: 20, bottom: height - 24, low: 0, high: Math.max(...known(samples.flat()), 1) * 1.05 };
+  const box = { left: 42, right: width - 12, top: 20, bottom: height - 24, low: 0, high: Math.max(...recorded(samples.flat()), 1) * 1.05 };
   let [drawn, y] = axes(box, "performance P");
   const x = (i) => box.left + 30 + (i * (box.right - box.left - 60)) / (samples.length - 1);
   chosen.arms.forEach((arm, i) => {
     drawn += `<text x="${x(i)}" y="${height - 6}" text-anchor="middle">${escaped(arm[0])}</text>`;
   });
-  const means = samples.map((p) => known(p).reduce((sum, one) => sum + one, 0) / Math.max(1, known(p).length));
+  const means = samples.map((p) => recorded(p).reduce((sum, value) => sum + value, 0) / Math.max(1, recorded(p).length));
   for (let k = 0; k < samples[0].length; k++) {
     const points = samples.map((p, i) => (p[k] === null || p[k] === undefined ? null : `${x(i)},${y(p[k])}`));
     const marked = k === chosen.seed ? " chosen" : "";
@@ -109,7 +109,7 @@ function drawSlopes() {
     });
   }
   drawn += `<polyline fill="none" points="${means.map((p, i) => `${x(i)},${y(p)}`).join(" ")}" stroke="var(--ink)" stroke-width="3.5"/>`;
-  put(place, width, height, drawn, `P ${repeat} by ${repeat}`);
+  put(container, width, height, drawn, `P ${repeat} by ${repeat}`);
 }
 
 function timesOf(gaps) {
@@ -118,10 +118,10 @@ function timesOf(gaps) {
 }
 
 function drawCurves() {
-  const place = at("curves"), width = Math.max(280, place.clientWidth), height = 220;
+  const container = at("curves"), width = Math.max(280, container.clientWidth), height = 220;
   const curves = chosen.arms.map((arm) => data.conditions[arm[2]].curves.map((gaps) => gaps && timesOf(gaps)));
-  place.parentElement.hidden = !curves.flat().some(Boolean);  // no times were recorded
-  if (place.parentElement.hidden) return;
+  container.parentElement.hidden = !curves.flat().some(Boolean);  // no times were recorded
+  if (container.parentElement.hidden) return;
   const end = Math.max(...chosen.arms.map((arm) => data.conditions[arm[2]].end));
   const most = Math.max(1, ...curves.flat().filter(Boolean).map((times) => times.length));
   const box = { left: 42, right: width - 12, top: 20, bottom: height - 24, low: 0, high: most * 1.05 };
@@ -145,18 +145,18 @@ function drawCurves() {
   const means = curves.map(mean);
   drawn += means.map((points) => `<polyline class="halo" points="${points}"/>`).join("");
   drawn += means.map((points, i) => `<polyline class="mean" points="${points}" stroke="${colour(i)}" stroke-dasharray="${["none", "9 5", "3 3"][i]}"/>`).join("");
-  put(place, width, height, drawn, "deliveries over time");
+  put(container, width, height, drawn, "deliveries over time");
 }
 
 function showRun() {
-  const seed = data.seeds[chosen.seed], place = at("run");
-  place.hidden = !data.paired;  // unpaired trials have nothing in common but their place
+  const seed = data.seeds[chosen.seed], container = at("run");
+  container.hidden = !data.paired;  // unpaired trials have nothing in common but their place
   const runs = chosen.arms.map(([symbol, name, condition]) => {
     const { p, command } = data.conditions[condition];
     const shown = command ? `<code>${unbroken(`${escaped(command)} --seed ${seed}`)}</code>` : ". No command plays this run.";
     return `${escaped(symbol)}, ${escaped(name)}: P = ${p[chosen.seed] ?? "no run"}${shown}`;
   });
-  place.innerHTML = `<b>Seed ${seed}</b><br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
+  container.innerHTML = `<b>Seed ${seed}</b><br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
 }
 
 // Tables sort by the first number of a cell, or by its text
@@ -176,10 +176,10 @@ function sort(head) {
 }
 
 document.addEventListener("click", (event) => {
-  const one = event.target.closest("[data-question], [data-condition], [data-seed], .sortable thead th");
-  if (!one) return;
-  const { question, seed } = one.dataset, condition = one.closest("[data-condition]")?.dataset.condition;
-  if (one.matches("th")) sort(one);
+  const target = event.target.closest("[data-question], [data-condition], [data-seed], .sortable thead th");
+  if (!target) return;
+  const { question, seed } = target.dataset, condition = target.closest("[data-condition]")?.dataset.condition;
+  if (target.matches("th")) sort(target);
   else if (question !== undefined || condition !== undefined) {
     if (question !== undefined) choose(Number(question), seed && Number(seed));
     else chooseCondition(Number(condition), seed && Number(seed));
@@ -197,8 +197,8 @@ choose(0);
 let width = innerWidth;
 addEventListener("resize", () => { if (innerWidth !== width) { width = innerWidth; showQuestion(); } });
 // On paper nothing can be unfolded: the warnings belong to the answer.
-addEventListener("beforeprint", () => { for (const one of document.querySelectorAll(".warnings")) one.open = true; });
+addEventListener("beforeprint", () => { for (const warning of document.querySelectorAll(".warnings")) warning.open = true; });
 // A link to a folded chapter unfolds it.
-const unfold = () => { const found = at(location.hash.slice(1)); if (found && found.matches("details")) found.open = true; };
+const unfold = () => { const chapter = at(location.hash.slice(1)); if (chapter && chapter.matches("details")) chapter.open = true; };
 addEventListener("hashchange", unfold);
 unfold();

@@ -141,7 +141,7 @@ def _views(
 def _performance_charts(results: StudyResults, runs: Runs) -> Iterator[Chart]:
     repeat = "seed" if results.plan.paired else "trial"
     n_drawn = max(map(len, runs.values()))
-    only = f" of the first {n_drawn:,}" * (n_drawn < len(results.plan.seeds))
+    only = f" of the first {n_drawn:,}" if n_drawn < len(results.plan.seeds) else ""
     legend = (f"bar: {P_LEVEL} interval", f"dot: one {repeat}{only}, click it")
     for table, panel in _performance_panels(results, runs):
         svg = drawing.svg_image(partial(drawing.intervals, panels=[panel]), _HEIGHT)

@@ -263,7 +263,7 @@ def join_names(names: Sequence[str]) -> str:
 
 def plural(count: int, noun: str) -> str:
     """Return a number of things, e.g. "1 claim" or "2 claims"."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
+    return f"1 {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def interval_to_clear(cell: Cell) -> spi.Interval:

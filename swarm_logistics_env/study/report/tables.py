@@ -65,7 +65,8 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
         columns = [_SETTING, *_performance_columns(published=has_published, looks=has_looks)]
         if not for_paper:
             columns.append((f"one run [{section.P_LEVEL}]", _one_run))
-            columns += [(CONTACTS_HEADING, contacts_text)] * has_contacts
+            if has_contacts:
+                columns.append((CONTACTS_HEADING, contacts_text))
         decision = _holm if for_paper else section.decision_text
         answers = partial(_answers, decision, published=has_published, looks=has_looks)
         layouts = _layouts(verdicts, columns, answers, repeats_p=for_paper)
@@ -234,7 +235,7 @@ def _on_claim(verdict: Verdict) -> str:
     word = section.word_to_count(verdict, decision)
     above = verdict.lies_above
     if word == "open" and above is not None:
-        return f"open, leans {'for' if above == verdict.claimed else 'against'}"
+        return "open, leans for" if above == verdict.claimed else "open, leans against"
     return "contradicted" if word == "refuted" else word
 
 

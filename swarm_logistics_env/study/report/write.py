@@ -37,7 +37,8 @@ def write_report(
     advice = how_to_get_figures()
     names = "report.md", "cells.csv", "claims.csv", "tables.tex"
     paths = tuple(directory / name for name in names)
-    pictures, page = directory / "figures", directory / "report.html"
+    pictures = directory / "figures"
+    page = directory / "report.html"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
         drawn = () if advice else report.figures

@@ -125,7 +125,8 @@ def play(
     queue = RunQueue(runs, may_grow=more is not None)
     errors: list[str | None] = []
     failed: list[Run] = []
-    n_played_at_growth, goes_on = -1, True  # how many were played when others joined the queue
+    n_played_at_growth = -1  # how many were played when others joined the queue
+    goes_on = True
     with ProgressBar(title, len(runs), "runs") as progress:
         while goes_on and len(queue):
             # Closed at once where this stops early, so that no worker outlives it.
@@ -152,7 +153,8 @@ def play(
 
 def _is_hopeless(runs: Sequence[Run], failed: Sequence[Run]) -> bool:
     """Return whether these failures, without a success, say that all the others will fail."""
-    cases, seeds = {run.case.key for run in runs}, {run.seed for run in runs}
+    cases = {run.case.key for run in runs}
+    seeds = {run.seed for run in runs}
     # A fault or a size alone, or a single seed, may be what a policy cannot do.
     return (
         len(failed) >= len(runs) / len(cases)

@@ -193,7 +193,8 @@ def _case(origin: Origin, row: Trial) -> Case:
         parameters=row.parameters,
     )
     fault = RecordedFault(mode=row.fault, robots=row.faulty, onset=row.onset)
-    policy, behaviour = PolicySpec(name=row.policy), int(row.fault == REPEATED)
+    policy = PolicySpec(name=row.policy)
+    behaviour = int(row.fault == REPEATED)
     faults = (fault,) if row.faulty else ()
     return Case(policy, identity, scenario, faults, behaviour, task=RECORDED)
 

@@ -129,7 +129,8 @@ def in_processes(count: int, run_limit: float, runs: Iterable[Run]) -> Played:
             with workers(count if waiting.may_grow else min(count, len(waiting))) as pool:
                 interrupted = yield from _played(pool, waiting, count, watch)
             for run in interrupted:
-                error, died = watch.error(run), [run]
+                error = watch.error(run)
+                died = [run]
                 if error is None:
                     with workers(1) as alone:
                         died = yield from _played(alone, RunQueue([run]), 1, watch)

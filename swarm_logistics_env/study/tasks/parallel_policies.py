@@ -44,7 +44,8 @@ def agents_by_row(env: Env, n_robots: int, absent: Collection[int]) -> list[str 
     Raises:
         StudyError: the environment has another number of agents.
     """
-    present, agents = n_robots - len(absent), env.possible_agents
+    present = n_robots - len(absent)
+    agents = env.possible_agents
     if len(agents) != present:
         raise StudyError(
             f"the environment of {present} robots has {len(agents)} agents: should have as "

@@ -217,7 +217,8 @@ class ParallelTask:
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one run; see `Task.play`."""
-        scenario, n_robots = case.scenario, case.scenario.n_robots
+        scenario = case.scenario
+        n_robots = case.scenario.n_robots
         assert isinstance(scenario, ParallelScenario)
         faults = [fault for fault in case.faults if isinstance(fault, RobotFault)]
         # The sets of one seed are nested: the largest holds them all.

@@ -119,7 +119,8 @@ class ChangingAgents(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's
         super().__init__(largest)
         # In episodes of every size; what else the wrapper has is that of the episode's environment.
         self.possible_agents = list(largest.possible_agents)
-        self.observation_space, self.action_space = largest.observation_space, largest.action_space
+        self.observation_space = largest.observation_space
+        self.action_space = largest.action_space
         self._next = int(np.random.default_rng().integers(2**31))
         spaces = _spaces(largest)
         for size, env in self._envs.items():
@@ -224,7 +225,8 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
     ) -> None:
         super().__init__(env)
         self._faults = tuple(faults)
-        self._failures, self._period = failures, period
+        self._failures = failures
+        self._period = period
         self._rows = {agent: row for row, agent in enumerate(env.possible_agents)}
         self._seed = -1
         for fault in self._faults:
@@ -260,7 +262,8 @@ class FailingRobots(BaseParallelWrapper):  # type: ignore[misc]  # PettingZoo's 
         return self._faulty_observations(observations), rewards, terminations, truncations, infos
 
     def _modes(self, agent: str) -> set[str]:
-        time, row = self._steps * self._period, self._rows[agent]
+        time = self._steps * self._period
+        row = self._rows[agent]
         return {fault.mode for fault, rows in self._failing if row in rows and fault.active(time)}
 
     def _faulty_action(self, agent: str, action: Value) -> Value:

@@ -294,7 +294,8 @@ class Run:
 
     def play(self) -> Outcome:
         """Play it; whatever goes wrong in it is its outcome."""
-        start, task = time.perf_counter(), self.case.task
+        start = time.perf_counter()
+        task = self.case.task
         try:
             if self.code != (code := task.code()):
                 raise StudyError(

@@ -158,7 +158,8 @@ def _notes_on_partners(trials: Sequence[Trial], block: str) -> Iterator[str]:
         conditions.setdefault(trial.condition, set()).add(trial.seed)
     for (policy, table), conditions in sorted(by_table.items()):
         title = f"{policy}, {table}" if table else policy
-        in_any, in_all = set.union(*conditions.values()), set.intersection(*conditions.values())
+        in_any = set.union(*conditions.values())
+        in_all = set.intersection(*conditions.values())
         if len(in_any) < len(every):
             yield f"{title} has runs of {len(in_any)} of the file's {len(every)} blocks ({block})."
         alone = sum(len(seeds - in_all) for seeds in conditions.values())

@@ -144,7 +144,8 @@ def _notes_on_left_out(
 
 def _parameters(table: Table, columns: Columns) -> tuple[list[str], list[str]]:
     """Return the parameters that vary, and the covariates among them."""
-    varying, covariates = list[str](), list[str]()
+    varying = list[str]()
+    covariates = list[str]()
     for name in columns.parameters:
         values = {*table.column(name)}
         if len(values) > 1:
@@ -245,11 +246,11 @@ def _refuse_unnamed_finished(table: Table, columns: Columns) -> None:
         is_number = all(cell.replace(".", "").isdigit() for cell in cells)
         if not are_words(cells) or (is_number and means is None):
             continue
-        values = "".join(
-            f" --value {quote(f'finished:{cell}=' + ('no' if says_yes(cell) else 'yes'))}"
-            for cell in sorted(cells)
-            if means is False
-        )
+        values = ""
+        if means is False:  # it says who did not finish
+            for cell in sorted(cells):
+                finished = "no" if says_yes(cell) else "yes"
+                values += f" --value {quote(f'finished:{cell}={finished}')}"
         raise IndicatorError(
             f"{table.source}: {name!r} may say which trials finished: say --column "
             f"{quote(f'finished={name}')}{values}, or leave it out by --ignore {quote(name)}"

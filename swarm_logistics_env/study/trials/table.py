@@ -177,7 +177,7 @@ class Row:
         value = _value_of(cell, self._columns.decimal, self._columns.thousands)
         if math.isfinite(value) and value >= least and (not must_be_whole or value.is_integer()):
             return value
-        should = f"should be a {'whole ' * must_be_whole}number"
+        should = "should be a whole number" if must_be_whole else "should be a number"
         should += f", {least:g} or more" if math.isfinite(least) else ""
         should += self._hint(cell, column, is_parameter)
         raise self._error(cell, column if is_parameter else self.names.get(column), column, should)
@@ -193,7 +193,7 @@ class Row:
                 "--thousands , where it stands between thousands"
             )
         if _GROUPED.fullmatch(cell):
-            point = "; --decimal . where decimals have a point" * (decimal == ",")
+            point = "; --decimal . where decimals have a point" if decimal == "," else ""
             return f" without a sign between thousands{point}, or --thousands ."
         if is_parameter:
             return (

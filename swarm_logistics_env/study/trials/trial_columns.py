@@ -101,7 +101,8 @@ def _names(
     table: Table, columns: Mapping[str, str], ignore: Sequence[str]
 ) -> tuple[dict[str, str], list[str], list[str]]:
     """Return the name of each known column, columns left as parameters, and those of the block."""
-    path, header = table.source, _with_content(table, columns)
+    path = table.source
+    header = _with_content(table, columns)
     for column in columns:
         if column not in MEANING:
             raise IndicatorError(f"--column {column}: {_one_of(column, MEANING)}")
@@ -112,7 +113,9 @@ def _names(
     for column, name in table.meanings.items():
         if name not in ignore:
             names.setdefault(column, name)
-    chosen, parameters, of_robots = {*names}, list[str](), list[str]()
+    chosen = {*names}
+    parameters = list[str]()
+    of_robots = list[str]()
     blocks = [names["seed"]] if "seed" in names else []
     for name in header:
         if not name or name in ignore or name in names.values():
@@ -214,7 +217,8 @@ def _refuse_thousands(table: Table, name: str) -> None:
     with_points = [cell for cell in first if re.fullmatch(r"[1-9]\d{0,2}\.\d{3}", cell)]
     if not (plain_numbers and with_points) or len(plain_numbers) + len(with_points) < len(first):
         return
-    largest, smallest = max(plain_numbers, key=float), min(with_points, key=float)
+    largest = max(plain_numbers, key=float)
+    smallest = min(with_points, key=float)
     if float(largest) >= 10.0 * float(smallest):
         raise IndicatorError(
             f"{table.location(first[smallest])}, column {name!r}: {smallest!r}: is "
@@ -237,7 +241,9 @@ def _refuse_rows_of_robots(table: Table, columns: Columns) -> None:
         first = trials.setdefault(tuple(cells[column] for column in compared), row)
         for robot in of_robots:
             if cells[table.index[robot]] != table.cells[first][table.index[robot]]:
-                hint = ", or name each row's trial in a column 'trial'" * ("trial" not in names)
+                hint = ""
+                if "trial" not in names:
+                    hint = ", or name each row's trial in a column 'trial'"
                 raise IndicatorError(
                     f"{table.location(row)}: differs from {table.line_word} {table.lines[first]} "
                     f"in {robot!r} and in what was delivered alone, so these may be robots of one "

@@ -129,7 +129,8 @@ def trial_of(
         performance: P of it.
     """
     n_robots = row.whole_or_none("n_robots", 1)
-    fault, faulty = faults[row.text("fault")], row.whole_or_none("faulty", 0) or 0
+    fault = faults[row.text("fault")]
+    faulty = row.whole_or_none("faulty", 0) or 0
     is_fault = fault not in (NO_FAULT_WORD, REPEATED)
     onset = row.number_or_none("onset") or 0.0
     if row.text("duration"):

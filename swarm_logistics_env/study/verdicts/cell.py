@@ -167,7 +167,8 @@ class Cell:
     @property
     def published_inside(self) -> bool | None:
         """Whether the published P lies in the interval of one run; None: unknown."""
-        p, (_, low, high) = self.published, self.one_run
+        p = self.published
+        _, low, high = self.one_run
         return None if p is None or low is None or high is None else low <= p <= high
 
 

@@ -93,10 +93,10 @@ def _breaks(outcomes: Sequence[Outcome], has_collapsed: NDArray[np.bool_]) -> Nu
     """Return when runs broke off that had delivered at half of the others' rate or more [s]."""
     # A run without deliveries never began; where P is no number of times, none is known.
     is_timed = np.array([len(run.delivery_times) > 0 and run.ended_at > 0.0 for run in outcomes])
-    others = [outcomes[i] for i in np.flatnonzero(is_timed & ~has_collapsed).tolist()]
-    if not others:
+    working = [outcomes[i] for i in np.flatnonzero(is_timed & ~has_collapsed).tolist()]
+    if not working:
         return np.empty(0)
-    usual = float(np.median([len(run.delivery_times) / run.ended_at for run in others]))
+    usual = float(np.median([len(run.delivery_times) / run.ended_at for run in working]))
     breaks = []
     for i in np.flatnonzero(is_timed & has_collapsed).tolist():
         change = _change_of_rate(outcomes[i].delivery_times, outcomes[i].ended_at)
@@ -120,7 +120,8 @@ def _change_of_rate(times: Numbers, end: float) -> _Change | None:
         return None
     n_before = np.arange(1, len(inside) + 1)
     n_after = len(inside) - n_before
-    before, after = n_before / inside, n_after / (end - inside)
+    before = n_before / inside
+    after = n_after / (end - inside)
     # n ln(rate) is 0 where nothing is delivered.
     likelihood = n_before * np.log(before) + n_after * np.log(np.where(n_after, after, 1.0))
     best = int(np.argmax(likelihood))

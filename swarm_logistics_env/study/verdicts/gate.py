@@ -68,7 +68,8 @@ def match(old: StudyResults, new: StudyResults) -> Matching:
     if len(before) == len(after) == 1:
         partners = dict(zip(after, before))
     matches = list[tuple[str, Cell, Cell]]()
-    unmatched, notes = list[_Unmatched](), list[str]()
+    unmatched = list[_Unmatched]()
+    notes = list[str]()
     for label, old_label in partners.items():
         named = label if label == old_label else f"{old_label} -> {label}"
         old_cells, new_cells = before.get(old_label, {}), after.get(label, {})
@@ -164,8 +165,10 @@ class Gate(NamedTuple):
                 f"gate {text!r}: should be [possibly] {SUBJECTS} <|> NUMBER [at TEXT], "
                 'e.g. "R < 0" or "possibly change < -0.1 at N = 25"'
             )
-        possibly, below = match["possibly"] is not None, match["sign"] == "<"
-        number, at = float(match["number"]), match["at"] or ""
+        possibly = match["possibly"] is not None
+        below = match["sign"] == "<"
+        number = float(match["number"])
+        at = match["at"] or ""
         return cls(text.strip(), possibly, match["subject"], below, number, at)
 
     def holds_for(self, value: float) -> bool:
@@ -246,7 +249,8 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
         name = f"{comparison.policy}: {comparison.indicator}, {label}"
         if gate.at not in name:
             continue
-        cells, margin = new.cells_of(comparison), new.plan.specification.margin
+        cells = new.cells_of(comparison)
+        margin = new.plan.specification.margin
         verdict = judge_comparison(comparison, cells, paired=new.plan.paired, margin=margin)
         estimate = verdict.estimate
         if estimate is None:
@@ -271,7 +275,8 @@ def _change(
     after: tuple[StudyResults, Cell],
     seeds: Sequence[int] | None,
 ) -> _Found:
-    (old, old_cell), (new, new_cell) = before, after
+    old, old_cell = before
+    new, new_cell = after
     if problem := old_cell.problem or new_cell.problem:
         return problem
     if seeds is not None:

@@ -88,7 +88,9 @@ def resiliences(results: StudyResults) -> Iterator[Resilience]:
 def _resilience(
     results: StudyResults, comparison: Comparison, curves: tuple[RateCurve, ...]
 ) -> Resilience:
-    original, removed, faulty = comparison.original, comparison.removed, comparison.changed
+    original = comparison.original
+    removed = comparison.removed
+    faulty = comparison.changed
     null = results.plan.nulls.get((comparison.table, original))
     single: tuple[RepairCurve, ...] = ()
     problem = None
@@ -189,9 +191,12 @@ def window_of(comparison: Comparison) -> float:
 
 def rate_curves(results: StudyResults, comparison: Comparison) -> tuple[RateCurve, ...]:
     """Return the delivery rates without fault, with the robots removed, and with the fault."""
-    window, end = window_of(comparison), comparison.original.case.scenario.duration
+    window = window_of(comparison)
+    end = comparison.original.case.scenario.duration
     seconds = np.arange(window, end + _STEP / 2, min(_STEP, window / 10)).round(6)
-    original, removed, faulty = comparison.original, comparison.removed, comparison.changed
+    original = comparison.original
+    removed = comparison.removed
+    faulty = comparison.changed
     arms = {"no fault": original, "removed": removed, "fault": faulty}
     curves = []
     for runs, arm in arms.items():

@@ -74,7 +74,9 @@ def _read_reference(path: Path) -> Reference:
     for sentence in table["sentences"]:
         claims = sentences[sentence["text"]] = {}
         for claim in sentence["claims"]:
-            symbol, name, threshold = claim["indicator"], claim["name"], claim.get("threshold", 0.0)
+            symbol = claim["indicator"]
+            name = claim["name"]
+            threshold = claim.get("threshold", 0.0)
             kind = DEFINITIONS[symbol].compares
             for before, after in claim["steps"]:
                 settings = _setting(kind, name, before), _setting(kind, name, after)

@@ -62,7 +62,8 @@ class StudyResults:
 
     def cells_of(self, comparison: Comparison) -> dict[Arm, Cell]:
         """Return the cells of a comparison's arms."""
-        policy, table = comparison.policy, comparison.table
+        policy = comparison.policy
+        table = comparison.table
         return {arm: self._cells_by_key[policy, table, arm] for arm in comparison.arms}
 
     @property
@@ -128,7 +129,8 @@ class StudyResults:
         if not self.plan.paired:
             fewest = min(cell.n_seeds for cell in self.cells)
             count = f"{fewest} to {len(seeds)}" if fewest < len(seeds) else f"{fewest}"
-            return f"{count} unpaired {'run' if count == '1' else 'runs'} a condition"
+            runs = "run" if count == "1" else "runs"
+            return f"{count} unpaired {runs} a condition"
         fewest = len(seeds)
         if self.looks:  # conditions have as many as were needed
             most = max([fewest, *(cell.n_seeds for cell in self.cells)])
@@ -158,7 +160,8 @@ def judge(
     declared = declared or Declaration.model_validate(specification)
     is_exploratory = not declared.covers(plan)
     verdicts: Iterable[Verdict] = ()
-    all_seeds, seeds_of = plan.seeds, dict[str, int]()
+    all_seeds = plan.seeds
+    seeds_of = dict[str, int]()
     if specification.until_clear:
         look = look or latest_look(plan, outcomes)
         seeds_of |= look.seeds_of

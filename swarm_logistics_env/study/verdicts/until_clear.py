@@ -303,5 +303,6 @@ def predictive_power(p: float, n_seeds: int, most: int, alpha: float) -> float:
     if n_seeds >= most:
         return 0.0
     growth = most / n_seeds
-    expected, deviation = -math.sqrt(growth) * ndtri(p), math.sqrt(growth - 1.0)
+    expected = -math.sqrt(growth) * ndtri(p)
+    deviation = math.sqrt(growth - 1.0)
     return float(ndtr((expected + ndtri(alpha)) / deviation))

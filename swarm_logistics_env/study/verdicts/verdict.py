@@ -246,7 +246,8 @@ def judge_comparison(
     saturated = [arm for arm in comparison.arms if cells[arm].saturated]
     # S is not tested for equivalence.
     has_equivalence = comparison.definition.unchanged(margin) is not None
-    estimate, unchanged = None, None
+    estimate = None
+    unchanged = None
     problems = [
         f"{arm.setting}: {cells[arm].problem}" for arm in comparison.arms if cells[arm].problem
     ]

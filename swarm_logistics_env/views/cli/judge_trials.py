@@ -169,14 +169,17 @@ def _sizes_and_counts(sizes: list[tuple[int | None, int]]) -> tuple[str, str]:
     """Return the sizes of some conditions, and how many trials each has."""
     numbers = ", ".join(str(n_robots) for n_robots, _ in sizes if n_robots is not None)
     counts = sorted({count for _, count in sizes})
-    each = " each" * (len(sizes) > 1)
-    return numbers, f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}{each}"
+    if len(counts) > 1:
+        return numbers, f"{counts[0]} to {counts[-1]}"
+    if len(sizes) > 1:
+        return numbers, f"{counts[0]} each"
+    return numbers, str(counts[0])
 
 
 def _values_of(column: Column) -> str:
     left = column.n_values - len(column.values)
     shown = ", ".join(value[:_LONGEST_VALUE] or "(empty)" for value in column.values)
-    return shown + f", and {left} more" * (left > 0)
+    return f"{shown}, and {left} more" if left > 0 else shown
 
 
 def _labels(trial: Trial) -> Texts:

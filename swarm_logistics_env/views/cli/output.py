@@ -94,7 +94,9 @@ def _prepare(stream: TextIO | None) -> TextIO:
         stream = os.fdopen(nowhere, "w", encoding="utf-8")
     if not isinstance(stream, io.TextIOWrapper):
         return stream  # of a notebook, a test or a program that has taken it over
-    encoding, in_lines, at_once = stream.encoding, stream.line_buffering, stream.write_through
+    encoding = stream.encoding
+    in_lines = stream.line_buffering
+    at_once = stream.write_through
     buffer = stream.detach()
     raw: Any = buffer.detach() if isinstance(buffer, io.BufferedWriter) else buffer
     is_ascii = codecs.lookup(encoding).name == "ascii"

@@ -88,7 +88,8 @@ def ask_in_world(study: Study, scenario: Scenario) -> None:
     if scenario.bodies != CHIPMUNK:
         load_bodies(scenario.bodies)  # what is wrong with them is said before anything is written
     specification = study.specification
-    original, n_robots = specification.scenario, scenario.n_robots
+    original = specification.scenario
+    n_robots = scenario.n_robots
     share = n_robots / original.n_robots
     sizes = [
         factor.replace(values=values)
@@ -126,10 +127,10 @@ def _sizes_that_fit(scenario: Scenario, sizes: Iterable[float]) -> tuple[int, ..
 
 def _without_sizes_of_plan(parameters: Iterable[Parameter]) -> list[Parameter]:
     """Return the parameters that do not follow from a floor plan; tell which ones do."""
-    from_plan, others = partition(lambda parameter: parameter.name not in PLAN_SIZES, parameters)
+    from_plan, remaining = partition(lambda parameter: parameter.name not in PLAN_SIZES, parameters)
     for parameter in from_plan:
         say(f"No question of {parameter.name}, which follows from the floor plan.")
-    return list(others)
+    return list(remaining)
 
 
 def change_scenario(study: Study, fields: Mapping[str, Any]) -> None:
@@ -145,6 +146,6 @@ def change_scenario(study: Study, fields: Mapping[str, Any]) -> None:
         load_bodies(fields["bodies"])  # what is wrong with them is said before anything is written
     specification = study.specification
     if fields.get("floor") is not None:
-        others = _without_sizes_of_plan(specification.parameters)
-        specification = specification.replace(parameters=tuple(others))
+        remaining = _without_sizes_of_plan(specification.parameters)
+        specification = specification.replace(parameters=tuple(remaining))
     study.specification = specification.varying(fields)

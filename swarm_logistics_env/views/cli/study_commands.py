@@ -149,7 +149,10 @@ def run_command(
     words = ["clearing"] * clearing + ["restock"] * restock + changes_in_words(fields)
     out = out or _default_directory(study, words, has_own_policies=bool(policies))
     study.out = out / part.directory if part else out
-    engine = engine or ("ray" if address else "local" if processes == 1 else "process")
+    if not engine and address:
+        engine = "ray"
+    if not engine:
+        engine = "local" if processes == 1 else "process"
     player = engine_named(engine, processes, address, run_limit)
     say(str(study.plan()))
     echo()

@@ -121,7 +121,8 @@ class AnswerSoFar:
     def show(self, results: StudyResults) -> None:
         """Show these results."""
         now = f"After {time.monotonic() - self._start:.0f} s"
-        so_far, verdicts = answer(results), results.verdicts
+        so_far = answer(results)
+        verdicts = results.verdicts
         seeds = [verdict.estimate.n_seeds for verdict in verdicts if verdict.estimate]
         if not seeds:
             lines = f"{now}: {so_far.performance}"

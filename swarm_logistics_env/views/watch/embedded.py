@@ -26,7 +26,8 @@ class EmbeddedFilm:
     """
 
     def __init__(self, content: bytes, title: str) -> None:
-        self.content, self.title = content, title
+        self.content = content
+        self.title = title
 
     def save(self, path: str | Path) -> None:
         """Write it as an .mp4 file.

@@ -261,7 +261,9 @@ class Recording:
         """Keep the session as it is now, if it has gone on far enough."""
         session = self._session
         if session.run is not self._play:  # another episode
-            self._play, self._last, self._messages = session.run, {}, []
+            self._play = session.run
+            self._last = {}
+            self._messages = []
         time = session.state.time
         if self._last and time < self._last["time"] + _SPACING - 1e-9 and not session.is_over:
             return

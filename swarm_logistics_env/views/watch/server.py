@@ -81,7 +81,8 @@ class _Connection:
     def __init__(
         self, served: asyncio.Protocol, silent_since: dict[asyncio.Transport, float]
     ) -> None:
-        self._served, self._silent_since = served, silent_since
+        self._served = served
+        self._silent_since = silent_since
 
     def connection_made(self, transport: asyncio.Transport) -> None:
         self._silent_since[transport] = time.monotonic()
@@ -103,7 +104,8 @@ class _Page:
     """
 
     def __init__(self, socket: web.WebSocketResponse, transport: asyncio.Transport) -> None:
-        self._socket, self._transport = socket, transport
+        self._socket = socket
+        self._transport = transport
         self._sent_frame: Message = {}
         self._sending: asyncio.Task[None] | None = None
         self._sent_at = 0.0
@@ -138,7 +140,8 @@ class WatchServer:
     """
 
     def __init__(self, session: Session, port: int) -> None:
-        self.session, self.port = session, port
+        self.session = session
+        self.port = port
         self.token = secrets.token_urlsafe(18)
         self.recording = Recording(session)
         self.address = ""
@@ -222,7 +225,8 @@ class WatchServer:
             while True:
                 await asyncio.sleep(_FRAME_PERIOD)
                 now = time.monotonic()
-                elapsed, before = now - before, now
+                elapsed = now - before
+                before = now
                 self._drop_silent(_LONGEST_SILENCE)
                 if now > self._noted_at + _NOTE_LASTS:
                     self.session.note = ""

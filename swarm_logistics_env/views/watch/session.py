@@ -287,7 +287,8 @@ class Session:
             self.beside.world.set_faults(change(self.beside.world.numbered_faults))
 
     def _deselect_absent_robot(self) -> None:
-        robot, present = self.selected, self.state.robot_present
+        robot = self.selected
+        present = self.state.robot_present
         if robot is not None and not (robot < len(present) and present[robot]):
             self.selected = None
 

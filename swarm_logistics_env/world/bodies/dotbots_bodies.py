@@ -46,7 +46,8 @@ _LARGEST = 60.0  # [m]; an axle's position has 16 bits
 _FENCE = _RADIUS + _AHEAD
 _FENCE_LAG = 0.2  # [s]: a pose is up to 0.1 s old, and a wheel takes as long to its speed
 # A robot that is driven slower may stand: its wheels turn in pulses below 15 mm/s.
-_LEAST_SPEED, _LEAST_TURN_RATE = 0.03, 0.3  # [m/s], [rad/s]
+_LEAST_SPEED = 0.03  # [m/s]
+_LEAST_TURN_RATE = 0.3  # [rad/s]
 
 Numbers = NDArray[np.float64]
 
@@ -115,9 +116,9 @@ class DotbotsBodies:
     def _fenced(self, speed: Numbers) -> Numbers:
         """Return speeds forward, 0 of a robot that would leave the warehouse."""
         guard = self._guard
-        ahead = self._period + _FENCE_LAG + guard.age
+        lookahead = self._period + _FENCE_LAG + guard.age
         direction = np.column_stack([np.cos(guard.heading), np.sin(guard.heading)])
-        displacement = (ahead * speed)[:, None] * direction
+        displacement = (lookahead * speed)[:, None] * direction
         end = guard.position + displacement
         leaves_low = (end < _FENCE) & (displacement < 0.0)
         leaves_high = (end > self._size - _FENCE) & (displacement > 0.0)
@@ -140,10 +141,12 @@ class DotbotsBodies:
     def _reported(self) -> tuple[Numbers, Numbers, NDArray[np.bool_]]:
         """Return positions and headings, nan where none, and who was heard."""
         n_robots = len(self._addresses)
-        axles, directions = np.full((n_robots, 2), np.nan), np.full(n_robots, np.nan)
+        axles = np.full((n_robots, 2), np.nan)
+        directions = np.full(n_robots, np.nan)
         is_heard = np.zeros(n_robots, np.bool_)
         for frame in self._messages:
-            robot, pose = self._robots[int(frame.header.source)], frame.packet.payload
+            robot = self._robots[int(frame.header.source)]
+            pose = frame.packet.payload
             is_heard[robot] = True
             if pose.direction != DIRECTION_NONE and AXLE_UNKNOWN not in (pose.axle_x, pose.axle_y):
                 axles[robot], directions[robot] = (pose.axle_x, pose.axle_y), pose.direction

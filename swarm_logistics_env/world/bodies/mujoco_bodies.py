@@ -46,7 +46,8 @@ _ARMATURE = 0.1
 _ANSWER = 0.05  # [s] in which a wheel comes near its wanted speed
 _WALL = 0.05  # [m] half the thickness of a wall
 # Categories of geoms: outlines meet each other, wheels and casters the floor alone.
-_OUTLINE, _FLOOR = 1, 2
+_OUTLINE = 1
+_FLOOR = 2
 
 Numbers = NDArray[np.float64]
 
@@ -116,7 +117,8 @@ class MujocoBodies:
 
     def _push(self, orders: Orders) -> None:
         """Push and turn robots towards what they want, by their greatest acceleration at most."""
-        data, limit = self._data, self._scenario.max_acceleration
+        data = self._data
+        limit = self._scenario.max_acceleration
         heading = data.qpos[self._positions + 2]
         forward, left, turn_rate = orders.motion.T
         wanted = np.column_stack(
@@ -209,7 +211,8 @@ def _model(placement: Placement, timestep: float) -> Xml.Element:
 def _add_solids(world: Xml.Element, placement: Placement) -> None:
     """Add walls, racks and obstacles."""
     scenario = placement.scenario
-    width, height = scenario.warehouse_width, scenario.warehouse_height
+    width = scenario.warehouse_width
+    height = scenario.warehouse_height
     boxes = [
         (-2.0 * _WALL, 0.0, 0.0, height),
         (width, 0.0, width + 2.0 * _WALL, height),
@@ -238,15 +241,17 @@ def _add_sliding(body: Xml.Element, scenario: Scenario) -> None:
 
 def _add_wheeled(body: Xml.Element, actuators: Xml.Element, scenario: Scenario, robot: int) -> None:
     """Add a chassis, two wheels with a motor each, and two casters without friction."""
-    radius, wheel_radius, mass = scenario.robot_radius, _wheel_radius(scenario), scenario.robot_mass
+    radius = scenario.robot_radius
+    wheel_radius = _wheel_radius(scenario)
+    mass = scenario.robot_mass
     Xml.SubElement(body, "freejoint")
     chassis_mass = mass * (1.0 - 2.0 * _WHEEL_MASS)
     centre = (0.0, 0.0, 0.0)
     _add_geom(body, "sphere", _OUTLINE, centre, (radius,), _OUTLINE_FRICTION, chassis_mass)
-    for ahead in (-0.7 * radius, 0.7 * radius):
+    for offset in (-0.7 * radius, 0.7 * radius):
         size = (0.9 * wheel_radius,)
         _add_geom(
-            body, "sphere", _FLOOR, (ahead, 0.0, -0.08 * wheel_radius), size, 0.0, 1e-3 * mass
+            body, "sphere", _FLOOR, (offset, 0.0, -0.08 * wheel_radius), size, 0.0, 1e-3 * mass
         )
     # Both wheels together give the robot its greatest acceleration, as long as they do not slip.
     inertia = (0.5 + _ARMATURE) * mass * wheel_radius**2  # that each motor moves

@@ -16,7 +16,9 @@ STOP_AFTER = 0.5  # [s] without a pose, or driven without motion
 LOST_AFTER = 10.0  # [s] without any message
 # A robot that does not move may be blocked, and one without a heading has to move to find it. So
 # one that still sends messages tries again, for so long, so often, at such a share of its speed.
-TRY_EVERY, TRY_FOR, TRY_SHARE = 2.0, 0.5, 0.3  # [s], [s]
+TRY_EVERY = 2.0  # [s]
+TRY_FOR = 0.5  # [s]
+TRY_SHARE = 0.3
 # A robot that a hand has moved is believed once its poses have agreed for so long.
 SETTLED_AFTER = 0.3  # [s]
 SLACK = 0.05  # [m] that a pose may be off
@@ -46,16 +48,19 @@ class PoseGuard:
         self, position: Numbers, heading: Numbers, period: float, max_speed: float
     ) -> None:
         n_robots = len(position)
-        self.position, self.heading = position.copy(), heading.copy()
+        self.position = position.copy()
+        self.heading = heading.copy()
         self.velocity = np.zeros((n_robots, 2))
         self.age = np.zeros(n_robots)
         self.speed_share = np.ones(n_robots)
         self.lost = np.zeros(n_robots, np.bool_)
-        self._period, self._max_speed = period, max_speed
+        self._period = period
+        self._max_speed = max_speed
         self._silence = np.zeros(n_robots)  # [s] since the last message
         self._standing = np.zeros(n_robots)  # [s] driven since the last motion
         self._stopped = np.zeros(n_robots)  # [s]
-        self._moved_position, self._moved_heading = position.copy(), heading.copy()
+        self._moved_position = position.copy()
+        self._moved_heading = heading.copy()
         self._is_jumping = np.zeros(n_robots, np.bool_)
         self._jump = np.full((n_robots, 2), np.nan)
         self._settled = np.zeros(n_robots)  # [s] for which poses agree with `_jump`

@@ -58,7 +58,8 @@ def rows_of_benchmark_map(text: str) -> list[str]:
         raise ValueError("the map has no free cell")
     plan = np.where(is_open, ".", "#")
     if (signs == "E").any() and (signs == "S").any():
-        plan[signs == "E"], plan[signs == "S"] = ":", "A"
+        plan[signs == "E"] = ":"
+        plan[signs == "S"] = "A"
     else:
         parts, _ = ndimage.label(is_open)
         largest = parts == np.argmax(np.bincount(parts[parts > 0]))

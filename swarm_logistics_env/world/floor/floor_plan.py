@@ -88,36 +88,36 @@ def floor_title(text: str) -> str:
 PLAN_SIZES = ("warehouse_width", "warehouse_height", "delivery_width")
 
 
-def with_plan_sizes(fields: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+def with_plan_sizes(fields: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
     """Return the given fields of a scenario with its floor in its one form and the sizes it makes.
 
     Args:
         fields: of the whole scenario, by name.
-        given: those of them that somebody set.
+        chosen: those of them that somebody set.
 
     Raises:
         ValueError: the plan cannot be, or a size is given that is not the plan's.
     """
     try:
-        return _with_sizes(fields, given)
+        return _with_sizes(fields, chosen)
     except ValueError as error:
         raise ValueError(f"Scenario.floor = {floor_title(fields['floor'])}: {error}") from None
 
 
-def _with_sizes(fields: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+def _with_sizes(fields: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
     text = plan_text(fields["floor"])
     numbers = fields["cell_size"], fields["robot_radius"]
     if not all(isinstance(number, int | float) and number > 0 for number in numbers):
-        return {**given, "floor": text}  # the fields' own checks say what is wrong
+        return {**chosen, "floor": text}  # the fields' own checks say what is wrong
     cell_size, robot_radius = map(float, numbers)
     plan = floor_plan(text, cell_size, 2.0 * robot_radius)
     sizes = dict(zip(PLAN_SIZES, (plan.width, plan.height, plan.delivery_width), strict=True))
     for name, size in sizes.items():
-        if given.get(name, size) != size:
+        if chosen.get(name, size) != size:
             raise ValueError(
-                f"{name} = {given[name]} should be left out, as the plan makes it {size:g} m"
+                f"{name} = {chosen[name]} should be left out, as the plan makes it {size:g} m"
             )
-    return {**given, **sizes, "floor": text}
+    return {**chosen, **sizes, "floor": text}
 
 
 def _is_file(text: str) -> bool:
@@ -282,12 +282,13 @@ def _spread(corners: NDArray[np.int32], n_wide: int) -> NDArray[np.int32]:
 
 def _check_reached(kind: Cells, reached: Mask, problem: str) -> None:
     ways = ((DOCK, "this dock", "storage"), (STORAGE, "this storage", "a dock"))
-    for code, place, other in (*ways, (START, "this start", "a dock")):
+    for code, origin, goal in (*ways, (START, "this start", "a dock")):
         rows, columns = np.nonzero((kind == code) & ~reached)
         if len(rows):
             first = int(np.lexsort((columns, -rows))[0])  # from the first line on
-            line, column = len(kind) - int(rows[first]), int(columns[first]) + 1
-            raise ValueError(f"line {line}, column {column}: {problem.format(place, other)}")
+            line = len(kind) - int(rows[first])
+            column = int(columns[first]) + 1
+            raise ValueError(f"line {line}, column {column}: {problem.format(origin, goal)}")
 
 
 def merged_boxes(is_solid: Mask) -> NDArray[np.int64]:

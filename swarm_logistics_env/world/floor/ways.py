@@ -153,7 +153,9 @@ def _distances(may_pass: Mask, is_goal: Mask, cell_size: float) -> Numbers:
     from scipy.sparse.csgraph import dijkstra
 
     numbers = np.arange(may_pass.size).reshape(may_pass.shape)
-    starts, ends, lengths = [], [], []
+    starts = []
+    ends = []
+    lengths = []
     for (rows, columns), (next_rows, next_columns) in _PAIRS:
         is_way = may_pass[rows, columns] & may_pass[next_rows, next_columns]
         length = cell_size
@@ -195,8 +197,10 @@ def _fill_along(
     half = 0.5 * cell_size
     n_rows, n_columns = is_open.shape
     for point in range(len(cells)):
-        x, y = cells[point, 0], cells[point, 1]
-        column, row = min(max(int(x), 0), n_columns - 1), min(max(int(y), 0), n_rows - 1)
+        x = cells[point, 0]
+        y = cells[point, 1]
+        column = min(max(int(x), 0), n_columns - 1)
+        row = min(max(int(y), 0), n_rows - 1)
         if is_dock[row, column]:
             along[point] = max(_at_point(to_outside, is_open, row, column, x, y) - half, 0.0)
         else:
@@ -219,15 +223,16 @@ def _at_point(far: Numbers, is_open: Mask, row: int, column: int, x: float, y: f
     # From the cell's centre, within +-0.5.
     aside_x = min(max(x, 0.0), n_columns) - column - 0.5
     aside_y = min(max(y, 0.0), n_rows) - row - 0.5
-    weight_x, weight_y = abs(aside_x), abs(aside_y)
+    weight_x = abs(aside_x)
+    weight_y = abs(aside_y)
     next_column = min(max(column + (-1 if aside_x < 0.0 else 1), 0), n_columns - 1)
     next_row = min(max(row + (-1 if aside_y < 0.0 else 1), 0), n_rows - 1)
-    here = far[row, column]
-    along_x = far[row, next_column] if is_open[row, next_column] else here
-    along_y = far[next_row, column] if is_open[next_row, column] else here
-    askew = along_x + along_y - here
+    at_cell = far[row, column]
+    along_x = far[row, next_column] if is_open[row, next_column] else at_cell
+    along_y = far[next_row, column] if is_open[next_row, column] else at_cell
+    askew = along_x + along_y - at_cell
     if is_open[row, next_column] and is_open[next_row, column] and is_open[next_row, next_column]:
         askew = far[next_row, next_column]
-    near_y = (1.0 - weight_x) * here + weight_x * along_x
+    near_y = (1.0 - weight_x) * at_cell + weight_x * along_x
     far_y = (1.0 - weight_x) * along_y + weight_x * askew
     return float((1.0 - weight_y) * near_y + weight_y * far_y)

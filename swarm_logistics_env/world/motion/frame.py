@@ -58,8 +58,10 @@ class MotionView:
             bodies: (N, 4) of robots that are not all as the scenario has them (`memory.body_of`).
         """
         n = len(keys)
-        self.keys, self.counts = np.empty(n, np.uint64), np.empty(n, np.int64)
-        self.memory, self.turned = np.empty((n, N_COLUMNS)), np.zeros(n)
+        self.keys = np.empty(n, np.uint64)
+        self.counts = np.empty(n, np.int64)
+        self.memory = np.empty((n, N_COLUMNS))
+        self.turned = np.zeros(n)
         self.begin_rows(np.arange(n), keys, bodies)
 
     def begin_rows(
@@ -69,7 +71,8 @@ class MotionView:
         bodies: NDArray[np.float64] | None = None,
     ) -> None:
         """Begin an episode in these rows alone."""
-        self.keys[rows], self.counts[rows] = keys, 0
+        self.keys[rows] = keys
+        self.counts[rows] = 0
         fresh = np.zeros((len(rows), N_COLUMNS))
         fresh[:, BODY] = self._body if bodies is None else bodies
         face_anywhere(keys, fresh)
@@ -108,7 +111,9 @@ class MotionView:
         self, observations: NDArray[np.float32], rows: NDArray[np.int64]
     ) -> NDArray[np.float32]:
         """Return the inputs that observations of these rows would make, without going on."""
-        memory, keys, counts = self.memory[rows], self.keys[rows], self.counts[rows]
+        memory = self.memory[rows]
+        keys = self.keys[rows]
+        counts = self.counts[rows]
         return self._inputs(observations, memory, keys, counts, np.empty(len(rows)))
 
     def _inputs(
@@ -120,7 +125,8 @@ class MotionView:
         turned: NDArray[np.float64],
     ) -> NDArray[np.float32]:
         inputs = np.empty((len(observations), len(INPUTS)), np.float32)
-        period, listens = self.period, self._listens
+        period = self.period
+        listens = self._listens
         read_observations(observations, period, memory, keys, counts, listens, inputs, turned)
         return inputs
 
@@ -175,7 +181,9 @@ def command_own_frames(
     """Do as `command_rows` with commands (N, 4) in the robots' own frames; turns are left out."""
     for robot in range(commands.shape[0]):
         beams = round(turned[robot] / (2.0 * math.pi / row.N_BEAMS))
-        x, y, gripper = commands[robot, 0], commands[robot, 1], commands[robot, 3]
+        x = commands[robot, 0]
+        y = commands[robot, 1]
+        gripper = commands[robot, 3]
         # There and back: outputs are clipped in the frame of motion.
         along, aside = to_frame((COSINES[beams], SINES[beams]), x, y)
         turn_outputs(along, aside, gripper, turned[robot], commands[robot])
@@ -199,11 +207,14 @@ def turn_outputs(
     along: float, aside: float, gripper: float, turned: float, command: NDArray[np.float64]
 ) -> None:
     """Fill the command (4,) of outputs; clipped, no turn."""
-    along, aside = min(max(along, -1.0), 1.0), min(max(aside, -1.0), 1.0)
+    along = min(max(along, -1.0), 1.0)
+    aside = min(max(aside, -1.0), 1.0)
     longer = max(length_of(along, aside), 1.0)
     cosine, sine = cosine_and_sine(turned)
     x, y = to_frame((cosine, -sine), along, aside)
-    command[0], command[1], command[2] = x / longer, y / longer, 0.0
+    command[0] = x / longer
+    command[1] = y / longer
+    command[2] = 0.0
     command[3] = min(max(gripper, -1.0), 1.0)
 
 

@@ -43,14 +43,20 @@ def wall_angle(sensed: NDArray[np.float32]) -> float:
     """Return the direction of the nearest wall in the robot's frame, 0 to pi/2 [rad]; -1: none."""
     walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
     nearest = np.argmin(walls)
-    a, b, c = walls[nearest - 1], walls[nearest], walls[(nearest + 1) % row.N_BEAMS]
+    a = walls[nearest - 1]
+    b = walls[nearest]
+    c = walls[(nearest + 1) % row.N_BEAMS]
     # In a room every robot has a beam that meets nothing, or too long a one to be used.
     if max(a, c) >= walls.max():
         return -1.0
-    ax, ay = a * _BEFORE[nearest, 0], a * _BEFORE[nearest, 1]
-    bx, by = b * _ALONG[nearest, 0], b * _ALONG[nearest, 1]
-    cx, cy = c * _AFTER[nearest, 0], c * _AFTER[nearest, 1]
-    x, y = cx - ax, cy - ay
+    ax = a * _BEFORE[nearest, 0]
+    ay = a * _BEFORE[nearest, 1]
+    bx = b * _ALONG[nearest, 0]
+    by = b * _ALONG[nearest, 1]
+    cx = c * _AFTER[nearest, 0]
+    cy = c * _AFTER[nearest, 1]
+    x = cx - ax
+    y = cy - ay
     length = max(length_of(x, y), 1e-6)
     if abs((bx - ax) * y - (by - ay) * x) / length > STRAIGHT:
         return -1.0
@@ -160,7 +166,8 @@ def remember_row(
     memory: NDArray[np.float64],
 ) -> tuple[float, float, float]:
     """Take what one row (D,) tells into a memory, and return its `kept_home`."""
-    x, y = sensed[row.VELOCITY_X], sensed[row.VELOCITY_Y]
+    x = sensed[row.VELOCITY_X]
+    y = sensed[row.VELOCITY_Y]
     speed = length_of(x, y)
     is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
     delivers = sensed[row.CARRYING_REQUESTED] > 0.5
@@ -175,7 +182,8 @@ def remember_row(
     memory[MEMORY.standing] = max(0.0, memory[MEMORY.standing] + (period if stands else -period))
     memory[MEMORY.clearing] = max(0.0, memory[MEMORY.clearing] - period)
     if memory[MEMORY.standing] > CAGED_TIME and not is_inside:
-        memory[MEMORY.standing], memory[MEMORY.clearing] = 0.0, CLEARING_TIME
+        memory[MEMORY.standing] = 0.0
+        memory[MEMORY.clearing] = CLEARING_TIME
 
     watch_walls(sensed, period, memory)
     home_share, kept_share = fades
@@ -221,7 +229,8 @@ def diagnose(sensed: NDArray[np.float32], period: float, memory: NDArray[np.floa
     than its handling time; then it tries again later. Readings may come late.
     """
     is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
-    carries, delivers = sensed[row.CARRYING] > 0.5, sensed[row.CARRYING_REQUESTED] > 0.5
+    carries = sensed[row.CARRYING] > 0.5
+    delivers = sensed[row.CARRYING_REQUESTED] > 0.5
     memory[MEMORY.failed] *= 1.0 - period / FAILURE_TIME
     for column in (MEMORY.cannot_lift, MEMORY.cannot_deliver):
         memory[column] = max(0.0, memory[column] - period / RETRY_TIME)
@@ -234,7 +243,8 @@ def diagnose(sensed: NDArray[np.float32], period: float, memory: NDArray[np.floa
         memory[MEMORY.failed] = 0.0
     surely = memory[MEMORY.handling_time] + SURELY_IN_VAIN - 0.5 * period
     if carries:
-        memory[MEMORY.in_vain], memory[MEMORY.cannot_lift] = 0.0, 0.0
+        memory[MEMORY.in_vain] = 0.0
+        memory[MEMORY.cannot_lift] = 0.0
     elif memory[MEMORY.held] == HOLDING and item_in_reach(sensed):
         memory[MEMORY.in_vain] += period
         if memory[MEMORY.in_vain] > surely:
@@ -244,7 +254,8 @@ def diagnose(sensed: NDArray[np.float32], period: float, memory: NDArray[np.floa
     if is_inside and delivers:
         memory[MEMORY.delivering] += period
         if memory[MEMORY.delivering] > surely:
-            memory[MEMORY.cannot_deliver], memory[MEMORY.failed] = 1.0, 1.0
+            memory[MEMORY.cannot_deliver] = 1.0
+            memory[MEMORY.failed] = 1.0
 
 
 @kernel
@@ -305,10 +316,13 @@ def note_command(
     sensed: NDArray[np.float32], command: NDArray[np.float64], memory: NDArray[np.float64]
 ) -> None:
     """Remember the command (4,) that was given upon a row."""
-    x, y, grips = command[0], command[1], command[3]
+    x = command[0]
+    y = command[1]
+    grips = command[3]
     speed = length_of(x, y)
     if speed > 0.05:
-        memory[MEMORY.heading_x], memory[MEMORY.heading_y] = x / speed, y / speed
+        memory[MEMORY.heading_x] = x / speed
+        memory[MEMORY.heading_y] = y / speed
     memory[MEMORY.held] = HOLDING if grips > 0.5 else OPEN
     if sensed[row.CARRYING_REQUESTED] > 0.5 and grips > -0.5:
         memory[MEMORY.held] = HOLDING_REQUESTED
@@ -326,8 +340,10 @@ def turn_back(turn: float, memory: NDArray[np.float64]) -> None:
     if turn == 0.0:
         return
     frame = math.cos(turn), math.sin(turn)
-    heading_x, heading_y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
-    home_x, home_y = memory[MEMORY.home_x], memory[MEMORY.home_y]
+    heading_x = memory[MEMORY.heading_x]
+    heading_y = memory[MEMORY.heading_y]
+    home_x = memory[MEMORY.home_x]
+    home_y = memory[MEMORY.home_y]
     memory[MEMORY.heading_x], memory[MEMORY.heading_y] = to_frame(frame, heading_x, heading_y)
     memory[MEMORY.home_x], memory[MEMORY.home_y] = to_frame(frame, home_x, home_y)
     memory[MEMORY.wall] -= turn

@@ -25,8 +25,12 @@ from swarm_logistics_env.world.motion.memory import (
     to_frame,
 )
 
-N_FAR, N_NEAR, N_OBSTACLES = 8, 3, 6  # neighbours, near ones, items that a laden robot avoids
-WALL_REACH, FAR, NEAR = 0.7, 2.0, 0.5  # [m], where nearness 1 .. 0 ends
+N_FAR = 8  # neighbours
+N_NEAR = 3  # near ones
+N_OBSTACLES = 6  # items that a laden robot avoids
+WALL_REACH = 0.7  # [m], where nearness 1 .. 0 ends
+FAR = 2.0  # [m]
+NEAR = 0.5  # [m]
 RANDOM_HEADING_TIME = 0.8  # [s] that a random direction lasts
 FARTHEST = 8.0  # [m] from the delivery area, as far as a network is told
 FIRST_RANDOM_HEADING = 1_000_003  # number in the robot's stream
@@ -97,7 +101,9 @@ def read_observations(
     """
     fades = fading(period)
     for robot in range(rows.shape[0]):
-        sensed, memory, read = rows[robot], memories[robot], inputs[robot]
+        sensed = rows[robot]
+        memory = memories[robot]
+        read = inputs[robot]
         kept_home = remember_row(sensed, period, fades, memory)
         beams = beams_turned(memory)
         turned[robot] = TURNS[beams]
@@ -162,13 +168,15 @@ def read_items(
         present = INPUT.obstacle_0_present + len(_OBSTACLE) * index
         read[present] = 1.0 if carries and sensed[item + row.ITEM.present] > 0.5 else 0.0
         along = INPUT.obstacle_0_along + len(_OBSTACLE) * index
-        x, y = sensed[item + row.ITEM.x], sensed[item + row.ITEM.y]
+        x = sensed[item + row.ITEM.x]
+        y = sensed[item + row.ITEM.y]
         put(read, along, read[present], frame, x, y)
     read[INPUT.requested_present : INPUT.requested_recently_held + 1] = 0.0
     for index in range(row.N_ITEMS_IN_VIEW):
         item = row.ITEMS + row.ITEM_WIDTH * index
         if sensed[item + row.ITEM.present] > 0.5 and sensed[item + row.ITEM.requested] > 0.5:
-            x, y = float(sensed[item + row.ITEM.x]), float(sensed[item + row.ITEM.y])
+            x = float(sensed[item + row.ITEM.x])
+            y = float(sensed[item + row.ITEM.y])
             distance = max(length_of(x, y), 1e-9)
             along, aside = to_frame(frame, x, y)
             read[INPUT.requested_present] = 1.0
@@ -191,7 +199,8 @@ def read_lead(
 ) -> None:
     """Fill the inputs of the lowest timer heard, times `trust`."""
     heard = sensed[row.LOWEST_TIMER] * trust
-    x, y = float(sensed[row.LOWEST_TIMER_X]), float(sensed[row.LOWEST_TIMER_Y])
+    x = float(sensed[row.LOWEST_TIMER_X])
+    y = float(sensed[row.LOWEST_TIMER_Y])
     distance = length_of(x, y)
     unit = heard / distance if distance > 0.0 else 0.0
     read[INPUT.lead_present] = heard
@@ -214,9 +223,11 @@ def read_robot(
     read[INPUT.timer_runs] = sensed[row.TIMER_RUNS]
     read[INPUT.timer] = sensed[row.TIMER] / 10.0
     read[INPUT.contact] = sensed[row.CONTACT]
-    velocity_x, velocity_y = sensed[row.VELOCITY_X], sensed[row.VELOCITY_Y]
+    velocity_x = sensed[row.VELOCITY_X]
+    velocity_y = sensed[row.VELOCITY_Y]
     put(read, INPUT.velocity_along, 0.5, frame, velocity_x, velocity_y)
-    heading_x, heading_y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
+    heading_x = memory[MEMORY.heading_x]
+    heading_y = memory[MEMORY.heading_y]
     put(read, INPUT.heading_along, 1.0, frame, heading_x, heading_y)
     # The heading is at most half a beam aside, so it is doubled to be as large as other inputs.
     read[INPUT.heading_aside] *= 2.0

@@ -18,7 +18,8 @@ from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import MEMORY, length_of
 
 # Ranges in m, beside the pick-up range of 0.25: hold lifts the requested item first if in reach.
-_IN_REACH, _OUT_OF_REACH = 0.2, 0.28
+_IN_REACH = 0.2
+_OUT_OF_REACH = 0.28
 _PUT_DOWN_TIME = 0.5  # [s] before the end, at which the item that was in the way is put down
 
 
@@ -31,7 +32,8 @@ def steer(memory: NDArray[np.float64], command: NDArray[np.float64]) -> None:
     Args:
         command: forward and left as if the drive were holonomic; left becomes 0.
     """
-    widest, speed = memory[MEMORY.widest_turn], length_of(command[0], command[1])
+    widest = memory[MEMORY.widest_turn]
+    speed = length_of(command[0], command[1])
     if widest <= 0.0 or speed < 1e-6:
         return
     angle = math.atan2(command[1], command[0])
@@ -43,7 +45,8 @@ def steer(memory: NDArray[np.float64], command: NDArray[np.float64]) -> None:
     turn = min(max(angle, -widest), widest)
     # It drives along its mean direction in the period, and slower the more that is off.
     command[0] = forwards * speed * max(0.0, math.cos(angle - 0.5 * turn))
-    command[1], command[2] = 0.0, turn / widest
+    command[1] = 0.0
+    command[2] = turn / widest
 
 
 @kernel
@@ -54,15 +57,21 @@ def clear_the_way(
     if memory[MEMORY.clearing] <= 0.0:
         return
     requested, other = nearest_items(sensed)
-    x, y, speed, gripper = 0.0, 0.0, 0.0, -1.0
+    x = 0.0
+    y = 0.0
+    speed = 0.0
+    gripper = -1.0
     if sensed[row.CARRYING_REQUESTED] < 0.5 and sensed[row.CARRYING] > 0.5:
-        x, y = memory[MEMORY.heading_x], memory[MEMORY.heading_y]
+        x = memory[MEMORY.heading_x]
+        y = memory[MEMORY.heading_y]
         if requested >= 0:
-            x, y = -sensed[requested + row.ITEM.x], -sensed[requested + row.ITEM.y]
+            x = -sensed[requested + row.ITEM.x]
+            y = -sensed[requested + row.ITEM.y]
         speed = 1.0
         gripper = 1.0 if memory[MEMORY.clearing] > _PUT_DOWN_TIME else -1.0
     elif sensed[row.CARRYING] < 0.5 and other >= 0:
-        x, y = sensed[other + row.ITEM.x], sensed[other + row.ITEM.y]
+        x = sensed[other + row.ITEM.x]
+        y = sensed[other + row.ITEM.y]
         away = length_of(x, y)
         speed = min(1.0, 2.0 * away)
         alone = requested < 0 or square_to(sensed, requested) > _OUT_OF_REACH**2
@@ -76,8 +85,10 @@ def set_velocity(
 ) -> None:
     """Fill one robot's command (4,): `speed` in the direction (x, y), of any length; no turn."""
     length = max(length_of(x, y), 1e-9)
-    command[0], command[1] = speed * x / length, speed * y / length
-    command[2], command[3] = 0.0, gripper
+    command[0] = speed * x / length
+    command[1] = speed * y / length
+    command[2] = 0.0
+    command[3] = gripper
 
 
 @kernel
@@ -86,7 +97,9 @@ def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
 
     The nearest thing comes first in a row.
     """
-    requested, other, nearest = -1, -1, math.inf
+    requested = -1
+    other = -1
+    nearest = math.inf
     for index in range(row.N_ITEMS_IN_VIEW):
         item = row.ITEMS + row.ITEM_WIDTH * index
         if sensed[item + row.ITEM.present] < 0.5:
@@ -96,7 +109,8 @@ def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
         else:
             square = square_to(sensed, item)
             if square < nearest:
-                other, nearest = item, square
+                other = item
+                nearest = square
     return requested, other
 
 

@@ -94,7 +94,8 @@ def dock_colours(hue: str) -> tuple[RGB, RGB, RGB]:
 
 def _mixed(colour: RGB, other: RGB, share: float) -> RGB:
     red, green, blue = (
-        round(share * one + (1.0 - share) * two) for one, two in zip(colour, other, strict=True)
+        round(share * value + (1.0 - share) * other_value)
+        for value, other_value in zip(colour, other, strict=True)
     )
     return red, green, blue
 

@@ -71,7 +71,8 @@ class Picture:
         """Draw what changes with the scenario alone."""
         self._scenario = scenario
         margin = self._margin
-        across, down = scenario.warehouse_width, scenario.warehouse_height
+        across = scenario.warehouse_width
+        down = scenario.warehouse_height
         self._scale = scale = self._longer_side / max(across, down)
         # In a long warehouse words are as small as in a square of twice its shorter side.
         side = min(self._longer_side, 2.0 * scale * min(across, down))
@@ -97,7 +98,9 @@ class Picture:
             self._background.blit(picture, picture.get_rect(midleft=at))
 
     def _draw_floor(self, scenario: Scenario) -> None:
-        picture, floor, scale = self._background, self.floor, self._scale
+        picture = self._background
+        floor = self.floor
+        scale = self._scale
         wall = self._wall
         picture.fill(palette.SURROUNDINGS)
         picture.fill(palette.INK, floor.inflate(2 * wall, 2 * wall))
@@ -116,7 +119,8 @@ class Picture:
             plan_picture.draw_docks_and_solids(picture)
 
     def _draw_delivery_area(self, area: Rect) -> None:
-        picture, area = self._background, area.clip(self.floor)
+        picture = self._background
+        area = area.clip(self.floor)
         picture.set_clip(area)
         picture.fill(palette.DELIVERY_AREA)
         for x in range(area.left, area.right + area.height, 2 * max(4, self._margin)):
@@ -135,12 +139,14 @@ class Picture:
         height = self._text_height
         marks = legend(self._scenario, height)
         entries = []
-        x, y = self._margin, self._caption + 2 * self._line
+        x = self._margin
+        y = self._caption + 2 * self._line
         for name, picture in marks.items():
             word = words(name, height)
             wide = picture.get_width() + height // 3
             if x + wide + word.get_width() > self.width - self._margin:
-                x, y = self._margin, y + self._line
+                x = self._margin
+                y = y + self._line
             # Its height does not depend on whether there are obstacles.
             if name != OBSTACLE or self._scenario.n_obstacles:
                 entries += [(picture, (x, y)), (word, (x + wide, y))]

@@ -31,7 +31,8 @@ class PlanPicture:
 
     def __init__(self, plan: FloorPlan, floor: Rect, scale: float) -> None:
         self._shapes = plan_shapes(plan)
-        self._floor, self._scale = floor, scale
+        self._floor = floor
+        self._scale = scale
         self._cell = scale * plan.cell_size
         self._edge = max(1, round(0.07 * self._cell))
 

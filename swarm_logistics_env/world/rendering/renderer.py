@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     import pygame
 
 RenderMode = Literal["rgb_array", "human"]
-LEAST_SIZE, LARGEST_SIZE = 100, 8000  # of a picture's longer side [px]
+LEAST_SIZE = 100  # of a picture's longer side [px]
+LARGEST_SIZE = 8000
 
 FRAME_RATE = 25.0  # of films, frames a second
 

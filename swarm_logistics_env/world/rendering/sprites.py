@@ -76,7 +76,9 @@ def robot(radius: float, activity: str, heading: int, is_faulty: bool) -> Surfac
         activity: a key of `ACTIVITIES`.
         heading: to the left from the right [degrees].
     """
-    nose, base, half_width = 1.45 * radius + 1.0, 0.5 * radius, 0.6 * radius + 0.5
+    nose = 1.45 * radius + 1.0
+    base = 0.5 * radius
+    half_width = 0.6 * radius + 0.5
     sheet = _sheet(nose, INK)
     corners = Vector2(nose, 0.0), Vector2(base, half_width), Vector2(base, -half_width)
     middle = Vector2(sheet.get_rect().center)
@@ -130,7 +132,8 @@ def obstacle(radius: float) -> Surface:
     sheet = _sheet(radius, INK)
     _disc(sheet, INK, radius)
     _disc(sheet, OBSTACLE, radius - 1.5)
-    middle, arm = Vector2(sheet.get_rect().center), Vector2(_LARGER * (radius - 1.0), 0.0)
+    middle = Vector2(sheet.get_rect().center)
+    arm = Vector2(_LARGER * (radius - 1.0), 0.0)
     for angle in (45, 135):
         ends = middle + arm.rotate(angle), middle - arm.rotate(angle)
         pygame.draw.line(sheet, INK, *ends, round(1.5 * _LARGER))

@@ -51,7 +51,7 @@ class Scenario(ScenarioFields):
         if not isinstance(fields, dict) or not isinstance(fields.get("floor"), str):
             return fields
         defaults = {name: field.default for name, field in cls.model_fields.items()}
-        return with_plan_sizes({**defaults, **fields}, given=fields)
+        return with_plan_sizes({**defaults, **fields}, chosen=fields)
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -25,7 +25,8 @@ def choose(me: int, pose: Pose, world: World, grid: Grid, n_found: int, purpose:
     n_chosen = 0
     step = world.progress.step[0]
     for index in range(n_found):
-        other, square = grid.members[nearby.slot[index]], nearby.square[index]
+        other = grid.members[nearby.slot[index]]
+        square = nearby.square[index]
         is_heard = purpose == ROBOT_SEEN and nearby.is_heard[index]
         is_seen = square <= limit
         if world.floor.n_columns > 0 and is_seen:
@@ -35,7 +36,8 @@ def choose(me: int, pose: Pose, world: World, grid: Grid, n_found: int, purpose:
             )
         if dropout > 0.0 and is_seen:
             is_seen = not is_missed(world.robots.sensor_key[me], other, step, purpose, dropout)
-        nearby.chosen[n_chosen], nearby.chosen_square[n_chosen] = other, square
+        nearby.chosen[n_chosen] = other
+        nearby.chosen_square[n_chosen] = square
         nearby.chosen_heard[n_chosen] = is_heard
         n_chosen += int(is_heard | is_seen)
     return n_chosen
@@ -67,7 +69,8 @@ def rank_nearest(nearby: Nearby, count: int, n_wanted: int) -> int:
 @inlined_kernel
 def describe_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
     """Fill the block of items in a row from the chosen items."""
-    robots, nearby = world.robots, world.nearby
+    robots = world.robots
+    nearby = world.nearby
     for rank in range(rank_nearest(nearby, n_chosen, row.N_ITEMS_IN_VIEW)):
         item = nearby.chosen[nearby.nearest[rank]]
         position = world.items.position
@@ -84,12 +87,14 @@ def describe_items(me: int, pose: Pose, world: World, n_chosen: int, out: Sensed
 @inlined_kernel
 def describe_neighbours(pose: Pose, world: World, n_chosen: int, out: Sensed) -> None:
     """Fill the blocks of neighbours and of their messages in a row from the chosen neighbours."""
-    robots, parameters = world.robots, world.parameters
+    robots = world.robots
+    parameters = world.parameters
     nearby = world.nearby
     width = world.robots.message.shape[1]
     for rank in range(rank_nearest(nearby, n_chosen, row.N_NEIGHBOURS)):
         index = nearby.nearest[rank]
-        other, is_heard = nearby.chosen[index], nearby.chosen_heard[index]
+        other = nearby.chosen[index]
+        is_heard = nearby.chosen_heard[index]
         forward, left = in_frame(pose, robots.position[other, 0], robots.position[other, 1])
         tells = is_heard and not math.isnan(robots.told[other])
         column = row.NEIGHBOURS + rank * row.NEIGHBOUR_WIDTH

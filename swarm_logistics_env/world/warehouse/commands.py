@@ -75,7 +75,8 @@ def wanted_motion(world: World, robot: int) -> tuple[float, float, float, float,
     turns as commanded and by its heading drift, unless its motor is dead; one that is not holonomic
     ignores `left`.
     """
-    command, able = world.commands.now[robot], world.able
+    command = world.commands.now[robot]
+    able = world.able
     forward = min(max(command[FORWARD], -1.0), 1.0)
     left = min(max(command[LEFT], -1.0), 1.0) if world.parameters.is_holonomic else 0.0
     norm = math.sqrt(forward * forward + left * left)
@@ -93,7 +94,8 @@ def list_motions(world: World, motions: Numbers) -> None:
     for robot in range(len(motions)):
         if may_drive(world, robot):
             forward, left, speed, turn_rate, drift = wanted_motion(world, robot)
-            motions[robot, 0], motions[robot, 1] = speed * forward, speed * left
+            motions[robot, 0] = speed * forward
+            motions[robot, 1] = speed * left
             motions[robot, 2] = turn_rate + drift
 
 
@@ -103,7 +105,8 @@ def drive(world: World) -> None:
 
     A robot drives along its mean direction while it turns. One that may not drive stands.
     """
-    robots, wanted_velocity = world.robots, world.engine.wanted_velocity
+    robots = world.robots
+    wanted_velocity = world.engine.wanted_velocity
     for robot in range(len(world.commands.now)):
         wanted_velocity[robot, 0] = 0.0
         wanted_velocity[robot, 1] = 0.0
@@ -114,7 +117,8 @@ def drive(world: World) -> None:
         robots.turn_rate[robot] = turn_rate + drift - robots.heading_drift[robot]
         angle = (turn_rate + drift) * world.parameters.control_period
         heading = robots.heading[robot]
-        cosine, sine = math.cos(heading + 0.5 * angle), math.sin(heading + 0.5 * angle)
+        cosine = math.cos(heading + 0.5 * angle)
+        sine = math.sin(heading + 0.5 * angle)
         wanted_velocity[robot, 0] = speed * (forward * cosine - left * sine)
         wanted_velocity[robot, 1] = speed * (forward * sine + left * cosine)
         if angle != 0.0:

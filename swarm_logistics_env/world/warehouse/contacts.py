@@ -79,8 +79,11 @@ def count_motion(world: World) -> None:
 
     Notes where the robots were and how fast, for `count_overlap`.
     """
-    counts, robots, bodies = world.contacts, world.robots, world.engine.bodies
-    period, total = world.parameters.control_period, counts.acceleration_sum[0]
+    counts = world.contacts
+    robots = world.robots
+    bodies = world.engine.bodies
+    period = world.parameters.control_period
+    total = counts.acceleration_sum[0]
     for robot in range(len(robots.item)):
         counts.closing[robot] = 0.0
         for axis in range(2):
@@ -102,11 +105,14 @@ def count_overlap(me: int, other: int, square: float, world: World) -> None:
 
     `square` [m2] is of the distance between their centres.
     """
-    counts, diameter = world.contacts, 2.0 * world.parameters.robot_radius
+    counts = world.contacts
+    diameter = 2.0 * world.parameters.robot_radius
     if diameter - math.sqrt(square) > DEEP:
         counts.is_deep[0] = True
-    position, velocity = counts.position_before, counts.velocity_before
-    x, y = position[other, 0] - position[me, 0], position[other, 1] - position[me, 1]
+    position = counts.position_before
+    velocity = counts.velocity_before
+    x = position[other, 0] - position[me, 0]
+    y = position[other, 1] - position[me, 1]
     square_before = x * x + y * y
     if square_before < diameter * diameter:
         return  # they did before; at the start of an episode, too, where nobody was anywhere

@@ -38,7 +38,8 @@ def ask(world: World) -> None:
 @kernel
 def close_request(world: World, closed: int) -> None:
     """Close a request, by its place, whose item was delivered; all for it if it left for good."""
-    requested, docks = world.progress.requested, world.progress.requested_dock
+    requested = world.progress.requested
+    docks = world.progress.requested_dock
     item = requested[closed]
     has_left = world.items.status[item] == DELIVERED
     n_open = 0
@@ -67,7 +68,8 @@ def takes(world: World, dock: int, item: int) -> bool:
     if not world.parameters.names_docks or item == NOBODY:
         return True
     progress = world.progress
-    is_taken, is_wanted = False, False
+    is_taken = False
+    is_wanted = False
     for index in range(len(progress.requested)):
         if progress.requested[index] == item:
             is_wanted = True
@@ -109,18 +111,18 @@ def next_of_cycle(world: World) -> int:
 
     Each item draws a number in every cycle; the lowest comes first, of equal ones the first item.
     """
-    keys, cycle, last_item = (
-        world.items.request_key,
-        world.progress.cycle[0],
-        world.progress.asked_last[0],
-    )
+    keys = world.items.request_key
+    cycle = world.progress.cycle[0]
+    last_item = world.progress.asked_last[0]
     last_number = uniform(keys[last_item], cycle) if last_item != NOBODY else -1.0
-    chosen_item, lowest_number = NOBODY, math.inf
+    chosen_item = NOBODY
+    lowest_number = math.inf
     for item in range(len(keys)):
         number = uniform(keys[item], cycle)
         is_next = number > last_number or (number == last_number and item > last_item)
         if is_next and number < lowest_number and weight_of(world, item) > 0.0:
-            chosen_item, lowest_number = item, number
+            chosen_item = item
+            lowest_number = number
     return chosen_item
 
 

@@ -270,8 +270,10 @@ class Occurrence:
 
     def remaining_factors(self, time: float, end: float) -> tuple[float, float]:
         """Return the factors on speed and view at `time` [s] of an episode until `end` [s]."""
-        mode, fault = self.mode, self.fault
-        speed, view = mode.speed, mode.view
+        mode = self.mode
+        fault = self.fault
+        speed = mode.speed
+        view = mode.view
         if fault.factor is not None:
             speed = fault.factor if mode.factor == "speed" else speed
             view = fault.factor if mode.factor == "view" else view

@@ -33,7 +33,8 @@ def floor_of(scenario: Scenario) -> Floor:
 def floor_map(scenario: Scenario) -> FloorMap:
     """Return what is where on a scenario's floor, for points."""
     if scenario.floor is None:
-        width, height = scenario.warehouse_width, scenario.warehouse_height
+        width = scenario.warehouse_width
+        height = scenario.warehouse_height
         return OpenFloor(width, height, scenario.storage_width)
     return planned_floor(scenario.floor, scenario.cell_size, 2.0 * scenario.robot_radius)
 
@@ -152,7 +153,8 @@ def is_near_solid(floor: Floor, x: float, y: float, distance: float) -> bool:
     for row in range(bottom, top + 1):
         for column in range(left, right + 1):
             if floor.is_solid[row, column]:
-                low_x, low_y = column * floor.cell, row * floor.cell
+                low_x = column * floor.cell
+                low_y = row * floor.cell
                 dx = max(low_x - x, 0.0, x - (low_x + floor.cell))
                 dy = max(low_y - y, 0.0, y - (low_y + floor.cell))
                 if dx * dx + dy * dy < distance * distance:
@@ -171,8 +173,10 @@ def free_way(floor: Floor, x: float, y: float, step_x: float, step_y: float, rea
         step_x, step_y: its step [m]; of length 1 m, `reach` and the result are in m.
     """
     cell = floor.cell
-    column, row = index_along(x, cell, floor.n_columns), index_along(y, cell, floor.n_rows)
-    right, up = (1 if step_x > 0.0 else -1), (1 if step_y > 0.0 else -1)
+    column = index_along(x, cell, floor.n_columns)
+    row = index_along(y, cell, floor.n_rows)
+    right = 1 if step_x > 0.0 else -1
+    up = 1 if step_y > 0.0 else -1
     # How far along the ray its next borders are, and how far apart they follow each other.
     every_x = cell / abs(step_x) if step_x != 0.0 else math.inf
     every_y = cell / abs(step_y) if step_y != 0.0 else math.inf
@@ -180,10 +184,12 @@ def free_way(floor: Floor, x: float, y: float, step_x: float, step_y: float, rea
     next_y = ((row + (up > 0)) * cell - y) / step_y if step_y != 0.0 else math.inf
     while True:
         if next_x < next_y:
-            distance, column = next_x, column + right
+            distance = next_x
+            column = column + right
             next_x += every_x
         else:
-            distance, row = next_y, row + up
+            distance = next_y
+            row = row + up
             next_y += every_y
         is_outside = column < 0 or row < 0 or column >= floor.n_columns or row >= floor.n_rows
         if distance >= reach or is_outside:

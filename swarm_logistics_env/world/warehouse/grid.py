@@ -19,7 +19,8 @@ def blank_grid(width: float, height: float, cell: float, n_points: int) -> Grid:
     """Return an empty grid for `n_points` points, of cells at least `cell` wide [m]."""
     # More cells than points buys nothing: widen the cells of an arena that is nearly empty.
     cell = max(cell, math.sqrt(width * height / (4.0 * n_points + 16.0)))
-    n_columns, n_rows = math.ceil(width / cell), math.ceil(height / cell)
+    n_columns = math.ceil(width / cell)
+    n_rows = math.ceil(height / cell)
     return Grid(
         cell=cell,
         n_columns=n_columns,
@@ -72,7 +73,8 @@ def look_through(
     Returns how many are listed then.
     """
     for slot in range(run[0], run[1]):
-        dx, dy = grid.position[0, slot] - centre[0], grid.position[1, slot] - centre[1]
+        dx = grid.position[0, slot] - centre[0]
+        dy = grid.position[1, slot] - centre[1]
         square = dx * dx + dy * dy
         # Written always and counted only if near: no branch to mispredict.
         nearby.slot[n_found] = slot
@@ -103,7 +105,8 @@ def fill(grid: Grid, position: Numbers, included: Flags) -> None:
     # Backwards, so that each cell lists its points in ascending order: ties never depend on memory.
     for point in range(len(position) - 1, -1, -1):
         if included[point]:
-            x, y = position[point, 0], position[point, 1]
+            x = position[point, 0]
+            y = position[point, 1]
             cell = cell_of(grid, x, y)
             start[cell] -= 1
             grid.members[start[cell]] = point

@@ -58,7 +58,8 @@ def place_obstacles(scenario: Scenario, seed: int) -> Numbers:
     floor = floor_of(scenario)
     # With a plan a robot gets past on every side, so that no obstacle closes a way.
     gap = 2.0 * scenario.robot_radius + _GAP if floor.n_columns else 0.0
-    n, radius = scenario.n_obstacles, scenario.obstacle_radius
+    n = scenario.n_obstacles
+    radius = scenario.obstacle_radius
     return _draw_centres(
         scenario, seed, Discs("obstacles", n, radius, floor.start, gap, gap), _NO_DISCS
     )
@@ -66,7 +67,8 @@ def place_obstacles(scenario: Scenario, seed: int) -> Numbers:
 
 def place_items(scenario: Scenario, seed: int, obstacles: Numbers) -> Numbers:
     """Return item centres in the storage [m], shape (n_items, 2), clear of each other."""
-    radius, cells = scenario.item_radius, floor_of(scenario).storage
+    radius = scenario.item_radius
+    cells = floor_of(scenario).storage
     discs = Discs("items", scenario.n_items, radius, cells, item_gap(radius, scenario.robot_radius))
     return _draw_centres(scenario, seed, discs, obstacles)
 
@@ -94,12 +96,16 @@ def place_restocked(world: World, item: int) -> bool:
 
     Returns whether there was room.
     """
-    parameters, items, robots = world.parameters, world.items, world.robots
+    parameters = world.parameters
+    items = world.items
+    robots = world.robots
     radius = parameters.item_radius
-    high_x, high_y = parameters.storage_width - radius, parameters.warehouse_height - radius
+    high_x = parameters.storage_width - radius
+    high_y = parameters.warehouse_height - radius
     spacing = radius + max(radius, parameters.robot_radius)
     key = pair_key(items.restock_key[0], world.progress.n_delivered[0])
-    floor, gap = world.floor, item_gap(radius, parameters.robot_radius)
+    floor = world.floor
+    gap = item_gap(radius, parameters.robot_radius)
     for attempt in range(_ATTEMPTS):
         if floor.n_columns > 0:
             x, y = draw_in_cells(floor, floor.storage, key, attempt)
@@ -109,11 +115,13 @@ def place_restocked(world: World, item: int) -> bool:
             is_free = True
         is_free &= is_clear(x, y, world.obstacles, parameters.obstacle_radius + radius)
         for other in range(len(items.status)):
-            dx, dy = items.position[other, 0] - x, items.position[other, 1] - y
+            dx = items.position[other, 0] - x
+            dy = items.position[other, 1] - y
             is_near = dx * dx + dy * dy < spacing * spacing
             is_free &= not (is_near and items.status[other] == STORED)
         for robot in range(len(robots.present)):
-            dx, dy = robots.position[robot, 0] - x, robots.position[robot, 1] - y
+            dx = robots.position[robot, 0] - x
+            dy = robots.position[robot, 1] - y
             is_near = dx * dx + dy * dy < spacing * spacing
             is_free &= not (is_near and robots.present[robot])
         if is_free:
@@ -130,9 +138,11 @@ def item_gap(item_radius: float, robot_radius: float) -> float:
 
 
 def _draw_centres(scenario: Scenario, seed: int, discs: Discs, obstacles: Numbers) -> Numbers:
-    floor, radius = floor_of(scenario), discs.radius
+    floor = floor_of(scenario)
+    radius = discs.radius
     centres = np.zeros((discs.n, 2))
-    high_x, high_y = scenario.storage_width - radius, scenario.warehouse_height - radius
+    high_x = scenario.storage_width - radius
+    high_y = scenario.warehouse_height - radius
     reach = scenario.obstacle_radius + radius
     for arrangement in range(_ARRANGEMENTS):
         suffix = f" {arrangement}" if arrangement else ""
@@ -208,7 +218,8 @@ def strew_in_cells(
 @kernel
 def is_clear_of_sides(floor: Floor, x: float, y: float, distance: float) -> bool:
     """Return whether no side of the warehouse and no rack is nearer than `distance` [m]."""
-    width, height = floor.n_columns * floor.cell, floor.n_rows * floor.cell
+    width = floor.n_columns * floor.cell
+    height = floor.n_rows * floor.cell
     from_sides = min(min(x, width - x), min(y, height - y))
     return from_sides >= distance and not is_near_solid(floor, x, y, distance)
 

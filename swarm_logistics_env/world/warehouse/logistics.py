@@ -38,7 +38,9 @@ def gripper_of(world: World, robot: int, command: float) -> float:
     kind = world.robots.handling[robot, KIND]
     if kind == IDLE:
         return command
-    return 1.0 if kind == LIFTING else (-1.0 if kind == PUTTING_DOWN else 0.0)
+    if kind == LIFTING:
+        return 1.0
+    return -1.0 if kind == PUTTING_DOWN else 0.0
 
 
 @inlined_kernel
@@ -46,7 +48,8 @@ def is_done(world: World, robot: int, kind: int, item: int) -> bool:
     """Return whether a robot has done this to an item; let it begin if it is idle."""
     if world.parameters.handling_steps == 0:
         return True
-    handling, step = world.robots.handling, world.progress.step[0]
+    handling = world.robots.handling
+    step = world.progress.step[0]
     if handling[robot, KIND] == IDLE:
         handling[robot, KIND] = kind
         handling[robot, ITEM] = item
@@ -58,7 +61,8 @@ def is_done(world: World, robot: int, kind: int, item: int) -> bool:
 @inlined_kernel
 def may_deliver(world: World, robot: int) -> bool:
     """Return whether a robot delivers already, or may begin; the dock is taken then."""
-    progress, parameters = world.progress, world.parameters
+    progress = world.progress
+    parameters = world.parameters
     if parameters.dock_period == 0.0 or world.robots.handling[robot, KIND] != IDLE:
         return True
     if progress.time[0] < progress.dock_free[0] - _GRACE:
@@ -104,14 +108,18 @@ def end_handling(world: World) -> None:
             handling[robot, KIND] = IDLE
 
 
-_HOLD, _OPEN = 0.5, -0.5
+_HOLD = 0.5
+_OPEN = -0.5
 
 
 @engine_kernel
 def mask_below(world: World, robot: int) -> None:
     """Mask what stands below a robot that lifts."""
-    items, grid, nearby = world.items, world.item_grid, world.nearby
-    x, y = world.robots.position[robot, 0], world.robots.position[robot, 1]
+    items = world.items
+    grid = world.item_grid
+    nearby = world.nearby
+    x = world.robots.position[robot, 0]
+    y = world.robots.position[robot, 1]
     n_found = look_around(grid, x, y, reach_of(world), NOBODY, nearby)
     for index in range(n_found):
         item = grid.members[nearby.slot[index]]
@@ -126,12 +134,14 @@ def unmask_left(world: World) -> None:
 
     Both grids hold where things stand now. An item that is in none yet waits for the next step.
     """
-    grid, nearby = world.item_grid, world.nearby
+    grid = world.item_grid
+    nearby = world.nearby
     for slot in range(grid.start[-1]):
         item = grid.members[slot]
         if world.items.covered[item] == 0:
             continue
-        x, y = grid.position[0, slot], grid.position[1, slot]
+        x = grid.position[0, slot]
+        y = grid.position[1, slot]
         n_found = look_around(world.robot_grid, x, y, reach_of(world), NOBODY, nearby)
         is_below_laden = False
         for index in range(n_found):
@@ -151,11 +161,13 @@ def reach_of(world: World) -> float:
 @kernel
 def carry_along(world: World) -> None:
     """Bring carried items to where their carriers are and note who is in the delivery area."""
-    robots, items = world.robots, world.items
+    robots = world.robots
+    items = world.items
     for robot in range(len(robots.item)):
         x = robots.position[robot, 0]
         y = robots.position[robot, 1]
-        item, dock = robots.item[robot], dock_at(world, x, y)
+        item = robots.item[robot]
+        dock = dock_at(world, x, y)
         is_there = robots.present[robot] and dock != NOBODY
         robots.in_delivery[robot] = is_there and takes(world, dock, item)
         if item != NOBODY:
@@ -169,7 +181,9 @@ def open_grippers(world: World) -> None:
 
     A requested item is let go of anywhere, another one only outside the delivery area.
     """
-    robots, able, commands = world.robots, world.able, world.commands.now
+    robots = world.robots
+    able = world.able
+    commands = world.commands.now
     for robot in range(len(commands)):
         item = robots.item[robot]
         is_able = robots.present[robot] and able.obeys[robot]
@@ -187,7 +201,9 @@ def open_grippers(world: World) -> None:
 @engine_kernel
 def put_down(world: World, robot: int) -> None:
     """Let a robot's item lie where it is, covered."""
-    robots, items, engine = world.robots, world.items, world.engine
+    robots = world.robots
+    items = world.items
+    engine = world.engine
     item = robots.item[robot]
     robots.item[robot] = NOBODY
     items.status[item] = STORED
@@ -200,7 +216,8 @@ def put_down(world: World, robot: int) -> None:
 @engine_kernel
 def take_out(world: World, robot: int) -> None:
     """Take a robot out of the arena; what it carries is put down where it is."""
-    robots, engine = world.robots, world.engine
+    robots = world.robots
+    engine = world.engine
     if robots.item[robot] != NOBODY:
         put_down(world, robot)
     collide_with(engine, engine.robot_shapes[robot], NO_ONE)
@@ -245,14 +262,20 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
     The nearest in reach that it knows to be requested comes first, else the nearest that is not in
     its memory. A robot that lifts goes on with its item, and nobody else takes it.
     """
-    robots, grid, nearby = world.robots, world.item_grid, world.nearby
+    robots = world.robots
+    grid = world.item_grid
+    nearby = world.nearby
     if robots.handling[robot, KIND] == LIFTING:
         return item_lifted(world, robot)
-    x, y = robots.position[robot, 0], robots.position[robot, 1]
+    x = robots.position[robot, 0]
+    y = robots.position[robot, 1]
     n_found = look_around(grid, x, y, world.parameters.pickup_range, NOBODY, nearby)
-    best, best_square, is_best_requested = NOBODY, math.inf, False
+    best = NOBODY
+    best_square = math.inf
+    is_best_requested = False
     for index in range(n_found):
-        item, square = grid.members[nearby.slot[index]], nearby.square[index]
+        item = grid.members[nearby.slot[index]]
+        square = nearby.square[index]
         if world.items.status[item] != STORED or is_being_lifted(world, item):
             continue
         is_asked_for = is_known_request(world, robot, item)
@@ -263,7 +286,9 @@ def wanted_item(world: World, robot: int) -> tuple[int, float]:
             continue
         position = world.items.position[item]
         if is_in_sight(world, x, y, position[0], position[1]):
-            best, best_square, is_best_requested = item, square, is_asked_for
+            best = item
+            best_square = square
+            is_best_requested = is_asked_for
     return best, best_square
 
 
@@ -273,8 +298,12 @@ def close_grippers(world: World) -> None:
 
     If several want the same item, the nearest able one gets it, and the others choose again.
     """
-    robots, able, items, claims = world.robots, world.able, world.items, world.claims
-    engine, commands = world.engine, world.commands.now
+    robots = world.robots
+    able = world.able
+    items = world.items
+    claims = world.claims
+    engine = world.engine
+    commands = world.commands.now
     while True:
         is_settled = True
         for robot in range(len(commands)):
@@ -326,12 +355,16 @@ def deliver(world: World) -> tuple[int, bool]:
 
     Returns how many there were, and whether all that came back found room.
     """
-    robots, items, progress, engine = world.robots, world.items, world.progress, world.engine
+    robots = world.robots
+    items = world.items
+    progress = world.progress
+    engine = world.engine
     n_delivered = 0
     is_room = True
     index = 0
     while index < len(progress.requested) and progress.requested[index] != NOBODY:
-        request, item = index, progress.requested[index]
+        request = index
+        item = progress.requested[index]
         robot = items.carrier[item]
         index += 1
         if robot == NOBODY or not robots.in_delivery[robot] or not world.able.delivers[robot]:

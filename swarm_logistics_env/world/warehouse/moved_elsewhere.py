@@ -26,7 +26,8 @@ class MovedElsewhere:
     """
 
     def __init__(self, bodies: Bodies, scenario: Scenario, seed: int, world: World) -> None:
-        robots, corners = world.robots, world.floor.corners.reshape(-1, N_CORNERS, 2)
+        robots = world.robots
+        corners = world.floor.corners.reshape(-1, N_CORNERS, 2)
         boxes = np.column_stack([corners.min(axis=1), corners.max(axis=1)])
         bodies.place(
             Placement(

@@ -33,7 +33,9 @@ from .structs import (
     World,
 )
 
-_ROBOT, _SOLID, _ITEM = 1, 2, 4  # categories of shapes
+_ROBOT = 1  # categories of shapes
+_SOLID = 2
+_ITEM = 4
 _MASK = 32  # bits of the categories in a filter's second word, below those of its mask
 
 # A filter says what a shape collides with: its own categories, and a mask of the others'.
@@ -46,7 +48,9 @@ SOLID_THING = _SOLID | _ROBOT << _MASK
 # The contact solver iterates more if more touch. With 16 a jam of 150 in a corner stands
 # 10 mm inside itself, with 50 now and then 7 mm, with 80 always 1 mm; always 80 costs a swarm of
 # 25 an eighth of its step.
-_FEWEST_ITERATIONS, _MOST_ITERATIONS, _TOUCHING_PER_ITERATION = 16, 80, 2
+_FEWEST_ITERATIONS = 16
+_MOST_ITERATIONS = 80
+_TOUCHING_PER_ITERATION = 2
 
 
 @engine_kernel
@@ -56,7 +60,9 @@ def advance(world: World) -> None:
     Before each, every drive pushes with the force that brings its robot to the wanted velocity
     within the substep, or with its greatest force.
     """
-    engine, parameters, n_touching = world.engine, world.parameters, 0
+    engine = world.engine
+    parameters = world.parameters
+    n_touching = 0
     for touches in world.robots.contact:
         n_touching += int(touches)
     iterations = min(_FEWEST_ITERATIONS + n_touching // _TOUCHING_PER_ITERATION, _MOST_ITERATIONS)
@@ -82,13 +88,15 @@ def push(engine: EngineArrays, greatest: float, mass_per_period: float) -> None:
         change_y = engine.wanted_velocity[robot, 1] - body[at.velocity + 1]
         change = math.sqrt(change_x * change_x + change_y * change_y)
         share = mass_per_period * (1.0 if change <= greatest else greatest / change)
-        body[at.force], body[at.force + 1] = share * change_x, share * change_y
+        body[at.force] = share * change_x
+        body[at.force + 1] = share * change_y
 
 
 @engine_kernel
 def read(engine: EngineArrays) -> None:
     """Note where the bodies are and how fast."""
-    at, bodies = engine.body_words, engine.bodies
+    at = engine.body_words
+    bodies = engine.bodies
     for robot in range(len(bodies)):
         body = words_of(engine, robot)
         for axis in range(2):
@@ -123,14 +131,16 @@ N_WORDS = 16  # of a body that are looked at: up to its force, which pointers fo
 _SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
 _BIAS = 1e-4  # share of an overlap that is left after a second; the engine's default: 0.0018
 _WALL = 0.5  # [m], half the thickness of a wall
-N_WALLS, N_CORNERS = 4, 4
+N_WALLS = 4
+N_CORNERS = 4
 
 
 @engine_kernel
 def build(address: int) -> None:
     """Make everything of the world at `address` and note it in its engine's arrays."""
     world = unpacked_at(World, address)
-    engine, call = world.engine, world.engine.functions
+    engine = world.engine
+    call = world.engine.functions
     space = made_at(call.cpSpaceNew, ())
     engine.space[0] = space
     call_at(call.cpSpaceSetCollisionSlop, (space, _SLOP))
@@ -145,13 +155,17 @@ def build(address: int) -> None:
 @engine_kernel
 def build_solids(world: World, static: int) -> None:
     """Make walls, obstacles and racks."""
-    engine, parameters, obstacles = world.engine, world.parameters, world.obstacles
+    engine = world.engine
+    parameters = world.parameters
+    obstacles = world.obstacles
     call = engine.functions
-    width, height = parameters.warehouse_width, parameters.warehouse_height
+    width = parameters.warehouse_width
+    height = parameters.warehouse_height
     corner_x = (-_WALL, width + _WALL, width + _WALL, -_WALL)
     corner_y = (-_WALL, -_WALL, height + _WALL, height + _WALL)
     for side in range(N_WALLS):
-        corner, next_corner = side, (side + 1) % N_WALLS
+        corner = side
+        next_corner = (side + 1) % N_WALLS
         ends = (
             (corner_x[corner], corner_y[corner]),
             (corner_x[next_corner], corner_y[next_corner]),
@@ -176,8 +190,11 @@ def build_solids(world: World, static: int) -> None:
 @engine_kernel
 def build_robots(world: World) -> None:
     """Make the robots' bodies, which no contact turns, and their shapes."""
-    engine, parameters, robots = world.engine, world.parameters, world.robots
-    call, space = engine.functions, engine.space[0]
+    engine = world.engine
+    parameters = world.parameters
+    robots = world.robots
+    call = engine.functions
+    space = engine.space[0]
     for robot in range(len(robots.item)):
         body = made_at(call.cpBodyNew, (parameters.robot_mass, math.inf))
         position = (engine.robot_places[robot, 0], engine.robot_places[robot, 1])
@@ -187,7 +204,8 @@ def build_robots(world: World) -> None:
         shape = made_at(call.cpCircleShapeNew, (body, parameters.robot_radius, (0.0, 0.0)))
         kind = EMPTY_ROBOT if robots.item[robot] == NOBODY else LADEN_ROBOT
         collide_with(engine, shape, kind if robots.present[robot] else NO_ONE)
-        engine.robot_bodies[robot], engine.robot_shapes[robot] = body, shape
+        engine.robot_bodies[robot] = body
+        engine.robot_shapes[robot] = shape
         made_at(call.cpSpaceAddBody, (space, body))
         made_at(call.cpSpaceAddShape, (space, shape))
 
@@ -198,7 +216,9 @@ def build_items(world: World, static: int) -> None:
 
     So there is no body to integrate or to read.
     """
-    engine, items, call = world.engine, world.items, world.engine.functions
+    engine = world.engine
+    items = world.items
+    call = world.engine.functions
     for item in range(len(items.status)):
         centre = (items.position[item, 0], items.position[item, 1])
         shape = made_at(call.cpCircleShapeNew, (static, world.parameters.item_radius, centre))
@@ -254,7 +274,8 @@ class Physics:
             bodies=np.zeros((n, 4)),
             wanted_velocity=np.zeros((n, 2)),
         )
-        self.n_boxes, self.words = n_boxes, packed(self.engine)
+        self.n_boxes = n_boxes
+        self.words = packed(self.engine)
 
     def begin(self, address: int) -> None:
         """Make the bodies of the world at `address` as its arrays have them now."""

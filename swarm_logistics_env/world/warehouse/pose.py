@@ -19,5 +19,6 @@ class Pose(NamedTuple):
 @inlined_kernel
 def in_frame(pose: Pose, x: float, y: float) -> tuple[float, float]:
     """Return how far (x, y) [m] lies forward and to the left of the robot."""
-    dx, dy = x - pose.x, y - pose.y
+    dx = x - pose.x
+    dy = y - pose.y
     return dx * pose.cosine + dy * pose.sine, dy * pose.cosine - dx * pose.sine

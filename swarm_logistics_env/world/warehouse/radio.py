@@ -14,8 +14,11 @@ from .structs import NOBODY, World
 @kernel
 def send_messages(world: World) -> None:
     """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
-    robots, able, step = world.robots, world.able, world.progress.step[0]
-    message, before = robots.message, robots.message_before
+    robots = world.robots
+    able = world.able
+    step = world.progress.step[0]
+    message = robots.message
+    before = robots.message_before
     n = len(message)
     n_kept = len(robots.told_before)
     for robot in range(n):
@@ -38,9 +41,12 @@ def run_timers(world: World) -> None:
     own timer and of what it heard one period ago, aged. If the radio is delayed, the broadcast
     comes late. One that is not honest tells 0.
     """
-    robots, able, step = world.robots, world.able, world.progress.step[0]
+    robots = world.robots
+    able = world.able
+    step = world.progress.step[0]
     parameters = world.parameters
-    period, limit = parameters.control_period, parameters.timer_limit - 1e-9
+    period = parameters.control_period
+    limit = parameters.timer_limit - 1e-9
     n_kept = len(robots.told_before)
     for robot in range(len(robots.timer)):
         if robots.in_delivery[robot]:
@@ -73,11 +79,17 @@ def listen(me: int, world: World, n_found: int) -> tuple[int, float]:
     Returns who of them tells the lowest timer, or NOBODY, and it [s]. If several broadcast the same
     timer, it is the nearest of them.
     """
-    robots, able, nearby = world.robots, world.able, world.nearby
-    limit, loss = world.parameters.radio_range**2, world.parameters.radio_loss
-    lowest, lowest_square, lowest_timer = NOBODY, 0.0, math.inf
+    robots = world.robots
+    able = world.able
+    nearby = world.nearby
+    limit = world.parameters.radio_range**2
+    loss = world.parameters.radio_loss
+    lowest = NOBODY
+    lowest_square = 0.0
+    lowest_timer = math.inf
     for index in range(n_found):
-        other, square = world.robot_grid.members[nearby.slot[index]], nearby.square[index]
+        other = world.robot_grid.members[nearby.slot[index]]
+        square = nearby.square[index]
         is_heard = (square <= limit) & able.sends[other] & able.hears[me]
         if loss > 0.0 and is_heard:
             step = world.progress.step[0]

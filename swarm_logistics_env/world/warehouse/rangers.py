@@ -35,14 +35,16 @@ def full_range(world: World, robot: int) -> float:
 @inlined_kernel
 def scan_solids(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
     """Shorten the beams of `scan` (N_BEAMS,) [m] that meet walls, racks or obstacles."""
-    parameters, obstacles = world.parameters, world.obstacles
+    parameters = world.parameters
+    obstacles = world.obstacles
     scan_walls(pose, parameters.warehouse_width, parameters.warehouse_height, scan)
     if world.floor.n_columns > 0:
         scan_boxes(pose, reach, world, scan)
     radius = parameters.obstacle_radius
     for obstacle in range(len(obstacles)):
         forward, left = in_frame(pose, obstacles[obstacle, 0], obstacles[obstacle, 1])
-        dx, dy = obstacles[obstacle, 0] - pose.x, obstacles[obstacle, 1] - pose.y
+        dx = obstacles[obstacle, 0] - pose.x
+        dy = obstacles[obstacle, 1] - pose.y
         square = dx * dx + dy * dy
         if square < (reach + radius) ** 2:
             scan_disc(forward, left, square, radius, scan)
@@ -54,12 +56,19 @@ def scan_walls(pose: Pose, width: float, height: float, scan: Sensed) -> None:
     reach = scan[0]
     for axis in range(2):
         if axis == 0:
-            back, front, axis_forward, axis_left = pose.x, width - pose.x, pose.cosine, -pose.sine
+            back = pose.x
+            front = width - pose.x
+            axis_forward = pose.cosine
+            axis_left = -pose.sine
         else:
-            back, front, axis_forward, axis_left = pose.y, height - pose.y, pose.sine, pose.cosine
+            back = pose.y
+            front = height - pose.y
+            axis_forward = pose.sine
+            axis_left = pose.cosine
         if min(back, front) >= reach:
             continue
-        back, front = max(back, 0.0), max(front, 0.0)
+        back = max(back, 0.0)
+        front = max(front, 0.0)
         for beam in range(_N_BEAMS):
             towards = _BEAM_X[beam] * axis_forward + _BEAM_Y[beam] * axis_left
             # Without a branch: all beams together are a few vector instructions.
@@ -76,7 +85,9 @@ def scan_boxes(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
     floor = world.floor
     if is_all_free(floor, pose.x, pose.y, reach):
         return
-    per_x, per_y, free = world.nearby.per_x, world.nearby.per_y, world.nearby.free
+    per_x = world.nearby.per_x
+    per_y = world.nearby.per_y
+    free = world.nearby.free
     for beam in range(_N_BEAMS):
         step_x = _BEAM_X[beam] * pose.cosine - _BEAM_Y[beam] * pose.sine
         step_y = _BEAM_X[beam] * pose.sine + _BEAM_Y[beam] * pose.cosine
@@ -88,14 +99,19 @@ def scan_boxes(pose: Pose, reach: float, world: World, scan: Sensed) -> None:
     block += index_along(pose.x, floor.block, floor.n_block_columns)
     for index in range(floor.first_near[block], floor.first_near[block + 1]):
         low = 4 * floor.near[index]  # its lowest corner; the highest one is two farther
-        left, bottom = floor.corners[low, 0] - pose.x, floor.corners[low, 1] - pose.y
-        right, top = floor.corners[low + 2, 0] - pose.x, floor.corners[low + 2, 1] - pose.y
-        away_x, away_y = max(left, -right, 0.0), max(bottom, -top, 0.0)
+        left = floor.corners[low, 0] - pose.x
+        bottom = floor.corners[low, 1] - pose.y
+        right = floor.corners[low + 2, 0] - pose.x
+        top = floor.corners[low + 2, 1] - pose.y
+        away_x = max(left, -right, 0.0)
+        away_y = max(bottom, -top, 0.0)
         if away_x * away_x + away_y * away_y > reach * reach:
             continue
         for beam in range(_N_BEAMS):
-            to_left, to_right = left * per_x[beam], right * per_x[beam]
-            to_bottom, to_top = bottom * per_y[beam], top * per_y[beam]
+            to_left = left * per_x[beam]
+            to_right = right * per_x[beam]
+            to_bottom = bottom * per_y[beam]
+            to_top = top * per_y[beam]
             enters = max(min(to_left, to_right), min(to_bottom, to_top), 0.0)
             leaves = min(max(to_left, to_right), max(to_bottom, to_top))
             distance = enters if enters <= leaves else math.inf
@@ -137,7 +153,8 @@ def scan_discs(
     for number in range(n_scanned):
         square = nearby.scanned_square[number]
         if square > _ONE_BEAM * radius * radius:
-            beam, distance = nearby.beam[number], nearby.distance[number]
+            beam = nearby.beam[number]
+            distance = nearby.distance[number]
             scan[beam] = distance if distance < scan[beam] else scan[beam]
         else:
             scan_disc(nearby.forward[number], nearby.left[number], square, radius, scan)
@@ -150,7 +167,8 @@ def meet_middle_beams(nearby: Nearby, n_scanned: int, radius: float) -> None:
     Infinitely far where they do not. Without branches: several discs are one vector instruction.
     """
     for number in range(n_scanned):
-        forward, left = nearby.forward[number], nearby.left[number]
+        forward = nearby.forward[number]
+        left = nearby.left[number]
         beam = nearest_beam(forward, left)
         along = forward * _BEAM_X[beam] + left * _BEAM_Y[beam]
         inside = along * along - (nearby.scanned_square[number] - radius * radius)
@@ -188,7 +206,8 @@ def scan_disc(forward: float, left: float, square: float, radius: float, scan: S
 @inlined_kernel
 def nearest_beam(forward: float, left: float) -> int:
     """Return the number of the beam that looks nearest to a direction in the robot's frame."""
-    abs_left, abs_forward = abs(left), abs(forward)
+    abs_left = abs(left)
+    abs_forward = abs(forward)
     beam = 0
     for border in _BORDERS:
         beam += abs_left > border * abs_forward

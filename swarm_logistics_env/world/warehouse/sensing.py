@@ -64,9 +64,14 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
 
     Returns whether `me` is sound and touches one that failed.
     """
-    robots, able, parameters = world.robots, world.able, world.parameters
-    grid, nearby, radius = world.robot_grid, world.nearby, world.parameters.robot_radius
-    ranger_range, view_range = able.ranger_range[me], able.view_range[me]
+    robots = world.robots
+    able = world.able
+    parameters = world.parameters
+    grid = world.robot_grid
+    nearby = world.nearby
+    radius = world.parameters.robot_radius
+    ranger_range = able.ranger_range[me]
+    view_range = able.view_range[me]
     reach = max(
         ranger_range + radius, view_range, parameters.radio_range, 2.0 * radius + TOUCHING_GAP
     )
@@ -92,9 +97,12 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
 @kernel
 def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     """Sense free items: in the beams, in view, and by touch when laden."""
-    parameters, grid, nearby = world.parameters, world.item_grid, world.nearby
+    parameters = world.parameters
+    grid = world.item_grid
+    nearby = world.nearby
     radius = parameters.item_radius
-    ranger_range, view_range = world.able.ranger_range[me], world.able.view_range[me]
+    ranger_range = world.able.ranger_range[me]
+    view_range = world.able.view_range[me]
     touch = parameters.robot_radius + TOUCHING_GAP + radius
     reach = max(ranger_range + radius, view_range, touch)
     n_found = look_around(grid, pose.x, pose.y, reach, NOBODY, nearby)
@@ -110,8 +118,10 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
 @inlined_kernel
 def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     """Fill the end of a row: load, delivery area, timer, velocity, contact and turn rate."""
-    robots, parameters = world.robots, world.parameters
-    velocity_x, velocity_y = robots.velocity[me, 0], robots.velocity[me, 1]
+    robots = world.robots
+    parameters = world.parameters
+    velocity_x = robots.velocity[me, 0]
+    velocity_y = robots.velocity[me, 1]
     forward = velocity_x * pose.cosine + velocity_y * pose.sine
     left = velocity_y * pose.cosine - velocity_x * pose.sine
     limit = parameters.max_speed

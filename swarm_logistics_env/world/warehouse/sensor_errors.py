@@ -20,7 +20,9 @@ RADIO, ROBOT_SEEN, ITEM_SEEN, N_PURPOSES = range(4)
 # Things with a position: items, neighbours, and the teller of the lowest timer.
 _N_THINGS = row.N_ITEMS_IN_VIEW + row.N_NEIGHBOURS + 1
 # A robot draws in a step: an error for every beam, whether each is dropped, errors of positions.
-_DROPPED, _POSITIONS, _DRAWS = N_RANGES, 2 * N_RANGES, 2 * N_RANGES + 2 * _N_THINGS
+_DROPPED = N_RANGES
+_POSITIONS = 2 * N_RANGES
+_DRAWS = 2 * N_RANGES + 2 * _N_THINGS
 
 
 @inlined_kernel
@@ -54,7 +56,8 @@ def disturb_beams(
 
     A beam that is dropped reports what one does that meets nothing within `reach` [m].
     """
-    dropout, noise = parameters.sensor_dropout, parameters.ranger_noise
+    dropout = parameters.sensor_dropout
+    noise = parameters.ranger_noise
     for beam in range(N_RANGES):
         if dropout > 0.0 and uniform(key, 2 * (first + _DROPPED + beam)) < dropout:
             out[beam] = reach
@@ -69,7 +72,8 @@ def disturb_positions(key: np.uint64, first: int, parameters: Parameters, out: S
     far = max(parameters.view_range, parameters.radio_range)
     for thing in range(_N_THINGS):
         if thing < row.N_ITEMS_IN_VIEW:
-            column, limit = row.ITEMS + row.ITEM_WIDTH * thing, parameters.view_range
+            column = row.ITEMS + row.ITEM_WIDTH * thing
+            limit = parameters.view_range
         else:
             column = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (thing - row.N_ITEMS_IN_VIEW)
             limit = far

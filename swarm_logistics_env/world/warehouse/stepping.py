@@ -34,7 +34,9 @@ def begin(address: int) -> None:
 def perceive(address: int, rows: Sensed) -> None:
     """Run the timers and fill the observation rows (N, D) of the world at `address`."""
     world = unpacked_at(World, address)
-    robots, items, progress = world.robots, world.items, world.progress
+    robots = world.robots
+    items = world.items
+    progress = world.progress
     run_timers(world)
     fill(world.robot_grid, robots.position, robots.present)
     for item in range(len(items.status)):
@@ -97,7 +99,8 @@ def follow_bodies(address: int, rows: Sensed) -> bool:
 @kernel
 def begin_step(world: World) -> bool:
     """Note the commands and go on with time, unless a command is refused: then return False."""
-    progress, outcome = world.progress, world.outcome
+    progress = world.progress
+    outcome = world.outcome
     outcome.refused[0] = refused_command(world)
     if outcome.refused[0] != NOBODY:
         return False
@@ -110,7 +113,9 @@ def begin_step(world: World) -> bool:
 @engine_kernel
 def end_step(address: int, world: World, rows: Sensed) -> bool:
     """Do what follows the bodies' motion; returns what `step` returns."""
-    commands, progress, outcome = world.commands, world.progress, world.outcome
+    commands = world.commands
+    progress = world.progress
+    outcome = world.outcome
     take_motion(world)
     send_messages(world)
     n_delivered, is_room = handle_items(world)
@@ -143,7 +148,8 @@ def log_command(commands: Commands) -> None:
 def take_motion(world: World) -> None:
     """Take over where the bodies are after their motion, and how fast; absent robots are at 0."""
     count_motion(world)
-    robots, bodies = world.robots, world.engine.bodies
+    robots = world.robots
+    bodies = world.engine.bodies
     for robot in range(len(robots.item)):
         is_there = 1.0 if robots.present[robot] else 0.0
         for axis in range(2):

@@ -18,7 +18,9 @@ from swarm_logistics_env.world.scenario import Scenario
 
 from .failure_modes import FAILURE_MODES, Capabilities
 
-STORED, CARRIED, DELIVERED = 0, 1, 2
+STORED = 0
+CARRIED = 1
+DELIVERED = 2
 N_ACCELERATIONS = 1024  # bins that accelerations are counted in
 NOBODY = -1
 
@@ -289,7 +291,8 @@ class World(NamedTuple):
 
 def lengths_of(scenario: Scenario) -> dict[str, int]:
     """Return the lengths of a world's arrays by the names that their shapes have."""
-    n, n_items = scenario.n_robots, scenario.n_items
+    n = scenario.n_robots
+    n_items = scenario.n_items
     longest_delay = max(mode.radio_delay for mode in FAILURE_MODES.values())
     n_kept = round(longest_delay / scenario.control_period) + 1  # steps of broadcasts
     return {

@@ -68,17 +68,20 @@ class WorldThreadPool:
     close: Callable[[], object]
 
     def __init__(self, worlds: Sequence[Warehouse], firsts: Sequence[int], n_helpers: int) -> None:
-        self._worlds, self._firsts = worlds, firsts
+        self._worlds = worlds
+        self._firsts = firsts
         # The interpreter runs one thread at a time.
         self._n_helpers = 0 if IS_PLAIN else n_helpers
         self.is_watched = np.zeros(len(worlds), np.int64)
         self._start()
 
     def _start(self) -> None:
-        self._process, n_worlds = os.getpid(), len(self._worlds)
+        self._process = os.getpid()
+        n_worlds = len(self._worlds)
         self._queue = queue = np.zeros(FIRST_JOB + n_worlds * JOB_LENGTH, np.int64)
         self._jobs = jobs = queue[FIRST_JOB:].reshape(-1, JOB_LENGTH)
-        jobs[:, FIRST_ROW], jobs[:, IS_DONE] = self._firsts, 1
+        jobs[:, FIRST_ROW] = self._firsts
+        jobs[:, IS_DONE] = 1
         jobs[:, IS_WATCHED], self.is_watched = self.is_watched, jobs[:, IS_WATCHED]
         self._address: int = queue.ctypes.data
         # No semaphore: another thread may hold its lock at a fork or when a finalizer comes.
@@ -136,7 +139,8 @@ class WorldThreadPool:
         if self._process != os.getpid():
             self._start()
         self._jobs[:, WORLD] = [world.address for world in self._worlds]
-        index, n_worlds = 0, len(self._worlds)
+        index = 0
+        n_worlds = len(self._worlds)
         try:
             # One call for all, and one that ends what is left: Ctrl-C comes between calls.
             refused = submit(self._address, commands, rows)
@@ -165,7 +169,8 @@ class WorldThreadPool:
                     self._take(left, rows)
 
     def _take(self, index: int, rows: Sensed) -> Sensed:
-        world, first = self._worlds[index], self._firsts[index]
+        world = self._worlds[index]
+        first = self._firsts[index]
         sensed = rows[first : first + world.scenario.n_robots]
         world.take(sensed, bool(self._jobs[index, IS_EVENTFUL]))
         return sensed
@@ -236,7 +241,8 @@ def run_next_job(queue: int) -> bool:
         if replace(queue, TAKEN, taken, taken + 1):
             break
     job = job_at(queue, taken % load_word(queue, N_JOBS))
-    address, first = load_word(job, WORLD), load_word(job, FIRST_ROW)
+    address = load_word(job, WORLD)
+    first = load_word(job, FIRST_ROW)
     n_robots = len(unpacked_at(World, address).robots.item)
     n_columns = load_word(queue, ROW_COLUMNS)
     first_row = load_word(queue, ROWS) + 4 * first * n_columns
@@ -254,7 +260,8 @@ def find_next_done(queue: int, index: int, patience: int) -> int:
     Returns its index; the number of worlds if all are done and none is; _NOT_YET if others still
     step it after `patience` looks.
     """
-    n_jobs, looks = load_word(queue, N_JOBS), 0
+    n_jobs = load_word(queue, N_JOBS)
+    looks = 0
     while index < n_jobs:
         job = job_at(queue, index)
         if load_word(job, IS_DONE) != 0:

@@ -15,7 +15,8 @@ TOUCHING_GAP = 0.01  # [m], gap below which two things touch
 @inlined_kernel
 def touches_solid(pose: Pose, world: World) -> bool:
     """Return whether a robot touches a wall, an obstacle or a rack."""
-    parameters, obstacles = world.parameters, world.obstacles
+    parameters = world.parameters
+    obstacles = world.obstacles
     reach = parameters.robot_radius + TOUCHING_GAP
     away_x = min(pose.x, parameters.warehouse_width - pose.x)
     away_y = min(pose.y, parameters.warehouse_height - pose.y)
@@ -24,7 +25,8 @@ def touches_solid(pose: Pose, world: World) -> bool:
         touches |= is_near_solid(world.floor, pose.x, pose.y, reach)
     limit = (reach + parameters.obstacle_radius) ** 2
     for obstacle in range(len(obstacles)):
-        dx, dy = obstacles[obstacle, 0] - pose.x, obstacles[obstacle, 1] - pose.y
+        dx = obstacles[obstacle, 0] - pose.x
+        dy = obstacles[obstacle, 1] - pose.y
         touches |= dx * dx + dy * dy < limit
     return touches
 

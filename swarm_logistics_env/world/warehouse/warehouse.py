@@ -31,7 +31,9 @@ from .state import NOBODY, WarehouseState
 from .structs import Claims, Commands, Nearby, Parameters, Sensed, StepResult, World, lengths_of
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
-_LONGEST_LOG, _SHORTEST_LOG, _LOGGED_NUMBERS = 500, 20, 4_000_000
+_LONGEST_LOG = 500
+_SHORTEST_LOG = 20
+_LOGGED_NUMBERS = 4_000_000
 _NOT_PICKLED = ("_physics", "_world", "_words", "_address", "_memory", "_elsewhere", "lock")
 
 
@@ -87,7 +89,9 @@ class Warehouse:
         occurrences = _occurrences(faults, seed, scenario.n_robots)
         state = WarehouseState(scenario)
         lay_out(state, scenario, seed)
-        self.scenario, self.state, self._seed = scenario, state, seed
+        self.scenario = scenario
+        self.state = state
+        self._seed = seed
         self._occurrences = occurrences
         self._make_room_to_work()
         self._robot_places = state.robot_position.copy()
@@ -152,10 +156,12 @@ class Warehouse:
         if not is_eventful:
             self._rows = rows
             return
-        outcome, state = self._world.outcome, self.state
+        outcome = self._world.outcome
+        state = self.state
         if outcome.refused[0] != NOBODY:
             raise not_finite(self._world.commands.now, outcome.refused.item())
-        self._rows, n_delivered = rows, outcome.n_delivered.item()
+        self._rows = rows
+        n_delivered = outcome.n_delivered.item()
         state.delivery_times += [state.time] * n_delivered
         state.delivered_by += self._world.claims.delivered_by[:n_delivered].tolist()
         if outcome.is_paused[0]:

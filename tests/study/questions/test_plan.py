@@ -44,7 +44,7 @@ def test_removed_robots_are_those_that_fail_and_only_what_indicators_need_is_run
     small: dict[str, Any],
 ) -> None:
     late = {**small, "faults": [{"modes": ["FM1"], "robots": [1], "onsets": [10.0]}]}
-    plans = {asked: Study(**late, indicators=[asked]).plan() for asked in ("FT", "R")}
+    plans = {indicator: Study(**late, indicators=[indicator]).plan() for indicator in ("FT", "R")}
     # No fault, its twin with other behaviour, the robot failed, the robot removed.
     assert len(plans["FT"].cases) == 4
     (comparison,) = plans["FT"].comparisons
@@ -58,11 +58,11 @@ def test_removed_robots_are_those_that_fail_and_only_what_indicators_need_is_run
 
 
 def test_cases_and_runs_are_known_by_content() -> None:
-    one, fault = PolicySpec(name="swarm-dt"), (Fault("FM1", 2),)
-    base = Case(one, "same", Scenario(), fault, task=WAREHOUSE)
-    same = replace(base, policy=one.replace(label="other"), scenario=Scenario(n_robots=25))
-    assert base.key == same.key
-    others = [
+    spec, fault = PolicySpec(name="swarm-dt"), (Fault("FM1", 2),)
+    base = Case(spec, "same", Scenario(), fault, task=WAREHOUSE)
+    renamed = replace(base, policy=spec.replace(label="other"), scenario=Scenario(n_robots=25))
+    assert base.key == renamed.key
+    different = [
         replace(base, identity="different"),
         replace(base, scenario=Scenario(n_robots=26)),
         replace(base, faults=(Fault("FM1", 1),)),
@@ -70,7 +70,7 @@ def test_cases_and_runs_are_known_by_content() -> None:
         replace(base, faults=()),
         replace(base, behaviour=1),
     ]
-    assert len({base.key, *(other.key for other in others)}) == 7
+    assert len({base.key, *(other.key for other in different)}) == 7
     assert len({Run(base, "a", 0).key, Run(base, "a", 1).key, Run(base, "b", 0).key}) == 3
     named, built, other = (
         {case.key for case in Study(policies=[policy], sizes=[{"values": [2, 3]}]).plan().cases}
@@ -128,15 +128,15 @@ def test_every_preset_can_be_planned_and_an_unknown_one_is_refused() -> None:
 
 def test_published_tables_give_the_golden_values_and_every_claim_follows_from_them() -> None:
     comparisons = Study.preset("paper").plan().comparisons
-    published = {c: found.value for c in comparisons if (found := PAPER.estimate(c))}
+    published = {c: estimate.value for c in comparisons if (estimate := PAPER.estimate(c))}
     for symbol, golden in GOLDEN.items():
-        asked = (c for c in comparisons if (c.indicator, c.threshold) == (symbol, 0))
-        assert [published[c] for c in asked] == pytest.approx(golden, abs=5e-4)
+        of_symbol = (c for c in comparisons if (c.indicator, c.threshold) == (symbol, 0))
+        assert [published[c] for c in of_symbol] == pytest.approx(golden, abs=5e-4)
     claims = {c: PAPER.claims[c.question] for c in comparisons if c.indicator != "change"}
     assert len(claims) == 41
     # Those of the other reading of FM3 are asked of that alone.
     rest = PAPER.claims.keys() - {comparison.question for comparison in claims}
-    assert {asked.changed.name for asked in rest} == {"FM3_send"}
+    assert {question.changed.name for question in rest} == {"FM3_send"}
     for comparison, claim in claims.items():
         assert (published[comparison] > comparison.threshold) == claim, comparison.label
 
@@ -155,9 +155,9 @@ def test_file_says_what_python_says_and_a_bad_one_is_named(tmp_path: Path) -> No
     assert Study.from_file(path, seeds=5).plan().seeds == range(5)
     with pytest.raises(StudyError, match=r"cannot read the study file .*none\.toml"):
         Study.from_file(tmp_path / "none.toml")
-    for text, said in ((b"seeds = ", "TOML"), (b"\xed\xb0\x80", "UTF-8 text")):
+    for text, expected_format in ((b"seeds = ", "TOML"), (b"\xed\xb0\x80", "UTF-8 text")):
         path.write_bytes(text)
-        with pytest.raises(StudyError, match=rf"small\.toml.* is not {said}"):
+        with pytest.raises(StudyError, match=rf"small\.toml.* is not {expected_format}"):
             Study.from_file(path)
 
 

@@ -34,9 +34,9 @@ def test_every_question_has_a_line_with_its_numbers(few: StudyResults) -> None:
         assert high is not None
         assert line.value == f"{value:.2f}" + "†" * test.saturated
         # One of them is 0.0004, above its threshold 0.
-        told = limits(test.estimate or test.interval, 2)
-        assert told == f"[{low:.2f}, {high:.2f}]" or abs(low) < 0.005
-        assert (line.interval(0.95), line.interval(0.9)) == (told, f"{told} 95 %")
+        interval_text = limits(test.estimate or test.interval, 2)
+        assert interval_text == f"[{low:.2f}, {high:.2f}]" or abs(low) < 0.005
+        assert (line.interval(0.95), line.interval(0.9)) == (interval_text, f"{interval_text} 95 %")
         assert line.verdict_text.startswith(test.on_property.adjusted)
         assert line.question.startswith(test.compared.indicator)
         more = re.fullmatch(r"open; (\d+) more to tell -?0.1 from 0", line.verdict_text)
@@ -55,24 +55,24 @@ def test_what_is_alike_shares_a_line_and_no_question_is_lost(few: StudyResults) 
         counts = Counter(test.on_property.adjusted for test in line.verdicts)
         for word, count in counts.items():
             assert (word if len(counts) == 1 else f"{count} {word}") in line.verdict_text
-    asked = [line.question for line in lines if "FM4" in line.question]
-    assert asked == ["FT FM4, 1, 2, 3 of 25", "R FM4, 1, 2, 3 of 25"]
+    questions = [line.question for line in lines if "FM4" in line.question]
+    assert questions == ["FT FM4, 1, 2, 3 of 25", "R FM4, 1, 2, 3 of 25"]
 
 
 @pytest.mark.parametrize("width", [60, 80])
 def test_digest_fits_the_screen_and_nothing_is_cut(
     width: int, few: StudyResults, compared: StudyResults
 ) -> None:
-    for found in (few, compared):
-        lines = digest(answer(found), width).splitlines()
+    for results in (few, compared):
+        lines = digest(answer(results), width).splitlines()
         assert len(lines) <= MOST_LINES
         assert not any("…" in line for line in lines if "N 5→" not in line)
-        whole = digest(answer(found, most=None), width, most=None).splitlines()
-        assert max(map(len, [*lines, *whole])) <= width
-        assert len(whole) >= len(found.verdicts)
+        all_lines = digest(answer(results, most=None), width, most=None).splitlines()
+        assert max(map(len, [*lines, *all_lines])) <= width
+        assert len(all_lines) >= len(results.verdicts)
         # No line is folded within the values of a question, where there is room for them.
         values = "1, 2, 3 of 25"
-        questions = [line.question for line in answer(found).lines]
+        questions = [line.question for line in answer(results).lines]
         assert width < 80 or "\n".join(lines).count(values) == sum(
             values in text for text in questions
         )
@@ -110,11 +110,11 @@ def test_words_for_what_is_no_plain_verdict() -> None:
     undefined = {line.verdict_text for line in nothing.lines if line.indicator == "S"}
     assert undefined == {"undefined: it delivers nothing"}
     assert "P is small: a longer duration tells more" in nothing.notes
-    same = answer(paper(same=frozenset({"FM2"})), most=None)
-    exact = {line.verdict_text for line in same.lines if line.question.startswith("R FM2")}
+    unaffected = answer(paper(unaffected=frozenset({"FM2"})), most=None)
+    exact = {line.verdict_text for line in unaffected.lines if line.question.startswith("R FM2")}
     assert exact == {"unaffected, exact"}
-    assert "provisional" not in same.notes
-    assert "P is small" not in same.notes
+    assert "provisional" not in unaffected.notes
+    assert "P is small" not in unaffected.notes
 
 
 def test_several_verdicts_share_the_interval_of_those_that_have_one(few: StudyResults) -> None:

@@ -19,9 +19,9 @@ SMALL |= {"n_robots": 4, "n_items": 6, "duration": 150.0, "restock": True}
 def test_what_is_held_out_is_no_condition_of_training_or_development() -> None:
     plan = make_plan(PRESETS["benchmark"])
     conditions: dict[str, set[object]] = {}
-    for one in plan.comparisons:
-        case = one.changed.case
-        part = conditions.setdefault(one.table.partition(":")[0], set())
+    for comparison in plan.comparisons:
+        case = comparison.changed.case
+        part = conditions.setdefault(comparison.table.partition(":")[0], set())
         part.add((str(case.scenario), case.faults))
     held_out = conditions.pop(benchmark.HELD_OUT)
     assert conditions.keys() == {"Development"}
@@ -60,7 +60,9 @@ def test_the_table_names_the_worst_cell_and_the_score() -> None:
     ]
     assert benchmark.score(results, references) == pytest.approx(np.mean(shares, axis=0))
     # Both failures hold for the same robots.
-    (arm,) = {one.compared.changed for one in results.verdicts if "both" in one.compared.table}
+    (arm,) = {
+        verdict.compared.changed for verdict in results.verdicts if "both" in verdict.compared.table
+    }
     outcome = results.succeeded.get((arm.case.key, 0))
     assert outcome is not None
     assert len(outcome.failed_robots) == 3
@@ -81,7 +83,7 @@ def test_ranks_are_as_stable_as_the_scores_allow(
     kind: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ranked = stats.rankdata
-    monkeypatch.setattr(stats, "rankdata", lambda *given, **how: ranked(*given, **how).astype(kind))
+    monkeypatch.setattr(stats, "rankdata", lambda *data, **how: ranked(*data, **how).astype(kind))
     rng = np.random.default_rng(0)
     clear = {"low": rng.normal(10, 1, 15), "high": rng.normal(50, 1, (5, 15))}
     high, low = benchmark.leaderboard(clear).rows

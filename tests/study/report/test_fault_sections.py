@@ -48,8 +48,8 @@ def after_a_fault(share: float, back: float) -> StudyResults:
 
 
 def only(results: StudyResults) -> Resilience:
-    (one,) = resiliences(results)
-    return one
+    (resilience,) = resiliences(results)
+    return resilience
 
 
 def emptied(results: StudyResults, key: str) -> StudyResults:
@@ -61,8 +61,8 @@ def emptied(results: StudyResults, key: str) -> StudyResults:
 def times_back(results: StudyResults) -> tuple[str, ...]:
     """The row of the table of times until single runs are back."""
     title = "Time until single runs are back"
-    (found,) = (one for one in document(results).summary if one.title == title)
-    (row,) = found.rows
+    (section,) = (part for part in document(results).summary if part.title == title)
+    (row,) = section.rows
     return row
 
 
@@ -83,20 +83,20 @@ def test_swarm_that_comes_back_has_a_time_and_its_null_a_shorter_one(
 
 
 def test_swarm_that_never_comes_back_is_censored() -> None:
-    found = after_a_fault(0.3, back=END)
-    against = only(found).against_removed
+    results = after_a_fault(0.3, back=END)
+    against = only(results).against_removed
     assert against is not None
     assert against.value == pytest.approx(0.3, abs=0.03)
     assert against.verdict == "refuted"
-    assert times_back(found)[2:4] == ("not reached", f"{SEEDS} of {SEEDS} runs")
+    assert times_back(results)[2:4] == ("not reached", f"{SEEDS} of {SEEDS} runs")
 
 
 def test_no_loss_leaves_robustness_local_in_time_but_for_a_cap() -> None:
     unharmed = after_a_fault(1.0, back=END)
     (comparison,) = (c for c in unharmed.plan.comparisons if c.indicator == "FT")
     capped = emptied(unharmed, comparison.original.case.key)
-    for found, verdict in ((unharmed, "supported"), (capped, "open")):
-        against = only(found).against_whole
+    for results, verdict in ((unharmed, "supported"), (capped, "open")):
+        against = only(results).against_whole
         assert against is not None
         assert against.threshold == pytest.approx(1 - 3 / 25)
         assert against.verdict == verdict
@@ -105,8 +105,8 @@ def test_no_loss_leaves_robustness_local_in_time_but_for_a_cap() -> None:
 
 def test_a_null_that_is_missing_or_ran_out_of_items_is_none(repaired: StudyResults) -> None:
     (null,) = repaired.plan.nulls.values()
-    kept = {where: o for where, o in repaired.outcomes.items() if where[0] != null.case.key}
-    missing = judge(repaired.plan, kept)
+    outcomes = {where: o for where, o in repaired.outcomes.items() if where[0] != null.case.key}
+    missing = judge(repaired.plan, outcomes)
     assert not only(missing).single
     assert "the runs of the no-fault null are missing" in markdown(document(missing))
     without_items = only(emptied(repaired, null.case.key))
@@ -121,11 +121,13 @@ def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) ->
     # 0.5 deliveries a second, in 100 s.
     for number, second, expected in ((0, 900.0, 50), (2, 900.0, 20), (2, 1800.0, 50)):
         curve = curves[number]
-        (found,) = curve.deliveries[curve.seconds == second]
-        assert found == pytest.approx(expected, abs=6)
+        (n_deliveries,) = curve.deliveries[curve.seconds == second]
+        assert n_deliveries == pytest.approx(expected, abs=6)
     # One scale holds the rates of all panels.
     canvas = Figure()
-    many = [RateCurve(one.runs, one.seconds, *(10.0 * x for x in one[2:])) for one in curves]
+    many = [
+        RateCurve(rates.runs, rates.seconds, *(10.0 * x for x in rates[2:])) for rates in curves
+    ]
     drawing.rates(canvas, {"few": curves, "many": many}, ONSET, "deliveries")
     for axes in canvas.axes:
         assert axes.get_ylim()[1] >= max(curve.high.max() for curve in many)
@@ -134,7 +136,9 @@ def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) ->
 def test_figures_have_files_and_numbers_of_their_own() -> None:
     sizes = [{"title": title, "values": [5, 10]} for title in ("My sizes", "my-sizes")]
     study = Study(seeds=4, sizes=sizes, ablations=[{"policy": "random-walk", "fall": 0.25}])
-    found = judged(study, lambda _, at, s: delivered((20 if at.name == "random-walk" else 40) + s))
-    *others, last = document(found).figures
-    assert [figure.name for figure in others] == ["answer", "S-My-sizes", "S-my-sizes-2"]
+    results = judged(
+        study, lambda _, at, s: delivered((20 if at.name == "random-walk" else 40) + s)
+    )
+    *first_figures, last = document(results).figures
+    assert [figure.name for figure in first_figures] == ["answer", "S-My-sizes", "S-my-sizes-2"]
     assert last.data["value"].tolist() == pytest.approx([21.5 / 41.5 - 1])

@@ -152,7 +152,7 @@ def compiled(latex: str, page: str, tmp_path: Path) -> str:
     (tmp_path / "paper.tex").write_text(f"{text}\\end{{document}}\n")
     options = ["-interaction=nonstopmode", "-halt-on-error"] * compiler.endswith("pdflatex")
     done = subprocess.run([compiler, *options, "paper.tex"], cwd=tmp_path, capture_output=True)
-    said = (done.stdout + done.stderr).decode(errors="replace")
-    assert done.returncode == 0, said[-2000:]
+    printed = (done.stdout + done.stderr).decode(errors="replace")
+    assert done.returncode == 0, printed[-2000:]
     assert (tmp_path / "paper.pdf").is_file()
-    return said
+    return printed

@@ -99,8 +99,8 @@ class Scale:
         self.factor = (end - start) / (high - low)
         self.start = start - low * self.factor
 
-    def values(self, places: Iterable[float]) -> list[float]:
-        return [(place - self.start) / self.factor for place in places]
+    def values(self, positions: Iterable[float]) -> list[float]:
+        return [(position - self.start) / self.factor for position in positions]
 
 
 def test_every_seed_stands_behind_its_interval(made: Made) -> None:
@@ -223,9 +223,9 @@ def test_command_of_a_run_plays_it_in_run_and_watch_whatever_its_faults(
     )
     monkeypatch.setattr(messages, "recorded_page", keep_session)
     assert study.run().failed == 0
-    found = study.findings()
-    for _, _, arm in found.plan.cells:
-        outcome = found.outcomes[arm.case.key, 1]
+    results = study.findings()
+    for _, _, arm in results.plan.cells:
+        outcome = results.outcomes[arm.case.key, 1]
         words = [*shlex.split(str(WAREHOUSE.watch_command(arm.case)))[1:], "--seed", "1"]
         assert app.run(["run", *words[1:]]) == 0
         assert f"P = {outcome.delivered} items" in capsys.readouterr().out
@@ -253,9 +253,9 @@ def test_no_command_is_shown_for_a_run_that_none_plays_and_lists_stay_one_word()
     arm = plan.cells[0][2]
     model = replace(arm, case=replace(arm.case, policy=PolicySpec(name="model.zip")))
     assert "--policy model.zip --trust-code" in str(WAREHOUSE.watch_command(model.case))
-    given = {"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}}
-    own = Study(policies=[SwarmDT(), given], sizes=[{"values": [2, 3]}]).plan()
-    assert {WAREHOUSE.watch_command(arm.case) for _, _, arm in own.cells} == {None}
+    policy = {"name": "swarm-dt", "parameters": {"taxis_gain": 0.5}}
+    own_plan = Study(policies=[SwarmDT(), policy], sizes=[{"values": [2, 3]}]).plan()
+    assert {WAREHOUSE.watch_command(arm.case) for _, _, arm in own_plan.cells} == {None}
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="runs a line of the page's script")
@@ -283,14 +283,14 @@ def test_answer_and_comparison_stand_on_the_first_screen_and_a_click_shows_the_q
         assert browser.value("document.documentElement.scrollWidth") <= size[0]
         bottom = "document.querySelector('#comparison').getBoundingClientRect().bottom"
         assert browser.value(bottom) <= size[1]
-        asked = len(made.data["questions"]) - 1
-        row = f'.answer tr[data-question="{asked}"]'
-        place = f"document.querySelector('{row}').getBoundingClientRect()"
-        browser.click(browser.value(f"{place}.x") + 4, browser.value(f"{place}.y") + 4)
+        question = len(made.data["questions"]) - 1
+        row = f'.answer tr[data-question="{question}"]'
+        rectangle = f"document.querySelector('{row}').getBoundingClientRect()"
+        browser.click(browser.value(f"{rectangle}.x") + 4, browser.value(f"{rectangle}.y") + 4)
         shown = browser.wait_for("document.querySelector('.answer tr.chosen').dataset.question")
-        assert int(shown) == asked
+        assert int(shown) == question
         head = browser.value("document.querySelector('#question h2').textContent")
-        assert head == made.data["questions"][asked]["head"]
+        assert head == made.data["questions"][question]["head"]
         lines = browser.value("document.querySelectorAll('#slopes polyline.thin').length")
         assert lines == len(made.data["seeds"])
         assert browser.console == []

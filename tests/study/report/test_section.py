@@ -57,12 +57,12 @@ def test_an_interval_is_shown_beside_its_threshold() -> None:
     assert bracketed(spi.Interval(0.0521, -0.0049, 0.0986), 2, [0.0]) == "0.05 [-0.005, 0.10]"
     rng = np.random.default_rng(0)
     p = rng.poisson(40, 20)
-    found = spi.scalability(p, p + 1 + rng.integers(0, 2, 20), n=40, m=1, threshold=1.0)
-    assert found.low is not None
-    rounded = round(found.low, 2)
-    assert fixed(found.low, 2) in bracketed(found, 2)
+    estimate = spi.scalability(p, p + 1 + rng.integers(0, 2, 20), n=40, m=1, threshold=1.0)
+    assert estimate.low is not None
+    rounded = round(estimate.low, 2)
+    assert fixed(estimate.low, 2) in bracketed(estimate, 2)
     # A threshold that would be shown as the limit is, gets it more digits.
-    assert fixed(found.low, 2, [rounded]) != fixed(rounded, 2)
+    assert fixed(estimate.low, 2, [rounded]) != fixed(rounded, 2)
     assert fixed(np.inf, 2, [0.0]) == "∞"
 
 
@@ -96,29 +96,29 @@ ALWAYS_95 = (
 def test_every_surface_names_the_level_that_it_prints(
     stopped: StudyResults, tmp_path: Path
 ) -> None:
-    own = {
+    level_by_question = {
         f"R {test.after.name}": percent(test.estimate.confidence)
         for test in stopped.verdicts
         if test.estimate
     }
-    assert len({*own.values()}) == 3
-    assert "95 %" not in own.values()
+    assert len({*level_by_question.values()}) == 3
+    assert "95 %" not in level_by_question.values()
     write_report(stopped, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    whole = document(stopped)
+    full_document = document(stopped)
     surfaces = {
         "terminal": digest(answer(stopped), 80),
-        "report": markdown(whole),
+        "report": markdown(full_document),
         "page": page.split("<script", maxsplit=1)[0],
-        "tables": latex_tables(stopped, whole).replace("\\,\\%", " %"),
+        "tables": latex_tables(stopped, full_document).replace("\\,\\%", " %"),
         "sentence": in_a_sentence(stopped, answer(stopped)),
-        "captions": " ".join(figure.caption for figure in whole.figures),
+        "captions": " ".join(figure.caption for figure in full_document.figures),
     }
     for name, text in surfaces.items():
         assert "95 %" not in re.sub(ALWAYS_95, "", text), name
     # What the heading does not name stands behind the interval.
     common = percent(answer(stopped).level)
-    for question, level in own.items():
+    for question, level in level_by_question.items():
         (row,) = re.findall(rf"^{question}, .*$", surfaces["terminal"], re.MULTILINE)
         assert (f"] {level}" in row) == (level != common)
         assert f", {level} interval [" in surfaces["report"]
@@ -128,7 +128,7 @@ def test_every_surface_names_the_level_that_it_prints(
     assert f"R [{common}]" in surfaces["report"]
     assert f">value [{common}]</th>" in page
     assert f"{levels(stopped.verdicts)} intervals" in surfaces["captions"]
-    assert f" = -0.55, {own['R FM4']} interval [-0." in surfaces["sentence"]
+    assert f" = -0.55, {level_by_question['R FM4']} interval [-0." in surfaces["sentence"]
     view = r'role="img" aria-label="(.).*?<p class="legend"><span>bar: (.*?) interval'
     assert dict(re.findall(view, page, re.DOTALL)) == {"P": "95 %", "R": levels(stopped.verdicts)}
     for file, column in (("claims", "confidence"), ("figures/answer", "confidence")):
@@ -139,25 +139,25 @@ def test_every_surface_names_the_level_that_it_prints(
 
 
 def test_what_is_asked_is_answered_before_what_else_is_known() -> None:
-    found = paper(seeds=100)
-    same = [test for test in found.verdicts if test.conclusion == "equivalent"]
-    told = {
+    results = paper(seeds=100)
+    equivalent = [test for test in results.verdicts if test.conclusion == "equivalent"]
+    texts = {
         "FT": "open; P_F and P_S differ by less than 10 % of P_o",
         "R": "open; P changes by less than 10 %",
     }
-    assert {test.compared.indicator for test in same} == {*told}
-    assert [conclusion_text(test) for test in same] == [
-        told[test.compared.indicator] for test in same
+    assert {test.compared.indicator for test in equivalent} == {*texts}
+    assert [conclusion_text(test) for test in equivalent] == [
+        texts[test.compared.indicator] for test in equivalent
     ]
-    said = [line.verdict_text for line in answer(found, most=None).lines]
-    assert Counter(word for word in said if word in told.values()) == Counter(
-        conclusion_text(test) for test in same
+    verdict_texts = [line.verdict_text for line in answer(results, most=None).lines]
+    assert Counter(word for word in verdict_texts if word in texts.values()) == Counter(
+        conclusion_text(test) for test in equivalent
     )
-    text = markdown(document(found))
+    text = markdown(document(results))
     assert not re.search(r"\| equivalent|\d equivalent", text)
-    counts = Counter(test.compared.indicator for test in same)
-    sentence = in_a_sentence(found, answer(found))
-    for symbol, words in told.items():
+    counts = Counter(test.compared.indicator for test in equivalent)
+    sentence = in_a_sentence(results, answer(results))
+    for symbol, words in texts.items():
         assert f"{words.removeprefix('open')} in {counts[symbol]}" in sentence
 
 

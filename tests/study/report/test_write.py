@@ -58,7 +58,7 @@ def directory(few: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 def test_a_report_is_as_recorded(tmp_path: Path) -> None:
     """Every number and sentence, but for the sheet of the set-up."""
-    results = paper(seeds=12, noise=2.0, full=NARROW, same=frozenset({"FM2"}))
+    results = paper(seeds=12, noise=2.0, full=NARROW, unaffected=frozenset({"FM2"}))
     report = document(results)
     texts = {
         "report.md": markdown(report).partition("\n## Set-up")[0],
@@ -76,15 +76,15 @@ def test_a_report_is_as_recorded(tmp_path: Path) -> None:
 
 def test_equal_rows_give_equal_bytes(few: StudyResults, directory: Path, tmp_path: Path) -> None:
     write_report(replace(few, outcomes=dict(reversed(list(few.outcomes.items())))), tmp_path)
-    files, others = (
+    files, other_files = (
         {
-            path.relative_to(here): path.read_bytes()
-            for path in here.rglob("*.*")
+            path.relative_to(folder): path.read_bytes()
+            for path in folder.rglob("*.*")
             if path.suffix not in (".pdf", ".png")
         }
-        for here in (directory, tmp_path)
+        for folder in (directory, tmp_path)
     )
-    assert files == others
+    assert files == other_files
     figure = document(few).figures[0]
     with drawn_in_all_formats():
         drawing = images(figure.draw, figure.height)
@@ -100,9 +100,9 @@ def test_page_needs_nothing_but_itself(directory: Path) -> None:
     )
     # The browser itself refuses what would be loaded all the same.
     assert "default-src 'none'" in page
-    beside = set(re.findall(r'href="([^#"][^"]*)"', page))
-    assert beside
-    assert all((directory / name).is_file() for name in beside)
+    linked = set(re.findall(r'href="([^#"][^"]*)"', page))
+    assert linked
+    assert all((directory / name).is_file() for name in linked)
     ids = re.findall(r'\bid="([^"]+)"', page)
     assert len(ids) == len(set(ids))
     assert set(re.findall(r'href="#([^"]+)', page)) <= set(ids)
@@ -130,12 +130,12 @@ def test_every_figure_comes_as_drawing_and_data(few: StudyResults, directory: Pa
 def test_every_verdict_quotes_seeds_interval_and_what_it_rests_on(few: StudyResults) -> None:
     for test in few.verdicts:
         assert test.estimate is not None
-        told = sentence(few, test).text
-        assert f"95 % interval {limits(test.estimate, 3)} over 4 paired seeds (0 to 3)" in told
-        assert ("Unadjusted: " in told) != test.estimate.untestable
-        assert ("Holm-adjusted: " in told) != test.estimate.untestable
-        assert ("†" in told) == test.saturated
-    text = markdown(document(paper(same=frozenset({"FM2"}))))
+        words = sentence(few, test).text
+        assert f"95 % interval {limits(test.estimate, 3)} over 4 paired seeds (0 to 3)" in words
+        assert ("Unadjusted: " in words) != test.estimate.untestable
+        assert ("Holm-adjusted: " in words) != test.estimate.untestable
+        assert ("†" in words) == test.saturated
+    text = markdown(document(paper(unaffected=frozenset({"FM2"}))))
     assert re.search(
         r"P_F within 10 % of P_o\? Change -0\.[67]\d\d \[.*\] \(90 %\): refuted\.", text
     )

@@ -79,8 +79,8 @@ def test_ray_with_two_local_nodes(played: Path, tmp_path: Path) -> None:
         cluster.shutdown()
     assert tally.failed == 0
     assert digest(out, tmp_path) == digest(played, tmp_path)
-    own = Study(**{**SMALL, "faults": [], "parameters": []})
-    assert own.run("ray", processes=1).failed == 0  # on a node that it starts
+    study = Study(**{**SMALL, "faults": [], "parameters": []})
+    assert study.run("ray", processes=1).failed == 0  # on a node that it starts
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -114,16 +114,16 @@ class Remembering(SwarmDT):
 
 def test_other_behaviour_meets_the_same_worlds_and_nothing_is_remembered() -> None:
     scenario = Scenario(n_robots=3, n_items=5, warehouse_width=3, warehouse_height=3, duration=10)
-    same = Case(PolicySpec.of(Remembering()), "remembering", scenario, task=WAREHOUSE)
-    other = replace(same, behaviour=1)
-    played = [(seed, one) for seed in (0, 1) for one in (same, other, same)]
-    outcomes = [Run(one, WAREHOUSE.code(), seed).play() for seed, one in played]
+    usual_case = Case(PolicySpec.of(Remembering()), "remembering", scenario, task=WAREHOUSE)
+    other = replace(usual_case, behaviour=1)
+    played = [(seed, case) for seed in (0, 1) for case in (usual_case, other, usual_case)]
+    outcomes = [Run(case, WAREHOUSE.code(), seed).play() for seed, case in played]
     assert {outcome.error for outcome in outcomes} == {None}
     assert outcomes[0].digest == outcomes[2].digest != outcomes[1].digest
     first, other_first, again, second, other_second, _ = Remembering.seeds[-6:]
     assert (first, again, second) == (0, 0, 1)
     assert len({first, second, other_first, other_second}) == 4
-    stale = Run(same, "0" * 16, 0).play()
+    stale = Run(usual_case, "0" * 16, 0).play()
     assert "the package changed while the study ran" in str(stale.error)
 
 
@@ -140,9 +140,9 @@ def test_workers_end_with_a_parent_that_is_killed() -> None:
     killed = subprocess.Popen([sys.executable, "-c", script], start_new_session=True, **pipes)
     try:
         # Its workers write there as well, so that it ends only once they have ended.
-        said, _ = killed.communicate(timeout=600)
+        printed, _ = killed.communicate(timeout=600)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(killed.pid, signal.SIGKILL)
-    assert int(said) >= 1
+    assert int(printed) >= 1
     assert killed.returncode == -signal.SIGKILL

@@ -62,15 +62,15 @@ def test_an_edited_helper_is_played_and_told_and_what_is_the_same_counts(
     world: dict[str, Any], scaled: Path, tmp_path: Path, processes: int
 ) -> None:
     out, name = tmp_path / "out", f"{scaled}:Scaled"
-    played, kept, delivered, _ = play(world, [name], out, processes)
-    assert (played, kept) == (4, 0)
+    played, n_reused, delivered, _ = play(world, [name], out, processes)
+    assert (played, n_reused) == (4, 0)
     assert delivered[name] > 0
     assert play(world, [name], out, processes)[:2] == (0, 4)
     scaled.write_text("# A comment.\n" + SCALED)
     assert play(world, [name], out, processes)[:2] == (0, 4)
     (scaled.parent / "gains.py").write_text("GAIN = 0.0\n")
-    played, kept, delivered, changes = play(world, [name], out, processes)
-    assert (played, kept, delivered) == (4, 0, {name: 0})
+    played, n_reused, delivered, changes = play(world, [name], out, processes)
+    assert (played, n_reused, delivered) == (4, 0, {name: 0})
     assert changes == (f"policy {name}: gains.py changed",)
     (scaled.parent / "gains.py").write_text("GAIN = 1.0\n")
     assert play(world, [name], out, processes)[:2] == (0, 4)
@@ -172,8 +172,8 @@ def test_what_is_another_one_each_time_is_played_again_and_told(
     )
     name, out = f"{tmp_path}/dice.py:Dice", tmp_path / "out"
     assert play(world, [name], out, processes=2)[:2] == (4, 0)
-    played, kept, _, changes = play(world, [name], out)
-    assert (played, kept) == (4, 0)
+    played, n_reused, _, changes = play(world, [name], out)
+    assert (played, n_reused) == (4, 0)
     assert "is another one each time it is made" in changes[0]
 
 

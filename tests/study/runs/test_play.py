@@ -182,11 +182,11 @@ def test_torch_computes_in_one_thread_whoever_plays(
     torch.set_num_threads = lambda count: n_threads.__setitem__(0, count)
     monkeypatch.setitem(sys.modules, "torch", torch)
     fields = {**sizes, "policies": [Threaded()], "seeds": 1}
-    here, in_worker = Study(**fields), Study(**fields)
-    assert here.run().failed == in_worker.run("process", processes=1).failed == 0
-    digests = here.results()["digest"].tolist()
+    in_process, in_worker = Study(**fields), Study(**fields)
+    assert in_process.run().failed == in_worker.run("process", processes=1).failed == 0
+    digests = in_process.results()["digest"].tolist()
     assert in_worker.results()["digest"].tolist() == digests
-    scenario: Any = here.specification.scenario
+    scenario: Any = in_process.specification.scenario
     assert run_episode(scenario, Threaded(), 0).digest in digests
     play = Play(scenario, Threaded(), 0)  # as a film and `watch` do
     start = play.world.state.robot_position.copy()

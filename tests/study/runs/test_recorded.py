@@ -49,13 +49,13 @@ def test_indicators_of_a_lab_file_are_those_of_spi_by_hand(tmp_path: Path) -> No
         "R": spi.robustness(WHOLE, BROKEN, n=8, m=1, paired=False),
         "A": spi.adaptability(WHOLE, NARROW, x_o=2.0, x_new=1.5, paired=False),
     }
-    found = study.indicators().set_index("indicator")
-    assert sorted(found.index) == sorted(by_hand)
+    table = study.indicators().set_index("indicator")
+    assert sorted(table.index) == sorted(by_hand)
     for symbol, estimate in by_hand.items():
         for name in ("value", "low", "high", "p_value", "probability", "verdict"):
-            assert found.loc[symbol, name] == getattr(estimate, name)
-    assert found.loc["R", "comparison"] == "wheel, m = 1"
-    assert found.loc["A", "comparison"] == "width 2 -> 1.5"
+            assert table.loc[symbol, name] == getattr(estimate, name)
+    assert table.loc["R", "comparison"] == "wheel, m = 1"
+    assert table.loc["A", "comparison"] == "width 2 -> 1.5"
     report = markdown(document(study.findings()))
     assert "imported from table.csv. Unpaired" in report
     assert "| arena | 4 m x 4 m |" in report
@@ -104,23 +104,26 @@ def test_an_event_log_has_the_resilience_of_the_simulators_own_rows(tmp_path: Pa
     late = {"modes": ["FM4"], "robots": [2], "onsets": [100.0]}
     study = Study(seeds=3, scenario=scenario, faults=[late])
     study.run()
-    ours = study.findings()
+    simulated = study.findings()
     # One delivery a row; a run that delivers nothing is a row without a time.
     rows = ["policy;robots;fault;m;onset [s];seed;trial;time [s];duration"]
-    for _, _, arm in ours.plan.cells:
+    for _, _, arm in simulated.plan.cells:
         at = arm.setting
-        for seed in ours.plan.seeds:
+        for seed in simulated.plan.seeds:
             run = f"swarm-dt;8;{at.name};{at.value:g};{at.onset:g};{seed};{at.name} {seed}"
-            times = ours.outcomes[arm.case.key, seed].delivery_times.tolist() or [""]
+            times = simulated.outcomes[arm.case.key, seed].delivery_times.tolist() or [""]
             rows += [f"{run};{time};300" for time in times]
-    (own,), (theirs,) = (
-        resiliences(one) for one in (ours, imported(tmp_path, "\n".join(rows)).findings())
+    (expected,), (recorded,) = (
+        resiliences(results)
+        for results in (simulated, imported(tmp_path, "\n".join(rows)).findings())
     )
-    assert theirs.against_removed == own.against_removed
-    assert theirs.against_whole == own.against_whole
-    curves, same = ([np.array(one.curve) for one in of.single] for of in (own, theirs))
+    assert recorded.against_removed == expected.against_removed
+    assert recorded.against_whole == expected.against_whole
+    curves, recorded_curves = (
+        [np.array(resilience.curve) for resilience in of.single] for of in (expected, recorded)
+    )
     assert len(curves) == 2
-    assert np.array_equal(curves, same)
+    assert np.array_equal(curves, recorded_curves)
 
 
 def test_without_seeds_no_run_of_an_event_log_is_compared_with_one_other(tmp_path: Path) -> None:
@@ -194,14 +197,14 @@ def test_the_order_of_rows_decides_nothing(columns: list[str]) -> None:
     ]
     names = ["policy", "robots", "fault", "faulty", "width", "map", "seed", "delivered"]
     frame = pd.DataFrame(rows, columns=names).drop(columns={"map", "seed"} - {*columns})
-    first, *others = (
+    first, *shuffled = (
         judge(frame.sample(frac=1.0, random_state=state), reference={"width": 2.0})
         for state in range(2)
     )
     assert first.plan.paired == bool(columns)
     assert first.policies == ("Base", "ours")
     assert len(first.verdicts) == 2 * (1 + 1 + 2 + 1)
-    for results in others:
+    for results in shuffled:
         assert results.verdict_table.equals(first.verdict_table)
         assert results.cell_table.equals(first.cell_table)
         assert [cell.words for cell in results.cells] == [cell.words for cell in first.cells]
@@ -270,7 +273,7 @@ def test_study_is_neither_overwritten_nor_run_into(tmp_path: Path, small: dict[s
 
 def test_p_o_is_of_trials_without_a_fault_and_repeated_ones_are_their_null(tmp_path: Path) -> None:
     measured = {"none again,0": (9, 8, 7), "none,0": (20, 22, 21), "jam,1": (19, 20, 18)}
-    rows = [f"8,{fault},{p}" for fault, found in measured.items() for p in found]
+    rows = [f"8,{fault},{p}" for fault, performances in measured.items() for p in performances]
     study = imported(tmp_path, "\n".join(["robots,fault,faulty,p", *rows]))
     (test,) = study.findings().verdicts
     assert (test.compared.indicator, test.compared.label) == ("R", "jam, m = 1")

@@ -28,7 +28,7 @@ def test_every_run_is_in_one_shard() -> None:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Directory of a study of two sizes and other seeds and margin than the usual ones."""
     directory, other = tmp_path_factory.mktemp("whole"), {"first_seed": 1000, "margin": 0.2}
     small = {"n_robots": 3, "n_items": 4, "warehouse_width": 3, "warehouse_height": 3}
@@ -37,8 +37,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def altered(whole: Path, directory: Path, change: str) -> Path:
-    shutil.copytree(whole, directory)
+def altered(source: Path, directory: Path, change: str) -> Path:
+    shutil.copytree(source, directory)
     alter(directory / FILE_NAME, change)
     return directory
 
@@ -52,17 +52,17 @@ def rows(directory: Path) -> list[dict[Any, Any]]:
         return runs.frame().to_dict("records")
 
 
-def test_merged_parts_are_the_declared_study_and_success_wins(whole: Path, tmp_path: Path) -> None:
+def test_merged_parts_are_the_declared_study_and_success_wins(full: Path, tmp_path: Path) -> None:
     fail = "UPDATE runs SET failed = 1, outcome = json_set(outcome, '$.error', 'Traceback')"
-    failed = altered(whole, tmp_path / "failed", fail)
-    for number, order in enumerate([(whole, failed), (failed, whole)]):
+    failed = altered(full, tmp_path / "failed", fail)
+    for number, order in enumerate([(full, failed), (failed, full)]):
         out = tmp_path / str(number)
         assert merge(order, out) == 4
-        assert rows(out) == rows(whole)
+        assert rows(out) == rows(full)
         assert [path.name for path in out.iterdir()] == [FILE_NAME]
-        found = Study.stored(out).findings()
-        assert (found.exploratory, found.late_margin) == (False, False)
-        assert StoredStudy.existing(out) == StoredStudy.existing(whole)
+        results = Study.stored(out).findings()
+        assert (results.exploratory, results.late_margin) == (False, False)
+        assert StoredStudy.existing(out) == StoredStudy.existing(full)
 
 
 @pytest.mark.parametrize(
@@ -77,11 +77,11 @@ def test_merged_parts_are_the_declared_study_and_success_wins(whole: Path, tmp_p
     ],
 )
 def test_what_is_not_one_study_is_not_merged(
-    whole: Path, tmp_path: Path, change: str, words: str
+    full: Path, tmp_path: Path, change: str, words: str
 ) -> None:
-    other = altered(whole, tmp_path / "other", change)
+    other = altered(full, tmp_path / "other", change)
     before = rows(other)
     with pytest.raises(StudyError, match=words):
-        merge([whole, other], tmp_path / "both")
+        merge([full, other], tmp_path / "both")
     assert rows(other) == before
     assert not (tmp_path / "both" / FILE_NAME).exists()

@@ -79,8 +79,8 @@ def test_csv_says_what_the_store_holds_sorted_and_without_wall_times(
     text = pd.read_csv(tmp_path / "0.csv")
     assert list(text["run"]) == sorted(text["run"])
     assert "wall_seconds" not in text
-    for times, known in zip(text["delivery_times"].fillna(""), frame["delivery_times"]):
-        assert list(map(float, times.split())) == known
+    for times, expected in zip(text["delivery_times"].fillna(""), frame["delivery_times"]):
+        assert list(map(float, times.split())) == expected
     assert json.loads(text["scenario"][0])["warehouse_width"] == 3.0
 
 
@@ -94,13 +94,13 @@ def test_no_text_in_a_csv_is_a_formula_and_each_is_read_again(text: str) -> None
             pd.DataFrame({"policy": [text, "us"], "low": [-1.5, 2.0], "P": [4, 4]}),
             StudyError,
         )
-        found = read_trials(path, ignore=["low"])
+        trials = read_trials(path, ignore=["low"])
         with path.open(newline="") as file:
             _, (cell, number, _), _ = csv.reader(file)
     assert number == "-1.5"
     assert not re.match(r"[=@\t\r\n]|[+-](?!\d*\.?\d*$)", cell)
-    said = re.sub(r"[\r\n]+", " ", text.strip())
-    assert [trial.policy for trial in found.rows] == [said or "one", "us"]
+    cleaned = re.sub(r"[\r\n]+", " ", text.strip())
+    assert [trial.policy for trial in trials.rows] == [cleaned or "one", "us"]
 
 
 def test_labels_and_errors_are_exported_without_formulas(tmp_path: Path) -> None:
@@ -161,13 +161,13 @@ def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: P
             assert reader.succeeded() == {run(0).key}
     before = path.read_bytes()
     with Runs.existing(directory) as runs:
-        ((place, kept),) = runs.outcomes([run(0), run(1)]).items()
+        ((run_key, stored),) = runs.outcomes([run(0), run(1)]).items()
         with pytest.raises(StudyError, match="readonly database"):
             runs.add([(run(1), outcome(1.0))])
         assert list(directory.iterdir()) == [path]
     assert path.read_bytes() == before
-    assert (place, kept.delivery_times.tolist()) == ((CASE.key, 0), times)
-    assert (kept.ended_at, kept.failed_robots, kept.anchoring_seconds) == (500.0, (3,), 1.5)
+    assert (run_key, stored.delivery_times.tolist()) == ((CASE.key, 0), times)
+    assert (stored.ended_at, stored.failed_robots, stored.anchoring_seconds) == (500.0, (3,), 1.5)
 
 
 def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) -> None:
@@ -209,8 +209,8 @@ def test_a_policy_that_fails_with_any_text_leaves_a_study_that_is_finished_and_r
     say_what_was_played(tally)
     for words in (["report"], ["export", "--to", str(tmp_path / "rows.csv")]):
         assert app.run(["study", words[0], str(tmp_path), *words[1:]]) == 0
-    assert "\x1b" not in (said := capsys.readouterr().out)
-    assert len(said) < 20_000
+    assert "\x1b" not in (printed := capsys.readouterr().out)
+    assert len(printed) < 20_000
     errors = study.results()["error"]
     assert errors.str.contains("ValueError").all()
     assert max(map(len, errors)) < 21_000

@@ -17,7 +17,7 @@ STUDIES = Path(__file__).parents[3] / "examples" / "tasks"
 
 # File of the study: the package that it needs, where a row of observations tells a place.
 @pytest.mark.parametrize(
-    ("name", "package", "place"),
+    ("name", "package", "columns"),
     [
         ("rware", "rware", slice(0, 2)),
         ("simple_spread", "mpe2", slice(2, 4)),
@@ -25,7 +25,7 @@ STUDIES = Path(__file__).parents[3] / "examples" / "tasks"
     ],
 )
 def test_its_own_policy_beats_chance_and_robots_that_stay_start_where_they_would(
-    name: str, package: str, place: slice, monkeypatch: pytest.MonkeyPatch
+    name: str, package: str, columns: slice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip(package, reason="make tasks installs it")
     monkeypatch.syspath_prepend(STUDIES)
@@ -39,6 +39,6 @@ def test_its_own_policy_beats_chance_and_robots_that_stay_start_where_they_would
     for absent in ((), (0, 2)):
         env = task._environment(task.default, absent)
         observations, _ = env.reset(seed=5)
-        starts.append(observation_rows(env, list(env.possible_agents), observations)[:, place])
+        starts.append(observation_rows(env, list(env.possible_agents), observations)[:, columns])
         env.close()
     assert np.array_equal(starts[0][[1, 3]], starts[1])

@@ -61,28 +61,28 @@ def test_a_study_plays_sizes_parameters_and_failure_modes(study: Study) -> None:
     # A silent robot stands in the way of the others; one that is blind stands still, too.
     assert p["walker", "silent, m = 1"].mean() < p["walker", "removed, m = 1"].mean()
     assert p["walker", "silent, m = 1"].tolist() == p["walker", "blind, m = 1"].tolist()
-    asked = next(v for v in results.verdicts if v.compared.indicator == "FT")
-    assert (asked.compared.policy, asked.compared.label) == ("walker", "silent, m = 1")
+    verdict = next(v for v in results.verdicts if v.compared.indicator == "FT")
+    assert (verdict.compared.policy, verdict.compared.label) == ("walker", "silent, m = 1")
     conditions = ("no fault", "silent, m = 1", "removed, m = 1")
     by_hand = spi.fault_tolerance(*(p["walker", condition] for condition in conditions))
-    assert asked.value == by_hand.value
+    assert verdict.value == by_hand.value
     for outcome in results.outcomes.values():  # whole rewards are events with times
         assert len(outcome.delivery_times) == outcome.delivered
         assert (outcome.ended_at, outcome.untimed) == (40, None)
 
 
 def test_what_the_team_shares_counts_once() -> None:
-    told = {"a": 2.0, "b": 2.0, "c": 2.0}
-    infos = {"d": {}, **{agent: {"done": value} for agent, value in told.items()}}
+    rewards = {"a": 2.0, "b": 2.0, "c": 2.0}
+    infos = {"d": {}, **{agent: {"done": value} for agent, value in rewards.items()}}
     for shared, wanted in ((False, 6.0), (True, 2.0)):
-        assert SumOfRewards(shared)(None, told, {}) == wanted
+        assert SumOfRewards(shared)(None, rewards, {}) == wanted
         assert SumOfInfos("done", shared)(None, {}, infos) == wanted
 
 
 def played(*gains: float) -> Outcome:
     """A run of random actions whose steps add so much to P."""
-    given = iter(gains)
-    task = task_of(performance=lambda *_: next(given), period=0.5)
+    steps = iter(gains)
+    task = task_of(performance=lambda *_: next(steps), period=0.5)
     return task.play(Case(PolicySpec(name="random"), "", task.default, task=task), 0, 0)
 
 
@@ -104,10 +104,10 @@ def test_equal_seeds_give_equal_bits_in_other_processes(study: Study) -> None:
         [sys.executable, "-c", script, str(study.out)], capture_output=True, text=True, check=True
     )
     outcomes = study.findings().outcomes
-    kept = [(run.key, outcomes[run.case.key, run.seed]) for run in study.plan().runs]
-    told = {f"{key} {outcome.delivered} {outcome.digest}" for key, outcome in kept}
-    assert {*done.stdout.splitlines()} == told
-    assert len({outcome.digest for _, outcome in kept}) > len(kept) / 2
+    stored = [(run.key, outcomes[run.case.key, run.seed]) for run in study.plan().runs]
+    lines = {f"{key} {outcome.delivered} {outcome.digest}" for key, outcome in stored}
+    assert {*done.stdout.splitlines()} == lines
+    assert len({outcome.digest for _, outcome in stored}) > len(stored) / 2
 
 
 def test_fractions_are_kept_without_times_and_told_apart_by_digests(tmp_path: Path) -> None:
@@ -214,8 +214,8 @@ def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
     assert task_of().code() == task_of().code()
     assert "pettingzoo" in task_of().code()
     noisier = task_of(failures={**FAILURES, "noisy": 0.1})
-    others = [task_of(performance=costs), SCORED, noisier, task_of(period=0.5), SMALLER]
-    assert len({task.code() for task in (task_of(), *others)}) == 6
+    changed_tasks = [task_of(performance=costs), SCORED, noisier, task_of(period=0.5), SMALLER]
+    assert len({task.code() for task in (task_of(), *changed_tasks)}) == 6
 
 
 def test_a_task_is_known_by_what_its_functions_hold() -> None:
@@ -288,10 +288,10 @@ def test_torch_computes_in_one_thread() -> None:
     before = torch.get_num_threads()
     torch.set_num_threads(2)
     try:
-        whole, threaded = (
+        of_walker, of_threaded = (
             only_run(LANE, policies=[policy]).play().delivered for policy in ("walker", Threaded())
         )
-        assert threaded == whole > 0
+        assert of_threaded == of_walker > 0
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(before)

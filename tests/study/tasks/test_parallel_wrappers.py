@@ -55,16 +55,16 @@ LATE: dict[str, Any] = {"onset": 2.0, "duration": 3.0}
 
 
 @pytest.mark.parametrize(
-    ("mode", "fields", "mine"),
+    ("mode", "fields", "expected"),
     [
         ("silent", LATE, [0, 1, STAY, STAY, STAY, 1, 0, 1, 0, 1]),
         ("frozen", LATE, [0, WALK, WALK, WALK, WALK, 1, 0, 1, 0, 1]),
         ("frozen", {}, [0] * 10),
     ],
 )
-def test_silent_and_frozen_robots(mode: str, fields: dict[str, Any], mine: list[int]) -> None:
+def test_silent_and_frozen_robots(mode: str, fields: dict[str, Any], expected: list[int]) -> None:
     executed, _, row = played(mode, **fields)
-    assert [actions[row] for actions in executed] == mine
+    assert [actions[row] for actions in executed] == expected
     assert [actions[row - 1] for actions in executed] == [step % 2 for step in range(10)]
 
 
@@ -151,14 +151,14 @@ class Leaving(Lane):
         return super().reset(seed, options)
 
     def step(self, actions: dict[str, Any]) -> Any:
-        there, self.steps = list(self.agents), self.steps + 1
-        assert list(actions) == there
+        acting, self.steps = list(self.agents), self.steps + 1
+        assert list(actions) == acting
         seen, _, *_ = super().step({"robot_0": STAY, **actions})
-        gone = {agent: self.steps == 2 and agent == "robot_0" for agent in there}
-        over = dict.fromkeys(there, self.steps == 4)
-        self.agents = [agent for agent in there if not (gone[agent] or over[agent])]
-        told = {agent: {"steps": self.steps} for agent in there}
-        return {a: seen[a] for a in there}, dict.fromkeys(there, 1.0), gone, over, told
+        gone = {agent: self.steps == 2 and agent == "robot_0" for agent in acting}
+        over = dict.fromkeys(acting, self.steps == 4)
+        self.agents = [agent for agent in acting if not (gone[agent] or over[agent])]
+        infos = {agent: {"steps": self.steps} for agent in acting}
+        return {a: seen[a] for a in acting}, dict.fromkeys(acting, 1.0), gone, over, infos
 
 
 def test_agents_are_padded_and_masked_until_all_end_together() -> None:
@@ -187,8 +187,10 @@ def test_the_number_of_agents_is_drawn_for_each_episode() -> None:
     assert set(sizes) == {2, 5}
     assert 30 < sizes.count(2) < 50
     again.reset(seed=59)
-    for one, other in [[each.reset()[0] for each in (env, again)] for _ in range(5)]:
-        assert {a: v.tolist() for a, v in one.items()} == {a: v.tolist() for a, v in other.items()}
+    for seen, seen_again in [[each.reset()[0] for each in (env, again)] for _ in range(5)]:
+        assert {a: v.tolist() for a, v in seen.items()} == {
+            a: v.tolist() for a, v in seen_again.items()
+        }
     with pytest.raises(SetupError, match="should be one number of agents or more"):
         ChangingAgents(Lane, [])
     with pytest.raises(SetupError, match=r"make_env\(1\) has robot_0: should be"):

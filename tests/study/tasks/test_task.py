@@ -39,8 +39,10 @@ def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_p
 
 
 def test_the_warehouse_is_varied_by_presets_and_its_cases_are_its_own() -> None:
-    own, other = (Case(PolicySpec(name="x"), "x", Scenario(), task=t) for t in (WAREHOUSE, LANE))
-    assert own.key != other.key
+    case, lane_case = (
+        Case(PolicySpec(name="x"), "x", Scenario(), task=t) for t in (WAREHOUSE, LANE)
+    )
+    assert case.key != lane_case.key
     assert WAREHOUSE.vary(Scenario(), {"preset": "dots"}) == Scenario.preset("dots")
     with pytest.raises(ScenarioError, match="no scenario preset"):
         WAREHOUSE.vary(Scenario(), {"preset": "dot"})
@@ -134,8 +136,8 @@ def test_parameters_reach_the_policy_and_count_where_it_does_not_tell_them(tmp_p
     # Swarm D-T without its taxis is the random walk.
     assert policies.identity(chosen.load()) == PolicySpec.of("random-walk").identity()
     tables = [{"name": f"{__name__}:Silent", "parameters": {"speed": s}} for s in (0.1, 0.2)]
-    one, other = map(PolicySpec.of, tables)
-    assert one.identity() != other.identity()
+    slow, fast = map(PolicySpec.of, tables)
+    assert slow.identity() != fast.identity()
     # A file may not name code by way of parameters.
     table = f'{{ name = "{__name__}:Silent", parameters = {{ speed = 0.1 }} }}'
     (tmp_path / "mine.toml").write_text(FILE.replace('"swarm-dt",', f"{table},", 1))

@@ -66,12 +66,12 @@ def test_verdicts_hold_where_a_fault_costs_more_in_some_maps(
     draw = np.random.default_rng(0)
     shape = STUDIES, n_maps, n_trials
     left = np.clip(draw.normal(0.9, deviation, (STUDIES, n_maps, 1)), 0.0, None)
-    whole, faulty = draw.poisson(P, shape), draw.poisson(P * left, shape)
+    sound, faulty = draw.poisson(P, shape), draw.poisson(P * left, shape)
     study, number_of_map, _ = (axis.ravel() for axis in np.indices(shape))
     of_study = {"policy": study, "map": [f"map {k}" for k in number_of_map], "robots": 10}
     frame = pd.concat(
         [
-            pd.DataFrame({**of_study, "fault": "none", "m": 0, "P": whole.ravel()}),
+            pd.DataFrame({**of_study, "fault": "none", "m": 0, "P": sound.ravel()}),
             pd.DataFrame({**of_study, "fault": "jam", "m": 1, "P": faulty.ravel()}),
         ]
     )

@@ -51,9 +51,9 @@ def test_a_data_frame_is_read_as_the_file_that_it_would_be(tmp_path: Path) -> No
 def test_a_data_frame_is_judged_in_one_call(tmp_path: Path) -> None:
     frame = pd.concat([FRAME.assign(boxes=FRAME["boxes"] + step) for step in range(4)])
     in_memory = judge(frame, columns=COLUMNS)
-    kept = judge(frame, columns=COLUMNS, out=tmp_path / "study")
-    assert [verdict.value for verdict in in_memory.verdicts] == [v.value for v in kept.verdicts]
-    assert {verdict.compared.indicator for verdict in kept.verdicts} == {"S", "R"}
+    stored = judge(frame, columns=COLUMNS, out=tmp_path / "study")
+    assert [verdict.value for verdict in in_memory.verdicts] == [v.value for v in stored.verdicts]
+    assert {verdict.compared.indicator for verdict in stored.verdicts} == {"S", "R"}
 
 
 @pytest.mark.parametrize("ending", ["xlsx", "parquet"])
@@ -202,7 +202,7 @@ def test_a_metric_that_is_not_read_may_be_no_number(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "value", "words"),
+    ("field", "value", "words"),
     [
         ("metrics", {"avg_throughput": None}, "record 2, column 'avg_throughput': 'null': should"),
         ("metrics", {"avg_throughput": "0.5"}, "record 2, column 'avg_throughput': '\"0.5\"': sho"),
@@ -212,10 +212,10 @@ def test_a_metric_that_is_not_read_may_be_no_number(tmp_path: Path) -> None:
     ],
 )
 def test_a_record_of_pogema_without_a_number_is_refused(
-    tmp_path: Path, place: str, value: object, words: str
+    tmp_path: Path, field: str, value: object, words: str
 ) -> None:
     results = pogema_results()
-    results[1][place] = value
+    results[1][field] = value
     path = tmp_path / "results.json"
     path.write_text(json.dumps(results))
     with pytest.raises(spi.IndicatorError) as caught:

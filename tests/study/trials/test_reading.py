@@ -18,10 +18,10 @@ from swarm_logistics_env.core.csv_cells import inert
 from swarm_logistics_env.study.trials import Trials, read_trials
 
 
-def read(tmp_path: Path, text: str, **asked: Any) -> Trials:
+def read(tmp_path: Path, text: str, **options: Any) -> Trials:
     path = tmp_path / "trials.csv"
     path.write_bytes(text.encode(errors="surrogateescape"))
-    return read_trials(path, **asked)
+    return read_trials(path, **options)
 
 
 # Semicolons, decimal commas, a unit, a fault of its own, a note, no seeds.
@@ -36,8 +36,8 @@ COMMAS = """trial;robots;fault;faulty;delivered;width [m];note
 def test_a_file_with_decimal_commas_is_read(tmp_path: Path) -> None:
     trials = read(tmp_path, COMMAS, ignore=["note"], decimal=",")
     assert (trials.paired, len(trials.rows)) == (False, 4)
-    whole = {"n_robots": 8, "width [m]": 2.0}
-    assert trials.performance(fault="none", **whole).tolist() == [12.5, 11.25]
+    sound = {"n_robots": 8, "width [m]": 2.0}
+    assert trials.performance(fault="none", **sound).tolist() == [12.5, 11.25]
     assert trials.performance(fault="wheel", faulty=1).tolist() == [10.5]
     assert trials.performance(**{"width [m]": 1.5}).tolist() == [9.5]
     with pytest.raises(spi.IndicatorError, match="no trial with fault = 'wheal'"):
@@ -174,13 +174,13 @@ def test_a_column_that_is_left_out_is_named_if_it_differs_between_conditions(
 
 
 def test_a_mapping_that_cannot_be_is_refused(tmp_path: Path) -> None:
-    for asked, words in (
+    for options, words in (
         ({"columns": {"performanse": "delivered"}}, "did you mean 'performance'?"),
         ({"ignore": ["faultz"]}, "no column 'faultz': did you mean 'fault'"),
         ({"decimal": ";"}, "--decimal ;: should be . or ,"),
     ):
         with pytest.raises(spi.IndicatorError) as caught:
-            read(tmp_path, HEAD + GOOD, **asked)
+            read(tmp_path, HEAD + GOOD, **options)
         assert words in str(caught.value)
     with pytest.raises(spi.IndicatorError, match=r"cannot read .*nowhere\.csv: No such file"):
         read_trials(tmp_path / "nowhere.csv")
@@ -232,14 +232,14 @@ def test_seeds_are_exact(tmp_path: Path) -> None:
 
 
 def test_a_point_may_stand_before_three_decimals(tmp_path: Path) -> None:
-    for text, asked in (
+    for text, options in (
         ("robots;p\n4;980\n4;1.200\n", {"decimal": "."}),
         ("robots;p\n4;980\n4;1.25\n4;1.200\n", {}),
         ("robots;p\n4;2\n4;1.125\n", {}),
         ("robots;p\n4;9\n4;0.125\n", {}),
     ):
         written = re.findall(r";([\d.]+)", text)
-        assert [row.performance for row in read(tmp_path, text, **asked).rows] == [
+        assert [row.performance for row in read(tmp_path, text, **options).rows] == [
             float(cell) for cell in written
         ]
     with pytest.raises(
@@ -286,9 +286,9 @@ def test_what_is_written_is_read_row_by_row(
     written = written if ends else written.removesuffix(line_end)
     path = tmp_path_factory.mktemp("trials") / "t.csv"
     path.write_bytes(codecs.BOM_UTF8 * marked + written.encode())
-    found = read_trials(path, decimal=decimal).rows
-    assert [(row.performance, row.line) for row in found] == [*zip((p for p, _ in rows), lines)]
-    for row, (_, text) in zip(found, rows):
+    trials = read_trials(path, decimal=decimal).rows
+    assert [(row.performance, row.line) for row in trials] == [*zip((p for p, _ in rows), lines)]
+    for row, (_, text) in zip(trials, rows):
         assert row.policy == (re.sub("[\n\v\f\r\x85\u2028\u2029]+", " ", text.strip()))
 
 
@@ -299,8 +299,8 @@ def test_a_seed_alone_tells_two_runs_of_an_event_log_apart(tmp_path: Path) -> No
 
 def test_a_label_may_stand_in_several_conditions_once_each(tmp_path: Path) -> None:
     rows = "robots,fault,faulty,trial,p\n8,none,0,1,10\n8,none,0,2,9\n8,jam,1,1,7\n"
-    found = read(tmp_path, rows).rows
-    assert [(row.fault, row.performance) for row in found] == [
+    trials = read(tmp_path, rows).rows
+    assert [(row.fault, row.performance) for row in trials] == [
         ("none", 10.0), ("none", 9.0), ("jam", 7.0),
     ]  # fmt: skip
     with pytest.raises(spi.IndicatorError, match=r"line 5, .*'1': is in line 4 too"):

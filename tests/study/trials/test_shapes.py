@@ -19,9 +19,9 @@ WHOLE = [12.5, 11.25, 13.0, 12.0, 12.75, 11.5, 12.25, 13.5, 11.0, 12.0, 13.25, 1
 BROKEN = [10.5, 9.75, 8.5, 9.0]
 
 
-def rows(line: str, whole: str = "none", broken: str = "wheel", comma: str = ".") -> str:
+def rows(line: str, sound: str = "none", broken: str = "wheel", comma: str = ".") -> str:
     """Return a line for each trial: {p}, {fault}, {m}, {k} are filled."""
-    trials = [(p, whole, 0) for p in WHOLE] + [(p, broken, 1) for p in BROKEN]
+    trials = [(p, sound, 0) for p in WHOLE] + [(p, broken, 1) for p in BROKEN]
     return "".join(
         line.format(p=str(p).replace(".", comma), fault=fault, m=m, k=k) + "\n"
         for k, (p, fault, m) in enumerate(trials)
@@ -55,9 +55,9 @@ SHAPES = [
     Shape("capitals and blanks", " N , Fault , M , P \n" + rows(" 8 , {fault} , {m} , {p} ")),
     Shape("an empty column", "N,fault,m,P,seed\n" + rows("8,{fault},{m},{p},")),
     Shape("empty lines", "\nN,fault,m,P\n\n" + rows("8,{fault},{m},{p}") + ",,,\n\n,,,\n"),
-    Shape("an empty fault", "N,fault,m,P\n" + rows("8,{fault},{m},{p}", whole="")),
-    Shape("NA for no fault", "N,fault,m,P\n" + rows("8,{fault},{m},{p}", whole="NA")),
-    Shape("German for no fault", "N;fault;m;P\n" + rows("8;{fault};{m};{p}", whole="keiner")),
+    Shape("an empty fault", "N,fault,m,P\n" + rows("8,{fault},{m},{p}", sound="")),
+    Shape("NA for no fault", "N,fault,m,P\n" + rows("8,{fault},{m},{p}", sound="NA")),
+    Shape("German for no fault", "N;fault;m;P\n" + rows("8;{fault};{m};{p}", sound="keiner")),
     Shape("others' names", "agents,failure_mode,n_faulty,throughput\n" + rows("8,{fault},{m},{p}")),
     Shape("a number of its own each", "id,N,fault,m,P\n" + rows("{k},8,{fault},{m},{p}")),
     Shape("a temperature", "N,fault,m,P,temperature\n" + rows("8,{fault},{m},{p},2{k}.5")),
@@ -119,7 +119,7 @@ def test_a_shape_is_read_at_once_or_as_the_refusal_says(shape: Shape, tmp_path: 
             read_trials(path)
         assert shape.refusal in str(refused.value)
     trials = read_trials(path, **reading(shape.option))
-    whole = trials.performance(fault="none")
+    sound = trials.performance(fault="none")
     (fault,) = {row.fault for row in trials.rows} - {"none"}
     broken = trials.performance(fault=fault)
     expected = WHOLE, BROKEN
@@ -127,5 +127,5 @@ def test_a_shape_is_read_at_once_or_as_the_refusal_says(shape: Shape, tmp_path: 
         expected = [1200.0] * 12, [1111.0] * 4
     elif shape.name == "a row a robot":
         expected = [p + 1.0 for p in WHOLE], [p + 1.0 for p in BROKEN]
-    assert (whole.tolist(), broken.tolist()) == (list(expected[0]), list(expected[1]))
+    assert (sound.tolist(), broken.tolist()) == (list(expected[0]), list(expected[1]))
     assert {row.n_robots for row in trials.rows} == {8}

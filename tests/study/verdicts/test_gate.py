@@ -95,21 +95,21 @@ def test_a_gate_over_several_comparisons_keeps_its_error_over_all_of_them() -> N
         old = drawn(42, rng)
         new = drawn(38, rng)
         for gate in ("change < 0", "R > 0", "FT > 0"):
-            said = answers(Gate.parse(gate), old, new)
-            estimates = [answer.estimate for answer in said if answer.estimate]
-            assert len(estimates) == len(said) >= 6
+            gate_answers = answers(Gate.parse(gate), old, new)
+            estimates = [answer.estimate for answer in gate_answers if answer.estimate]
+            assert len(estimates) == len(gate_answers) >= 6
             adjusted = spi.adjust(estimates)
-            assert tuple(answer.verdict for answer in said) == adjusted
+            assert tuple(answer.verdict for answer in gate_answers) == adjusted
             if tuple(estimate.verdict for estimate in estimates) != adjusted:
                 softened.add(gate)
     assert len(softened) == 3
 
 
 def test_a_capped_p_is_never_called_equivalent() -> None:
-    same = results({**WELL, (10, 1): 60}, margin=0.9)
-    outcomes = {key: replace(one, all_delivered=True) for key, one in same.outcomes.items()}
-    for found, verdict in ((same, "equivalent"), (judge(same.plan, outcomes), "open")):
-        tests = [v.equivalence for v in found.verdicts if v.compared.indicator == "R"]
+    base = results({**WELL, (10, 1): 60}, margin=0.9)
+    outcomes = {key: replace(outcome, all_delivered=True) for key, outcome in base.outcomes.items()}
+    for judged, verdict in ((base, "equivalent"), (judge(base.plan, outcomes), "open")):
+        tests = [v.equivalence for v in judged.verdicts if v.compared.indicator == "R"]
         assert {test.verdict for test in tests if test} == {verdict}
 
 
@@ -130,10 +130,10 @@ def test_the_same_runs_answer_a_gate_exactly() -> None:
     plan = results(WELL).plan
     # If nothing is delivered, no change can be estimated.
     nothing = judge(plan, {(r.case.key, r.seed): Outcome(digest=r.key) for r in plan.runs})
-    for same in (results(WORSE, seeds=2), nothing):
+    for unchanged in (results(WORSE, seeds=2), nothing):
         for text, failing in (("possibly change < 0", False), ("change > -0.1", True)):
-            said = answers(Gate.parse(text), same, same)
-            assert {(answer.fails, answer.exact) for answer in said} == {(failing, 0.0)}
+            gate_answers = answers(Gate.parse(text), unchanged, unchanged)
+            assert {(answer.fails, answer.exact) for answer in gate_answers} == {(failing, 0.0)}
     # Imported results have no digests: equal numbers do not show that runs are the same.
     recorded = [Outcome(digest="a"), Outcome()]
     assert not same_runs(recorded, recorded)
@@ -159,15 +159,15 @@ def test_an_ablation_s_policy_is_not_compared() -> None:
     # The random walk of the old study is judged in none.
     ablation: dict[str, Any] = {"ablations": [{"policy": "random-walk"}]}
     old, new = results(WELL, **ablation), results(WORSE, policies=["random-walk"], **ablation)
-    said = answers(Gate.parse("change < 0"), old, new)
-    assert {a.name.split(": ")[0] for a in said} == {"swarm-dt -> random-walk"}
-    assert len(said) == 4
-    assert any(answer.fails for answer in said)
+    gate_answers = answers(Gate.parse("change < 0"), old, new)
+    assert {a.name.split(": ")[0] for a in gate_answers} == {"swarm-dt -> random-walk"}
+    assert len(gate_answers) == 4
+    assert any(answer.fails for answer in gate_answers)
 
 
 def test_a_judged_policy_without_a_match_fails_and_is_named() -> None:
-    one, two = results(WELL), results(WELL, policies=["swarm-dt", "random-walk"])
-    for old, new in ((one, two), (two, one)):
+    single, both = results(WELL), results(WELL, policies=["swarm-dt", "random-walk"])
+    for old, new in ((single, both), (both, single)):
         (failing,) = (a for a in answers(Gate.parse("change < 0"), old, new) if a.fails)
         assert "policy 'random-walk' is judged under no condition of both" in str(failing.problem)
         # A gate on the other policy alone is answered.
@@ -177,7 +177,7 @@ def test_a_judged_policy_without_a_match_fails_and_is_named() -> None:
 
 def test_what_cannot_be_judged_fails_and_a_gate_on_nothing_is_refused() -> None:
     old = results(WELL, scenario={"n_robots": 10, "n_items": 70})
-    failed = judge(old.plan, {place: Outcome(error="x") for place in old.outcomes})
+    failed = judge(old.plan, {run_key: Outcome(error="x") for run_key in old.outcomes})
     for gate, new, words in (
         (
             "change < 0",
@@ -196,10 +196,10 @@ def test_what_cannot_be_judged_fails_and_a_gate_on_nothing_is_refused() -> None:
 
 def test_a_gate_on_what_cannot_be_passes() -> None:
     widths = {"name": "handling_time", "values": [1.0, 2.0]}
-    found = results({(10, 0): 40}, sizes=[], faults=[], parameters=[widths])
-    (answer,) = answers(Gate.parse("possibly A < 0"), found, found)
+    judged = results({(10, 0): 40}, sizes=[], faults=[], parameters=[widths])
+    (answer,) = answers(Gate.parse("possibly A < 0"), judged, judged)
     assert (answer.fails, answer.verdict) == (False, "open")
-    (answer,) = answers(Gate.parse("possibly A < 0.5"), found, found)
+    (answer,) = answers(Gate.parse("possibly A < 0.5"), judged, judged)
     assert answer.estimate is not None
     assert not answer.estimate.untestable
 
@@ -219,8 +219,8 @@ def test_blocks_of_other_names_are_no_pairs() -> None:
 
     before = trials("hall", "roof", "yard")
     assert match(before, trials("yard", "hall", "roof")).seeds == (0, 1, 2)
-    others = match(before, trials("roof", "tower", "yard"))
-    assert others.seeds is None
-    assert others.notes == (
+    unmatched = match(before, trials("roof", "tower", "yard"))
+    assert unmatched.seeds is None
+    assert unmatched.notes == (
         "Their blocks have other names, so that runs are compared without pairs.",
     )

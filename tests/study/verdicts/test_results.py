@@ -27,17 +27,17 @@ def by_question(results: StudyResults) -> dict[tuple[str, str, float], Verdict]:
 
 
 @pytest.fixture(scope="module")
-def found() -> StudyResults:
+def paper_results() -> StudyResults:
     return paper()
 
 
-def test_misses_lie_outside_the_interval_of_one_run(found: StudyResults) -> None:
-    (own,) = found.agreements
-    assert len(own.cells) == 33
+def test_misses_lie_outside_the_interval_of_one_run(paper_results: StudyResults) -> None:
+    (agreement,) = paper_results.agreements
+    assert len(agreement.cells) == 33
     # Three cells share the base run with 39 under other published values: 41 twice missing.
-    assert {cell.words for cell in own.misses} <= {"warehouse_width = 10"}
-    assert (own.mean_log_error or 1.0) < 0.03
-    assert len(own.met) > 25
+    assert {cell.words for cell in agreement.misses} <= {"warehouse_width = 10"}
+    assert (agreement.mean_log_error or 1.0) < 0.03
+    assert len(agreement.met) > 25
     (more,) = paper(lambda *where: published(*where) + 2.0).agreements
     assert len(more.met) < 5
     logs = [abs(math.log(c.by_seed.mean() / (c.published or 0.0))) for c in more.cells]
@@ -53,17 +53,17 @@ def test_misses_lie_outside_the_interval_of_one_run(found: StudyResults) -> None
     ],
 )
 def test_claims_are_judged_in_their_own_direction(
-    question: tuple[str, str, float], verdict: str, found: StudyResults
+    question: tuple[str, str, float], verdict: str, paper_results: StudyResults
 ) -> None:
-    test = by_question(found)[question]
+    test = by_question(paper_results)[question]
     assert decided(test.on_claim).plain == verdict
     assert (decided(test.on_claim).plain == test.on_threshold.plain) == (
         test.claimed is True or verdict == "open"
     )
 
 
-def test_power_and_caps_stand_where_they_belong(found: StudyResults) -> None:
-    power = by_question(found)
+def test_power_and_caps_stand_where_they_belong(paper_results: StudyResults) -> None:
+    power = by_question(paper_results)
     at_threshold = power["FT", "FM4, m = 1", 0.0]
     assert (at_threshold.published, at_threshold.seeds_needed) == (0, None)
     assert power["FT", "FM4, m = 3", 0.0].seeds_needed == 10
@@ -75,14 +75,14 @@ def test_power_and_caps_stand_where_they_belong(found: StudyResults) -> None:
 
 
 def test_ablation_that_falls_is_supported() -> None:
-    found = paper(lambda _, at: 30.0 if at.name == "random-walk" else published(_, at))
-    changes = [test for test in found.verdicts if test.compared.indicator == "change"]
+    results = paper(lambda _, at: 30.0 if at.name == "random-walk" else published(_, at))
+    changes = [test for test in results.verdicts if test.compared.indicator == "change"]
     # At N = 25: 39 -> 30; at N = 100: 74 -> 30, beyond a third.
-    said = [
+    verdicts = [
         (decided(test.on_claim).adjusted, test.on_property.plain, test.on_threshold.plain)
         for test in changes
     ]
-    assert said == [("supported", "supported", "refuted")] * 2
+    assert verdicts == [("supported", "supported", "refuted")] * 2
 
 
 def test_a_fault_without_harm_is_equivalent_where_its_threshold_is_open() -> None:
@@ -111,17 +111,19 @@ def test_a_fault_without_harm_is_equivalent_where_its_threshold_is_open() -> Non
     assert unchanged
 
 
-def test_a_margin_that_was_not_declared_is_exploratory(found: StudyResults) -> None:
-    late = judge(found.plan, found.outcomes, Declaration(first_seed=0, seeds=10, margin=0.2))
-    assert (late.late_margin, late.exploratory, found.late_margin) == (True, False, False)
+def test_a_margin_that_was_not_declared_is_exploratory(paper_results: StudyResults) -> None:
+    late = judge(
+        paper_results.plan, paper_results.outcomes, Declaration(first_seed=0, seeds=10, margin=0.2)
+    )
+    assert (late.late_margin, late.exploratory, paper_results.late_margin) == (True, False, False)
     assert any("margin of equivalence are exploratory" in text for text in warnings(late))
 
 
 def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
-    found = paper(same=frozenset({"FM2"}))
-    same = [test for test in found.verdicts if test.on_threshold.plain == "unaffected"]
-    assert {(test.compared.indicator, test.after.name) for test in same} == {("R", "FM2")}
-    for test in same:
+    results = paper(unaffected=frozenset({"FM2"}))
+    unaffected = [test for test in results.verdicts if test.on_threshold.plain == "unaffected"]
+    assert {(test.compared.indicator, test.after.name) for test in unaffected} == {("R", "FM2")}
+    for test in unaffected:
         assert test.value == test.after.value / 25
         assert (test.p_adjusted, decided(test.on_claim).adjusted) == (None, "unaffected")
         # The same runs answer whether P is unchanged, exactly and without evidence.
@@ -132,16 +134,16 @@ def test_a_mode_that_changes_no_run_is_unaffected_and_no_evidence() -> None:
         assert test.equivalence is not None
         assert test.equivalence.p_value is None
     # Holm's family of R has nine members left, so the smallest p counts nine times.
-    rest = [t for t in found.verdicts if t.compared.indicator == "R" and t not in same]
+    rest = [t for t in results.verdicts if t.compared.indicator == "R" and t not in unaffected]
     assert len(rest) == 9
     smallest = min(t.estimate.p_value for t in rest if t.estimate and t.estimate.p_value)
     assert min(t.p_adjusted for t in rest if t.p_adjusted) == pytest.approx(9 * smallest)
 
 
-def test_one_failed_run_blocks_its_family_under_holm(found: StudyResults) -> None:
-    case = next(c for c in found.plan.cases if c.scenario.n_robots == 150)
-    broken = {**found.outcomes, (case.key, 1): Outcome(error="Traceback")}
-    tests = [t for t in judge(found.plan, broken).verdicts if t.compared.indicator == "S"]
+def test_one_failed_run_blocks_its_family_under_holm(paper_results: StudyResults) -> None:
+    case = next(c for c in paper_results.plan.cases if c.scenario.n_robots == 150)
+    broken = {**paper_results.outcomes, (case.key, 1): Outcome(error="Traceback")}
+    tests = [t for t in judge(paper_results.plan, broken).verdicts if t.compared.indicator == "S"]
     assert [t.problem for t in tests if t.problem] == ["N = 150: 1 of 10 runs failed"]
     assert [t.value is None for t in tests] == [t.problem is not None for t in tests]
     assert {t.on_threshold.adjusted for t in tests} == {"undefined"}
@@ -153,27 +155,27 @@ def test_two_seeds_and_a_cap_everywhere_give_no_verdict() -> None:
         digest = f"{setting} {seed}"
         return Outcome(delivery_times=np.arange(60.0), all_delivered=True, digest=digest)
 
-    for found in (paper(seeds=2), judged(Study.preset("paper", seeds=10), capped)):
-        for test in found.verdicts:
+    for results in (paper(seeds=2), judged(Study.preset("paper", seeds=10), capped)):
+        for test in results.verdicts:
             assert test.estimate is not None
             word = "untestable" if test.estimate.untestable else "open"
             assert (test.on_threshold.plain, test.on_threshold.adjusted) == (word, word)
 
 
 def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
-    found = judge(Study.preset("paper", seeds=2).plan(), {})
-    assert {cell.problem for cell in found.cells} == {"2 of 2 runs missing"}
-    means = frame(found.cells, CELL_COLUMNS)["mean"]
+    results = judge(Study.preset("paper", seeds=2).plan(), {})
+    assert {cell.problem for cell in results.cells} == {"2 of 2 runs missing"}
+    means = frame(results.cells, CELL_COLUMNS)["mean"]
     assert means.isna().all()
     assert means.dtype == np.dtype(float)
-    assert {(test.value, test.on_threshold.plain) for test in found.verdicts} == {
+    assert {(test.value, test.on_threshold.plain) for test in results.verdicts} == {
         (None, "undefined")
     }
 
 
-def test_every_column_has_a_value_somewhere(found: StudyResults) -> None:
+def test_every_column_has_a_value_somewhere(paper_results: StudyResults) -> None:
     # Every column has a value somewhere in a whole study, but for what only others have.
-    claimed = paper(same=frozenset({"FM2"}), seeds=40)
+    claimed = paper(unaffected=frozenset({"FM2"}), seeds=40)
     cells, verdicts = frame(claimed.cells, CELL_COLUMNS), frame(claimed.verdicts, VERDICT_COLUMNS)
     counted = {
         "contacts", "contacts_low", "contacts_high", "fast_contacts", "overlap_share",
@@ -190,9 +192,9 @@ def test_every_column_has_a_value_somewhere(found: StudyResults) -> None:
 
 
 def test_ft_of_a_fault_that_changes_no_run_is_what_the_removed_robots_cost() -> None:
-    found = by_question(paper(same=frozenset({"FM1"})))
-    assert found["R", "FM1, m = 1", 0.0].on_threshold.plain == "unaffected"
-    ft = found["FT", "FM1, m = 1", 0.0]
+    verdicts = by_question(paper(unaffected=frozenset({"FM1"})))
+    assert verdicts["R", "FM1, m = 1", 0.0].on_threshold.plain == "unaffected"
+    ft = verdicts["FT", "FM1, m = 1", 0.0]
     assert ft.problem is None
     assert ft.estimate is not None
     assert not ft.estimate.identical

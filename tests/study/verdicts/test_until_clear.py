@@ -48,7 +48,7 @@ def made_up(run: Run) -> Outcome:
 class Engine:
     """Gives made-up outcomes, as they are or as `changed` makes them, and notes the runs."""
 
-    changed: Callable[[Run, Outcome], Outcome] = lambda _, one: one
+    changed: Callable[[Run, Outcome], Outcome] = lambda _, outcome: outcome
     most: int | None = None
     played: list[Run] = field(default_factory=list)
 
@@ -76,9 +76,9 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     (line, _), last = answer(study.findings())[2:]
     assert line.verdict_text == "untestable: it cannot be below 0"
     assert "untestable where it cannot lie below the threshold" in last
-    told = sentence(study.findings(), doubled).text
-    assert "it cannot lie below the threshold, so it is not tested" in told
-    assert "djusted" not in told
+    text = sentence(study.findings(), doubled).text
+    assert "it cannot lie below the threshold, so it is not tested" in text
+    assert "djusted" not in text
 
 
 def test_p_stands_before_the_rest_of_the_first_look_and_the_same_engine_plays_all(
@@ -110,15 +110,15 @@ def test_p_stands_before_the_rest_of_the_first_look_and_the_same_engine_plays_al
 
 
 def test_an_engine_that_takes_all_runs_at_once_is_called_again_for_the_next_look(
-    whole: tuple[Study, Engine],
+    finished: tuple[Study, Engine],
 ) -> None:
     def eager(runs: Iterable[Run]) -> Generator[tuple[Run, Outcome], None, None]:
         yield from Engine()(list(runs))
 
     study = until_clear(60)
     tally = study.run(eager)
-    assert (tally.played, tally.left) == (len(whole[1].played), 0)
-    assert told(study) == told(whole[0])
+    assert (tally.played, tally.left) == (len(finished[1].played), 0)
+    assert told(study) == told(finished[0])
 
 
 def verdicts_of(study: Study) -> dict[str, Verdict]:
@@ -138,7 +138,7 @@ def told(study: Study) -> dict[str, tuple[Any, ...]]:
 
 
 @pytest.fixture(scope="module")
-def whole() -> tuple[Study, Engine]:
+def finished() -> tuple[Study, Engine]:
     """A study of at most 60 seeds, and the engine that played it."""
     study, engine = until_clear(60), Engine()
     assert study.run(engine).played == len(engine.played)
@@ -146,19 +146,19 @@ def whole() -> tuple[Study, Engine]:
 
 
 def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
-    whole: tuple[Study, Engine],
+    finished: tuple[Study, Engine],
 ) -> None:
-    study, engine = whole
-    found = told(study)
-    assert found["FM4"][:3] == (10, 10, "refuted")
-    assert 10 < found["FM3"][1] < 60
-    stopped_at, n_seeds, verdict, _ = found["FM2"]
+    study, engine = finished
+    results_by_mode = told(study)
+    assert results_by_mode["FM4"][:3] == (10, 10, "refuted")
+    assert 10 < results_by_mode["FM3"][1] < 60
+    stopped_at, n_seeds, verdict, _ = results_by_mode["FM2"]
     # It is no longer played once the seeds to come would hardly decide it.
     assert (stopped_at, verdict) == (None, "open")
     assert 10 < n_seeds < 60
     modes = [mode_of(run) for run in engine.played]
     seeds = {mode: modes.count(mode) for mode in MEANS}
-    assert seeds == {mode: found[mode][1] for mode in MEANS}
+    assert seeds == {mode: results_by_mode[mode][1] for mode in MEANS}
     assert len(engine.played) == sum(seeds.values()) + max(seeds.values())
     cells, most = study.findings().cells, max(seeds.values())
     assert {cell.n_seeds for cell in cells} == {*seeds.values()}  # the sound swarm has the most
@@ -197,9 +197,9 @@ def test_a_change_within_the_margin_is_played_no_further() -> None:
 def test_stopped_before_the_first_look_it_has_a_value_of_every_question_and_no_verdict() -> None:
     study = until_clear(60)
     study.run(Engine(most=35))
-    found = verdicts_of(study)
-    assert {test.estimate and test.estimate.n_seeds for test in found.values()} <= {8, 9}
-    assert {test.conclusion for test in found.values()} == {"undefined"}
+    verdicts = verdicts_of(study)
+    assert {test.estimate and test.estimate.n_seeds for test in verdicts.values()} <= {8, 9}
+    assert {test.conclusion for test in verdicts.values()} == {"undefined"}
 
 
 def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
@@ -212,13 +212,13 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
 
         study = until_clear(30)
         study.run(Engine(poisson))
-        found = [
+        tests = [
             (e.n_seeds, e.p_value or 0.0, t.on_threshold.adjusted)
             for t in verdicts_of(study).values()
             if (e := t.estimate)
         ]
-        n_open = len(found)
-        for n_seeds, p, verdict in sorted(found, key=lambda one: one[:2]):
+        n_open = len(tests)
+        for n_seeds, p, verdict in sorted(tests, key=lambda test: test[:2]):
             look = looks.index(n_seeds)
             alone, level = (spi.look_alphas(looks, alpha)[look] for alpha in (0.05, 0.05 / n_open))
             is_clear = verdict != "open"
@@ -229,9 +229,9 @@ def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
 
 
 def test_interrupted_at_any_moment_it_goes_on_to_the_same_result(
-    whole: tuple[Study, Engine], tmp_path: Path
+    finished: tuple[Study, Engine], tmp_path: Path
 ) -> None:
-    study, engine = whole
+    study, engine = finished
     interrupted, played = until_clear(60, tmp_path), 0
     for most in (25, 7, 5, 1):
         tally = interrupted.run(Engine(most=most))
@@ -246,20 +246,24 @@ def test_interrupted_at_any_moment_it_goes_on_to_the_same_result(
 
 
 def test_later_outcomes_of_a_shared_condition_change_no_verdict(
-    whole: tuple[Study, Engine],
+    finished: tuple[Study, Engine],
 ) -> None:
     capped = until_clear(60)
     capped.run(
-        Engine(lambda run, one: replace(one, all_delivered=not mode_of(run) and run.seed >= 20))
+        Engine(
+            lambda run, outcome: replace(outcome, all_delivered=not mode_of(run) and run.seed >= 20)
+        )
     )
     # A capped P_F would block "refuted" only; a capped P_o blocks "supported", and marks the rest.
-    assert told(capped)["FM4"] == told(whole[0])["FM4"]
+    assert told(capped)["FM4"] == told(finished[0])["FM4"]
     assert not verdicts_of(capped)["FM4"].saturated
 
 
 def test_a_failed_run_blocks_its_comparison_and_no_other() -> None:
-    def fails_once(run: Run, one: Outcome) -> Outcome:
-        return Outcome(error="ValueError: no") if (mode_of(run), run.seed) == ("FM3", 7) else one
+    def fails_once(run: Run, outcome: Outcome) -> Outcome:
+        return (
+            Outcome(error="ValueError: no") if (mode_of(run), run.seed) == ("FM3", 7) else outcome
+        )
 
     study = until_clear(30)
     assert study.run(Engine(fails_once)).failed == 1
@@ -310,14 +314,14 @@ def with_p(p_value: Callable[[Numbers], float | None], sampled: Sampled, wanted:
 def family(most: int, p_f: dict[str, Numbers]) -> tuple[dict[str, Verdict], Engine]:
     """Judge R of a robot of 100 for each mode until it is clear, with P_F at each seed."""
 
-    def given(run: Run, _: Outcome) -> Outcome:
+    def outcome_of(run: Run, _: Outcome) -> Outcome:
         p = float(p_f.get(mode_of(run), P_O)[run.seed])
         # Runs of one P at one seed are the same runs.
         return Outcome(untimed=p, digest=f"{run.seed} {p}")
 
-    asked: dict[str, Any] = {"scenario": {"n_robots": 100}, "indicators": ["R"]}
-    asked["faults"], engine = [{"modes": [*p_f], "robots": [1]}], Engine(given)
-    study = Study(seeds=most, until_clear=True, **asked)
+    fields: dict[str, Any] = {"scenario": {"n_robots": 100}, "indicators": ["R"]}
+    fields["faults"], engine = [{"modes": [*p_f], "robots": [1]}], Engine(outcome_of)
+    study = Study(seeds=most, until_clear=True, **fields)
     study.run(engine)
     return verdicts_of(study), engine
 
@@ -331,11 +335,11 @@ def test_every_step_of_holm_at_a_look_has_a_level_of_its_own() -> None:
 
     # Below 0.05, 0.05 / 2 and 0.05 / 3; in the plan the largest comes first.
     wanted = {"FM2": 0.042, "FM3": 0.021, "FM4": 0.012}
-    found, _ = family(
+    verdicts, _ = family(
         10, {mode: with_p(p_of_r, sampled(n), p) for n, (mode, p) in enumerate(wanted.items(), 1)}
     )
     assert {
-        mode: (test.on_threshold.adjusted, test.stopped_at) for mode, test in found.items()
+        mode: (test.on_threshold.adjusted, test.stopped_at) for mode, test in verdicts.items()
     } == dict.fromkeys(wanted, ("supported", 10))
 
 
@@ -359,12 +363,12 @@ def test_equivalences_step_down_too_each_at_the_level_of_its_own_look(
         mode: with_p(p_of_equivalence, sampled(n), share * level)
         for n, (mode, share, level) in enumerate(zip(modes, shares, levels), 1)
     }
-    found, _ = family(60, p_f)
-    assert {test.stopped_at for test in found.values()} == {None}
-    alphas = [test.equivalence.alpha for test in found.values() if test.equivalence]
+    verdicts, _ = family(60, p_f)
+    assert {test.stopped_at for test in verdicts.values()} == {None}
+    alphas = [test.equivalence.alpha for test in verdicts.values() if test.equivalence]
     assert alphas == pytest.approx([levels[0]] * 3)
     assert {
-        m for m, test in found.items() if decided(test.on_equivalence).adjusted == "equivalent"
+        m for m, test in verdicts.items() if decided(test.on_equivalence).adjusted == "equivalent"
     } == equivalent
 
 
@@ -381,13 +385,13 @@ def test_predictive_power_is_the_share_of_studies_that_the_last_look_decides() -
 
 
 def test_a_comparison_of_the_same_runs_stops_at_the_first_look() -> None:
-    found, engine = family(60, {"FM2": P_O})
-    assert (found["FM2"].on_threshold.adjusted, found["FM2"].stopped_at) == ("unaffected", 10)
+    verdicts, engine = family(60, {"FM2": P_O})
+    assert (verdicts["FM2"].on_threshold.adjusted, verdicts["FM2"].stopped_at) == ("unaffected", 10)
     assert len(engine.played) == 20
 
 
 def test_all_seeds_after_looks_were_declared_are_exploratory(tmp_path: Path) -> None:
     until_clear(30, tmp_path).run(Engine())
     assert not until_clear(30, tmp_path).findings().exploratory
-    asked: dict[str, Any] = {"faults": [{"modes": [*MEANS], "robots": [1]}], "indicators": ["R"]}
-    assert Study(out=tmp_path, seeds=30, **asked).is_exploratory()
+    fields: dict[str, Any] = {"faults": [{"modes": [*MEANS], "robots": [1]}], "indicators": ["R"]}
+    assert Study(out=tmp_path, seeds=30, **fields).is_exploratory()

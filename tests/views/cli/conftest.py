@@ -32,7 +32,7 @@ def command(folder: Path, capsys: pytest.CaptureFixture[str]) -> Command:
         printed = capsys.readouterr()
         if code != 2:
             return printed.out
-        (said,) = printed.err.splitlines()
-        return said
+        (sentence,) = printed.err.splitlines()
+        return sentence
 
     return run

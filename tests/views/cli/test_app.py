@@ -27,7 +27,7 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "reason"),
     [
         ("fly", "fly"),
         ("run --policy a\x1b[31m\udc80", r"'a\x1b[31m\udc80'"),
@@ -53,12 +53,12 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_code_2(
-    words: str, said: str, folder: Path, capsys: pytest.CaptureFixture[str]
+    words: str, reason: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert app.run(words.split()) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert said in printed.err
+    assert reason in printed.err
     assert len(printed.err.splitlines()) == 1
     assert list(folder.iterdir()) == []
 
@@ -108,7 +108,7 @@ def test_a_help_page_shows_each_help_text_in_full(
     words: list[str], parsed: Any, command: Command
 ) -> None:
     page = "".join(command(" ".join(words)).split())
-    for text in [parsed.help, *(getattr(one, "help", "") for one in parsed.params)]:
+    for text in [parsed.help, *(getattr(parameter, "help", "") for parameter in parsed.params)]:
         assert "".join((text or "").split()) in page
     assert words != ["study", "run", "--help"] or ",".join(PRESETS) in page
     is_group = hasattr(parsed, "commands")  # in which no command's sentence is cut
@@ -135,12 +135,12 @@ def test_a_policy_of_ones_own_that_cannot_be_made_is_one_sentence(
     command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("own_policy.py").write_text(OWN)
-    for name, said in (
+    for name, reason in (
         ("own_policy:Unmade", "'own_policy:Unmade' cannot be made: KeyError: 'gain'"),
         ("own_policy:Laxy", "'own_policy:Laxy': own_policy has no Laxy"),
         ("own_policy", "no policy 'own_policy' (a name, 'my.py:Class', 'package.module:Class'"),
     ):
-        assert said in command(f"run --policy {name} {SMALL}", code=2)
+        assert reason in command(f"run --policy {name} {SMALL}", code=2)
     # Its traceback says where, without the frames that called it.
     assert app.run(f"run --policy own_policy:Torn {SMALL}".split()) == 1
     printed = capsys.readouterr().err.splitlines()
@@ -168,13 +168,13 @@ def test_policy_of_ones_own_is_found_where_the_command_is_run(
 def test_a_scenario_is_read_from_a_file(command: Command) -> None:
     Path("small.json").write_text(command(f"list scenario {SMALL} --json"))
     *expected, _ = command(f"run {SMALL}").splitlines()
-    *told, _ = command("run --scenario small.json").splitlines()
-    assert told == expected
+    *printed, _ = command("run --scenario small.json").splitlines()
+    assert printed == expected
     # --set has the last word, and the file goes before --preset.
     Path("dots.toml").write_text("preset = 'dots'\nn_robots = 7\nn_items = 9\n")
-    given = "--preset realistic --scenario dots.toml --set n_items=8"
-    found = Scenario.from_json(command(f"list scenario --json {given}"))
-    assert found == Scenario.preset("dots").replace(n_robots=7, n_items=8)
+    options = "--preset realistic --scenario dots.toml --set n_items=8"
+    scenario = Scenario.from_json(command(f"list scenario --json {options}"))
+    assert scenario == Scenario.preset("dots").replace(n_robots=7, n_items=8)
 
 
 def test_scenario_faults_studies_policies_and_trainings_are_listed(command: Command) -> None:
@@ -191,10 +191,10 @@ def test_scenario_faults_studies_policies_and_trainings_are_listed(command: Comm
 
 
 def test_run_prints_what_the_episode_gave(command: Command) -> None:
-    told = [command(f"run --seed 1 {SMALL} --fault FM1:2@5") for _ in range(2)]
+    outputs = [command(f"run --seed 1 {SMALL} --fault FM1:2@5") for _ in range(2)]
     for words in ("P = ", " items delivered of 4 in ", "seed 1", "failed robots ", "real time"):
-        assert words in told[0]
-    assert told[1].splitlines()[:-1] == told[0].splitlines()[:-1]
+        assert words in outputs[0]
+    assert outputs[1].splitlines()[:-1] == outputs[0].splitlines()[:-1]
     # Items that come back have no number.
     assert " items delivered in 20 s" in command(f"run {SMALL} --set restock=true")
 

@@ -38,8 +38,8 @@ PLAYED: dict[str, dict[str, Any]] = {
 def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A directory with a study for each entry of `PLAYED`."""
     folder = tmp_path_factory.mktemp("gate")
-    mine = {"policies": [{"name": "swarm-dt", "label": "mine"}], "faults": [], "parameters": []}
-    fields = {**SMALL, **mine, "seeds": 6, "sizes": [{"values": [4, 6]}]}
+    shared = {"policies": [{"name": "swarm-dt", "label": "mine"}], "faults": [], "parameters": []}
+    fields = {**SMALL, **shared, "seeds": 6, "sizes": [{"values": [4, 6]}]}
     for name, changed in PLAYED.items():
         Study(out=folder / name, **{**fields, **changed}).run()
     return folder
@@ -59,8 +59,8 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_gates_end_with_their_code_and_name_what_they_are_about(
     studies: Path, new: str, gate: str | None, code: int, words: str, command: Command
 ) -> None:
-    asked = f" --fail-if {gate}" if gate else ""
-    assert words in command(f"study compare {studies}/old {studies}/{new}{asked}", code=code)
+    option = f" --fail-if {gate}" if gate else ""
+    assert words in command(f"study compare {studies}/old {studies}/{new}{option}", code=code)
 
 
 def imported(command: Command, name: str, faulty: tuple[int, ...], first: int = 0) -> None:
@@ -77,7 +77,7 @@ def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(comman
     imported(command, "old", (40, 41, 43, 42))
     imported(command, "new", (20, 22, 21, 23))
     imported(command, "late", (44, 41, 41, 42), first=2)
-    for asked, code, words in (
+    for arguments, code, words in (
         ("old new", 0, "change, FM1, m = 1"),
         ("old new --fail-if R<0", 1, "Gate fails (fails if R<0)"),
         ("new old --fail-if R<0 --fail-if change<0", 0, "passes"),
@@ -85,7 +85,7 @@ def test_recorded_trials_are_gated_and_paired_by_the_seeds_of_their_files(comman
         ("old late --fail-if change<0", 0, "FM1, m = 1 (Fault tolerance and robustness) | 0.000 ["),
         ("old new --fail-if S<0", 2, "tests nothing"),
     ):
-        assert words in command(f"study compare {asked}", code=code)
+        assert words in command(f"study compare {arguments}", code=code)
 
 
 def test_seeds_needed_are_told_of_a_stored_study(command: Command) -> None:
@@ -94,8 +94,8 @@ def test_seeds_needed_are_told_of_a_stored_study(command: Command) -> None:
     assert test.estimate is not None
     distance = f"{spi.minimum_detectable_effect(test.estimate, 0.8):.3f}"
     seeds = spi.seeds_for_power(test.estimate, -0.1, 0.8)
-    told = f"R > 0, FM1, m = 1 | -0.100 | {seeds} | {distance} | "
-    assert told in command("study plan old --effect -0.1")
+    row = f"R > 0, FM1, m = 1 | -0.100 | {seeds} | {distance} | "
+    assert row in command("study plan old --effect -0.1")
     assert "| – | no effect is named |" in command("study plan old")
     assert "at the thresh" in command("study plan old --effect 0")
     assert "--policy: a study that" in command("study plan old --policy homing", code=2)

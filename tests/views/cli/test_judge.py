@@ -127,11 +127,11 @@ def test_trials_are_judged_from_python_without_a_file(
     assert {*folder.rglob("*")} == before
 
 
-@pytest.mark.parametrize("place", ["", "--out mine"])
+@pytest.mark.parametrize("option", ["", "--out mine"])
 def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
-    place: str, command: Command, monkeypatch: pytest.MonkeyPatch
+    option: str, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = f"{TRIALS} {place}"
+    words = f"{TRIALS} {option}"
     with monkeypatch.context() as patched:
         patched.setattr(judge_trials, "show_report", lambda *_, **__: 1 / 0)
         command(words, code=1)
@@ -141,7 +141,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
     (out,) = {path.parent for path in Path().rglob("study.sqlite")}
     assert (out / "report.html").is_file()
     Path("lab.csv").write_text(LAB + "8;wheel;1;9.5\n")
-    if place:
+    if option:
         assert "holds a study already" in command(words, code=2)
     else:
         (out / "study.sqlite").write_bytes(b"damaged")
@@ -149,7 +149,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "reason"),
     [
         ("lab.csv --column performance", "--column performance: should be NAME=VALUE"),
         ("lab.csv --column performance=boxe", "'boxe': did you mean 'boxes'?"),
@@ -173,9 +173,9 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
     ],
 )
 def test_what_cannot_be_judged_ends_in_one_sentence_before_anything_is_written(
-    words: str, said: str, folder: Path, command: Command
+    words: str, reason: str, folder: Path, command: Command
 ) -> None:
-    assert said in command(f"judge {words}", code=2)
+    assert reason in command(f"judge {words}", code=2)
     assert {path.name for path in folder.iterdir()} <= {
         "lab.csv",
         "judged_policy.py",
@@ -230,8 +230,8 @@ def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
     printed = command(f"{words} clear")
     assert Study.stored("clear").specification.until_clear
     # Nobody delivers: there is no ratio, and every question stops at the first look.
-    told = "no fault: 0 (at most 0.30 at 95 %, as none of 10 runs delivered anything)."
-    assert told in " ".join(printed.split())
+    line = "no fault: 0 (at most 0.30 at 95 %, as none of 10 runs delivered anything)."
+    assert line in " ".join(printed.split())
     assert "undefined: it delivers nothing" in printed
     assert "40 runs played" in printed.splitlines()[-1]
     assert "120 runs played" in command(f"{words} all --all-seeds").splitlines()[-1]
@@ -249,8 +249,8 @@ def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(command:
     assert "judged_policy.py:8. The same command" in stopped
     assert "2 of 3 runs failed" in Path("card", "report.md").read_text()
     assert "failed" in command("judge judged_policy:Failing --benchmark --processes 1", code=1)
-    said = command("judge judged_policy:Short --processes 1 --out short", code=2)
-    assert "commands of shape (4, 3): should be (4, 4)" in said
+    error = command("judge judged_policy:Short --processes 1 --out short", code=2)
+    assert "commands of shape (4, 3): should be (4, 4)" in error
     assert not Path("short").exists()
 
 
@@ -317,11 +317,11 @@ def test_a_policy_is_judged_in_a_world_of_a_preset_and_a_file(command: Command) 
 
 
 def test_the_benchmark_gives_a_table_and_a_place_and_goes_on(command: Command) -> None:
-    told = command("judge homing --benchmark --processes 1")
-    assert "Worst cell: Held out: x, FM1+FM4, m = 1" in told
-    assert "entries by score" in told
+    printed = command("judge homing --benchmark --processes 1")
+    assert "Worst cell: Held out: x, FM1+FM4, m = 1" in printed
+    assert "entries by score" in printed
     assert Path("results/benchmark/homing/report.html").exists()
     again = command("judge homing --benchmark --processes 1")
     assert "0 runs played" in again
-    first, second = (text.split("entries")[1].split("Report:")[0] for text in (told, again))
+    first, second = (text.split("entries")[1].split("Report:")[0] for text in (printed, again))
     assert first == second

@@ -113,7 +113,9 @@ def test_nothing_is_lost_where_nobody_reads(closed: Sequence[int], folder: Path)
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     # If a text of ours was written into the store, no report can be made of it.
     assert run("judge t.csv --out o", "study report o", "judge nosuch.csv", **streams) == 2
-    assert {"report.html", "report.md", "study.sqlite"} <= {one.name for one in Path("o").iterdir()}
+    assert {"report.html", "report.md", "study.sqlite"} <= {
+        path.name for path in Path("o").iterdir()
+    }
     assert run("list faults", **streams) == 0
 
 
@@ -121,8 +123,8 @@ def test_output_that_cannot_be_written_is_still_told(folder: Path) -> None:
     if not Path("/dev/full").exists():
         pytest.skip("no device that is always full")
     with Path("/dev/full").open("w") as full:
-        told = subprocess.run(
+        process = subprocess.run(
             [*COMMAND, "list", "faults"], stdout=full, stderr=subprocess.PIPE, text=True
         )
-    assert told.returncode == 2
-    assert "No space left" in told.stderr
+    assert process.returncode == 2
+    assert "No space left" in process.stderr

@@ -67,8 +67,8 @@ def test_study_run_prints_and_writes_the_report(file: Path, command: Command) ->
         "undefined: it delivers nothing",
     ):
         assert words in printed
-    told = r"8 runs played in [\d.]+ s, [\d.]+ episodes/s; 0 were kept from before; "
-    assert re.fullmatch(told + "0 failed", printed.splitlines()[-1])
+    tally = r"8 runs played in [\d.]+ s, [\d.]+ episodes/s; 0 were kept from before; "
+    assert re.fullmatch(tally + "0 failed", printed.splitlines()[-1])
     report = Path("out", "report.md").read_text()
     assert "episodes/s" not in report
     assert "| duration | 0.5 (default 500) |" in report
@@ -159,11 +159,11 @@ def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
     _, errors = process.communicate(timeout=600)
     assert process.returncode == 130
-    kept = stored("out")
-    assert 0 < kept < 60
+    n_finished = stored("out")
+    assert 0 < n_finished < 60
     assert errors.strip() == (
-        f"Stopped. {kept} of 60 runs are finished and kept in out; the same command goes "
-        f"on with the other {60 - kept}."
+        f"Stopped. {n_finished} of 60 runs are finished and kept in out; the same command goes "
+        f"on with the other {60 - n_finished}."
     )
 
 
@@ -231,5 +231,5 @@ def test_a_trained_policy_is_called_by_the_name_on_its_card(file: Path, command:
     study = Study.from_file(file, out="out", policies=["first.safetensors"])
     study.run()
     Path("first.safetensors").unlink()  # the store knows the name, whatever became of the file
-    for found in (study, Study.stored("out")):
-        assert {cell.policy for cell in found.findings().cells} == {name}
+    for stored_study in (study, Study.stored("out")):
+        assert {cell.policy for cell in stored_study.findings().cells} == {name}

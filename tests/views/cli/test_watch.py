@@ -53,14 +53,14 @@ def test_page_is_served_until_ctrl_c_without_pygame() -> None:
         env={**os.environ, "PYTHONWARNINGS": "error", QUIET: "1"},
     )
     assert started.stdout
-    found = re.search(r"http://127\.0\.0\.1:(\d+)(/\S+/) in a browser", started.stdout.readline())
-    assert found
-    connection = http.client.HTTPConnection("127.0.0.1", int(found[1]), timeout=600)
-    connection.request("GET", f"{found[2]}page.js")
+    address = re.search(r"http://127\.0\.0\.1:(\d+)(/\S+/) in a browser", started.stdout.readline())
+    assert address
+    connection = http.client.HTTPConnection("127.0.0.1", int(address[1]), timeout=600)
+    connection.request("GET", f"{address[2]}page.js")
     answer = connection.getresponse()
     assert answer.status == 200
     assert answer.read()
-    with socket.create_connection(("127.0.0.1", int(found[1]))):  # must not keep it from ending
+    with socket.create_connection(("127.0.0.1", int(address[1]))):  # must not keep it from ending
         started.send_signal(signal.SIGINT)
         _, errors = started.communicate(timeout=600)
     connection.close()
@@ -80,7 +80,7 @@ def test_the_browser_opens_at_a_terminal_with_a_screen(
     words: str, at_terminal: bool, screen: str, opens: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     served: list[Any] = []
-    monkeypatch.setattr(server, "serve", lambda *given, show: served.append((*given, show)))
+    monkeypatch.setattr(server, "serve", lambda *arguments, show: served.append((*arguments, show)))
     monkeypatch.setattr("sys.stdout.isatty", lambda: at_terminal)
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("WAYLAND_DISPLAY", "BROWSER"):

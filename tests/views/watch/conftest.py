@@ -43,6 +43,6 @@ class Served:
 
 @pytest.fixture
 def served() -> Iterator[Served]:
-    one = Served()
-    yield one
-    one.stop()
+    running_server = Served()
+    yield running_server
+    running_server.stop()

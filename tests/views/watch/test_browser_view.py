@@ -17,11 +17,11 @@ from verification.browser import Browser
 @pytest.fixture
 def browser(tmp_path: Path) -> Iterator[Browser]:
     try:
-        one = Browser(tmp_path / "profile", (1280, 860))
+        opened_browser = Browser(tmp_path / "profile", (1280, 860))
     except FileNotFoundError as error:
         pytest.skip(str(error))
-    yield one
-    one.close()
+    yield opened_browser
+    opened_browser.close()
 
 
 AT = """(() => {{
@@ -141,8 +141,8 @@ def test_page_warns_of_a_policy_that_failed_and_of_nothing_before(
         calm = browser.value(BACKGROUND)
         browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
         browser.open(served.server.address)
-        said = "ValueError: <b>boom</b>, stumbling_policy.py line 3"
-        browser.wait_for(f"element('state').textContent.includes({said!r})")
+        reason = "ValueError: <b>boom</b>, stumbling_policy.py line 3"
+        browser.wait_for(f"element('state').textContent.includes({reason!r})")
         assert browser.value(BACKGROUND) != calm
         assert browser.value("element('step').disabled")
         browser.value("order({ do: 'compare', policy: 'homing', against: null })")

@@ -26,10 +26,10 @@ def test_runs_go_on_one_clock_until_the_end() -> None:
     takes = [take(), take(*faults)]
     film = Film(takes, until=1e9, speed=3.0, frame_rate=7.0, size=100)
     assert len(list(film.frames())) == film.n_frames == 28 + 1 + 14
-    for one, these in zip(takes, ([], faults)):
-        episode = run_episode(SMALL, policies.load("swarm-dt"), 3, these)
-        assert one.play.is_over
-        assert one.play.world.state.delivery_times == episode.delivery_times.tolist()
+    for film_take, faults_of_take in zip(takes, ([], faults)):
+        episode = run_episode(SMALL, policies.load("swarm-dt"), 3, faults_of_take)
+        assert film_take.play.is_over
+        assert film_take.play.world.state.delivery_times == episode.delivery_times.tolist()
 
 
 def test_same_runs_give_the_same_frames_and_faults_show() -> None:

@@ -27,11 +27,11 @@ from tests.views.watch.conftest import SMALL, Served
 
 
 @pytest.fixture(scope="module")
-def asked() -> Iterator[Served]:
+def shared() -> Iterator[Served]:
     """One server for all tests that change nothing of its session."""
-    one = Served()
-    yield one
-    one.stop()
+    running_server = Served()
+    yield running_server
+    running_server.stop()
 
 
 LONG = 300.0  # [s]; ends what hangs
@@ -44,9 +44,9 @@ def ask(served: Served, name: str, **headers: str) -> tuple[int, bytes, dict[str
     connection = http.client.HTTPConnection(host, served.server.port, timeout=LONG)
     connection.request("GET", path, headers=headers)
     answer = connection.getresponse()
-    found = answer.status, answer.read(), dict(answer.getheaders())
+    response = answer.status, answer.read(), dict(answer.getheaders())
     connection.close()
-    return found
+    return response
 
 
 def messages(
@@ -76,9 +76,9 @@ def messages(
     return asyncio.run(talk())
 
 
-def test_page_and_scripts_come_with_a_content_policy(asked: Served) -> None:
+def test_page_and_scripts_come_with_a_content_policy(shared: Served) -> None:
     for name in ("", "page.css", "draw.js", "panel.js", "page.js"):
-        status, body, headers = ask(asked, name)
+        status, body, headers = ask(shared, name)
         assert status == 200
         assert body
         policy = headers["Content-Security-Policy"]
@@ -105,16 +105,16 @@ def test_page_and_scripts_come_with_a_content_policy(asked: Served) -> None:
         {"Origin": "https://127.0.0.1"},
     ],
 )
-def test_other_hosts_and_origins_are_refused(asked: Served, headers: dict[str, str]) -> None:
+def test_other_hosts_and_origins_are_refused(shared: Served, headers: dict[str, str]) -> None:
     for name in ("", "live", "recording.html"):
-        assert ask(asked, name, **headers)[0] == 403
+        assert ask(shared, name, **headers)[0] == 403
 
 
-def test_without_the_token_nothing_is_served(asked: Served) -> None:
-    token = asked.server.token
+def test_without_the_token_nothing_is_served(shared: Served) -> None:
+    token = shared.server.token
     wrong = token[:-1] + ("a" if token[-1] != "a" else "b")
     for path in ("/", "/page.js", f"/{wrong}/", f"/{wrong}/live", "//", "/%ff/"):
-        status, body, _ = ask(asked, path)
+        status, body, _ = ask(shared, path)
         assert status == 403, path
         assert token.encode() not in body
 
@@ -122,14 +122,14 @@ def test_without_the_token_nothing_is_served(asked: Served) -> None:
 @pytest.mark.parametrize(
     "name", ["server.py", "../server.py", "..%2fserver.py", "%2e%2e/session.py", "/etc/passwd"]
 )
-def test_serves_no_other_file(asked: Served, name: str) -> None:
-    status, body, _ = ask(asked, f"/{asked.server.token}/{name}")
+def test_serves_no_other_file(shared: Served, name: str) -> None:
+    status, body, _ = ask(shared, f"/{shared.server.token}/{name}")
     assert status in (403, 404)
     assert b"import" not in body
 
 
-def test_listens_on_loopback_only(asked: Served) -> None:
-    listening = asked.server._listening
+def test_listens_on_loopback_only(shared: Served) -> None:
+    listening = shared.server._listening
     assert listening is not None
     assert listening.getsockname()[0] == "127.0.0.1"
 
@@ -184,9 +184,9 @@ def test_frames_hold_what_changed_and_orders_are_obeyed(served: Served) -> None:
     ],
 )
 def test_order_that_cannot_be_is_refused_in_a_sentence(
-    asked: Served, order: str, words: str
+    shared: Served, order: str, words: str
 ) -> None:
-    assert words in messages(asked, [order], 10)[-1]["problem"]
+    assert words in messages(shared, [order], 10)[-1]["problem"]
 
 
 def test_a_message_that_is_too_long_ends_its_page_alone(served: Served) -> None:
@@ -233,9 +233,9 @@ def test_malformed_requests_neither_stop_it_nor_leak_a_path(
         header = rng.choice([b"Host: evil", b"no colon", b"Content-Length: x", rng.randbytes(30)])
         answer = b""
         address = ("127.0.0.1", served.server.port)
-        with contextlib.suppress(OSError), socket.create_connection(address, timeout=LONG) as one:
-            one.sendall(line + b"\r\n" + header + b"\r\nConnection: close\r\n\r\n")
-            while part := one.recv(1 << 16):  # it is closed on a request that was too long
+        with contextlib.suppress(OSError), socket.create_connection(address, timeout=LONG) as peer:
+            peer.sendall(line + b"\r\n" + header + b"\r\nConnection: close\r\n\r\n")
+            while part := peer.recv(1 << 16):  # it is closed on a request that was too long
                 answer += part
         answered += bool(answer)
         assert not any(secret in answer for secret in (b"/usr/", b".py", b"Traceback"))
@@ -244,9 +244,9 @@ def test_malformed_requests_neither_stop_it_nor_leak_a_path(
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_where_it_cannot_listen_is_told_in_a_sentence(asked: Served) -> None:
+def test_where_it_cannot_listen_is_told_in_a_sentence(shared: Served) -> None:
     with pytest.raises(SetupError, match="in use; --port 0 takes any that is free"):
-        asyncio.run(WatchServer(Session(SMALL), asked.server.port).start())
+        asyncio.run(WatchServer(Session(SMALL), shared.server.port).start())
 
 
 RAISING = """
@@ -273,8 +273,8 @@ def test_a_policy_that_fails_is_told_to_the_page_and_the_server_stays(
     served = Served(session)
     try:
         got = messages(served, [], lambda message: bool(message.get("failure")))
-        said = "ValueError: boom in my controller, raising_policy.py line 8"
-        assert got[-1]["failure"] == said
+        reason = "ValueError: boom in my controller, raising_policy.py line 8"
+        assert got[-1]["failure"] == reason
         order = json.dumps({"do": "compare", "policy": "raising_policy:Leaving"})
         got = messages(served, [order], 99)
         assert got[-1]["problem"] == "SystemExit: 3, raising_policy.py line 11"
@@ -289,12 +289,12 @@ def test_a_policy_that_fails_is_told_to_the_page_and_the_server_stays(
 
 def silent(served: Served, request: str) -> socket.socket:
     """Return a connection that asks once, and neither reads nor answers after that."""
-    one = socket.socket()
-    one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    one.settimeout(LONG)
-    one.connect((LOOPBACK, served.server.port))
-    one.sendall(request.format(token=served.server.token, port=served.server.port).encode())
-    return one
+    connection = socket.socket()
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    connection.settimeout(LONG)
+    connection.connect((LOOPBACK, served.server.port))
+    connection.sendall(request.format(token=served.server.token, port=served.server.port).encode())
+    return connection
 
 
 def n_open(served: Served) -> int:
@@ -336,9 +336,9 @@ def test_connections_that_neither_read_nor_answer_end_and_shut_nobody_out(
     waiting = [silent(served, SILENT[kind]) for _ in range(16 if kind == "pages" else 100)]
     try:
         if kind == "pages":
-            for one in waiting:
+            for connection in waiting:
                 with contextlib.suppress(ConnectionError):
-                    while one.recv(1 << 16):  # until it is closed
+                    while connection.recv(1 << 16):  # until it is closed
                         pass
             monkeypatch.setattr(server, "_HEARTBEAT", LONG)
         else:
@@ -350,8 +350,8 @@ def test_connections_that_neither_read_nor_answer_end_and_shut_nobody_out(
         assert len(messages(served, [], 3)) == 3
     finally:
         served.stop()
-        for one in waiting:
-            one.close()
+        for connection in waiting:
+            connection.close()
     assert len(capfd.readouterr().err) < 1000
 
 
@@ -362,11 +362,11 @@ def test_of_pages_that_open_in_one_moment_all_are_answered(
     request = "GET /{token}/ HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n"
     asking = [silent(served, "") for _ in range(200)]
     text = request.format(token=served.server.token, port=served.server.port).encode()
-    for one in asking:
-        one.sendall(text)
+    for connection in asking:
+        connection.sendall(text)
     answers = []
-    for one in asking:
-        with one, one.makefile("rb") as answer:
+    for connection in asking:
+        with connection, connection.makefile("rb") as answer:
             answers.append(answer.read().partition(b"\r\n")[0])
     assert answers == [b"HTTP/1.1 200 OK"] * 200
 

@@ -31,8 +31,8 @@ def test_run_and_twin_are_the_episodes_that_run_episode_plays() -> None:
     session.play(1e6)
     assert session.is_over
     run, twin = (play.world.state.delivery_times for play in (session.run, session.beside))
-    for times, these in ((run, faults), (twin, [])):
-        episode = run_episode(scenario, policies.load("swarm-dt"), 2, these)
+    for times, faults_of_run in ((run, faults), (twin, [])):
+        episode = run_episode(scenario, policies.load("swarm-dt"), 2, faults_of_run)
         assert times == episode.delivery_times.tolist()
     assert run != twin
 
@@ -70,7 +70,9 @@ def test_robot_breaks_and_is_repaired(mode: str) -> None:
     state, shown = session.run.world.state, frame_message(session)
     assert state.failure_modes[3] == (mode,)
     assert not session.beside.world.state.failed.any()
-    assert [(one.time, one.robot, one.mode) for one in session.events] == [(state.time, 3, mode)]
+    assert [(event.time, event.robot, event.mode) for event in session.events] == [
+        (state.time, 3, mode)
+    ]
     assert shown["robots1"][3][2] == ""
     if mode == "removed":
         assert session.selected is None
@@ -91,10 +93,10 @@ def test_robot_breaks_and_is_repaired(mode: str) -> None:
 
 def test_repair_leaves_the_other_robots_of_a_fault_broken() -> None:
     session = Session(SMALL, faults=[Fault("dead", 3), Fault("FM1", 2, onset=15.0)])
-    first, *others = np.flatnonzero(session.run.world.state.failed).tolist()
+    first, *still_failed = np.flatnonzero(session.run.world.state.failed).tolist()
     session.select(first)
     session.repair_robot()
-    assert np.flatnonzero(session.run.world.state.failed).tolist() == others
+    assert np.flatnonzero(session.run.world.state.failed).tolist() == still_failed
     session.play(16.0)
     modes = [name for names in session.run.world.state.failure_modes for name in names]
     assert modes.count("FM1") == 2  # a fault that is yet to come comes
@@ -127,7 +129,7 @@ def test_a_fault_by_role_chooses_at_its_onset_and_each_of_its_robots_is_repaired
 def test_breaking_twice_in_a_mode_is_once() -> None:
     session = Session(SMALL)
     session.select(1)
-    for mode, modes, said in (
+    for mode, modes, word in (
         ("FM4", ("FM4",), "fails"),
         ("FM4", ("FM4",), "already"),
         ("FM1", ("FM4", "FM1"), "fails"),
@@ -135,11 +137,11 @@ def test_breaking_twice_in_a_mode_is_once() -> None:
         session.choose_mode(mode)
         session.break_robot()
         assert session.run.world.state.failure_modes[1] == modes
-        assert said in session.note
-    for said in ("repaired", "sound"):
+        assert word in session.note
+    for word in ("repaired", "sound"):
         session.repair_robot()
         assert session.run.world.state.failure_modes[1] == ()
-        assert said in session.note
+        assert word in session.note
 
 
 def test_swarm_size_next_seed_and_again_begin_anew_and_the_delivery_area_does_not() -> None:
@@ -226,8 +228,8 @@ def test_a_recording_begins_anew_with_each_episode() -> None:
         session.next_seed()
     recording.note()
     (packed,) = re.findall(r'id="recording">([^<]+)<', recording.page())
-    first, *others = json.loads(zlib.decompress(base64.b64decode(packed)))["frames"]
-    assert (first["seed"], first["time"], others) == (2, 0.0, [])
+    first, *later_frames = json.loads(zlib.decompress(base64.b64decode(packed)))["frames"]
+    assert (first["seed"], first["time"], later_frames) == (2, 0.0, [])
 
 
 BROKEN = """
@@ -271,7 +273,7 @@ def broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], S
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "reason"),
     [
         ("Raising", "ValueError: boom in my controller, broken_policy.py line 17"),
         ("InALibrary", "JSONDecodeError: Expecting value: "),
@@ -283,11 +285,11 @@ def broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], S
     ],
 )
 def test_a_policy_that_fails_stops_its_episode_alone_and_says_where(
-    name: str, said: str, broken: Callable[[str], Session]
+    name: str, reason: str, broken: Callable[[str], Session]
 ) -> None:
     session = broken(name)
     session.play(5.0)
-    assert said in session.failure
+    assert reason in session.failure
     assert len(session.failure) < 600
     assert frame_message(session)["failure"] == session.failure
     time = session.state.time
@@ -301,7 +303,7 @@ def test_a_policy_that_fails_stops_its_episode_alone_and_says_where(
     assert (session.failure, session.state.time) == ("", 0.0)
     session.pause()
     session.play(5.0)
-    assert said in session.failure
+    assert reason in session.failure
     session.compare("homing")
     session.play(5.0)
     assert session.failure == ""
@@ -309,22 +311,22 @@ def test_a_policy_that_fails_stops_its_episode_alone_and_says_where(
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "reason"),
     [
         ("NotBegun", "KeyError: 'gain', broken_policy.py line 27"),
         ("NotMade", "SystemExit, broken_policy.py line 29"),
     ],
 )
 def test_a_policy_that_cannot_begin_leaves_the_session_as_it_is(
-    name: str, said: str, broken: Callable[[str], Session]
+    name: str, reason: str, broken: Callable[[str], Session]
 ) -> None:
     session = broken("Sound")
     session.choices = (*session.choices, f"broken_policy:{name}")
     session.play(1.0)
-    run, beside = session.run, session.beside
-    with pytest.raises(SetupError, match=re.escape(said)):
+    run, twin = session.run, session.beside
+    with pytest.raises(SetupError, match=re.escape(reason)):
         session.compare("homing", f"broken_policy:{name}")
-    assert (session.run, session.beside) == (run, beside)
+    assert (session.run, session.beside) == (run, twin)
     session.play(1.0)
     assert session.failure == ""
 
@@ -335,13 +337,13 @@ def test_every_request_is_told_with_its_carrier() -> None:
     while not session.is_over:
         session.advance()
         state, shown = session.state, frame_message(session)
-        asked = sorted(set(state.open_requests.tolist()))  # one may be asked for twice
-        places = np.rint(1000 * state.item_position[asked]).astype(int).tolist()
-        carriers = state.item_carrier[asked].tolist()
+        requested = sorted(set(state.open_requests.tolist()))  # one may be asked for twice
+        places = np.rint(1000 * state.item_position[requested]).astype(int).tolist()
+        carriers = state.item_carrier[requested].tolist()
         assert shown["requested0"] == [[*at, robot] for at, robot in zip(places, carriers)]
-        stored = set(np.flatnonzero(state.item_status == STORED).tolist()) - set(asked)
+        stored = set(np.flatnonzero(state.item_status == STORED).tolist()) - set(requested)
         assert len(shown["items0"]) == len(stored)
-        activities = [told[0] for told in shown["robots0"]]
+        activities = [robot_fields[0] for robot_fields in shown["robots0"]]
         delivering = [robot for robot, does in enumerate(activities) if does == "delivering"]
         assert delivering == sorted({*carriers} - {NOBODY})
         n_carriers = max(n_carriers, len(delivering))

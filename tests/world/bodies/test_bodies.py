@@ -116,9 +116,9 @@ def test_a_robot_drives_as_its_bodies_do_and_carries_its_item_along() -> None:
     world.reset(seed=2)
     start, heading = world.state.robot_position[0].copy(), world.state.robot_heading[0]
     world.step([[0.5, 0.0, 0.0, 0.0]])
-    way = world.state.robot_position[0] - start
+    displacement = world.state.robot_position[0] - start
     step = 0.5 * world.scenario.max_speed * world.scenario.control_period
-    assert way == pytest.approx(step * np.array([np.cos(heading), np.sin(heading)]))
+    assert displacement == pytest.approx(step * np.array([np.cos(heading), np.sin(heading)]))
     episode = run_episode(world.scenario, load("homing"), seed=2)
     assert episode.delivered > 0
 

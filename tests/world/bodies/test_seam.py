@@ -88,7 +88,7 @@ def test_orders_and_poses_are_as_the_reference_says(
         assert orders.present.tolist() == before.robot_present.tolist()
         expected = [where_it_is(scenario, *start, m) for start, m in zip(starts, motions)]
         check_poses(before, now, expected, bodies.poses)
-        faults.gone = [gone or not there for gone, there in zip(faults.gone, now.robot_present)]
+        faults.gone = [gone or not present for gone, present in zip(faults.gone, now.robot_present)]
         able = faults.expected(world, before)  # whom a role struck, it tells from both moments
         before = deepcopy(now)
 

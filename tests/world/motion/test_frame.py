@@ -36,9 +36,9 @@ def amid(*items: tuple[float, float, bool], carries: str = "") -> Rows:
     rows[:, : row.ITEMS] = 2.0
     rows[0, row.CARRYING] = carries != ""
     rows[0, row.CARRYING_REQUESTED] = carries == "requested"
-    for place, (x, y, requested) in enumerate(items):
-        there = row.ITEMS + row.ITEM_WIDTH * place
-        rows[0, there : there + 4] = 1.0, x, y, requested
+    for index, (x, y, requested) in enumerate(items):
+        first_column = row.ITEMS + row.ITEM_WIDTH * index
+        rows[0, first_column : first_column + 4] = 1.0, x, y, requested
     return rows
 
 
@@ -62,10 +62,10 @@ def test_how_the_body_stands_does_not_matter() -> None:
     firsts = [*range(row.ITEMS, row.LOWEST_TIMER, 5), row.LOWEST_TIMER]
     for x in [*(first + 1 for first in firsts), row.VELOCITY]:
         other_rows[:, x], other_rows[:, x + 1] = turned(rows[:, x], rows[:, x + 1])
-    one, other = frame_of(40), frame_of(40)
-    heading = turned(one.memory[:, MEMORY.heading_x], one.memory[:, MEMORY.heading_y])
-    other.memory[:, MEMORY.heading_x], other.memory[:, MEMORY.heading_y] = heading
-    first, second = one.read(rows), other.read(other_rows)
+    frame, turned_frame = frame_of(40), frame_of(40)
+    heading = turned(frame.memory[:, MEMORY.heading_x], frame.memory[:, MEMORY.heading_y])
+    turned_frame.memory[:, MEMORY.heading_x], turned_frame.memory[:, MEMORY.heading_y] = heading
+    first, second = frame.read(rows), turned_frame.read(other_rows)
     whims = [INPUTS.index("whim_along"), INPUTS.index("whim_aside")]
     np.testing.assert_allclose(
         np.delete(second, whims, axis=1), np.delete(first, whims, axis=1), atol=2e-6
@@ -126,12 +126,12 @@ def test_rows_begin_anew_by_themselves() -> None:
             frame.command(np.full((6, 3), 0.25))
         return seen
 
-    some, whole, fresh = frame_of(6), frame_of(6), frame_of(6, seed=9)
+    some, uninterrupted, fresh = frame_of(6), frame_of(6), frame_of(6, seed=9)
     run(some, 12)
     some.begin_rows(np.arange(3, 6), row_keys(9, "test", 6)[3:])
     seen = run(some, 9)
     assert (seen[3:] == run(fresh, 9)[3:]).all()
-    assert (seen[:3] == run(whole, 21)[:3]).all()
+    assert (seen[:3] == run(uninterrupted, 21)[:3]).all()
 
 
 def test_a_robot_that_knows_the_way_home_is_not_led_astray_and_one_that_is_deaf_by_nobody() -> None:

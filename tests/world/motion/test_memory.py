@@ -121,7 +121,7 @@ def test_its_memory_turns_as_its_gyro_tells_whatever_was_commanded(memory: Memor
 )
 def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(memory: Memory, rows: Any) -> None:
     hold(memory, rows, 20)
-    assert memory[0, column.IN_VAIN] == memory[0, column.CANNOT_LIFT] == 0.0
+    assert memory[0, MEMORY.in_vain] == memory[0, MEMORY.cannot_lift] == 0.0
     hold(memory, LADEN, 1)
     remember_observation(sensed(item_at=0.1), 0.1, memory)  # it delivered, and holds on
     hold(memory, sensed(item_at=0.1), 9)
@@ -130,11 +130,11 @@ def test_nothing_is_held_in_vain_where_nothing_can_be_lifted(memory: Memory, row
 
 def test_the_border_sets_right_how_far_it_is_home(memory: Memory) -> None:
     memory[0, MEMORY.away] = 5.0  # it has reckoned wrongly
-    for way in (1.0, -1.0, 1.0):  # in, out and in again, at 1 m/s
+    for speed in (1.0, -1.0, 1.0):  # in, out and in again, at 1 m/s
         rows = sensed()
-        rows[0, row.VELOCITY], rows[0, row.IN_DELIVERY_AREA] = way, way > 0.0
+        rows[0, row.VELOCITY], rows[0, row.IN_DELIVERY_AREA] = speed, speed > 0.0
         remember_observation(rows, 0.1, memory)
-        assert memory[0, MEMORY.away] == pytest.approx(-0.1 * way)
+        assert memory[0, MEMORY.away] == pytest.approx(-0.1 * speed)
 
 
 @pytest.mark.compiled
@@ -148,15 +148,15 @@ def test_in_a_run_robots_with_fm2_find_out_and_no_healthy_one_believes_it() -> N
     assert (takes_for_broken == ~play.world.state.lifts).all()
 
 
-def scan(heading: float, ahead: float, left: float = 10.0) -> NDArray[np.float32]:
-    """A row beside a wall `ahead` [m] in direction 0 and one to the `left`, at a heading [rad]."""
-    own = np.zeros(row.N_COLUMNS, np.float32)
+def scan(heading: float, front: float, left: float = 10.0) -> NDArray[np.float32]:
+    """A row beside a wall `front` [m] in direction 0 and one to the `left`, at a heading [rad]."""
+    observation = np.zeros(row.N_COLUMNS, np.float32)
     for beam in range(row.N_BEAMS):
         angle = heading + beam * 2 * math.pi / row.N_BEAMS
         x, y = math.cos(angle), math.sin(angle)
-        away = min(ahead / x if x > 1e-9 else 2.0, left / y if y > 1e-9 else 2.0, 2.0)
-        own[row.RANGE_WALLS + beam] = away
-    return own
+        away = min(front / x if x > 1e-9 else 2.0, left / y if y > 1e-9 else 2.0, 2.0)
+        observation[row.RANGE_WALLS + beam] = away
+    return observation
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.7, 1.5, -2.0])
@@ -184,7 +184,7 @@ def test_the_way_home_is_kept_though_the_body_turns_unnoticed() -> None:
     while env.agents:
         observations, *_ = env.step_arrays(policy.act(observations))
     state, memory = env.warehouse.state, policy._frame.memory
-    ways = np.array([kept_home(own) for own in memory])
+    ways = np.array([kept_home(memory_row) for memory_row in memory])
     has = ways[:, 2] > 0
     assert has.sum() >= 8
     # The area lies along x, so the body's heading tells how far the direction kept is off.
@@ -217,9 +217,9 @@ def test_the_way_home_is_at_a_right_angle_to_a_wall_that_was_seen(
 
 
 def test_of_several_requested_items_in_view_the_nearest_counts() -> None:
-    rows, ahead = sensed(), [0.3, 0.5, 0.6, 0.8]
-    for place, (away, asked) in enumerate(zip(ahead, [0, 1, 1, 0])):
-        there = row.ITEMS + row.ITEM_WIDTH * place
-        rows[0, there : there + row.ITEM_WIDTH] = [1, away, 0, asked, 0]
+    rows, distances = sensed(), [0.3, 0.5, 0.6, 0.8]
+    for index, (away, is_requested) in enumerate(zip(distances, [0, 1, 1, 0])):
+        first_column = row.ITEMS + row.ITEM_WIDTH * index
+        rows[0, first_column : first_column + row.ITEM_WIDTH] = [1, away, 0, is_requested, 0]
     requested, other = nearest_items(rows[0])
     assert (requested, other) == (row.ITEMS + row.ITEM_WIDTH, row.ITEMS)

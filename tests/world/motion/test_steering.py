@@ -46,8 +46,8 @@ def test_it_drives_at_the_mean_heading_of_its_turn(
 @pytest.mark.compiled
 def test_homing_delivers_with_differential_drive() -> None:
     scenario = Scenario(restock=True, drive="differential", duration=60.0)
-    ours, scripted = (
+    homing, swarm_dt = (
         np.mean([run_episode(scenario, policies.load(name), seed).delivered for seed in range(2)])
         for name in ("homing", "swarm-dt")
     )
-    assert ours > 2 * scripted
+    assert homing > 2 * swarm_dt

@@ -82,12 +82,12 @@ def test_each_part_of_a_dock_has_the_docks_tint_and_its_letter() -> None:
         (7, 8, 9, green, purple),
         (0, 3, 9, purple, green),
     )
-    for first, last, column, own, other in strips:
+    for first, last, column, colours, other_colours in strips:
         strip = picture[CELL * first : CELL * (last + 1), CELL * column :][:, :CELL]
-        tint, _, letter = own
+        tint, _, letter = colours
         assert share(strip, tint) > 0.4
         assert (strip == letter).all(axis=2).sum() > 60
-        assert not any(share(strip, colour) for colour in other)
+        assert not any(share(strip, other_colour) for other_colour in other_colours)
 
 
 def test_robots_and_items_are_above_the_plan_and_the_background_is_drawn_once(

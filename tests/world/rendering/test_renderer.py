@@ -77,11 +77,11 @@ def digest() -> str:
     world = Warehouse(Scenario(n_robots=12, n_items=20, n_obstacles=2))
     world.reset(3, [Fault("FM1", 2), Fault("dead", 1)])
     renderer = Renderer(world.scenario, "rgb_array", 400)
-    found = hashlib.sha256()
+    frames_hash = hashlib.sha256()
     for _ in range(15):
         world.step(np.tile([1.0, 0.0, 0.3, 1.0], (12, 1)))
-        found.update(renderer.frame(world.state, world.scenario).tobytes())
-    return found.hexdigest()
+        frames_hash.update(renderer.frame(world.state, world.scenario).tobytes())
+    return frames_hash.hexdigest()
 
 
 def room() -> Frame:
@@ -157,14 +157,14 @@ def test_frame_depends_on_the_state_alone() -> None:
     before = renderer.frame(state, scenario)
     assert pickle.dumps(state) == untouched
     assert not pygame.display.get_init()
-    kept = before.copy()
+    copied = before.copy()
     for twin in (pickle.loads(pickle.dumps(renderer)), copy.deepcopy(renderer)):
         assert np.array_equal(twin.frame(state, scenario), before)
     pygame.quit()  # by somebody else
     moved = copy.deepcopy(state)
     moved.robot_position[0] = [5.0, 1.0]
     assert not np.array_equal(renderer.frame(moved, scenario), before)
-    assert np.array_equal(before, kept)  # an array of the caller's own
+    assert np.array_equal(before, copied)  # an array of the caller's own
     assert np.array_equal(renderer.frame(state, scenario), before)
     renderer.close()
     state.progress.time[0] = 271.8  # words that were not written before
@@ -173,15 +173,15 @@ def test_frame_depends_on_the_state_alone() -> None:
 
 def test_requested_item_is_plain_to_see() -> None:
     state, scenario = situation([[2, 2]], [[5, 5], [7, 7]])
-    for place in (0.5, 0.7, 0.2):  # one item, the other, and that one on the robot
-        if place == 0.7:
+    for share in (0.5, 0.7, 0.2):  # one item, the other, and that one on the robot
+        if share == 0.7:
             state.open_requests[0] = 1
-        if place == 0.2:
+        if share == 0.2:
             give(state, 0, 1)
         rows, columns = np.nonzero((arena(state, scenario, 800) == palette.REQUESTED).all(axis=2))
         assert len(rows) > 250
-        assert rows.mean() == pytest.approx((1.0 - place) * 780, abs=2)  # y points up
-        assert columns.mean() == pytest.approx(place * 780, abs=2)
+        assert rows.mean() == pytest.approx((1.0 - share) * 780, abs=2)  # y points up
+        assert columns.mean() == pytest.approx(share * 780, abs=2)
     state.open_requests[0], state.robot_item[0] = NOBODY, NOBODY
     state.item_status[:] = DELIVERED
     assert count(arena(state, scenario, 800), palette.REQUESTED) == 0

@@ -65,9 +65,9 @@ def test_a_robot_alone_or_beside_others_has_no_contact_though_it_hits_walls(buil
     steps(alone, WEST, times=20)
     assert alone.state.robot_contact[0]
     assert alone.state.contact_measures[:3] == (0.0, None, 0.0)
-    beside = build([(4.0, 5.0), (4.0, 5.3)], [FAR])
-    steps(beside, EAST, EAST, times=20)
-    assert beside.state.contact_measures[:3] == (0.0, None, 0.0)
+    abreast = build([(4.0, 5.0), (4.0, 5.3)], [FAR])
+    steps(abreast, EAST, EAST, times=20)
+    assert abreast.state.contact_measures[:3] == (0.0, None, 0.0)
 
 
 def test_a_percentile_of_many_accelerations_is_near_the_exact_one() -> None:
@@ -100,10 +100,10 @@ def test_a_copy_and_a_world_that_begins_again_count_the_same() -> None:
     measures = []
     for _ in range(2):
         world.reset(3)
-        for number, given in enumerate(commands):
+        for number, command in enumerate(commands):
             if number == 100:
                 world = pickle.loads(pickle.dumps(world))
-            world.step(given)
+            world.step(command)
         measures.append(world.state.contact_measures)
     assert measures[0] == measures[1]
     assert measures[0].contacts_per_robot_minute

@@ -48,8 +48,8 @@ def test_each_robot_has_its_turn_and_faults_do_not_move_where_things_start() -> 
     world.reset(9, [Fault("dead", (4,)), Fault("removed", (2,))])
     assert world.struck_robots == (2, 4)
     np.testing.assert_array_equal(world.state.item_position, sound.state.item_position)
-    some, same = (np.delete(each.state.robot_position, 2, 0) for each in (world, sound))
-    np.testing.assert_array_equal(some, same)
+    remaining, expected = (np.delete(each.state.robot_position, 2, 0) for each in (world, sound))
+    np.testing.assert_array_equal(remaining, expected)
 
 
 @pytest.mark.parametrize(
@@ -173,11 +173,11 @@ def test_robots_have_roles_and_those_of_a_role_come_first_then_those_near_the_it
         [[5.0, 5.0], [5.0, 5.8], [INSIDE, 5.0], [1.0, 1.0], [2.0, 8.0], [5.0, 7.0]]
     )
     state.robot_in_delivery[2] = True
-    asked = state.requested
-    other = (asked + 1) % 4
-    state.robot_item[[0, 3]] = asked, other
-    state.item_carrier[[asked, other]] = 0, 3
-    state.item_position[asked], state.item_position[other] = (5.0, 5.0), (1.0, 1.0)
+    requested = state.requested
+    other_item = (requested + 1) % 4
+    state.robot_item[[0, 3]] = requested, other_item
+    state.item_carrier[[requested, other_item]] = 0, 3
+    state.item_position[requested], state.item_position[other_item] = (5.0, 5.0), (1.0, 1.0)
     roles = ["carrier", "neighbour", "in_area", "shuffling", "searching", "searching"]
     assert roles_of(state).tolist() == roles
     assert set(roles) == set(ROLES)

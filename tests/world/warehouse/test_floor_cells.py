@@ -118,10 +118,10 @@ def test_what_comes_back_lies_in_storage_again() -> None:
     world = world_of("A:::::\nA:::::", restock=True, n_items=3, heading_drift=0.0)
     for _ in range(20):
         item = world.state.requested
-        place = [[0.25, 0.25]]
+        dock = [[0.25, 0.25]]
         items = world.state.item_position.copy()
-        items[item] = place[0]
-        put(world, place, items.tolist())
+        items[item] = dock[0]
+        put(world, dock, items.tolist())
         world.step(np.array([[0.0, 0.0, 0.0, 1.0]]))
         assert (world.state.item_position[:, 0] > 0.5).all()
         assert world.floor.is_free(world.state.item_position).all()
@@ -188,9 +188,9 @@ def test_sight_is_the_same_from_both_ends() -> None:
     rng = np.random.default_rng(0)
     points = rng.uniform(0.0, 10.0, (400, 2))
     points = points[world.floor.is_free(points)]
-    for one, other in zip(points[::2].tolist(), points[1::2].tolist(), strict=False):
-        there, back = (*one, *other), (*other, *one)
-        assert is_in_sight(world._world, *there) == is_in_sight(world._world, *back)
+    for start, end in zip(points[::2].tolist(), points[1::2].tolist(), strict=False):
+        forth, back = (*start, *end), (*end, *start)
+        assert is_in_sight(world._world, *forth) == is_in_sight(world._world, *back)
 
 
 def test_a_pickle_goes_on_with_the_same_bits() -> None:

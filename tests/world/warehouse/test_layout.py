@@ -52,12 +52,13 @@ def test_a_place_depends_on_its_own_number_not_on_how_many_follow(seed: int) -> 
     starts = []
     for scenario in (few, many):
         items, robots = (
-            place(scenario, seed, NOTHING) for place in (layout.place_items, layout.place_robots)
+            place_things(scenario, seed, NOTHING)
+            for place_things in (layout.place_items, layout.place_robots)
         )
         starts.append((items[:10], robots[0][:5], robots[1][:5]))
         assert not np.array_equal(items[0], robots[0][0])  # each kind has a stream of its own
-    for one, other in zip(*starts):
-        np.testing.assert_array_equal(one, other)
+    for of_few, of_many in zip(*starts):
+        np.testing.assert_array_equal(of_few, of_many)
 
 
 @pytest.mark.compiled

@@ -84,9 +84,9 @@ HANDS: dict[str, tuple[Any, ...]] = {
 
 @pytest.mark.parametrize("case", HANDS)
 def test_what_is_in_whose_hand(build: Build, case: str) -> None:
-    robots, items, script, carried, *others = HANDS[case]
-    faults = others[0] if others else ()
-    fields = others[1] if len(others) > 1 else {}
+    robots, items, script, carried, *options = HANDS[case]
+    faults = options[0] if options else ()
+    fields = options[1] if len(options) > 1 else {}
     state = follow(build(robots, items, faults, **fields), script).state
     assert state.robot_item.tolist() == carried
     for item in range(len(items)):

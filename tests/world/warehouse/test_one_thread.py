@@ -112,9 +112,9 @@ print(sys.argv[1] == "reset" or sum(n_steps) == world.state.step)
 """
 
 
-@pytest.mark.parametrize("beside", ["step", "reset"])
-def test_two_threads_at_one_world_do_not_end_the_process(beside: str) -> None:
-    command = [sys.executable, "-c", PROGRAM, beside]
+@pytest.mark.parametrize("call", ["step", "reset"])
+def test_two_threads_at_one_world_do_not_end_the_process(call: str) -> None:
+    command = [sys.executable, "-c", PROGRAM, call]
     environment = {**os.environ, QUIET: "1"}
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=600, check=False, env=environment

@@ -118,8 +118,8 @@ def test_an_item_is_in_the_way_where_it_was_put_down_and_nowhere_else(build: Bui
 
 def test_an_array_that_is_not_as_declared_is_refused_before_a_kernel_reads_it() -> None:
     items = blank(Items, {"I": 4})
-    others: list[Any] = [items.position.astype("f4"), items.position[0], items.position[::2].T]
-    for position in others:
+    wrong: list[Any] = [items.position.astype("f4"), items.position[0], items.position[::2].T]
+    for position in wrong:
         with pytest.raises(TypeError, match=r"Items\.position: should be"):
             packed(items._replace(position=position))
 

@@ -36,28 +36,28 @@ def worlds() -> list[Warehouse]:
 
 
 def commands(step: int) -> NDArray[np.float64]:
-    given = np.random.default_rng(step).uniform(-1.0, 1.0, (sum(SIZES), 4))
-    given[:, 3] = 1.0 if step % 20 < 15 else -1.0
-    return given
+    drawn = np.random.default_rng(step).uniform(-1.0, 1.0, (sum(SIZES), 4))
+    drawn[:, 3] = 1.0 if step % 20 < 15 else -1.0
+    return drawn
 
 
 def step(
-    pool: WorldThreadPool, made: list[Warehouse], given: NDArray[np.float64]
+    pool: WorldThreadPool, made: list[Warehouse], actions: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     rows = np.zeros((sum(SIZES), N_COLUMNS), np.float32)
-    told = []
+    reported = []
 
-    def arrived(place: int, sensed: NDArray[np.float32]) -> None:
-        told.append(place)
+    def arrived(index: int, sensed: NDArray[np.float32]) -> None:
+        reported.append(index)
         assert np.shares_memory(sensed, rows)
-        assert sensed is made[place].observe()
+        assert sensed is made[index].observe()
 
-    pool.step(given, rows, arrived)
-    assert told == sorted(told)
-    for place, world in enumerate(made):
+    pool.step(actions, rows, arrived)
+    assert reported == sorted(reported)
+    for index, world in enumerate(made):
         delivered_now = world.state.delivery_times[-1:] == [world.state.time]
-        is_told = delivered_now or world.is_eventful or pool.is_watched[place]
-        assert (place in told) == is_told
+        is_told = delivered_now or world.is_eventful or pool.is_watched[index]
+        assert (index in reported) == is_told
         assert np.shares_memory(world.observe(), rows)
     return rows
 
@@ -67,11 +67,11 @@ def step_beside(
 ) -> None:
     """Step worlds in a pool, and others alone, which should sense the same."""
     for number in numbers:
-        given = commands(number)
-        rows = step(pool, made, given)
+        actions = commands(number)
+        rows = step(pool, made, actions)
         for world, first in zip(alone, FIRSTS):
-            own = slice(first, first + world.state.n_robots)
-            np.testing.assert_array_equal(rows[own], world.step(given[own]))
+            robots = slice(first, first + world.state.n_robots)
+            np.testing.assert_array_equal(rows[robots], world.step(actions[robots]))
 
 
 @pytest.mark.parametrize("n_helpers", [0, pytest.param(3, marks=pytest.mark.compiled)])
@@ -80,10 +80,10 @@ def test_a_pool_steps_worlds_as_each_steps_itself(n_helpers: int) -> None:
     pool = WorldThreadPool(together, FIRSTS, n_helpers)
     pool.is_watched[2] = 1
     step_beside(pool, together, apart, range(120))
-    for mine, theirs in zip(together, apart):
-        assert mine.state.delivery_times == theirs.state.delivery_times
-        assert mine.state.anchoring_seconds == theirs.state.anchoring_seconds
-        assert mine.state.contact_measures == theirs.state.contact_measures
+    for pooled, alone in zip(together, apart):
+        assert pooled.state.delivery_times == alone.state.delivery_times
+        assert pooled.state.anchoring_seconds == alone.state.anchoring_seconds
+        assert pooled.state.contact_measures == alone.state.contact_measures
     pool.close()
 
 
@@ -108,10 +108,10 @@ def test_helpers_end_with_the_pool(is_closed: bool) -> None:
 
 def test_what_is_refused_is_raised_before_any_world_has_moved() -> None:
     made = worlds()
-    pool, given = WorldThreadPool(made, FIRSTS, 1), commands(0)
-    given[3, 1] = np.nan
+    pool, actions = WorldThreadPool(made, FIRSTS, 1), commands(0)
+    actions[3, 1] = np.nan
     with pytest.raises(CommandError, match=r"commands\[3, 1\] = nan"):
-        step(pool, made, given)
+        step(pool, made, actions)
     step_beside(pool, made, worlds(), range(1))
     pool.close()
 
@@ -164,11 +164,11 @@ def play_on(pool: WorldThreadPool, made: list[Warehouse], expected: NDArray[np.f
 )
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_a_process_that_was_forked_has_threads_of_its_own() -> None:
-    made, ahead = worlds(), worlds()
-    pool, alone = WorldThreadPool(made, FIRSTS, 2), WorldThreadPool(ahead, FIRSTS, 0)
+    made, expected_worlds = worlds(), worlds()
+    pool, alone = WorldThreadPool(made, FIRSTS, 2), WorldThreadPool(expected_worlds, FIRSTS, 0)
     step(pool, made, commands(0))
-    step(alone, ahead, commands(0))
-    expected = step(alone, ahead, commands(1))
+    step(alone, expected_worlds, commands(0))
+    expected = step(alone, expected_worlds, commands(1))
     context = multiprocessing.get_context("fork")
     forked = context.Process(target=play_on, args=(pool, made, expected))
     forked.start()
@@ -228,12 +228,12 @@ def test_every_world_takes_its_step_though_the_caller_fails_in_the_midst(n_helpe
     def fails(*_: object) -> None:
         raise ValueError("broken")
 
-    rows, given = np.zeros((sum(SIZES), N_COLUMNS), np.float32), commands(0)
+    rows, actions = np.zeros((sum(SIZES), N_COLUMNS), np.float32), commands(0)
     with pytest.raises(ValueError, match="broken"):
-        pool.step(given, rows, fails)
+        pool.step(actions, rows, fails)
     for world, other, first in zip(made, alone, FIRSTS):
-        own = slice(first, first + world.state.n_robots)
-        np.testing.assert_array_equal(other.step(given[own]), rows[own])
+        robots = slice(first, first + world.state.n_robots)
+        np.testing.assert_array_equal(other.step(actions[robots]), rows[robots])
         assert world.state.step == 1
     step_beside(pool, made, alone, range(1, 5))
     pool.close()

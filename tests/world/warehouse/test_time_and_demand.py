@@ -141,12 +141,12 @@ def requests_of(demand: str, seed: int, n_items: int, count: int) -> list[int]:
     if demand == "closed":
         keys = row_keys(seed, "requests 0", n_items)
         cycles = range(count // n_items + 1)
-        drawn = [np.argsort([uniform(one, c) for one in keys], kind="stable") for c in cycles]
+        drawn = [np.argsort([uniform(item, c) for item in keys], kind="stable") for c in cycles]
         return [int(item) for cycle in drawn for item in cycle][:count]
     ranks = np.arange(1.0, n_items + 1.0)
     shares = np.cumsum(1.0 / ranks if demand == "zipf" else np.ones(n_items))
-    own = np.array([key(seed, "demand")], np.uint64)
-    draws = np.array([uniform(own[0], number) for number in range(count)])
+    stream_key = np.array([key(seed, "demand")], np.uint64)
+    draws = np.array([uniform(stream_key[0], number) for number in range(count)])
     return [int(item) for item in np.searchsorted(shares / shares[-1], draws, side="right")]
 
 
@@ -166,9 +166,9 @@ def test_random_worlds_keep_their_items_their_order_and_their_bits(
     )  # fmt: skip
     modes = draw(st.lists(st.sampled_from(["dead", "FM2", "FM4", "removed"]), max_size=2))
     faults = [Fault(mode, 1, 5.0 * (n + 1)) for n, mode in enumerate(modes)]
-    world, same = Warehouse(scenario), Warehouse(scenario)
+    world, twin = Warehouse(scenario), Warehouse(scenario)
     rows, watch, state = world.reset(seed, faults), Watch(world), world.state
-    same.reset(seed, faults)
+    twin.reset(seed, faults)
     drawn = requests_of(demand, seed, n_items, 1000)
     policy = policies.load("central")
     start(policy, scenario, seed)
@@ -176,12 +176,12 @@ def test_random_worlds_keep_their_items_their_order_and_their_bits(
         watch.look()
         commands = decide(policy, rows, state)
         rows = world.step(commands)
-        np.testing.assert_array_equal(rows, same.step(commands))
+        np.testing.assert_array_equal(rows, twin.step(commands))
         if step == 70:
-            same = pickle.loads(pickle.dumps(same))
-        asked = drawn[: scenario.n_requests + state.delivered]
-        assert state.open_requests[-1] == asked[-1]
-        left = iter(asked)
+            twin = pickle.loads(pickle.dumps(twin))
+        expected = drawn[: scenario.n_requests + state.delivered]
+        assert state.open_requests[-1] == expected[-1]
+        left = iter(expected)
         assert all(item in left for item in state.open_requests)  # in the order of the draws
     assert capacity is None or (np.diff(state.delivery_times) >= 1.0 / capacity - 1e-6).all()
 
@@ -193,9 +193,9 @@ def test_first_requests_are_those_of_the_demand(demand: Any) -> None:
     for seed in range(20):
         world = Warehouse(scenario)
         world.reset(seed)
-        asked = world.state.open_requests.tolist()
-        assert asked == requests_of(demand, seed, 4, 4)
-        twice.add(len(set(asked)) < 4)
+        requested = world.state.open_requests.tolist()
+        assert requested == requests_of(demand, seed, 4, 4)
+        twice.add(len(set(requested)) < 4)
     assert (True in twice) == (demand != "closed")
 
 
@@ -204,7 +204,7 @@ def test_the_item_of_any_open_request_is_told_and_can_be_let_go_of_inside(build:
     world = build(robots, items, [Fault("FM4", (0, 1))], n_requests=2, pickup_range=0.3)
     rows = steps(world, STAY, STAY)
     assert world.state.open_requests.tolist() == [0, 1]
-    at = [row.ITEMS + row.ITEM_WIDTH * place + row.ITEM.requested for place in range(2)]
+    at = [row.ITEMS + row.ITEM_WIDTH * index + row.ITEM.requested for index in range(2)]
     assert rows[0, at].tolist() == [1.0, 0.0]  # items 1 and 2, the nearer first
     steps(world, HOLD, HOLD)
     assert world.state.robot_item.tolist() == [1, 2]

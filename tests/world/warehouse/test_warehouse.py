@@ -71,7 +71,7 @@ def test_the_rows_of_removed_and_dead_robots_are_ignored_whatever_they_hold() ->
     for world in worlds:
         world.reset(0, [Fault("removed", (1,)), Fault("dead", (2,))])
     for _ in range(5):
-        plain, nan = (world.step(given) for world, given in zip(worlds, commands))
+        plain, nan = (world.step(rows) for world, rows in zip(worlds, commands))
         np.testing.assert_array_equal(plain, nan)
         assert not plain[1].any()
     assert (commands[0] == 3.0).all()  # they are left as they were given
@@ -81,11 +81,11 @@ def test_a_seed_decides_the_episode_whatever_came_before() -> None:
     used, fresh = Warehouse(Scenario(n_robots=5)), Warehouse(SMALL)
     used.reset(5)
     start = used.reset(5, [Fault("removed", 2), Fault("dead", (0,), onset=0.5)], SMALL)
-    kept = start.copy()
+    copied = start.copy()
     rng = np.random.default_rng(0)
     for _ in range(60):
         used.step(rng.uniform([0, -1, -1, 0], 1, (8, 4)))
-    np.testing.assert_array_equal(start, kept)  # what was observed stays as it was
+    np.testing.assert_array_equal(start, copied)  # what was observed stays as it was
     np.testing.assert_array_equal(used.reset(3), fresh.reset(3))
     assert not np.array_equal(used.observe(), start)
     for _ in range(30):
@@ -127,6 +127,6 @@ def test_a_copy_goes_on_alike_after_many_steps_and_after_a_change(
         world.change(max_speed=1.0, view_range=0.6)
     other = copied(world)
     for _ in range(60):
-        given = rng.uniform(-1.0, 1.0, (8, 4))
-        np.testing.assert_array_equal(other.step(given), world.step(given))
+        commands = rng.uniform(-1.0, 1.0, (8, 4))
+        np.testing.assert_array_equal(other.step(commands), world.step(commands))
     assert other.scenario == world.scenario

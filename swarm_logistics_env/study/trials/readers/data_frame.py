@@ -26,7 +26,8 @@ def read(frame: pd.DataFrame) -> Table:
             f"trials = {frame!r}: should be the path of a file or folder, or a data frame of pandas"
         )
     named = frame.reset_index() if any(name is not None for name in frame.index.names) else frame
-    header, cells = header_of(named), cells_of(named)
+    header = header_of(named)
+    cells = cells_of(named)
     content = repr((header, cells)).encode()
     digest = hashlib.sha256(content).hexdigest()[:16]
     rows = range(1, len(cells) + 1)

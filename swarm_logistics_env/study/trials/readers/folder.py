@@ -58,7 +58,8 @@ def _tables(
     notes: list[str],
 ) -> dict[Path, Table]:
     """Return the table of each file of trials; notes say which files hold none."""
-    tables, other_files = {}, []
+    tables = {}
+    other_files = []
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder)
         if any(_HIDDEN.fullmatch(part) for part in name.parts) or not path.is_file():
@@ -85,7 +86,9 @@ def _tables(
         else:
             tables[path] = table
     if other_files:
-        names = ", ".join(other_files[:5]) + ", .." * (len(other_files) > 5)
+        names = ", ".join(other_files[:5])
+        if len(other_files) > 5:
+            names += ", .."
         notes.append(f"Files of other kinds are left out: {names}.")
     return tables
 
@@ -176,13 +179,15 @@ def _joined(
                 f"--ignore {lacking[0]!r} leaves one out of all"
             )
         if [*named[path]] != [*named[first_path]]:
-            names, first_names = _listed(named[path]), _listed(named[first_path])
+            names = _listed(named[path])
+            first_names = _listed(named[first_path])
             raise IndicatorError(f"{path} names {names}, but {first_path} {first_names}")
     labels = [*named[first_path]]
     names_policy = any(MEANING.get(bare(name)) == "policy" for name in (*header, *labels, *columns))
     labels += [] if names_policy else ["policy"]
     labels = [label for label in labels if label not in header]
-    cells, origins = [], []
+    cells = []
+    origins = []
     for path, table in tables.items():
         values = {"policy": _policy_of(path.relative_to(folder)), **named[path]}
         order = [table.index.get(name) for name in header]
@@ -191,7 +196,7 @@ def _joined(
             cells.append([*cells_of_file, *(values[name] for name in labels)])
             origins.append(table.location(number_of_row))
     digests = "".join(table.digest for table in tables.values())
-    files = f"{len(tables)} file{'s' * (len(tables) > 1)}"
+    files = "1 file" if len(tables) == 1 else f"{len(tables)} files"
     all_notes = dict.fromkeys(
         (
             f"The folder holds {files}: {len(cells)} rows.",

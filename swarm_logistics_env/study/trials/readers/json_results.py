@@ -96,7 +96,8 @@ def _runs(value: Any, names: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, 
 
 def _marl_eval(path: Path, digest: str, runs: list[tuple[tuple[str, ...], Any]]) -> Table:
     """Return a record for each run: the means of what its last evaluation measured."""
-    records, origins = [], []
+    records = []
+    origins = []
     metrics: dict[str, None] = {}
     for names, steps in runs:
         measured = _last_metrics(path, names, steps) if isinstance(steps, dict) else {}

@@ -30,8 +30,9 @@ def read(path: Path, content: bytes, digest: str) -> Table | None:
     table = csv_text.read(path, rest, digest)
     chosen = [name for name in table.header if MEANING.get(bare(name)) == "performance"]
     performance = chosen[0] if chosen else "r"
+    of_environment = f" of {environment}" if environment else ""
     note = (
-        f"These are episodes that a Monitor wrote{f' of {environment}' if environment else ''}: P "
+        f"These are episodes that a Monitor wrote{of_environment}: P "
         f"is {performance!r}; --column performance=NAME takes another."
     )
     return replace(

@@ -21,7 +21,8 @@ from swarm_logistics_env.study.trials.table import (
 
 from .data_frame import cell_text, cells_of, header_of
 
-_ZIP, _PARQUET = b"PK\x03\x04", b"PAR1"
+_ZIP = b"PK\x03\x04"
+_PARQUET = b"PAR1"
 _SHEETS = "xl/workbook.xml"  # the part of a workbook that lists them
 LARGEST = 200_000_000  # unpacked, in bytes
 
@@ -89,7 +90,8 @@ def _workbook(path: Path, content: bytes, digest: str) -> Table:
             "with the trials"
         )
     name = visible[0]
-    cells, sheet = cells_by_sheet[name], layout[name]
+    cells = cells_by_sheet[name]
+    sheet = layout[name]
     _fill_merged(cells, sheet)
     header = cells.pop(min(cells))
     hidden_rows = {line for line, row in sheet.row_dimensions.items() if row.hidden}
@@ -145,7 +147,8 @@ def _fill_merged(cells: dict[int, list[str]], sheet: Any) -> None:
     """Carry the values of merged cells: names to all their columns, others down to all rows."""
     header_line = min(cells)
     for merged in sheet.merged_cells.ranges:
-        column, first = merged.min_col - 1, cells.get(merged.min_row, [])
+        column = merged.min_col - 1
+        first = cells.get(merged.min_row, [])
         value = first[column] if column < len(first) else ""
         if not value:
             continue
@@ -162,7 +165,9 @@ def _fill_merged(cells: dict[int, list[str]], sheet: Any) -> None:
 def _notes_on_hidden(path: Path, header: list[str], lines: list[int], sheet: Any) -> Iterator[str]:
     """Yield which rows are hidden, by their lines, and which columns."""
     if lines:
-        numbers = ", ".join(map(str, lines[:5])) + ", .." * (len(lines) > 5)
+        numbers = ", ".join(map(str, lines[:5]))
+        if len(lines) > 5:
+            numbers += ", .."
         yield (
             f"Hidden rows of {path.name} are left out, as a filter or a group hides them: "
             f"{len(lines)} (rows {numbers}). Show them in the sheet if they count."

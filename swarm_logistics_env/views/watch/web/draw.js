@@ -145,9 +145,9 @@ function placeOf(canvas, scenario) {
 function floorOf(canvas, now, number, ratio) {
   const { scenario, obstacles } = now, items = now[`items${number}`];
   const parts = [scenario, obstacles, items, colours, canvas.clientWidth, canvas.clientHeight, ratio];
-  const known = sheets.get(number);
-  if (known && known.parts.every((part, nth) => part === parts[nth])) return known.sheet;
-  const sheet = known?.sheet ?? document.createElement("canvas");
+  const cached = sheets.get(number);
+  if (cached && cached.parts.every((part, nth) => part === parts[nth])) return cached.sheet;
+  const sheet = cached?.sheet ?? document.createElement("canvas");
   [sheet.width, sheet.height] = [canvas.width, canvas.height];
   const pen = sheet.getContext("2d"), { scale, left, bottom, across, down } = placeOf(canvas, scenario), top = bottom - down;
   const at = ([x, y]) => [left + (scale * x) / 1000, bottom - (scale * y) / 1000];
@@ -196,9 +196,9 @@ function posesBetween(now, next, share, number) {
   for (let robot = 0; 3 * robot < from.length; robot++) {
     const at = 3 * robot;
     if (from[at] === null) { poses.push(null); continue; }
-    const whole = to.length === from.length && to[at] !== null ? share : 0;
+    const portion = to.length === from.length && to[at] !== null ? share : 0;
     const turn = ((((to[at + 2] - from[at + 2]) / 1000 + Math.PI) % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI) - Math.PI;
-    poses.push([from[at] + whole * (to[at] - from[at]), from[at + 1] + whole * (to[at + 1] - from[at + 1]), from[at + 2] / 1000 + (whole ? whole * turn : 0)]);
+    poses.push([from[at] + portion * (to[at] - from[at]), from[at + 1] + portion * (to[at + 1] - from[at + 1]), from[at + 2] / 1000 + (portion ? portion * turn : 0)]);
   }
   return poses;
 }
@@ -248,12 +248,12 @@ function drawArena(canvas, number, now, next, share, options) {
     pen.translate(-x, -y);
   });
   if (watched) selection(pen, ...at(watched), radius);
-  for (const place of requested) {
-    const isCarried = place[2] !== NOBODY && poses[place[2]];
-    const [x, y] = at(isCarried ? poses[place[2]] : place);
+  for (const request of requested) {
+    const isCarried = request[2] !== NOBODY && poses[request[2]];
+    const [x, y] = at(isCarried ? poses[request[2]] : request);
     target(pen, x, y, 1.9 * radius + 1);
     item(pen, x, y, isCarried ? 0.5 * radius : 1.4 * half, true);
-    const [, , , letter, hue] = place, high = Math.max(15, 1.3 * radius), away = 1.3 * radius + high / 2;
+    const [, , , letter, hue] = request, high = Math.max(15, 1.3 * radius), away = 1.3 * radius + high / 2;
     if (letter) dockBadge(pen, Math.min(x + away, width - high / 2), Math.min(y + away, height - high / 2), high, letter, hue);
   }
   const tall = Math.max(13, 1.2 * radius);

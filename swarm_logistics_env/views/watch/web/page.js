@@ -252,9 +252,9 @@ function help() {
 }
 
 function robotAt(event, number) {
-  const canvas = element(`arena${number}`), { left, top } = canvas.getBoundingClientRect(), place = placeOf(canvas, latest.scenario);
-  const x = (event.clientX - left - place.left) / place.scale, y = (place.bottom - (event.clientY - top)) / place.scale;
-  let nearest = null, least = Math.max(2 * latest.scenario.robot_radius, 22 / place.scale);
+  const canvas = element(`arena${number}`), { left, top } = canvas.getBoundingClientRect(), floor = placeOf(canvas, latest.scenario);
+  const x = (event.clientX - left - floor.left) / floor.scale, y = (floor.bottom - (event.clientY - top)) / floor.scale;
+  let nearest = null, least = Math.max(2 * latest.scenario.robot_radius, 22 / floor.scale);
   posesBetween(shown.now, shown.next, shown.share, number).forEach((pose, robot) => {
     const away = pose ? Math.hypot(pose[0] / 1000 - x, pose[1] / 1000 - y) : Infinity;
     if (away <= least) [nearest, least] = [robot, away];
@@ -300,8 +300,8 @@ function listen() {
   document.addEventListener("keydown", press);
   // After a click with the mouse, keys mean the session again, not the button.
   document.addEventListener("click", (event) => {
-    const held = document.activeElement;
-    if (event.detail > 0 && held && held.tagName === "BUTTON") held.blur();
+    const focused = document.activeElement;
+    if (event.detail > 0 && focused && focused.tagName === "BUTTON") focused.blur();
   });
 }
 
@@ -310,10 +310,10 @@ function press(event) {
   if (!latest || event.ctrlKey || event.metaKey || event.altKey || tag === "SELECT") return;
   if (tag === "INPUT" && event.target.type === "number") return;
   if (event.key === " " && (tag === "BUTTON" || tag === "INPUT")) return; // space is that button's
-  const known = KEYS.find(([name]) => name === event.key);
-  if (!known || (element("help").open && event.key === "Escape")) return;
+  const command = KEYS.find(([name]) => name === event.key);
+  if (!command || (element("help").open && event.key === "Escape")) return;
   event.preventDefault();
-  known[3]();
+  command[3]();
 }
 
 async function replay() {
