@@ -1,10 +1,12 @@
-"""Writes what three pages tell of the code, between their markers: `python -m docs.generate`."""
+"""Writes what pages tell of the code, between their markers: `python -m docs.generate`."""
 
+import ast
 import csv
 import inspect
 import json
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import numpy as np
@@ -31,6 +33,11 @@ from swarm_logistics_env.world.observations import columns, n_columns
 from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
 
 FACTORS = ("sizes", "faults", "parameters", "ablations")
+# From the ground up, as data runs.
+ROOMS = (
+    "core", "compiler", "world", "environment", "wrappers", "policies", "adapters", "spi", "study",
+    "train", "views",
+)  # fmt: skip
 PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")
 
 
@@ -233,12 +240,35 @@ def summary(text: str | None) -> str:
     return " ".join((text or "").split("\n\n")[0].split())
 
 
+def contributing() -> dict[str, str]:
+    """Return the map of the package, room by room: each module with what its docstring says."""
+    package = ROOT / "swarm_logistics_env"
+    files = [path.relative_to(package) for path in package.rglob("*.py")]
+    # A folder's own line stands above those of its files, and folders below files.
+    files.sort(key=lambda file: (_rooms_above(file), file.name != "__init__.py", file.name))
+    lines = []
+    for file in files:
+        docstring = ast.get_docstring(ast.parse((package / file).read_text(encoding="utf-8")))
+        is_folder = file.name == "__init__.py"
+        depth = len(file.parts) - 1 - is_folder
+        name = f"{(package / file).parent.name}/" if is_folder else file.name
+        lines.append(f"{'  ' * max(depth, 0) + name:28}{summary(docstring)}")
+    return {"modules": "\n".join(["```text", *lines, "```"])}
+
+
+def _rooms_above(file: Path) -> tuple[tuple[int, str], ...]:
+    """Return the folders that a file lies in, as what orders them: rooms from the ground up."""
+    rooms = file.parent.parts
+    return tuple((ROOMS.index(room) if level == 0 else 0, room) for level, room in enumerate(rooms))
+
+
 def python() -> dict[str, str]:
     """Return the block of the page about Python."""
     return {"python": python_names()}
 
 
 PAGES = {
+    "../CONTRIBUTING": contributing,
     "environment": environment,
     "indicators": indicators,
     "reference": reference,

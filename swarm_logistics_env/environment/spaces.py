@@ -1,5 +1,7 @@
-"""What learners see of an environment: its spaces, wide enough for every scenario that it may
-play, the whole warehouse as one vector, and PettingZoo's dicts over the array methods.
+"""What learners see of an environment: its spaces, the whole warehouse as one vector, and dicts.
+
+Spaces are wide enough for every scenario that it may play; the dicts are PettingZoo's, over the
+array methods.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""Wrappers: break an environment, resize it, change it while it runs, reward by indicators, and
-let it be read in the frame of its robots' motion.
+"""Wrappers: break, resize or change an environment, reward by indicators, read it in motion's frame.
 
 Each is an environment itself, so they stack in any order; only `FixedAgents` has to be the
 outermost. The seed of an episode decides what a wrapper draws for it. If several ask for the same

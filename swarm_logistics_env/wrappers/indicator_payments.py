@@ -1,5 +1,6 @@
-"""The payments of an indicator, one for each delivery and one for the whole episode, and the
-performances that they are relative to: given, or measured during a training.
+"""The payments of an indicator: one for each delivery and one for the whole episode.
+
+The performances that they are relative to are given, or measured during a training.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
-"""The base of all wrappers; the condition of an episode, which indicators tell episodes apart by;
-and quantities of an episode that are fixed, or one of a list.
+"""The base of all wrappers, and the condition of an episode, by which indicators tell them apart.
+
+Quantities of an episode are fixed, or one of a list.
 """
 
 from __future__ import annotations
