@@ -1,4 +1,4 @@
-"""Wrappers: break, resize or change an environment, reward by indicators, read it in motion's frame.
+"""Wrappers: break, resize or change an environment, reward by indicators, see in motion's frame.
 
 Each is an environment itself, so they stack in any order; only `FixedAgents` has to be the
 outermost. The seed of an episode decides what a wrapper draws for it. If several ask for the same
