@@ -56,7 +56,7 @@ def test_gymnasium_makes_it_by_its_name() -> None:
 
 
 class Wider(Wrapper):
-    """Says that observations may be lower in the first world, and higher in the second."""
+    """Says between which numbers observations lie: `bounds`."""
 
     def observation_space(self, agent: str) -> Box:
         low, high = self.bounds
@@ -66,7 +66,7 @@ class Wider(Wrapper):
 def test_the_space_holds_the_observations_of_every_world() -> None:
     def make(world: int) -> Any:
         env = Wider(brief(n_robots=2))
-        env.bounds = [(-9.0, 1.0), (-1.0, 8.0)][world]
+        env.bounds = [(-1.0, 1.0), (-9.0, 8.0)][world]
         return env
 
     space = SwarmRows(2, make_env=make).single_observation_space

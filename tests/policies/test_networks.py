@@ -144,6 +144,19 @@ def test_the_first_output_or_the_one_called_action_is_played(form: Any) -> None:
     np.testing.assert_allclose(policies.of(network).act(ROWS), in_use(network.network), atol=1e-6)
 
 
+class Likely:
+    """Predicts as a policy of stable-baselines3: at random, if not asked for the most likely."""
+
+    def predict(self, rows: Any, deterministic: bool = False) -> Any:
+        return np.full((len(rows), 4), 1.0 if deterministic else -1.0)
+
+
+def test_of_what_predicts_the_most_likely_action_is_played() -> None:
+    policy = policies.of(Likely())
+    policy.reset(2, 0)
+    assert (policy.act(np.zeros((2, N_COLUMNS), np.float32)) == 1.0).all()
+
+
 def test_the_first_output_may_be_numbers_of_actions() -> None:
     network = Giving(lambda actions: (actions.argmax(1), actions))
     numbers = in_use(network.network).argmax(axis=1)

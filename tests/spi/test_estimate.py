@@ -50,6 +50,8 @@ CASES: dict[str, Callable[[], Any]] = {
     ),
     "R": lambda: SMALL,
     "R, few": lambda: spi.robustness(FEW, FEW_LESS, n=25, m=3),
+    "R, one seed": lambda: spi.robustness([40.0], [36.0], n=25, m=3),
+    "R, the same runs": lambda: spi.robustness(MANY, MANY, n=25, m=3, identical=True),
     "R, other seeds": lambda: spi.robustness(MANY, LESS[:8], n=25, m=3, paired=False),
     "R, stalled": lambda: spi.robustness(MANY, STALLED, n=25, m=3),
     "R, little": lambda: spi.robustness(LITTLE, LITTLE[::-1], n=25, m=3),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -94,6 +96,12 @@ def test_a_reference_episode_stands_for_as_many_as_it_serves() -> None:
     # An environment of another size does not take part in what this one's S is about.
     env = rewarded("S", filled({OWN: 30, LARGER: 40, Condition(2): 11}))
     assert env.payments_of(OWN)["S"].share == pytest.approx(-(N / 3) * 40 / 30**2)
+
+
+@pytest.mark.parametrize("window", [0, 1.5, True])
+def test_a_window_is_a_whole_number_of_episodes(window: Any) -> None:
+    with pytest.raises(SetupError, match=f"window = {window}: should be a whole number"):
+        RunningMeans(window=window)
 
 
 def test_means_that_are_not_there_yet_or_too_small() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,7 +86,10 @@ def test_a_robot_turns_at_the_rate_that_it_wants(drive: str) -> None:
     assert headings[-1] - headings[4] == pytest.approx(5 * 0.1 * 1.5, rel=0.05)
 
 
-def test_a_simulation_that_explodes_is_told() -> None:
+def test_a_simulation_that_explodes_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log there
     bodies = placed("holonomic", [[5.0, 5.0]])
     bodies._data.qvel[:] = 1e30
     with pytest.raises(BodiesError, match=r"unstable after .* should have a smaller max_acc"):

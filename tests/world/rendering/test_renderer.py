@@ -106,7 +106,7 @@ def room() -> Frame:
     return frame(state, scenario, 500)
 
 
-def hall() -> Frame:
+def hall(size: int = 600) -> Frame:
     """A floor plan, wider than high, with requests that name docks."""
     plan = "A.::::::.B\nA.::==::.B\nA.::==::.B\n..::##::..\n++::##::.A\n++::::::.A"
     scenario = Scenario(floor=plan, n_robots=2, n_items=3, request_docks="random", cell_size=1.0)
@@ -114,10 +114,15 @@ def hall() -> Frame:
     state.robot_position, state.item_position = [[0.6, 0.5], [7, 1]], [[3, 5], [2.5, 1.5], [7, 4]]
     state.open_requests[:], state.requested_docks[:] = 1, 1
     state.failed[1], state.failure_modes = True, ((), ("of_my_own",))
-    return frame(state, scenario, 600)
+    return frame(state, scenario, size)
 
 
-@pytest.mark.parametrize("scene", [room, hall])
+def small_hall() -> Frame:
+    """The same with lines and marks as small as they are drawn."""
+    return hall(130)
+
+
+@pytest.mark.parametrize("scene", [room, hall, small_hall])
 def test_pictures_are_as_recorded(scene: Callable[[], Frame], tmp_path: Path) -> None:
     """To every pixel with the recorded version of pygame; other ones draw letters otherwise."""
     import pygame
