@@ -77,7 +77,7 @@ def uniform(key: np.uint64, counter: int) -> float:
     """Return number `counter` of the stream `key`, in [0, 1) (SplitMix64).
 
     Counter-based: a kernel needs no generator's state, so a stream depends on nothing but its
-    key and the count. `streams.row_keys` makes the keys.
+    key and the count. `core.streams.row_keys` makes the keys.
     """
     value = np.uint64(key) + np.uint64(counter + 1) * np.uint64(0x9E3779B97F4A7C15)
     value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

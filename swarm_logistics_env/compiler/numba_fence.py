@@ -1,9 +1,9 @@
 """The fence around numba: whether kernels may rely on parts of it that may change any time.
 
 The fast way replaces parts of numba's compiler (`fast_kernels`), generates LLVM's instructions
-(`warehouse.compiled_addresses`) and steps worlds in threads that share one call
-(`warehouse.thread_pool`). It was tested with some versions of numba. With any other one, kernels
-are compiled in the plain way, by what numba documents alone, those that reach the physics engine
+(`compiled_addresses`) and steps worlds in threads that share one call
+(`world.warehouse.thread_pool`). It was tested with some versions of numba. With any other one,
+kernels are compiled in the plain way, by what numba documents alone, those that reach the physics engine
 are interpreted, and worlds step one after the other. Both ways give the same bits.
 """
 

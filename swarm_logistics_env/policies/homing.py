@@ -9,7 +9,7 @@ failure of its own leaves requested items to others, and lets go inside the area
 What it leans on: the remembered direction is kept in the robot's own frame, which drifts, so the
 memory fades within ten seconds. Swarm D-T remembers no direction and does not need it. This policy
 commands no turn; a robot of the differential drive turns to where it wants to go, see
-`motion.steering.steer`.
+`world.motion.steering.steer`.
 """
 
 from __future__ import annotations

@@ -46,8 +46,8 @@ class Network(_Part):
     """The inputs, layers and outputs of a trained policy.
 
     Args:
-        inputs: the names of its inputs in order, see `motion.INPUTS`.
-        outputs: the names of its outputs in order, see `motion.OUTPUTS`.
+        inputs: the names of its inputs in order, see `world.motion.INPUTS`.
+        outputs: the names of its outputs in order, see `world.motion.OUTPUTS`.
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
         hidden: widths of the hidden layers.
         activation: the activation function between layers.
@@ -114,7 +114,7 @@ class PolicyCard(_Part):
         network: the network that decides.
         command: the command line that trained it.
         versions: the versions of the packages that trained it; "simulation" is the digest of the
-            world's code (`tasks.warehouse_task.WAREHOUSE.code`) at that time.
+            world's code (`study.tasks.warehouse_task.WAREHOUSE.code`) at that time.
         scored_with: the versions with which it was scored.
         scenario: what it was trained in, fields that differ from the defaults.
         training: the specification of the training.

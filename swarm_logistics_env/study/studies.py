@@ -348,7 +348,7 @@ class Study:
         return self.findings().verdict_table
 
     def report(self, path: str | Path | None = None) -> tuple[Path, ...]:
-        """Write the report into a directory, see `report.write`; return the paths of its files.
+        """Write the report into a directory, see `report/write.py`; return the paths of its files.
 
         Args:
             path: the directory; None: the study's own.

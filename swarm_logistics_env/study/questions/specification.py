@@ -120,7 +120,7 @@ class Faults(Factor):
             in [0, 1); without it, the mode's own.
         intermittent: for how long [s] a failure holds, and for how long not, both on average, in
             turn: random failure and repair; without it, it holds without a break.
-        role: which robots fail: those that do this at the onset, of `warehouse.faults.ROLES`;
+        role: which robots fail: those that do this at the onset, of `world.warehouse.faults.ROLES`;
             without it, they are drawn.
     """
 
@@ -187,7 +187,7 @@ class Specification(Record):
         name: the study's name, of which its directory is called: at most 80 letters, digits, -, _
             and, within, points.
         task: the task to play: "warehouse", another name that the package knows, or the import path
-            "package.module:OBJECT" of a `tasks.Task`; in Python also the task itself.
+            "package.module:OBJECT" of a `study.tasks.Task`; in Python also the task itself.
         policies: names, paths, tables {name, parameters, label}, or objects with `reset` and
             `act`.
         seeds: number of seeds, the same for every condition.

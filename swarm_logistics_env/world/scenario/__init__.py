@@ -1,4 +1,4 @@
-"""Scenario: every condition of one run, frozen and validated, each with its unit and source."""
+"""Scenario: every condition of one run, frozen and validated, and its presets."""
 
 from __future__ import annotations
 
