@@ -3,8 +3,8 @@
 The fast way replaces parts of numba's compiler (`fast_kernels`), generates LLVM's instructions
 (`compiled_addresses`) and steps worlds in threads that share one call
 (`world.warehouse.thread_pool`). It was tested with some versions of numba. With any other one,
-kernels are compiled in the plain way, by what numba documents alone, those that reach the physics engine
-are interpreted, and worlds step one after the other. Both ways give the same bits.
+kernels are compiled in the plain way, by what numba documents alone, those that reach the physics
+engine are interpreted, and worlds step one after the other. Both ways give the same bits.
 """
 
 from __future__ import annotations
