@@ -97,10 +97,10 @@ quick: lint
 
 QUICK := tests/world/warehouse/test_kinematics.py tests/study/questions/test_plan.py tests/verification/test_mutants.py \
 	$(addprefix tests/spi/test_,indicators.py multiplicity.py) \
-	$(addprefix tests/test_,imports.py records.py scenario.py streams.py sizes.py)
+	$(addprefix tests/test_,imports.py sizes.py) $(addprefix tests/core/test_,records.py streams.py) tests/world/test_scenario.py
 
 # What reaches every line of the kernels in seconds, without the compiler.
-KERNELS := $(addprefix tests/warehouse/test_,thread_pool.py logistics.py sensing.py sensor_errors.py radio.py kinematics.py layout.py grid.py) \
+KERNELS := $(addprefix tests/world/warehouse/test_,thread_pool.py logistics.py sensing.py sensor_errors.py radio.py kinematics.py layout.py grid.py) \
 	$(addprefix tests/policies/test_,swarm_dt.py routes.py homing.py crowd.py layers.py learned.py) tests/world/motion
 
 lint: $(DEV)/installed

@@ -125,7 +125,7 @@ np.seterr(over="ignore", divide="ignore")
 CHECK_POLICIES_AND_STUDIES = """
 from swarm_logistics_env import Scenario, policies, run_episode, swarm_logistics_v0
 from swarm_logistics_env.core.errors import SetupError
-from swarm_logistics_env.spi import read_trials
+from swarm_logistics_env.study import read_trials
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.wrappers import HalfSpeed, IndicatorReward
 

@@ -223,7 +223,7 @@ def test_changes_are_told_by_the_file() -> None:
 @pytest.mark.parametrize(
     ("name", "old", "new", "counts"),
     [
-        ("errors.py", "class ", "MORE = 1\n\n\nclass ", False),
+        ("core/errors.py", "class ", "MORE = 1\n\n\nclass ", False),
         ("study/report/answer.py", "import ", "import os\nimport ", False),
         ("policies/spec.py", "import ", "import os\nimport ", False),
         ("policies/swarm_dt.py", "2.0 * uniform", "1.9 * uniform", True),

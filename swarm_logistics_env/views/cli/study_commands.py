@@ -149,11 +149,7 @@ def run_command(
     words = ["clearing"] * clearing + ["restock"] * restock + changes_in_words(fields)
     out = out or _default_directory(study, words, has_own_policies=bool(policies))
     study.out = out / part.directory if part else out
-    if not engine and address:
-        engine = "ray"
-    if not engine:
-        engine = "local" if processes == 1 else "process"
-    player = engine_named(engine, processes, address, run_limit)
+    player = engine_named(engine or _engine_for(processes, address), processes, address, run_limit)
     say(str(study.plan()))
     echo()
     if study.is_exploratory():
@@ -174,6 +170,13 @@ def run_command(
     # The last line: where it is looked for after a report of many pages.
     say_what_was_played(tally)
     raise Exit(1 if tally.failed else 0)
+
+
+def _engine_for(processes: int | None, address: str | None) -> str:
+    """Return the engine that a command line means which names none."""
+    if address:
+        return "ray"
+    return "local" if processes == 1 else "process"
 
 
 def _default_directory(study: Study, words: Sequence[str], *, has_own_policies: bool) -> Path:

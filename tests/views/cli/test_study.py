@@ -108,7 +108,7 @@ def test_study_plan_prints_conditions_once_and_what_they_take(file: Path, comman
 
 def test_every_study_that_is_shipped_or_an_example_is_planned(command: Command) -> None:
     # Those in tasks/ need packages that nothing else does.
-    files = sorted(EXAMPLES.glob("*.toml")) + sorted(EXAMPLES.glob("study/questions/*.toml"))
+    files = sorted(EXAMPLES.glob("*.toml")) + sorted(EXAMPLES.glob("questions/*.toml"))
     assert len(files) > 10
     for study in (*PRESETS, *map(str, files)):
         assert " conditions" in command(f"study plan {study}"), study
