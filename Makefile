@@ -174,7 +174,7 @@ docs: $(DOCS)/installed
 docs/media/run.html: $(DEV)/installed
 	$(DEV)/bin/swarm-logistics watch --fault FM4:3@60 --save $@ --until 150
 
-# Once a day: what all pages print, of which `make test` leaves out the three that take longest; then what they do not show.
+# Once a day: what all pages print, of which `make test` leaves out the four that take longest; then what they do not show.
 docs-check: $(DEV)/installed
 	HYPOTHESIS_PROFILE=nightly $(DEV)/bin/python -m pytest tests/test_docs.py
 	$(DEV)/bin/python -m docs.blocks --small
