@@ -51,8 +51,8 @@ def test_both_engines_of_a_world_stand_side_by_side(
     monkeypatch.setattr(play_bodies, "ROOT", tmp_path)
     monkeypatch.setattr(tables, "usable_cores", lambda: 1)
     scenario = Scenario(n_robots=4, n_items=8, duration=40.0, restock=True)
-    policies = ("homing", "homing-stock")
-    world = play_bodies.World("small", scenario, CHIPMUNK, 2, faults=(), policies=policies)
+    policies = ("swarm-dt", "homing", "homing-stock")
+    world = play_bodies.World("small", scenario, CHIPMUNK, 3, faults=(), policies=policies)
     results = play_bodies.played(world)
     for _, _, condition, p, p_of_other, change, *contacts in play_bodies.p_rows(results):
         assert condition == "no fault"
