@@ -1,4 +1,4 @@
-"""Training of policies: PPO from presets, and the search for a scripted policy's parameters.
+"""Training of policies: PPO, from a preset or a file of one's own.
 
 Nothing here is imported by the rest of the package; `trainer` and what it uses load torch.
 """

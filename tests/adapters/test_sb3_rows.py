@@ -257,7 +257,7 @@ def test_a_copy_goes_on_as_the_original(copied: Callable[[SwarmVecEnv], SwarmVec
     played(env, 13)
     other = copied(env)
     for _ in range(30):
-        returned, returned_by_copy = (each.step(np.full((12, 4), -0.4)) for each in (env, other))
+        returned, returned_by_copy = (rows.step(np.full((12, 4), -0.4)) for rows in (env, other))
         np.testing.assert_equal(returned[:3], returned_by_copy[:3])
 
 

@@ -43,10 +43,10 @@ def read_equal() -> tuple[Mutant, ...]:
 def _read_list(path: Path) -> Iterator[Mutant]:
     listed = tomllib.loads(path.read_text(encoding="utf-8"))
     common = {key: listed.pop(key) for key in ("tests", "interpreted") if key in listed}
-    for name, told in listed.items():
-        file, _, where = told.pop("at").partition(" ")
-        place = name, path.stem, file, where, told.pop("was")
-        yield Mutant(*place, **{**common, **told})
+    for name, fields in listed.items():
+        file, _, where = fields.pop("at").partition(" ")
+        node = fields.pop("was")
+        yield Mutant(name, path.stem, file, where, node, **{**common, **fields})
 
 
 def mutated(mutant: Mutant, source: str) -> str:

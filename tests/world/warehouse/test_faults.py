@@ -48,7 +48,7 @@ def test_each_robot_has_its_turn_and_faults_do_not_move_where_things_start() -> 
     world.reset(9, [Fault("dead", (4,)), Fault("removed", (2,))])
     assert world.struck_robots == (2, 4)
     np.testing.assert_array_equal(world.state.item_position, sound.state.item_position)
-    remaining, expected = (np.delete(each.state.robot_position, 2, 0) for each in (world, sound))
+    remaining, expected = (np.delete(w.state.robot_position, 2, 0) for w in (world, sound))
     np.testing.assert_array_equal(remaining, expected)
 
 
