@@ -11,6 +11,7 @@ from swarm_logistics_env.world.floor import PLAN_SIZES, floor_title, with_plan_s
 
 from .checks import check
 from .fields import CHANGES_DURING_RUN, CHIPMUNK, LARGEST, SOURCES, ScenarioFields
+from .order_file import orders_text, orders_title
 
 __all__ = [
     "CHANGES_DURING_RUN",
@@ -47,8 +48,12 @@ class Scenario(ScenarioFields):
 
     @model_validator(mode="before")
     @classmethod
-    def _with_plan(cls, fields: object) -> object:
-        if not isinstance(fields, dict) or not isinstance(fields.get("floor"), str):
+    def _with_files(cls, fields: object) -> object:
+        if not isinstance(fields, dict):
+            return fields
+        if isinstance(fields.get("orders"), str):
+            fields = {**fields, "orders": _with_orders(fields["orders"])}
+        if not isinstance(fields.get("floor"), str):
             return fields
         defaults = {name: field.default for name, field in cls.model_fields.items()}
         return with_plan_sizes({**defaults, **fields}, chosen=fields)
@@ -79,8 +84,15 @@ class Scenario(ScenarioFields):
         return rows
 
 
+def _with_orders(orders: str) -> str:
+    try:
+        return orders_text(orders)
+    except ValueError as error:
+        raise ValueError(f"Scenario.orders: {error}") from None
+
+
 def _as_text(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else floor_title(str(value))
+    return f"{value:g}" if isinstance(value, float) else orders_title(floor_title(str(value)))
 
 
 SCENARIO_PRESETS: dict[str, Scenario] = {

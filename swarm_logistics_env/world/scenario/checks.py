@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from .fields import ScenarioFields
+from .order_file import ANY, OrderFile
 
 # Discs may cover this part of the floor; random sequential addition ends at 0.547.
 DENSEST_COVER = 0.4
@@ -24,6 +25,7 @@ def check(scenario: ScenarioFields) -> None:
     check_periods(scenario)
     check_storage(scenario)
     check_requests(scenario)
+    check_orders(scenario)
     check_room(scenario)
 
 
@@ -90,7 +92,7 @@ def check_requests(scenario: ScenarioFields) -> None:
         raise ValueError(
             f"n_requests = {scenario.n_requests}: should be at most n_items = {scenario.n_items}"
         )
-    if scenario.names_docks and (scenario.plan is None or len(scenario.plan.dock_names) < 2):
+    if scenario.draws_docks and (scenario.plan is None or len(scenario.plan.dock_names) < 2):
         raise ValueError("request_docks = random: should have a floor of two docks or more")
     most = 1.0 / scenario.control_period
     if scenario.dock_capacity is not None and scenario.dock_capacity > most * (1.0 + 1e-9):
@@ -98,6 +100,50 @@ def check_requests(scenario: ScenarioFields) -> None:
             f"dock_capacity = {scenario.dock_capacity}: should be at most one in a control_period, "
             f"{most:g} per second, or None"
         )
+
+
+def check_orders(scenario: ScenarioFields) -> None:
+    """Check the orders of a file against the items and docks that there are."""
+    try:
+        orders = scenario.order_file
+        if orders is not None:
+            _check_ordered_items(orders, scenario.n_items, scenario.restock)
+            _check_docks(orders, scenario.dock_names)
+    except ValueError as error:
+        raise ValueError(f"Scenario.orders: {error}") from None
+
+
+def _check_ordered_items(orders: OrderFile, n_items: int, restock: bool) -> None:
+    line_of_item: dict[int, int] = {}
+    for item, line in zip(orders.item.tolist(), orders.line.tolist(), strict=True):
+        if item >= n_items:
+            raise ValueError(
+                f"line {line}: item = {item}: should be at most {n_items - 1}, as there are "
+                f"{n_items} items, from 0 on"
+            )
+        if item != ANY and item in line_of_item and not restock:
+            raise ValueError(
+                f"line {line}: item = {item} is ordered in line {line_of_item[item]} already: "
+                "should be ordered once, or restock be True, as a delivered item has left"
+            )
+        line_of_item[item] = line
+    n_classes = len(orders.classes)
+    for number, name in enumerate(orders.classes):
+        n_of_class = len(range(number, n_items, n_classes))
+        n_ordered = int((orders.kind == number).sum())
+        if n_of_class == 0 or (n_ordered > n_of_class and not restock):
+            raise ValueError(
+                f"item = {name!r} is ordered {n_ordered} times: there are {n_of_class} items of "
+                f"that class ({n_items} items in {n_classes} classes): should be fewer, or "
+                "restock be True"
+            )
+
+
+def _check_docks(orders: OrderFile, dock_names: tuple[str, ...]) -> None:
+    for name, line in zip(orders.dock, orders.line.tolist(), strict=True):
+        if name and name not in dock_names:
+            docks = ", ".join(dock_names) or "empty, as there is no floor with docks"
+            raise ValueError(f"line {line}: dock = {name!r}: should be {docks}")
 
 
 def check_room(scenario: ScenarioFields) -> None:

@@ -10,6 +10,8 @@ from pydantic import Field
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.world.floor import FloorPlan, floor_plan
 
+from .order_file import NEXT, ORDER_SHAPES, OrderFile, order_file
+
 # The public addresses of the sources that defaults were taken from.
 SOURCES = {
     "paper": "https://arxiv.org/abs/2311.01944",
@@ -55,6 +57,12 @@ CHANGES_DURING_RUN = frozenset(
         "radio_loss",
         "demand",
         "dock_capacity",
+        "request_timeout",
+        "request_delay",
+        "request_loss",
+        "order_rate",
+        "order_cycle",
+        "order_due",
     }
 )
 
@@ -92,6 +100,37 @@ class ScenarioFields(Record):
     )
     request_docks: Literal["any", "random"] = Field(
         "any", description="random: each request names a dock, which alone takes its item; off"
+    )
+    request_timeout: Positive | None = Field(
+        None,
+        description="a request that is not served so long [s] is put back, and the next item is "
+        "asked for; none: it waits for ever, as in the paper; off",
+    )
+    request_delay: NonNegative = Field(
+        0.0, description="a robot is told of a request so long after it is asked for [s]; off"
+    )
+    request_loss: Probability = Field(
+        0.0, description="a robot is never told of a request [probability]; off"
+    )
+    orders: str = Field(
+        NEXT,
+        description="next: an item is asked for when one was delivered; poisson, bursts, day: "
+        "orders come at random, and wait; a CSV file with the columns time and item, or its rows; "
+        "source: paper",
+    )
+    order_rate: Positive = Field(
+        0.1, description="orders that come on average, where they are drawn [1/s]; chosen"
+    )
+    order_cycle: Positive = Field(
+        100.0, description="time from burst to burst, or the length of a day [s]; chosen"
+    )
+    order_due: Positive | None = Field(
+        None, description="an order is due so long after it came [s]; none: never; off"
+    )
+    announced: Literal["oldest", "urgent", "all"] = Field(
+        "oldest",
+        description="which of the orders that wait is asked for where one of n_requests is free: "
+        "the oldest; the one of the highest priority that is due first; or all at once; off",
     )
     dock_capacity: Positive | None = Field(
         None,
@@ -207,9 +246,56 @@ class ScenarioFields(Record):
         return self.demand != "closed"
 
     @property
-    def names_docks(self) -> bool:
-        """Whether each request names its dock."""
+    def draws_docks(self) -> bool:
+        """Whether the dock of a request is drawn."""
         return self.request_docks == "random"
+
+    @property
+    def names_docks(self) -> bool:
+        """Whether requests name their docks."""
+        return self.draws_docks or (self.order_file is not None and self.order_file.names_docks)
+
+    @property
+    def has_orders(self) -> bool:
+        """Whether orders come by themselves, and wait."""
+        return self.orders != NEXT
+
+    @property
+    def order_file(self) -> OrderFile | None:
+        """The orders of a file, checked; None: there is none."""
+        if self.orders in (NEXT, *ORDER_SHAPES):
+            return None
+        return order_file(self.orders)
+
+    @property
+    def order_shape(self) -> tuple[float, ...]:
+        """Factors of `order_rate` in equal parts of `order_cycle`, with mean 1."""
+        return ORDER_SHAPES.get(self.orders, (0.0,))
+
+    @property
+    def n_open(self) -> int:
+        """The most requests that are open at a time."""
+        return self.n_items if self.has_orders and self.announced == "all" else self.n_requests
+
+    @property
+    def is_urgent_first(self) -> bool:
+        """Whether the most urgent order is asked for first."""
+        return self.announced == "urgent"
+
+    @property
+    def longest_request(self) -> float:
+        """The time after which a request is put back [s]; infinite: never."""
+        return math.inf if self.request_timeout is None else self.request_timeout
+
+    @property
+    def due_after(self) -> float:
+        """The time from an order to when it is due [s]; infinite: never."""
+        return math.inf if self.order_due is None else self.order_due
+
+    @property
+    def tells_all(self) -> bool:
+        """Whether every robot is told of every request at once."""
+        return self.request_delay == 0.0 and self.request_loss == 0.0
 
     @property
     def popularity_exponent(self) -> float:
@@ -225,6 +311,11 @@ class ScenarioFields(Record):
     def is_holonomic(self) -> bool:
         """Whether robots can move sideways."""
         return self.drive == "holonomic"
+
+    @property
+    def dock_names(self) -> tuple[str, ...]:
+        """Letters of the docks; none in an empty room, whose delivery area has no name."""
+        return () if self.plan is None else self.plan.dock_names
 
     @property
     def plan(self) -> FloorPlan | None:

@@ -1,7 +1,8 @@
 """What is asked for: the open requests, and which item the next one is for.
 
 `n_requests` of them are open at a time, oldest first. A delivery closes one, and the next is drawn:
-in cycles of all items, or each by itself from a keyed stream of its own. An item may be asked for
+in cycles of all items, or each by itself from a keyed stream of its own; or it is one of the
+orders that wait, see `orders`. An item may be asked for
 twice at a time where delivered items come back; else it is asked for once, as it leaves for good.
 With `request_docks` "random" each request names the dock that takes its item, from a stream.
 """
@@ -12,7 +13,19 @@ import math
 
 from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel, uniform
 
-from .structs import DELIVERED, NOBODY, World
+from .structs import (
+    ASKED,
+    CAME,
+    DELIVERED,
+    DOCK,
+    DUE,
+    ITEM_ORDERED,
+    NOBODY,
+    NUMBER,
+    PRIORITY,
+    Numbers,
+    World,
+)
 
 
 @inlined_kernel
@@ -26,13 +39,59 @@ def is_requested(world: World, item: int) -> bool:
 
 
 @kernel
+def is_ordered(world: World, item: int) -> bool:
+    """Return whether `item` is asked for, or an order for it waits."""
+    is_on_order = is_requested(world, item)
+    for index in range(world.orders.n_waiting[0]):
+        is_on_order |= world.orders.waiting[index, ITEM_ORDERED] == item
+    return is_on_order
+
+
+@kernel
 def ask(world: World) -> None:
     """Ask for items until `n_requests` requests are open or there is nothing to ask for."""
     requested = world.progress.requested
+    orders = world.orders
     for index in range(len(requested)):
-        if requested[index] == NOBODY:
-            requested[index] = next_item(world)
-            world.progress.requested_dock[index] = next_dock(world)
+        if requested[index] != NOBODY:
+            continue
+        order = orders.open[index]
+        if world.parameters.has_orders:
+            take_waiting(world, order)
+        else:
+            order[ITEM_ORDERED] = next_item(world)
+            order[DOCK] = next_dock(world)
+            order[CAME] = world.progress.time[0]
+            order[DUE] = world.progress.time[0] + world.parameters.due_after
+            order[PRIORITY] = 0.0
+        requested[index] = int(order[ITEM_ORDERED])
+        world.progress.requested_dock[index] = int(order[DOCK])
+        order[ASKED] = world.progress.time[0]
+        order[NUMBER] = orders.n_asked[0]
+        orders.n_asked[0] += int(requested[index] != NOBODY)
+
+
+@kernel
+def take_waiting(world: World, order: Numbers) -> None:
+    """Fill the row `order` with the next order that waits, which no longer does; or with nobody."""
+    orders = world.orders
+    waiting = orders.waiting
+    n_waiting = orders.n_waiting[0]
+    order[ITEM_ORDERED] = NOBODY
+    order[DOCK] = NOBODY
+    if n_waiting == 0:
+        return
+    chosen = 0
+    if world.parameters.is_urgent_first:
+        for index in range(1, n_waiting):
+            is_higher = waiting[index, PRIORITY] > waiting[chosen, PRIORITY]
+            is_equal = waiting[index, PRIORITY] == waiting[chosen, PRIORITY]
+            if is_higher or (is_equal and waiting[index, DUE] < waiting[chosen, DUE]):
+                chosen = index
+    order[:] = waiting[chosen, :]
+    for index in range(chosen, n_waiting - 1):
+        waiting[index, :] = waiting[index + 1, :]
+    orders.n_waiting[0] -= 1
 
 
 @kernel
@@ -45,7 +104,9 @@ def close_request(world: World, closed: int) -> None:
     n_open = 0
     for index in range(len(requested)):
         if index != closed and not (has_left and requested[index] == item):
-            requested[n_open], docks[n_open] = requested[index], docks[index]
+            requested[n_open] = requested[index]
+            docks[n_open] = docks[index]
+            world.orders.open[n_open, :] = world.orders.open[index, :]
             n_open += 1
     requested[n_open:] = NOBODY
     docks[n_open:] = NOBODY
@@ -55,7 +116,7 @@ def close_request(world: World, closed: int) -> None:
 def next_dock(world: World) -> int:
     """Return the dock that the next request names, or NOBODY: any takes it."""
     progress = world.progress
-    if not world.parameters.names_docks:
+    if not world.parameters.draws_docks:
         return NOBODY
     number = uniform(world.items.dock_key[0], progress.n_docks_drawn[0])
     progress.n_docks_drawn[0] += 1
@@ -80,28 +141,41 @@ def takes(world: World, dock: int, item: int) -> bool:
 @kernel
 def next_item(world: World) -> int:
     """Return the item of the next request, or NOBODY if there is none to ask for."""
-    items = world.items
+    if world.parameters.is_independent:
+        return drawn_item(world, 0, 1)
     progress = world.progress
     total = 0.0
-    for item in range(len(items.status)):
+    for item in range(len(world.items.status)):
         total += weight_of(world, item)
     if total == 0.0:
         return NOBODY
     chosen_item = NOBODY
-    if world.parameters.is_independent:
-        remaining = total * uniform(items.demand_key[0], progress.n_drawn[0])
-        progress.n_drawn[0] += 1
-        for item in range(len(items.status)):
-            weight = weight_of(world, item)
-            if weight > 0.0 and remaining >= 0.0:  # of equal numbers by rounding, the last one
-                chosen_item = item
-            remaining -= weight
-        return chosen_item
     while chosen_item == NOBODY:
         chosen_item = next_of_cycle(world)
         if chosen_item == NOBODY:
             progress.cycle[0] += 1
         progress.asked_last[0] = chosen_item
+    return chosen_item
+
+
+@kernel
+def drawn_item(world: World, kind: int, n_kinds: int) -> int:
+    """Return an item drawn by popularity, of those i with i % n_kinds == kind; or NOBODY."""
+    items = world.items
+    progress = world.progress
+    total = 0.0
+    for item in range(kind, len(items.status), n_kinds):
+        total += weight_of(world, item)
+    if total == 0.0:
+        return NOBODY
+    chosen_item = NOBODY
+    remaining = total * uniform(items.demand_key[0], progress.n_drawn[0])
+    progress.n_drawn[0] += 1
+    for item in range(kind, len(items.status), n_kinds):
+        weight = weight_of(world, item)
+        if weight > 0.0 and remaining >= 0.0:  # of equal numbers by rounding, the last one
+            chosen_item = item
+        remaining -= weight
     return chosen_item
 
 
@@ -131,6 +205,6 @@ def weight_of(world: World, item: int) -> float:
     """Return how often an item is asked for beside item 0; 0: it cannot be, now."""
     parameters = world.parameters
     is_away = world.items.status[item] == DELIVERED
-    if is_away or (not parameters.restock and is_requested(world, item)):
+    if is_away or (not parameters.restock and is_ordered(world, item)):
         return 0.0
     return float(1.0 / (item + 1.0) ** parameters.popularity_exponent)

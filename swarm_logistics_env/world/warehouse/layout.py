@@ -17,7 +17,22 @@ from swarm_logistics_env.world.scenario import Scenario
 
 from .floor_cells import draw_in_cells, floor_of, is_near_solid
 from .state import WarehouseState
-from .structs import NOBODY, STORED, Floor, Integers, Keys, Numbers, World
+from .structs import (
+    CAME,
+    DOCK,
+    DUE,
+    ITEM_ORDERED,
+    NOBODY,
+    NUMBER,
+    PRIORITY,
+    STORED,
+    Floor,
+    Integers,
+    Keys,
+    Numbers,
+    Orders,
+    World,
+)
 
 _ARRANGEMENTS = 100  # of all discs anew, where the first ones left no room for the last
 _ATTEMPTS = 5_000  # to place a disc among those that stand
@@ -45,12 +60,30 @@ def lay_out(state: WarehouseState, scenario: Scenario, seed: int) -> None:
     )
     state.robot_heading_drift = heading_drifts(scenario, seed)
     state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
+    state.robots.request_key[:] = row_keys(seed, "requests told", scenario.n_robots)
     items = state.items
     items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
     items.demand_key[0] = key(seed, "demand")
     items.restock_key[0] = key(seed, "restock")
     items.dock_key[0] = key(seed, "docks")
+    items.order_key[0] = key(seed, "orders")
     state.open_requests[:] = NOBODY
+    list_orders(state.orders, scenario)
+
+
+def list_orders(orders: Orders, scenario: Scenario) -> None:
+    """Take over the orders of a file; their docks by their numbers."""
+    rows = scenario.order_file
+    if rows is None:
+        return
+    docks = {"": NOBODY, **{name: dock for dock, name in enumerate(scenario.dock_names)}}
+    orders.n_classes[0] = len(rows.classes)
+    orders.listed[:, ITEM_ORDERED] = rows.item
+    orders.listed[:, DOCK] = [docks[name] for name in rows.dock]
+    orders.listed[:, CAME] = rows.time
+    orders.listed[:, DUE] = rows.due
+    orders.listed[:, PRIORITY] = rows.priority
+    orders.listed[:, NUMBER] = rows.kind
 
 
 def place_obstacles(scenario: Scenario, seed: int) -> Numbers:

@@ -20,6 +20,7 @@ from .structs import (
     Integers,
     Items,
     Numbers,
+    Orders,
     Progress,
     Robots,
     lengths_of,
@@ -76,6 +77,7 @@ class WarehouseState:
         self.able = blank(Capabilities, lengths)
         self.items = blank(Items, lengths)
         self.progress = blank(Progress, lengths)
+        self.orders = blank(Orders, lengths)
         self.contacts = blank(ContactCounts, lengths)
         robots.present[:] = True
         for nobody in (robots.item, robots.memory, robots.last_in_delivery, self.items.carrier):
@@ -97,6 +99,7 @@ class WarehouseState:
         self.failure_modes: tuple[tuple[str, ...], ...] = ((),) * scenario.n_robots
         self.delivery_times: list[float] = []  # [s], ascending
         self.delivered_by: list[int] = []  # robot, one per delivery
+        self.delivered_due: list[float] = []  # [s] when each was due; infinite: never
 
     def __setattr__(self, name: str, value: object) -> None:
         if isinstance(self.__dict__.get(name), np.ndarray):

@@ -18,6 +18,7 @@ from .logistics import (
     take_out,
     unmask_left,
 )
+from .orders import is_all_served, put_back_late, receive_orders
 from .physics import advance
 from .radio import run_timers, send_messages
 from .sensing import sense
@@ -27,7 +28,10 @@ from .structs import NOBODY, STORED, Commands, Numbers, Sensed, World
 @engine_kernel
 def begin(address: int) -> None:
     """Open the first requests of the world at `address`."""
-    ask(unpacked_at(World, address))
+    world = unpacked_at(World, address)
+    receive_orders(world)
+    ask(world)
+    world.orders.is_served[0] = is_all_served(world)
 
 
 @engine_kernel
@@ -125,7 +129,8 @@ def end_step(address: int, world: World, rows: Sensed) -> bool:
     outcome.n_delivered[0] = n_delivered
     outcome.is_paused[0] = is_paused
     outcome.is_room[0] = is_room
-    is_over = progress.step[0] >= progress.last_step[0] or progress.requested[0] == NOBODY
+    world.orders.is_served[0] = is_all_served(world)
+    is_over = progress.step[0] >= progress.last_step[0] or world.orders.is_served[0]
     is_full = commands.n_logged[0] * len(commands.now) == len(commands.log)
     is_changed = progress.is_changed[0]
     progress.is_changed[0] = False
@@ -163,6 +168,8 @@ def handle_items(world: World) -> tuple[int, bool]:
     carry_along(world)
     open_grippers(world)
     close_grippers(world)
+    receive_orders(world)
     n_delivered, is_room = deliver(world)
+    put_back_late(world)
     end_handling(world)
     return n_delivered, is_room

@@ -22,6 +22,7 @@ STORED = 0
 CARRIED = 1
 DELIVERED = 2
 N_ACCELERATIONS = 1024  # bins that accelerations are counted in
+MOST_WAITING = 1000  # orders; more are turned away
 NOBODY = -1
 
 Numbers: TypeAlias = NDArray[np.float64]
@@ -60,8 +61,18 @@ class Parameters(NamedTuple):
     handling_steps: int
     dock_period: float
     popularity_exponent: float
+    longest_request: float
+    request_delay: float
+    request_loss: float
+    order_rate: float
+    order_cycle: float
+    due_after: float
     is_independent: bool
+    draws_docks: bool
     names_docks: bool
+    has_orders: bool
+    is_urgent_first: bool
+    tells_all: bool
     restock: bool
     is_gossip: bool
     is_holonomic: bool
@@ -91,6 +102,7 @@ class Robots(NamedTuple):
     message_before: Annotated[Numbers, "K N", "message_size"]  # of the same steps
     frozen_beams: Annotated[Numbers, "N", "beams"]  # [m] that frozen rangers repeat, or NaN
     sensor_key: Annotated[Keys, "N"]  # of the streams of its sensors' noise
+    request_key: Annotated[Keys, "N"]  # of the streams of the requests that it is not told of
 
 
 class Items(NamedTuple):
@@ -104,6 +116,7 @@ class Items(NamedTuple):
     demand_key: Annotated[Keys, 1]  # of the stream of requests that are drawn independently
     dock_key: Annotated[Keys, 1]  # of the stream of docks that requests name
     restock_key: Annotated[Keys, 1]  # of the streams that decide where delivered items come back
+    order_key: Annotated[Keys, 1]  # of the stream of the times at which orders come
 
 
 class Progress(NamedTuple):
@@ -123,6 +136,35 @@ class Progress(NamedTuple):
     last_step: Annotated[Integers, 1]  # the step in which the time is up
     pause_step: Annotated[Integers, 1]  # it ends before anything is sensed, as faults change then
     is_changed: Annotated[Flags, 1]  # faults or conditions changed since the step before
+
+
+# Columns of an order, whether it waits or is asked for.
+ITEM_ORDERED, DOCK, CAME, DUE, PRIORITY, ASKED, NUMBER = range(7)
+N_ORDER_COLUMNS = 7
+
+
+class Orders(NamedTuple):
+    """When what is asked for came and is due, the orders that wait, and those of a file.
+
+    A row's columns are `ITEM_ORDERED`, `DOCK` (or NOBODY), `CAME` [s], `DUE` [s, or infinite],
+    `PRIORITY`, `ASKED` [s] and `NUMBER` (of the request, from 0). An order of a file has its class
+    in `NUMBER` and the item NOBODY, if it names a class.
+    """
+
+    open: Annotated[Numbers, "n_requests", N_ORDER_COLUMNS]  # beside `Progress.requested`
+    waiting: Annotated[Numbers, "waiting", N_ORDER_COLUMNS]  # in the order in which they came
+    listed: Annotated[Numbers, "orders of a file", N_ORDER_COLUMNS]  # by `CAME`
+    shape: Annotated[Numbers, "parts of a cycle"]  # factors of `order_rate`
+    next_draw: Annotated[Numbers, 1]  # [s] when the next order may come, if they are drawn
+    n_waiting: Annotated[Integers, 1]
+    n_drawn: Annotated[Integers, 1]  # times at which an order might have come so far
+    n_listed: Annotated[Integers, 1]  # orders of the file that came so far
+    n_classes: Annotated[Integers, 1]  # of the file's items: item i is of class i, repeating
+    n_asked: Annotated[Integers, 1]  # requests so far
+    n_put_back: Annotated[Integers, 1]  # requests that were not served in time
+    n_turned_away: Annotated[Integers, 1]  # orders that found no item or no room to wait
+    longest_queue: Annotated[Integers, 1]  # most orders that were open or waited at a time
+    is_served: Annotated[Flags, 1]  # nothing is asked for, and nothing will be
 
 
 class ContactCounts(NamedTuple):
@@ -202,6 +244,8 @@ class Claims(NamedTuple):
     robot: Annotated[Integers, "I"]  # who is going to lift the item, NOBODY before and after
     square: Annotated[Numbers, "I"]  # [m^2] of the distance between the two
     delivered_by: Annotated[Integers, "N"]  # robots that delivered in this step
+    delivered: Annotated[Numbers, "N", N_ORDER_COLUMNS]  # the orders that these served
+    order: Annotated[Numbers, N_ORDER_COLUMNS]  # that is on its way from one list to another
 
 
 class Functions(NamedTuple):
@@ -280,6 +324,7 @@ class World(NamedTuple):
     obstacles: Annotated[Numbers, "n_obstacles", 2]  # [m]
     floor: Floor
     progress: Progress
+    orders: Orders
     contacts: ContactCounts
     outcome: StepResult
     robot_grid: Grid
@@ -303,7 +348,10 @@ def lengths_of(scenario: Scenario) -> dict[str, int]:
         "K N": n_kept * n,
         "beams": 3 * N_BEAMS,
         "nearby": max(n, n_items) + RANKED_AT_ONCE,
-        "n_requests": scenario.n_requests,
+        "n_requests": scenario.n_open,
+        "waiting": MOST_WAITING if scenario.has_orders else 0,
+        "orders of a file": 0 if scenario.order_file is None else len(scenario.order_file.time),
+        "parts of a cycle": len(scenario.order_shape),
         "memory_size": scenario.memory_size,
         "message_size": scenario.message_size,
     }

@@ -28,7 +28,17 @@ from .moved_elsewhere import MovedElsewhere
 from .one_thread import in_one_thread, used_elsewhere
 from .physics import N_CORNERS, Physics
 from .state import NOBODY, WarehouseState
-from .structs import Claims, Commands, Nearby, Parameters, Sensed, StepResult, World, lengths_of
+from .structs import (
+    DUE,
+    Claims,
+    Commands,
+    Nearby,
+    Parameters,
+    Sensed,
+    StepResult,
+    World,
+    lengths_of,
+)
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG = 500
@@ -164,6 +174,8 @@ class Warehouse:
         n_delivered = outcome.n_delivered.item()
         state.delivery_times += [state.time] * n_delivered
         state.delivered_by += self._world.claims.delivered_by[:n_delivered].tolist()
+        served = self._world.claims.delivered[:n_delivered]
+        state.delivered_due += served[:, DUE].tolist()
         if outcome.is_paused[0]:
             self._apply_faults()
             stepping.perceive(self._address, rows)
@@ -269,8 +281,8 @@ class Warehouse:
 
     @property
     def all_delivered(self) -> bool:
-        """Whether nothing is left to ask for; never with `restock`."""
-        return self.state.requested == NOBODY
+        """Whether nothing is left to ask for, now and later; never with `restock`, but of a file."""
+        return bool(self.state.orders.is_served[0])
 
     @property
     def is_over_time(self) -> bool:
@@ -300,6 +312,7 @@ class Warehouse:
         scenario, state = self.scenario, self.state
         n, n_columns = self._command_shape
         state.progress.last_step[0] = scenario.n_steps
+        state.orders.shape[:] = scenario.order_shape
         lengths = lengths_of(scenario)
         floor = floor_of(scenario)
         self._physics = Physics(scenario, self._robot_places, len(floor.corners) // N_CORNERS)
@@ -316,6 +329,7 @@ class Warehouse:
             obstacles=state.obstacle_position,
             floor=floor,
             progress=state.progress,
+            orders=state.orders,
             contacts=state.contacts,
             outcome=blank(StepResult, lengths),
             robot_grid=self._robot_grid,

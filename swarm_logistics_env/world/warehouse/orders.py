@@ -1,0 +1,160 @@
+"""Orders that come by themselves and wait, and requests that are put back when they last too long.
+
+With `Scenario.orders` "next" nothing comes by itself: `demand` asks for an item when one was
+delivered. Else an order comes at its time, drawn or listed in a file, and waits until one of the
+`n_requests` open requests is free: the oldest comes first, or the most urgent.
+
+Times are drawn as a Poisson process whose rate changes: at the highest rate, of which each is kept
+with the probability of the rate at that time (thinning; Lewis and Shedler 1979).
+"""
+
+from __future__ import annotations
+
+import math
+
+from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel, uniform
+
+from .demand import ask, close_request, drawn_item, is_ordered, next_dock, next_item
+from .structs import (
+    ASKED,
+    CAME,
+    DELIVERED,
+    DOCK,
+    DUE,
+    ITEM_ORDERED,
+    NOBODY,
+    NUMBER,
+    PRIORITY,
+    Numbers,
+    World,
+)
+
+_GRACE = 1e-6  # [s]; times are sums of periods
+
+
+@kernel
+def receive_orders(world: World) -> None:
+    """Let the orders come whose time it is, and ask for items where requests are free."""
+    if not world.parameters.has_orders:
+        return
+    orders = world.orders
+    if len(orders.listed) > 0:
+        read_listed(world)
+    else:
+        draw_orders(world)
+    ask(world)
+    n_open = 0
+    for item in world.progress.requested:
+        n_open += int(item != NOBODY)
+    orders.longest_queue[0] = max(orders.longest_queue[0], n_open + orders.n_waiting[0])
+
+
+@kernel
+def read_listed(world: World) -> None:
+    """Let the orders of the file come whose time it is."""
+    orders = world.orders
+    latest = world.progress.time[0] + _GRACE
+    while orders.n_listed[0] < len(orders.listed):
+        order = orders.listed[orders.n_listed[0]]
+        if order[CAME] > latest:
+            return
+        orders.n_listed[0] += 1
+        item = int(order[ITEM_ORDERED])
+        if item == NOBODY:
+            item = drawn_item(world, int(order[NUMBER]), orders.n_classes[0])
+        elif not world.parameters.restock and is_gone(world, item):
+            item = NOBODY
+        dock = int(order[DOCK])
+        if dock == NOBODY:
+            dock = next_dock(world)
+        let_wait(world, item, dock, order)
+
+
+@kernel
+def is_gone(world: World, item: int) -> bool:
+    """Return whether an item was delivered for good, or is on order."""
+    return bool(world.items.status[item] == DELIVERED or is_ordered(world, item))
+
+
+@kernel
+def draw_orders(world: World) -> None:
+    """Let the orders come that were drawn for the time since the step before."""
+    orders = world.orders
+    parameters = world.parameters
+    key = world.items.order_key[0]
+    latest = world.progress.time[0] + _GRACE
+    n_parts = len(orders.shape)
+    highest = orders.shape[0]
+    for part in range(n_parts):
+        highest = max(highest, orders.shape[part])
+    order = world.claims.order
+    while True:
+        came = orders.next_draw[0]
+        if came > latest:
+            return
+        count = 2 * orders.n_drawn[0]
+        gap = -math.log(1.0 - uniform(key, count)) / (parameters.order_rate * highest)
+        part = int(came / parameters.order_cycle * n_parts) % n_parts
+        comes = count > 0 and uniform(key, count + 1) * highest < orders.shape[part]
+        orders.next_draw[0] = came + gap
+        orders.n_drawn[0] += 1
+        if comes:  # the first draw, at the start, is that of the first gap alone
+            order[CAME] = came
+            order[DUE] = came + parameters.due_after
+            order[PRIORITY] = 0.0
+            let_wait(world, next_item(world), next_dock(world), order)
+
+
+@kernel
+def let_wait(world: World, item: int, dock: int, order: Numbers) -> None:
+    """Let an order wait behind the others, or turn it away."""
+    orders = world.orders
+    last = orders.n_waiting[0]
+    if item == NOBODY or last == len(orders.waiting):
+        orders.n_turned_away[0] += 1
+        return
+    orders.waiting[last, :] = order
+    orders.waiting[last, ITEM_ORDERED] = item
+    orders.waiting[last, DOCK] = dock
+    orders.n_waiting[0] += 1
+
+
+@kernel
+def put_back_late(world: World) -> None:
+    """Put back the requests that were open for too long, and ask for the next ones.
+
+    One that is put back waits behind the others; without orders that wait, the item is asked for
+    anew as others are.
+    """
+    longest = world.parameters.longest_request
+    if longest == math.inf:
+        return
+    orders = world.orders
+    requested = world.progress.requested
+    order = world.claims.order
+    index = 0
+    while index < len(requested) and requested[index] != NOBODY:
+        if world.progress.time[0] - orders.open[index, ASKED] < longest - _GRACE:
+            index += 1
+            continue
+        order[:] = orders.open[index, :]
+        close_request(world, index)
+        ask(world)
+        orders.n_put_back[0] += 1
+        if world.parameters.has_orders:
+            let_wait(world, int(order[ITEM_ORDERED]), int(order[DOCK]), order)
+            ask(world)
+
+
+@inlined_kernel
+def is_all_served(world: World) -> bool:
+    """Return whether nothing is asked for, and no order is to come."""
+    if world.progress.requested[0] != NOBODY:
+        return False
+    orders = world.orders
+    if not world.parameters.has_orders:
+        return True
+    if len(orders.listed) > 0:
+        return bool(orders.n_listed[0] == len(orders.listed))
+    is_empty = world.progress.n_delivered[0] == len(world.items.status)
+    return bool(is_empty and not world.parameters.restock)
