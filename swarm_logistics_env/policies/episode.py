@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from swarm_logistics_env.policies.evaluation_mode import in_evaluation
 from swarm_logistics_env.policies.policy import Policy, decide_in_use, one_thread, start
 from swarm_logistics_env.world.scenario import CHIPMUNK, Scenario
 from swarm_logistics_env.world.warehouse import Warehouse
-from swarm_logistics_env.world.warehouse.contacts import NO_MEASURES, ContactMeasures
+from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 from swarm_logistics_env.world.warehouse.faults import FaultLike
 
 _MOST_STEPS = 100  # in one call: the interpreter answers a Ctrl-C between calls
@@ -44,7 +44,7 @@ class Episode:
     failed_robots: tuple[int, ...]
     anchoring_seconds: float
     digest: str
-    contacts: ContactMeasures = NO_MEASURES
+    contacts: ContactMeasures = field(default_factory=ContactMeasures)
 
     @property
     def delivered(self) -> int:

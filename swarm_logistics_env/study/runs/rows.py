@@ -17,7 +17,7 @@ from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 _OUTCOME = TypeAdapter(Outcome)
 _FIELDS = {one.name for one in fields(Outcome)} - {"wall_seconds"}
 # Left out where they are missing: older rows have none of them.
-_COUNTED = set(ContactMeasures._fields)
+COUNTED = tuple(one.name for one in fields(ContactMeasures))
 _DESCRIBED = {
     "policy", "policy_identity", "task", "scenario", "faults", "behaviour", "code", "seed"
 }  # fmt: skip
@@ -65,7 +65,7 @@ def row_digest(*values: object) -> str:
 
 def content_of(run: Run, outcome: Outcome) -> Content:
     """Return what a store keeps of a run and its outcome besides the wall time."""
-    missing = {name for name in _COUNTED if getattr(outcome, name) is None}
+    missing = {name for name in COUNTED if getattr(outcome, name) is None}
     result = _OUTCOME.dump_json(outcome, exclude={"wall_seconds", *missing}).decode()
     before, after = _described(run.case, run.code)
     return run.key, f"{before}{run.seed}{after}", int(outcome.error is not None), result
@@ -97,7 +97,7 @@ def outcome_of(text: str) -> Outcome:
     """
     outcome = _OUTCOME.validate_json(text, strict=True)
     # Unknown fields were refused; quotes within a text are escaped.
-    if not all(f'"{name}":' in text for name in _FIELDS - _COUNTED):
+    if not all(f'"{name}":' in text for name in _FIELDS.difference(COUNTED)):
         raise ValueError(f"an outcome should have the fields {sorted(_FIELDS)}")
     return outcome
 

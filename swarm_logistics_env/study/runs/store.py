@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any, Self
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.records import atomic_write, canonical_json, plain, write_csv
 from swarm_logistics_env.study.tasks.task import Outcome, Run
-from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 
-from .rows import StoredRow, case_of, content_of, outcome_of, row_digest
+from .rows import COUNTED, StoredRow, case_of, content_of, outcome_of, row_digest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -227,7 +226,7 @@ class Runs:
         for row in sorted(self._rows(None if keys is None else set(keys)), key=lambda row: row.key):
             outcome = outcome_of(row.outcome)
             result = json.loads(row.outcome)
-            result |= {name: result.get(name) for name in ContactMeasures._fields}
+            result |= {name: result.get(name) for name in COUNTED}
             result |= {"delivered": outcome.delivered}
             if outcome.error is not None:
                 result = dict.fromkeys(result) | {"error": outcome.error}

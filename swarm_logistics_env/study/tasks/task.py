@@ -24,6 +24,7 @@ from swarm_logistics_env.core.current_folder import allow_import
 from swarm_logistics_env.core.errors import RAISED_BY_OTHERS, StudyError, suggest
 from swarm_logistics_env.core.records import canonical_json
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
+from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 
 Seconds: TypeAlias = NDArray[np.float64]
 Fields: TypeAlias = Mapping[str, object]  # of a record, by name
@@ -55,12 +56,9 @@ def _make_storable(error: object) -> object:
     return text if len(text) <= _LONGEST_ERROR else f"{text[:half]} [..] {text[-half:]}"
 
 
-@validated(
-    frozen=True,
-    config=ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False, extra="forbid"),
-)
-class Outcome:
-    """What one run gave: an episode's result, or the traceback of the error that ended it.
+@dataclass(frozen=True)
+class Deliveries:
+    """What one run delivered, or the traceback of the error that ended it.
 
     Attributes:
         delivery_times: [s], ascending, shape (delivered,); its length is the paper's P.
@@ -73,14 +71,6 @@ class Outcome:
         error: traceback, its middle left out where it is very long; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
         untimed: P, 0 or more, where it is not the number of times; None: it is.
-        contacts_per_robot_minute: how often a robot begins to overlap another [1/min].
-        fast_contacts: share of these that close faster than 1 m/s.
-        overlap_share: share of the control steps with two robots that overlap by more than 10 mm.
-        mean_acceleration: of a robot from step to step, over robots and steps [m/s2].
-        p95_acceleration: its 95th percentile [m/s2].
-
-    The last five are those of `ContactMeasures`; None: nobody counted, as in runs of version 0.3,
-    or there was nothing to count.
     """
 
     delivery_times: Times = field(default_factory=lambda: np.empty(0))
@@ -92,11 +82,6 @@ class Outcome:
     error: Annotated[str | None, BeforeValidator(_make_storable)] = None
     wall_seconds: float = 0.0  # a clock may be set back
     untimed: NonNegativeFloat | None = None
-    contacts_per_robot_minute: NonNegativeFloat | None = None
-    fast_contacts: NonNegativeFloat | None = None
-    overlap_share: NonNegativeFloat | None = None
-    mean_acceleration: NonNegativeFloat | None = None
-    p95_acceleration: NonNegativeFloat | None = None
 
     @property
     def delivered(self) -> float:
@@ -112,6 +97,18 @@ class Outcome:
     def time_to_clear(self) -> float:
         """Time until every item was delivered [s]; infinite: not all were when the time was up."""
         return self.ended_at if self.all_delivered else math.inf
+
+
+# A dataclass has the fields of its last base first.
+@validated(
+    frozen=True,
+    config=ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False, extra="forbid"),
+)
+class Outcome(ContactMeasures, Deliveries):
+    """What one run gave: its deliveries, then what was counted of contacts, all validated.
+
+    A measure of contacts is None where nobody counted, too, as in runs of version 0.3.
+    """
 
 
 class _Fields(Protocol):

@@ -10,7 +10,7 @@ import json
 import math
 import shlex
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from types import MappingProxyType
 
 from swarm_logistics_env.core.errors import ScenarioError, StudyError
@@ -105,7 +105,7 @@ class WarehouseTask(TaskWorld):
             failed_robots=episode.failed_robots,
             anchoring_seconds=episode.anchoring_seconds,
             digest=episode.digest,
-            **episode.contacts._asdict(),
+            **asdict(episode.contacts),
         )
 
     def world_in_words(self, scenario: TaskScenario) -> str:

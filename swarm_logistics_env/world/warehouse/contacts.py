@@ -7,10 +7,11 @@ discs; walls, obstacles and items do not count, a failed robot does as long as i
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import NonNegativeFloat
 
 from swarm_logistics_env.compiler.kernels import kernel
 
@@ -23,8 +24,11 @@ DEEP = 0.01  # [m] that an overlap has to exceed
 _BINS_PER_ROOT = 32.0
 
 
-class ContactMeasures(NamedTuple):
+@dataclass(frozen=True)
+class ContactMeasures:
     """What the robots of an episode met, over all that are in the arena; None: nothing to count.
+
+    An outcome of a study's run has these fields, too: they become columns of its runs.
 
     Attributes:
         contacts_per_robot_minute: how often a robot begins to overlap another [1/min]; a contact
@@ -37,29 +41,26 @@ class ContactMeasures(NamedTuple):
         p95_acceleration: 95th percentile of the same [m/s2], within 0.1 at the usual 15.
     """
 
-    contacts_per_robot_minute: float | None
-    fast_contacts: float | None
-    overlap_share: float | None
-    mean_acceleration: float | None
-    p95_acceleration: float | None
-
-
-NO_MEASURES = ContactMeasures(None, None, None, None, None)
+    contacts_per_robot_minute: NonNegativeFloat | None = None
+    fast_contacts: NonNegativeFloat | None = None
+    overlap_share: NonNegativeFloat | None = None
+    mean_acceleration: NonNegativeFloat | None = None
+    p95_acceleration: NonNegativeFloat | None = None
 
 
 def contact_measures(counts: ContactCounts, n_steps: int, seconds: float) -> ContactMeasures:
     """Return what was counted in so many control steps, which took so many seconds together."""
     n_robot_steps = int(counts.accelerations.sum())
     if n_robot_steps == 0:
-        return NO_MEASURES
+        return ContactMeasures()
     n_contacts = counts.n_contacts.item()
     robot_minutes = n_robot_steps * (seconds / n_steps) / 60.0
     return ContactMeasures(
-        round(2 * n_contacts / robot_minutes, 9),
-        round(counts.n_fast.item() / n_contacts, 9) if n_contacts else None,
-        round(counts.n_deep_steps.item() / n_steps, 9),
-        round(counts.acceleration_sum.item() / n_robot_steps, 9),
-        round(_percentile(counts.accelerations, 0.95), 9),
+        contacts_per_robot_minute=round(2 * n_contacts / robot_minutes, 9),
+        fast_contacts=round(counts.n_fast.item() / n_contacts, 9) if n_contacts else None,
+        overlap_share=round(counts.n_deep_steps.item() / n_steps, 9),
+        mean_acceleration=round(counts.acceleration_sum.item() / n_robot_steps, 9),
+        p95_acceleration=round(_percentile(counts.accelerations, 0.95), 9),
     )
 
 

@@ -25,6 +25,7 @@ from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.records import write_csv
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
+from swarm_logistics_env.study.runs.rows import COUNTED
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs, export
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Case, Outcome, Run
@@ -32,7 +33,6 @@ from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.trials import read_trials
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.views.cli.terminal import say_what_was_played
-from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 
 CASE = Case(PolicySpec(name="swarm-dt", label="mine"), "identity", Scenario(), task=WAREHOUSE)
 
@@ -176,9 +176,9 @@ def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) ->
         runs.add([(run(0), outcome(1.0))])  # as an older version, which knew none of the fields
         runs.add([(run(1), counted)])
         written = [row.outcome for row in sorted(runs._rows(), key=lambda row: row.rowid)]
-        assert not any(name in written[0] for name in ContactMeasures._fields)
+        assert not any(name in written[0] for name in COUNTED)
         older, newer = (runs.outcomes([run(seed)])[CASE.key, seed] for seed in range(2))
-        assert [getattr(older, name) for name in ContactMeasures._fields] == [None] * 5
+        assert [getattr(older, name) for name in COUNTED] == [None] * 5
         assert (newer.contacts_per_robot_minute, newer.fast_contacts) == (0.0, None)
         other.absorb(runs)
         assert other.outcomes([run(1)])[CASE.key, 1].overlap_share == 0.25
@@ -221,6 +221,7 @@ def test_a_policy_that_fails_with_any_text_leaves_a_study_that_is_finished_and_r
 
 MAKER = """
 import pathlib, sys
+from swarm_logistics_env.study.runs.rows import COUNTED
 from swarm_logistics_env.study.runs.store import Runs
 
 for line in sys.stdin:

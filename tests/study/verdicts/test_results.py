@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -183,7 +183,7 @@ def test_every_column_has_a_value_somewhere(paper_results: StudyResults) -> None
     }  # fmt: skip
     assert {*cells.columns[cells.isna().all()]} == {"problem", *counted}
     for cell in claimed.cells:
-        measures = ContactMeasures(2.0, 0.5, 0.1, 6.0, 15.0)._asdict()
+        measures = asdict(ContactMeasures(2.0, 0.5, 0.1, 6.0, 15.0))
         outcomes = [replace(outcome, **measures) for outcome in cell.outcomes]
         (row,) = frame([replace(cell, outcomes=tuple(outcomes))], CELL_COLUMNS).to_dict("records")
         assert [row[name] for name in sorted(counted)] == [2.0, 2.0, 2.0, 0.5, 6.0, 0.1, 15.0]

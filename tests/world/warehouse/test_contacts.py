@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import astuple
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies, run_episode
-from swarm_logistics_env.world.warehouse.contacts import NO_MEASURES
+from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 from tests.world.warehouse.conftest import EAST, FAR, STAY, WEST, Build, steps
 
 DIAMETER, PERIOD = 0.25, 0.1
@@ -64,10 +65,10 @@ def test_a_robot_alone_or_beside_others_has_no_contact_though_it_hits_walls(buil
     alone = build([(0.5, 5.0)], [FAR])
     steps(alone, WEST, times=20)
     assert alone.state.robot_contact[0]
-    assert alone.state.contact_measures[:3] == (0.0, None, 0.0)
+    assert astuple(alone.state.contact_measures)[:3] == (0.0, None, 0.0)
     abreast = build([(4.0, 5.0), (4.0, 5.3)], [FAR])
     steps(abreast, EAST, EAST, times=20)
-    assert abreast.state.contact_measures[:3] == (0.0, None, 0.0)
+    assert astuple(abreast.state.contact_measures)[:3] == (0.0, None, 0.0)
 
 
 def test_a_percentile_of_many_accelerations_is_near_the_exact_one() -> None:
@@ -90,7 +91,7 @@ def test_removed_robots_are_not_counted(build: Build) -> None:
     assert world.state.contacts.accelerations.sum() == 3 * 5 + 15
     nobody = build(places, [FAR], [Fault("removed", (0, 1, 2))])
     steps(nobody, STAY, STAY, STAY, times=5)
-    assert nobody.state.contact_measures == NO_MEASURES
+    assert nobody.state.contact_measures == ContactMeasures()
 
 
 def test_a_copy_and_a_world_that_begins_again_count_the_same() -> None:
