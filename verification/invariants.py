@@ -19,6 +19,7 @@ from swarm_logistics_env.world.warehouse.state import (
     STORED,
     WarehouseState,
 )
+from swarm_logistics_env.world.warehouse.structs import ASKED, CAME
 
 SUSTAINED = 0.02  # [m], how far bodies may stand inside each other in a jam
 JAM = 1.0  # [s] of overlap without a break make a jam
@@ -51,6 +52,7 @@ class Watch:
         """Check everything; one sentence says what does not hold (BrokenPromiseError)."""
         self._items()
         self._deliveries()
+        self._orders()
         self._handling()
         self._cover()
         self._bodies()
@@ -99,7 +101,8 @@ class Watch:
         is_carried = (status == CARRIED) == (hands != NOBODY)
         self._demand(is_carried, "an item is carried by nobody, or is not and is")
         if state.requested == NOBODY:
-            self._demand(status == DELIVERED, "nothing is asked for")
+            is_all_gone = scenario.has_orders or (status == DELIVERED).all()
+            self._demand(is_all_gone, "nothing is asked for")
         else:
             requested = state.open_requests[state.open_requests != NOBODY]
             self._demand((requested >= 0) & (requested < scenario.n_items), f"{requested} is asked")
@@ -127,6 +130,28 @@ class Watch:
         restocks = self.world.scenario.restock, self._scenario.restock
         may_be = {left + (0 if restock else news) for restock in restocks}
         self._demand(gone in may_be, f"{gone} items have left for {state.delivered} deliveries")
+
+    def _orders(self) -> None:
+        """Check that requests and orders are conserved, and that none waits where it need not."""
+        state, scenario = self.world.state, self.world.scenario
+        orders, before = state.orders, self._before.orders
+        n_open = int((state.open_requests != NOBODY).sum())
+        n_closed = state.delivered + orders.n_put_back.item()
+        n_gone = orders.n_asked.item() - n_open - n_closed  # for an item that left with another
+        self._demand(n_gone == 0 or (n_gone > 0 and not scenario.restock), "a request is lost")
+        asked = orders.open[:n_open, ASKED]
+        self._demand(asked <= state.time + 1e-6, "something is asked for before its time")
+        self._demand(orders.open[:n_open, CAME] <= asked + 1e-6, "asked for before it came")
+        waits = orders.waiting[: orders.n_waiting.item()]
+        self._demand(waits[:, CAME] <= state.time + 1e-6, "an order waits before it came")
+        is_free = n_open < len(state.open_requests) and len(waits) > 0
+        self._demand(not is_free, "an order waits though a request is free")
+        if scenario.request_timeout is not None:
+            longest = max(scenario.request_timeout, self._scenario.longest_request)
+            self._demand(state.time - asked <= longest + 1e-6, "a request is open for too long")
+        for name in ("n_asked", "n_put_back", "n_turned_away", "longest_queue", "n_listed"):
+            is_less = getattr(orders, name) < getattr(before, name)
+            self._demand(~is_less, f"{name} fell")
 
     def _handling(self) -> None:
         """Check that who handles an item stands, and that nobody else lifts it."""

@@ -26,6 +26,7 @@ from swarm_logistics_env.core.errors import ScenarioError
 from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.world.floor import PLAN_SIZES
 from swarm_logistics_env.world.scenario.checks import LONGEST_STRIDE
+from swarm_logistics_env.world.scenario.order_file import NEXT, ORDER_SHAPES
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
 from verification.invariants import BrokenPromiseError, Watch
 
@@ -57,7 +58,8 @@ class Tally:
 # Lengths are drawn around the robot's own, so that things meet; the rest within what may be built.
 CHANGEABLE = ("delivery_width", "max_speed", "view_range", "radio_range", "pickup_range", "relay",
               "timer_limit", "drive", "ranger_noise", "sensor_dropout", "radio_loss",
-              "restock", "demand")  # fmt: skip
+              "restock", "demand", "request_timeout", "request_delay", "request_loss", "order_rate",
+              "order_due")  # fmt: skip
 
 
 def some_scenario(source: random.Random) -> Scenario:
@@ -90,6 +92,14 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "n_requests": rarely(source.randint(1, n_items), 1),
         "demand": source.choice(["closed", "closed", "independent", "zipf"]),
         "dock_capacity": rarely(number(0.1, 1.0 / control_period), None),
+        "request_timeout": rarely(number(0.1, 20.0), None),
+        "request_delay": rarely(number(0.1, 5.0), 0.0),
+        "request_loss": rarely(source.random(), 0.0),
+        "orders": rarely(source.choice([*ORDER_SHAPES, some_orders(source, n_items)]), NEXT),
+        "order_rate": number(0.01, 2.0),
+        "order_cycle": number(1.0, 100.0),
+        "order_due": rarely(number(0.1, 20.0), None),
+        "announced": source.choice(["oldest", "urgent", "all"]),
         "handling_time": rarely(number(0.02, 3.0), 0.0),
         "duration": 1e6,
         "restock": source.random() < 0.5,
@@ -120,6 +130,16 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "physics_period": physics_period,
         "floor": None,
     }
+
+
+def some_orders(source: random.Random, n_items: int) -> str:
+    """Return the rows of a file of orders, each for another item or for a class."""
+    rows = ["time,item,due,priority"]
+    for item in source.sample(range(n_items), source.randint(1, min(n_items, 5))):
+        time = source.uniform(0.0, 20.0)
+        due = source.choice(["", f"{time + source.uniform(0.0, 20.0)}"])
+        rows.append(f"{time},{item},{due},{source.randint(0, 2)}")
+    return "/".join(rows)
 
 
 def some_planned_scenario(source: random.Random) -> Scenario:

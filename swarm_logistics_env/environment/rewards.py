@@ -131,6 +131,14 @@ def own_delivery(world: Warehouse, before: Moment, after: Moment) -> Earned:
     return np.bincount(deliverers, minlength=world.state.n_robots).astype(np.float64)
 
 
+def on_time(world: Warehouse, before: Moment, after: Moment) -> Earned:
+    """Items delivered in this step before their orders were due, to every robot of the team."""
+    state = world.state
+    due = state.delivered_due[before.delivered :]
+    n_on_time = sum(time + _GRACE >= state.time for time in due)
+    return float(n_on_time) or None
+
+
 def lift_requested(world: Warehouse, before: Moment, after: Moment) -> Earned:
     """1 to the robot that took up a requested item, -1 to the one that let go of it.
 
@@ -240,6 +248,7 @@ Term = Callable[[Warehouse, Moment, Moment], Earned]
 REWARD_TERMS: dict[str, Term] = {
     "delivery": delivery,
     "own_delivery": own_delivery,
+    "on_time": on_time,
     "lift_requested": lift_requested,
     "approach": approach,
     "stocking": stocking,
@@ -247,7 +256,8 @@ REWARD_TERMS: dict[str, Term] = {
     "collision": collision,
     "blocked_request": blocked_request,
 }
-_AT_DELIVERIES = {"delivery", "own_delivery"}
+_AT_DELIVERIES = {"delivery", "own_delivery", "on_time"}
+_GRACE = 1e-6  # [s]; times are sums of periods
 
 
 def term_of(name: str) -> Term:

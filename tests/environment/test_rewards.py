@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import pickle
 from pathlib import Path
 from typing import Any
@@ -37,11 +38,12 @@ def put_down(world: Warehouse, robot: int) -> None:
     world.state.item_carrier[item], world.state.item_status[item] = NOBODY, STORED
 
 
-def deliver(world: Warehouse, robot: int, next_request: int) -> None:
+def deliver(world: Warehouse, robot: int, next_request: int, due: float = math.inf) -> None:
     put_down(world, robot)
     world.state.item_status[world.state.requested] = DELIVERED
     world.state.delivery_times.append(1.0)
     world.state.delivered_by.append(robot)
+    world.state.delivered_due.append(due)
     world.state.open_requests[0] = next_request
 
 
@@ -77,6 +79,9 @@ PAYS: dict[str, tuple[dict[str, float] | None, list[Act], list[tuple[list[Act], 
     "own_delivery the deliverers, of two in one step": (
         {"own_delivery": 2.0}, [(give, 1, 2), (give, 3, 4)], [
         ([(deliver, 1, 4), (deliver, 3, 0)], [0.0, 2.0, 0.0, 2.0]), ([], NOTHING)]),
+    "on_time everybody for each delivery that is not late": ({"on_time": 2.0}, [(give, 1, 2)], [
+        ([(deliver, 1, 4, -0.1), (deliver, 3, 0), (deliver, 1, 2, 0.0)], [4.0] * 4),
+        ([(deliver, 1, 4, -0.1)], NOTHING)]),
     "lift_requested for taking up, and fines letting go": ({"lift_requested": 1.0}, [], [
         ([(give, 0, 5)], NOTHING), ([(give, 1, 2)], [0.0, 1.0, 0.0, 0.0]), ([], NOTHING),
         ([(put_down, 1)], [0.0, -1.0, 0.0, 0.0])]),

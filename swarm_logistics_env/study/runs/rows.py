@@ -13,11 +13,14 @@ from pydantic import TypeAdapter
 from swarm_logistics_env.core.records import canonical_json
 from swarm_logistics_env.study.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
+from swarm_logistics_env.world.warehouse.orders import OrderMeasures
 
 _OUTCOME = TypeAdapter(Outcome)
-_FIELDS = {one.name for one in fields(Outcome)} - {"wall_seconds"}
+_FIELDS = {field.name for field in fields(Outcome)} - {"wall_seconds"}
 # Left out where they are missing: older rows have none of them.
-COUNTED = tuple(one.name for one in fields(ContactMeasures))
+OF_ORDERS = tuple(measure.name for measure in fields(OrderMeasures))
+COUNTED = (*(measure.name for measure in fields(ContactMeasures)), *OF_ORDERS)
+_FOLLOWING = ("delivered", "longest_standstill", "stands_still")  # from an outcome
 _DESCRIBED = {
     "policy", "policy_identity", "task", "scenario", "faults", "behaviour", "code", "seed"
 }  # fmt: skip
@@ -112,3 +115,20 @@ def case_of(text: str) -> dict[str, Any]:
     if not isinstance(case, dict) or case.keys() != _DESCRIBED:
         raise ValueError(f"a run should have the fields {sorted(_DESCRIBED)}")
     return case
+
+
+def record_of(row: StoredRow) -> dict[str, Any]:
+    """Return a run and its outcome by name, as a table of runs has them; None: it has none.
+
+    Raises:
+        ValueError: as `case_of` and `outcome_of` raise it.
+    """
+    outcome = outcome_of(row.outcome)
+    result = json.loads(row.outcome)
+    result |= {name: result.get(name) for name in COUNTED}
+    result |= {name: getattr(outcome, name) for name in _FOLLOWING}
+    if outcome.error is not None:
+        result = dict.fromkeys(result) | {"error": outcome.error}
+    case = case_of(row.run)
+    case |= {name: canonical_json(case[name]) for name in ("scenario", "faults")}
+    return {"run": row.key} | case | result

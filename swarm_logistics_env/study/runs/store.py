@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 import sqlite3
 import threading
@@ -17,7 +16,7 @@ from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.records import atomic_write, canonical_json, plain, write_csv
 from swarm_logistics_env.study.tasks.task import Outcome, Run
 
-from .rows import COUNTED, StoredRow, case_of, content_of, outcome_of, row_digest
+from .rows import OF_ORDERS, StoredRow, case_of, content_of, outcome_of, record_of, row_digest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -216,24 +215,17 @@ class Runs:
 
         Returns:
             The columns `run` (key), `policy`, `policy_identity`, `task`, `scenario`, `faults`,
-            `behaviour`, `code`, `seed`, `delivered` and those of `Outcome`; `scenario` and
-            `faults` are JSON, `delivery_times` lists [s]; the fields of an outcome are None where
-            the run failed, those of `ContactMeasures` also where nobody counted.
+            `behaviour`, `code`, `seed`, those of `Outcome`, `delivered`, `longest_standstill` [s]
+            and `stands_still`; `scenario` and `faults` are JSON, `delivery_times` lists [s]; the
+            fields of an outcome are None where the run failed, those of `ContactMeasures` also
+            where nobody counted. Those of `OrderMeasures` are there where any run has them.
         """
         import pandas as pd
 
-        records = []
-        for row in sorted(self._rows(None if keys is None else set(keys)), key=lambda row: row.key):
-            outcome = outcome_of(row.outcome)
-            result = json.loads(row.outcome)
-            result |= {name: result.get(name) for name in COUNTED}
-            result |= {"delivered": outcome.delivered}
-            if outcome.error is not None:
-                result = dict.fromkeys(result) | {"error": outcome.error}
-            case = case_of(row.run)
-            case |= {name: canonical_json(case[name]) for name in ("scenario", "faults")}
-            records.append({"run": row.key} | case | result)
-        return pd.DataFrame(records, dtype=object)
+        rows = sorted(self._rows(None if keys is None else set(keys)), key=lambda row: row.key)
+        table = pd.DataFrame([record_of(row) for row in rows], dtype=object)
+        is_nowhere = [name for name in OF_ORDERS if name in table and table[name].isna().all()]
+        return table.drop(columns=is_nowhere)
 
     def note(self, name: str, value: str) -> None:
         """Note a fact about the study; an earlier one of this name is replaced."""

@@ -25,6 +25,7 @@ from swarm_logistics_env.core.errors import RAISED_BY_OTHERS, StudyError, sugges
 from swarm_logistics_env.core.records import canonical_json
 from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
+from swarm_logistics_env.world.warehouse.orders import OrderMeasures
 
 Seconds: TypeAlias = NDArray[np.float64]
 Fields: TypeAlias = Mapping[str, object]  # of a record, by name
@@ -45,6 +46,7 @@ Times = Annotated[
 
 
 _LONGEST_ERROR = 20_000  # characters
+LAST_PART = 0.2  # of a run: who delivers nothing in it stands still
 
 
 def _make_storable(error: object) -> object:
@@ -94,6 +96,25 @@ class Deliveries:
         return self.all_delivered and self.untimed is None
 
     @property
+    def longest_standstill(self) -> float | None:
+        """The longest time without a delivery, from start to end [s]; None: times are unknown."""
+        if self.untimed is not None and not self.delivery_times.size:
+            return None
+        times = np.concatenate([[0.0], self.delivery_times, [self.ended_at]])
+        return float(np.diff(times).max())
+
+    @property
+    def stands_still(self) -> bool | None:
+        """Whether nothing was delivered in the last fifth, though there was something to deliver.
+
+        None: the times are unknown.
+        """
+        if self.longest_standstill is None:
+            return None
+        is_late = self.delivery_times > (1.0 - LAST_PART) * self.ended_at
+        return not self.all_delivered and not is_late.any()
+
+    @property
     def time_to_clear(self) -> float:
         """Time until every item was delivered [s]; infinite: not all were when the time was up."""
         return self.ended_at if self.all_delivered else math.inf
@@ -104,10 +125,10 @@ class Deliveries:
     frozen=True,
     config=ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False, extra="forbid"),
 )
-class Outcome(ContactMeasures, Deliveries):
-    """What one run gave: its deliveries, then what was counted of contacts, all validated.
+class Outcome(OrderMeasures, ContactMeasures, Deliveries):
+    """What one run gave: its deliveries, then what was counted of contacts and orders, validated.
 
-    A measure of contacts is None where nobody counted, too, as in runs of version 0.3.
+    A measure is None where nobody counted, too, as in runs of version 0.3.
     """
 
 

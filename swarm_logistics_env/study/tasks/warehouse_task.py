@@ -106,6 +106,7 @@ class WarehouseTask(TaskWorld):
             anchoring_seconds=episode.anchoring_seconds,
             digest=episode.digest,
             **asdict(episode.contacts),
+            **asdict(episode.orders),
         )
 
     def world_in_words(self, scenario: TaskScenario) -> str:

@@ -126,20 +126,9 @@ class Cell:
         is_known = not math.isnan(self.contacts.value) and sum(rates) > 0.0
         return float(np.average(fast, weights=rates)) if is_known else None
 
-    @property
-    def overlap_share(self) -> float | None:
-        """Mean over runs of the share of steps with an overlap above 10 mm; None: unknown."""
-        return _mean([outcome.overlap_share for outcome in self.outcomes])
-
-    @property
-    def mean_acceleration(self) -> float | None:
-        """Mean over runs of a robot's mean acceleration [m/s2]; None: unknown."""
-        return _mean([outcome.mean_acceleration for outcome in self.outcomes])
-
-    @property
-    def p95_acceleration(self) -> float | None:
-        """Mean over runs of the 95th percentile of the acceleration [m/s2]; None: unknown."""
-        return _mean([outcome.p95_acceleration for outcome in self.outcomes])
+    def mean_of(self, measure: str) -> float | None:
+        """Return the mean over runs of what `Outcome` has by that name; None: not of all runs."""
+        return _mean([getattr(outcome, measure) for outcome in self.outcomes])
 
     def _possible(self, interval: Interval) -> Interval:
         """Return an interval that ends at the largest P possible."""

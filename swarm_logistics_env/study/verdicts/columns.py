@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from swarm_logistics_env.spi import Equivalence, Estimate
@@ -17,6 +18,14 @@ Judged = TypeVar("Judged")
 # Name to type, what gives the value of a row, and what it means. A number that is missing is NaN, a
 # text None.
 Columns: TypeAlias = Mapping[str, tuple[type, Callable[[Judged], object], str]]
+# Mean over runs of what `OrderMeasures` has; the columns are there where any cell has a value.
+ORDER_MEASURES = {
+    "share_on_time": "share of the orders that were served by their due time",
+    "mean_tardiness": "mean time by which orders were late [s]",
+    "p95_tardiness": "95th percentile of it [s]",
+    "longest_queue": "most orders that were open or waited at a time",
+    "put_back": "requests that were not served within `request_timeout`",
+}
 CELL_COLUMNS: Columns[Cell] = {
     "policy": (str, lambda cell: cell.policy, "label of the policy"),
     "table": (str, lambda cell: cell.table, "heading of the report's table"),
@@ -78,6 +87,16 @@ CELL_COLUMNS: Columns[Cell] = {
         lambda cell: cell.stalled,
         "share of runs with less than a quarter of the median P",
     ),
+    "standstill": (
+        float,
+        lambda cell: cell.mean_of("longest_standstill"),
+        "longest time without a delivery, mean over runs [s]; missing: no times are known",
+    ),
+    "standstills": (
+        float,
+        lambda cell: cell.mean_of("stands_still"),
+        "share of runs without a delivery in their last fifth; missing: no times are known",
+    ),
     "phases_untestable": (
         str,
         lambda cell: cell.phases.untestable or None,
@@ -97,19 +116,23 @@ CELL_COLUMNS: Columns[Cell] = {
     ),
     "overlap_share": (
         float,
-        lambda cell: cell.overlap_share,
+        lambda cell: cell.mean_of("overlap_share"),
         "share of steps with two robots that overlap by more than 10 mm",
     ),
     "mean_acceleration": (
         float,
-        lambda cell: cell.mean_acceleration,
+        lambda cell: cell.mean_of("mean_acceleration"),
         "mean acceleration of a robot [m/s2]",
     ),
     "p95_acceleration": (
         float,
-        lambda cell: cell.p95_acceleration,
+        lambda cell: cell.mean_of("p95_acceleration"),
         "95th percentile of it, mean over runs [m/s2]",
     ),
+    **{
+        measure: (float, partial(Cell.mean_of, measure=measure), meaning)
+        for measure, meaning in ORDER_MEASURES.items()
+    },
     "problem": (str, lambda cell: cell.problem, "why runs are missing; missing: they are complete"),
 }
 
@@ -331,10 +354,12 @@ def frame(rows: Sequence[Judged], columns: Columns[Judged]) -> pd.DataFrame:
     """Return cells or verdicts as a table with these columns, for CSV and for users."""
     import pandas as pd
 
-    return pd.DataFrame(
+    table = pd.DataFrame(
         {
             # Missing texts stay None, which pandas would turn into NaN.
             name: pd.Series([value(row) for row in rows], dtype=kind if kind is float else "O")
             for name, (kind, value, _) in columns.items()
         }
     )
+    is_nowhere = [name for name in table if name in ORDER_MEASURES and table[name].isna().all()]
+    return table.drop(columns=is_nowhere)

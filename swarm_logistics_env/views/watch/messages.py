@@ -23,7 +23,7 @@ from swarm_logistics_env.world.rendering import palette
 from swarm_logistics_env.world.rendering.plan_shapes import dock_hue, plan_shapes
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
-from swarm_logistics_env.world.warehouse.state import STORED
+from swarm_logistics_env.world.warehouse.state import NOBODY, STORED
 
 from .session import SPEEDS, Session
 
@@ -32,7 +32,7 @@ Message: TypeAlias = dict[str, Any]
 _SESSION_FIELDS = ("seed", "speed", "paused", "mode", "note", "failure", "policy", "against")
 _SCENARIO_FIELDS = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
-    "restock", "robot_radius", "item_radius", "obstacle_radius",
+    "restock", "robot_radius", "item_radius", "obstacle_radius", "has_orders", "has_due_times",
 )  # fmt: skip
 _TIMER_STEPS = 8  # shades of the timer's halo
 
@@ -83,8 +83,9 @@ def frame_message(session: Session) -> Message:
     For each of the two runs, with its number 0 or 1 behind the name: `poses` (3 N numbers: x, y,
     heading of each robot, or None where it is absent), `robots` ([activity, age of its timer in 1/8
     of the limit or None, mark, robot it follows] of each), `items` (x, y of each that is stored),
-    `requested` ([x, y, carrier] of each that is asked for; where requests name docks, also the
-    dock's letter and the name of its colour) and `deliveries` (their times).
+    `requested` ([x, y, carrier] of each that is asked for; where it names its dock, also the dock's
+    letter and the name of its colour), `late` (indices of those that are overdue), `waiting` (how
+    many orders wait) and `deliveries` (their times).
     """
     message: Message = {
         **{name: getattr(session, name) for name in _SESSION_FIELDS},
@@ -198,6 +199,8 @@ def _arena(play: Play) -> Message:
             [*position, carrier, *label]
             for position, carrier, label in zip(requested_positions, carriers, labels, strict=True)
         ],
+        "late": np.flatnonzero(state.item_late[requested]).tolist(),
+        "waiting": state.n_waiting,
         "deliveries": [round(time, 1) for time in state.delivery_times],
     }
 
@@ -206,7 +209,8 @@ def _dock_labels(scenario: Scenario, docks: list[int]) -> list[tuple[str, ...]]:
     """Return letter and colour of each dock; nothing where requests name none."""
     if scenario.plan is None or not scenario.names_docks:
         return [()] * len(docks)
-    return [(scenario.plan.dock_names[dock], dock_hue(dock)) for dock in docks]
+    names = scenario.plan.dock_names
+    return [(names[dock], dock_hue(dock)) if dock != NOBODY else () for dock in docks]
 
 
 def _selected(session: Session) -> Message | None:

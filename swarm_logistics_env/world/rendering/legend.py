@@ -11,6 +11,7 @@ from .palette import ACTIVITIES, ITEM_EDGE, MARKS, PLAN_COLOURS, RGB, dock_colou
 from .plan_shapes import plan_shapes
 
 OBSTACLE = "obstacle"  # the last mark
+LATE = "!"
 
 
 def legend(scenario: Scenario, height: int) -> dict[str, Surface]:
@@ -27,9 +28,16 @@ def legend(scenario: Scenario, height: int) -> dict[str, Surface]:
         "failed": sprites.badge(MARKS["FM4"], round(0.9 * height)),
         "item": sprites.item(0.7 * radius, False),
         "requested item": _above(sprites.target(0.8 * radius), sprites.item(0.4 * radius, True)),
+        **_late_mark(scenario, height),
         **_plan_marks(scenario, height),
         OBSTACLE: sprites.obstacle(1.1 * radius),
     }
+
+
+def _late_mark(scenario: Scenario, height: int) -> dict[str, Surface]:
+    if not scenario.has_due_times:
+        return {}
+    return {"late": sprites.badge(LATE, round(0.9 * height))}
 
 
 def _above(lower: Surface, upper: Surface) -> Surface:

@@ -14,7 +14,7 @@ from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.state import NOBODY, STORED, WarehouseState
 
 from . import palette, sprites
-from .legend import OBSTACLE, legend
+from .legend import LATE, OBSTACLE, legend
 from .plan_picture import PlanPicture
 from .plan_shapes import dock_hue
 from .sprites import new_canvas, words
@@ -24,6 +24,12 @@ PixelPoint = tuple[int, int]  # [px]
 _HEADING_STEP = 3  # [degrees] between headings that are told apart
 # The widest scores there may be, so that a picture's size does not change with what happens.
 _WIDEST = "time 0000.0 s    N = 000    P = 000 of 000"
+_WIDEST_ORDERS = "    000 wait, 000 late"
+
+
+def _has_times(scenario: Scenario) -> bool:
+    """Return whether orders wait, or can be late."""
+    return scenario.has_orders or scenario.has_due_times
 
 
 class Picture:
@@ -63,6 +69,7 @@ class Picture:
                 self._stamp(sprites.item(1.4 * self._item_half, True), items[number])
             self._stamp(sprites.target(1.9 * self._robot_radius + 1.0), items[number])
         self._draw_named_docks(state, items)
+        self._draw_late(state, items)
         self._draw_badges(state, robots)
         self._write_caption(state)
         return self._canvas
@@ -81,7 +88,8 @@ class Picture:
         self._wall = max(2, self._text_height // 5)
         self.floor = Rect(0, margin, round(scale * across), round(scale * down))
         # A warehouse that is narrower than its caption stands in the middle above it.
-        width = max(self.floor.width, words(_WIDEST, self._text_height).get_width()) + 2 * margin
+        scores = _WIDEST + (_WIDEST_ORDERS if _has_times(scenario) else "")
+        width = max(self.floor.width, words(scores, self._text_height).get_width()) + 2 * margin
         self.width = width + width % 2
         self.floor.centerx = self.width // 2
         # Things stay visible in a warehouse that is drawn small.
@@ -194,15 +202,29 @@ class Picture:
         away = round(1.3 * self._robot_radius + 0.5 * height)
         for number in np.flatnonzero(state.item_requested).tolist():
             dock = int(state.item_docks[number])
+            if dock == NOBODY:
+                continue
             _, _, colour = palette.dock_colours(dock_hue(dock))
             sprite = sprites.badge(plan.dock_names[dock], height, colour)
             x, y = items[number]
             box = sprite.get_rect(center=(x + away, y + away))
             self._canvas.blit(sprite, box.clamp(self._canvas.get_rect()))
 
+    def _draw_late(self, state: WarehouseState, items: list[PixelPoint]) -> None:
+        """Draw the mark of what is late, above the item."""
+        height = max(12, round(1.3 * self._robot_radius))
+        away = round(1.3 * self._robot_radius + 0.5 * height)
+        for number in np.flatnonzero(state.item_late).tolist():
+            x, y = items[number]
+            sprite = sprites.badge(LATE, height)
+            box = sprite.get_rect(center=(x - away, y - away))
+            self._canvas.blit(sprite, box.clamp(self._canvas.get_rect()))
+
     def _write_caption(self, state: WarehouseState) -> None:
         total = "" if self._scenario.restock else f" of {self._scenario.n_items}"
         scores = f"time {state.time:.1f} s    N = {state.n_robots}    P = {state.delivered}{total}"
+        if _has_times(self._scenario):
+            scores += f"    {state.n_waiting} wait, {state.item_late.sum()} late"
         counts = Counter(mode for modes in state.failure_modes for mode in modes)
         entries = [f"{palette.mark((mode,))}: {mode} ×{n}" for mode, n in counts.items()]
         failures = (

@@ -293,6 +293,12 @@ class ScenarioFields(Record):
         return math.inf if self.order_due is None else self.order_due
 
     @property
+    def has_due_times(self) -> bool:
+        """Whether an order may be late."""
+        listed = self.order_file
+        return self.order_due is not None or (listed is not None and listed.has_due_times)
+
+    @property
     def tells_all(self) -> bool:
         """Whether every robot is told of every request at once."""
         return self.request_delay == 0.0 and self.request_loss == 0.0

@@ -63,6 +63,11 @@ class OrderFile(NamedTuple):
         """Whether any order names its dock."""
         return any(self.dock)
 
+    @property
+    def has_due_times(self) -> bool:
+        """Whether any order is due at some time."""
+        return bool(np.isfinite(self.due).any())
+
 
 def orders_text(orders: str) -> str:
     """Return the value of `Scenario.orders` in its one form: a name, or the rows of a file.

@@ -7,8 +7,9 @@ import math
 from swarm_logistics_env.compiler.kernels import inlined_kernel
 from swarm_logistics_env.world import observations as row
 
+from .demand import is_known_request
 from .floor_cells import is_in_sight
-from .logistics import is_known_request, is_remembered
+from .logistics import is_remembered
 from .pose import Pose, in_frame
 from .sensor_errors import ROBOT_SEEN, is_missed
 from .structs import RANKED_AT_ONCE, Grid, Nearby, Sensed, World

@@ -27,6 +27,8 @@ from .structs import (
     World,
 )
 
+_GRACE = 1e-6  # [s]; times are sums of periods
+
 
 @inlined_kernel
 def is_requested(world: World, item: int) -> bool:
@@ -36,6 +38,28 @@ def is_requested(world: World, item: int) -> bool:
     for index in range(len(requested)):
         is_open |= requested[index] == item
     return is_open
+
+
+@kernel
+def was_told(world: World, robot: int, item: int) -> bool:
+    """Return whether word of a request for `item` reached a robot: it may be late or lost."""
+    parameters = world.parameters
+    requested = world.progress.requested
+    key = world.robots.request_key[robot]
+    is_told = False
+    for index in range(len(requested)):
+        order = world.orders.open[index]
+        since = world.progress.time[0] - order[ASKED]
+        is_here = requested[index] == item and since >= parameters.request_delay - _GRACE
+        is_told |= is_here and uniform(key, int(order[NUMBER])) >= parameters.request_loss
+    return is_told
+
+
+@inlined_kernel
+def is_known_request(world: World, robot: int, item: int) -> bool:
+    """Return whether `robot` was told of an open request for `item`."""
+    is_open = bool(world.able.hears_requests[robot] and is_requested(world, item))
+    return is_open and (world.parameters.tells_all or was_told(world, robot, item))
 
 
 @kernel
@@ -73,25 +97,36 @@ def ask(world: World) -> None:
 
 @kernel
 def take_waiting(world: World, order: Numbers) -> None:
-    """Fill the row `order` with the next order that waits, which no longer does; or with nobody."""
+    """Fill the row `order` with the next order that waits, which no longer does; or with nobody.
+
+    An order is turned away if its item has left for good since it came.
+    """
     orders = world.orders
-    waiting = orders.waiting
-    n_waiting = orders.n_waiting[0]
+    while orders.n_waiting[0] > 0:
+        first = next_waiting(world)
+        order[:] = orders.waiting[first, :]
+        orders.n_waiting[0] -= 1
+        for index in range(first, orders.n_waiting[0]):
+            orders.waiting[index, :] = orders.waiting[index + 1, :]
+        if world.items.status[int(order[ITEM_ORDERED])] != DELIVERED:
+            return
+        orders.n_turned_away[0] += 1
     order[ITEM_ORDERED] = NOBODY
     order[DOCK] = NOBODY
-    if n_waiting == 0:
-        return
-    chosen = 0
+
+
+@kernel
+def next_waiting(world: World) -> int:
+    """Return which of the orders that wait, one or more, is the next to be asked for."""
+    waiting = world.orders.waiting
+    first = 0
     if world.parameters.is_urgent_first:
-        for index in range(1, n_waiting):
-            is_higher = waiting[index, PRIORITY] > waiting[chosen, PRIORITY]
-            is_equal = waiting[index, PRIORITY] == waiting[chosen, PRIORITY]
-            if is_higher or (is_equal and waiting[index, DUE] < waiting[chosen, DUE]):
-                chosen = index
-    order[:] = waiting[chosen, :]
-    for index in range(chosen, n_waiting - 1):
-        waiting[index, :] = waiting[index + 1, :]
-    orders.n_waiting[0] -= 1
+        for index in range(1, world.orders.n_waiting[0]):
+            is_higher = waiting[index, PRIORITY] > waiting[first, PRIORITY]
+            is_equal = waiting[index, PRIORITY] == waiting[first, PRIORITY]
+            if is_higher or (is_equal and waiting[index, DUE] < waiting[first, DUE]):
+                first = index
+    return first
 
 
 @kernel

@@ -19,15 +19,15 @@ from __future__ import annotations
 
 import math
 
-from swarm_logistics_env.compiler.kernels import engine_kernel, inlined_kernel, kernel, uniform
+from swarm_logistics_env.compiler.kernels import engine_kernel, inlined_kernel, kernel
 
 from .commands import DELIVERING, GRIPPER, IDLE, ITEM, KIND, LAST_STEP, LIFTING, PUTTING_DOWN
-from .demand import ask, close_request, is_requested, takes
+from .demand import ask, close_request, is_known_request, is_requested, takes
 from .floor_cells import dock_at, is_in_sight
 from .grid import look_around
 from .layout import place_restocked
 from .physics import EMPTY_ROBOT, FREE_ITEM, LADEN_ROBOT, NO_ONE, collide_with, put_item
-from .structs import ASKED, CARRIED, DELIVERED, NOBODY, NUMBER, STORED, Integers, World
+from .structs import CARRIED, DELIVERED, NOBODY, STORED, Integers, World
 
 _GRACE = 1e-6  # [s]; times are sums of periods
 
@@ -247,28 +247,6 @@ def is_remembered(memory: Integers, robot: int, item: int) -> bool:
     for index in range(memory.shape[1]):
         is_in_memory |= memory[robot, index] == item
     return is_in_memory
-
-
-@kernel
-def was_told(world: World, robot: int, item: int) -> bool:
-    """Return whether word of a request for `item` has reached a robot, which may be late or lost."""
-    parameters = world.parameters
-    requested = world.progress.requested
-    key = world.robots.request_key[robot]
-    is_told = False
-    for index in range(len(requested)):
-        order = world.orders.open[index]
-        since = world.progress.time[0] - order[ASKED]
-        is_here = requested[index] == item and since >= parameters.request_delay - _GRACE
-        is_told |= is_here and uniform(key, int(order[NUMBER])) >= parameters.request_loss
-    return is_told
-
-
-@inlined_kernel
-def is_known_request(world: World, robot: int, item: int) -> bool:
-    """Return whether `robot` was told of an open request for `item`."""
-    is_open = bool(world.able.hears_requests[robot] and is_requested(world, item))
-    return is_open and (world.parameters.tells_all or was_told(world, robot, item))
 
 
 @kernel

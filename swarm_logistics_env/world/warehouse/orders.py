@@ -11,6 +11,11 @@ with the probability of the rate at that time (thinning; Lewis and Shedler 1979)
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import NonNegativeFloat, NonNegativeInt
 
 from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel, uniform
 
@@ -26,8 +31,32 @@ from .structs import (
     NUMBER,
     PRIORITY,
     Numbers,
+    Orders,
     World,
 )
+
+
+@dataclass(frozen=True)
+class OrderMeasures:
+    """How the orders of an episode were served; None: nothing to count.
+
+    An outcome of a study's run has these fields, too: they become columns of its runs. Orders count
+    that were delivered and those that were overdue at the end; the latter as if served then.
+
+    Attributes:
+        share_on_time: share of the orders with a due time that were served by then.
+        mean_tardiness: mean time by which these were late, 0 for those on time [s].
+        p95_tardiness: 95th percentile of the same [s].
+        longest_queue: most orders that were open or waited at a time; None: none came by itself.
+        put_back: requests that were not served within `request_timeout`; None: none was put back.
+    """
+
+    share_on_time: NonNegativeFloat | None = None
+    mean_tardiness: NonNegativeFloat | None = None
+    p95_tardiness: NonNegativeFloat | None = None
+    longest_queue: NonNegativeInt | None = None
+    put_back: NonNegativeInt | None = None
+
 
 _GRACE = 1e-6  # [s]; times are sums of periods
 
@@ -158,3 +187,30 @@ def is_all_served(world: World) -> bool:
         return bool(orders.n_listed[0] == len(orders.listed))
     is_empty = world.progress.n_delivered[0] == len(world.items.status)
     return bool(is_empty and not world.parameters.restock)
+
+
+def order_measures(
+    orders: Orders, time: float, delivery_times: Sequence[float], due_times: Sequence[float]
+) -> OrderMeasures:
+    """Return how the orders were served until `time` [s].
+
+    Args:
+        delivery_times: [s] of the orders that were served.
+        due_times: [s] when each of these was due; infinite: never.
+    """
+    rows = np.concatenate([orders.open, orders.waiting[: orders.n_waiting.item()]])
+    is_overdue = (rows[:, ITEM_ORDERED] != NOBODY) & (rows[:, DUE] < time)
+    due = np.concatenate([due_times, rows[is_overdue, DUE]])
+    served = np.concatenate([delivery_times, np.full(is_overdue.sum(), time)])
+    tardiness = np.maximum(served - due, 0.0)[np.isfinite(due)]
+    counts = OrderMeasures(
+        longest_queue=orders.longest_queue.item() or None, put_back=orders.n_put_back.item() or None
+    )
+    if not tardiness.size:
+        return counts
+    return replace(
+        counts,
+        share_on_time=round(float((tardiness <= _GRACE).mean()), 9),
+        mean_tardiness=round(float(tardiness.mean()), 9),
+        p95_tardiness=round(float(np.quantile(tardiness, 0.95)), 9),
+    )

@@ -13,8 +13,8 @@ from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel
 from swarm_logistics_env.world import observations as row
 
 from .cameras import choose, describe_items, describe_neighbours
+from .demand import is_known_request
 from .grid import look_around
-from .logistics import is_known_request
 from .pose import Pose, in_frame
 from .radio import listen
 from .rangers import N_RANGES, full_range, hide_behind_solids, scan_discs, scan_solids

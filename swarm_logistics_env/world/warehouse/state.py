@@ -10,11 +10,14 @@ from swarm_logistics_env.world.scenario import Scenario
 
 from .contacts import ContactMeasures, contact_measures
 from .failure_modes import Capabilities
+from .orders import OrderMeasures, order_measures
 from .structs import (
     CARRIED,
     DELIVERED,
+    DUE,
     NOBODY,
     STORED,
+    Claims,
     ContactCounts,
     Flags,
     Integers,
@@ -86,6 +89,7 @@ class WarehouseState:
             silent[...] = np.nan
         robots.frozen_beams[...] = np.nan
         self.progress.asked_last[0] = NOBODY
+        self.orders.shape[:] = scenario.order_shape
         for prefix, structure in (("robot_", self.robots), ("", self.able), ("item_", self.items)):
             for name, array in structure._asdict().items():
                 setattr(self, prefix + name, array)
@@ -100,6 +104,12 @@ class WarehouseState:
         self.delivery_times: list[float] = []  # [s], ascending
         self.delivered_by: list[int] = []  # robot, one per delivery
         self.delivered_due: list[float] = []  # [s] when each was due; infinite: never
+
+    def note_deliveries(self, claims: Claims, count: int) -> None:
+        """Note the deliveries of a step: when, by whom, and when each was due."""
+        self.delivery_times += [self.time] * count
+        self.delivered_by += claims.delivered_by[:count].tolist()
+        self.delivered_due += claims.delivered[:count, DUE].tolist()
 
     def __setattr__(self, name: str, value: object) -> None:
         if isinstance(self.__dict__.get(name), np.ndarray):
@@ -138,6 +148,19 @@ class WarehouseState:
         return docks
 
     @property
+    def item_late(self) -> Flags:
+        """Which items are asked for by a request that is overdue (I,)."""
+        is_late = np.zeros(len(self.item_status), np.bool_)
+        is_overdue = (self.open_requests != NOBODY) & (self.orders.open[:, DUE] < self.time)
+        is_late[self.open_requests[is_overdue]] = True
+        return is_late
+
+    @property
+    def n_waiting(self) -> int:
+        """Orders that came and are not asked for yet."""
+        return int(self.orders.n_waiting[0])
+
+    @property
     def carries_requested(self) -> Flags:
         """Which robots carry an item that is asked for (N,)."""
         carries: Flags = (self.robot_item != NOBODY) & self.item_requested[self.robot_item]
@@ -152,6 +175,11 @@ class WarehouseState:
     def contact_measures(self) -> ContactMeasures:
         """How often robots ran into each other so far, how deep, and their accelerations."""
         return contact_measures(self.contacts, self.step, self.time)
+
+    @property
+    def order_measures(self) -> OrderMeasures:
+        """How the orders were served so far."""
+        return order_measures(self.orders, self.time, self.delivery_times, self.delivered_due)
 
     @property
     def n_robots(self) -> int:

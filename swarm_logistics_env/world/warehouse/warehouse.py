@@ -28,17 +28,7 @@ from .moved_elsewhere import MovedElsewhere
 from .one_thread import in_one_thread, used_elsewhere
 from .physics import N_CORNERS, Physics
 from .state import NOBODY, WarehouseState
-from .structs import (
-    DUE,
-    Claims,
-    Commands,
-    Nearby,
-    Parameters,
-    Sensed,
-    StepResult,
-    World,
-    lengths_of,
-)
+from .structs import Claims, Commands, Nearby, Parameters, Sensed, StepResult, World, lengths_of
 
 # How many steps of commands are kept for a pickle to replay, and how many numbers at most.
 _LONGEST_LOG = 500
@@ -171,11 +161,7 @@ class Warehouse:
         if outcome.refused[0] != NOBODY:
             raise not_finite(self._world.commands.now, outcome.refused.item())
         self._rows = rows
-        n_delivered = outcome.n_delivered.item()
-        state.delivery_times += [state.time] * n_delivered
-        state.delivered_by += self._world.claims.delivered_by[:n_delivered].tolist()
-        served = self._world.claims.delivered[:n_delivered]
-        state.delivered_due += served[:, DUE].tolist()
+        state.note_deliveries(self._world.claims, outcome.n_delivered.item())
         if outcome.is_paused[0]:
             self._apply_faults()
             stepping.perceive(self._address, rows)
@@ -281,7 +267,7 @@ class Warehouse:
 
     @property
     def all_delivered(self) -> bool:
-        """Whether nothing is left to ask for, now and later; never with `restock`, but of a file."""
+        """Whether nothing is asked for, and nothing will be."""
         return bool(self.state.orders.is_served[0])
 
     @property
@@ -312,7 +298,6 @@ class Warehouse:
         scenario, state = self.scenario, self.state
         n, n_columns = self._command_shape
         state.progress.last_step[0] = scenario.n_steps
-        state.orders.shape[:] = scenario.order_shape
         lengths = lengths_of(scenario)
         floor = floor_of(scenario)
         self._physics = Physics(scenario, self._robot_places, len(floor.corners) // N_CORNERS)

@@ -3,7 +3,7 @@
 // Draws an arena: what stands still on a sheet of its own, robots from pictures made once.
 
 const ACTIVITIES = { searching: "SEARCHING", shuffling: "SHUFFLING", delivering: "DELIVERING" };
-const TIMER_STEPS = 8, NOBODY = -1, MARGIN = 4;
+const TIMER_STEPS = 8, NOBODY = -1, MARGIN = 4, LATE = "!";
 const sheets = new Map();
 let colours = {}, sprites = new Map();
 
@@ -248,12 +248,14 @@ function drawArena(canvas, number, now, next, share, options) {
     pen.translate(-x, -y);
   });
   if (watched) selection(pen, ...at(watched), radius);
-  for (const request of requested) {
+  const late = new Set(now[`late${number}`]);  // a recording of a former version has none
+  for (const [index, request] of requested.entries()) {
     const isCarried = request[2] !== NOBODY && poses[request[2]];
     const [x, y] = at(isCarried ? poses[request[2]] : request);
     target(pen, x, y, 1.9 * radius + 1);
     item(pen, x, y, isCarried ? 0.5 * radius : 1.4 * half, true);
     const [, , , letter, hue] = request, high = Math.max(15, 1.3 * radius), away = 1.3 * radius + high / 2;
+    if (late.has(index)) badge(pen, Math.max(x - away, high / 2), Math.max(y - away, high / 2), high, LATE);
     if (letter) dockBadge(pen, Math.min(x + away, width - high / 2), Math.min(y + away, height - high / 2), high, letter, hue);
   }
   const tall = Math.max(13, 1.2 * radius);

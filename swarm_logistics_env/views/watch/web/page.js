@@ -147,7 +147,12 @@ function showNow(now) {
   element("clock").textContent = `${now.time.toFixed(1)} s`;
   drawStrip(element("strip"), now, fixed.curves, endOfStrip());
   const total = now.scenario.restock ? "" : ` of ${now.scenario.n_items}`;
-  for (const number of [0, 1]) element(`delivered${number}`).textContent = `${now[`deliveries${number}`].length}${total} delivered`;
+  for (const number of [0, 1]) {
+    const { has_orders, has_due_times } = now.scenario;
+    const waiting = has_orders ? `, ${now[`waiting${number}`]} wait` : "";
+    const late = has_due_times ? `, ${now[`late${number}`].length} late` : "";
+    element(`delivered${number}`).textContent = `${now[`deliveries${number}`].length}${total} delivered${waiting}${late}`;
+  }
 }
 
 // The time at the right end of the chart [s].
