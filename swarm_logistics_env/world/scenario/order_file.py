@@ -82,16 +82,16 @@ def orders_text(orders: str) -> str:
     names = (NEXT, *ORDER_SHAPES)
     if orders in names:
         return orders
-    if "\n" not in orders and not _looks_like_rows(orders):
-        if not _is_file(orders):
-            raise ValueError(
-                f"{orders!r}: should be {', '.join(names)} or a CSV file with the columns time "
-                f"and item{suggest(orders, names)}"
-            )
+    if _is_file(orders):
         try:
             orders = Path(orders).read_text(encoding="utf-8-sig")
         except (OSError, UnicodeError) as error:
             raise ValueError(f"cannot read the orders: {error}") from None
+    elif "\n" not in orders and not _looks_like_rows(orders):
+        raise ValueError(
+            f"{orders!r}: should be {', '.join(names)} or a CSV file with the columns time "
+            f"and item{suggest(orders, names)}"
+        )
     if _ROW_END in orders and "\n" in orders.strip():
         raise ValueError(f"a row has the sign {_ROW_END!r}: should have none, as it ends a row")
     return _ROW_END.join(line.rstrip() for line in orders.strip().splitlines())
@@ -99,7 +99,7 @@ def orders_text(orders: str) -> str:
 
 def _looks_like_rows(text: str) -> bool:
     header = text.split(_ROW_END, 1)[0].lower().replace(";", ",")
-    return _ROW_END in text and {name.strip() for name in header.split(",")} >= {"time", "item"}
+    return _ROW_END in text and not {"time", "item"}.isdisjoint(header.split(","))
 
 
 def _is_file(text: str) -> bool:

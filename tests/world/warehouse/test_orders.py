@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env.core.errors import ScenarioError
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.scenario.order_file import ORDER_SHAPES
 from swarm_logistics_env.world.warehouse.orders import OrderMeasures
@@ -271,7 +272,5 @@ BAD_ORDERS: dict[str, str] = {
 
 @pytest.mark.parametrize("orders", BAD_ORDERS)
 def test_orders_that_cannot_be_are_refused_with_line_and_value(orders: str) -> None:
-    from swarm_logistics_env.core.errors import ScenarioError
-
     with pytest.raises(ScenarioError, match=f"Scenario.orders.*{BAD_ORDERS[orders]}"):
         Scenario(orders=orders)
