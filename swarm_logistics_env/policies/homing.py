@@ -39,8 +39,11 @@ HOLD = 0.0
 LET_GO = -1.0
 
 
-class HomingParameters(ScriptParameters):
-    """The gains and ranges of `Homing`. All are fitted: they were tried for the most deliveries."""
+class DrivingParameters(ScriptParameters):
+    """The gains and ranges of the kernels that `Homing` and `HomingStock` share.
+
+    All are fitted: they were tried for the most deliveries.
+    """
 
     spread_gain: NonNegativeFloat = Field(
         0.8, description="away from each neighbour while it searches, in top speeds at distance 0"
@@ -72,6 +75,10 @@ class HomingParameters(ScriptParameters):
     obstacle_range: PositiveFloat = Field(
         0.5, description="how far it looks ahead for items when laden, beyond where they touch [m]"
     )
+
+
+class HomingParameters(DrivingParameters):
+    """The parameters of `Homing`."""
 
 
 Parameters = HomingParameters.for_kernels()
@@ -141,16 +148,15 @@ def decide_homing(
             if item >= 0 and observation[row.CARRYING] < 0.5:
                 x, y, speed, gripper = fetch(observation, item, push_x, push_y, period, parameters)
             else:
-                x, y = search_direction(observation, memory, x, y, is_inside, parameters)
-                x = x + push_x
-                y = y + push_y
-                speed = min(1.0, max(length_of(x, y), 0.3))
+                x, y, speed, gripper = search(
+                    observation, memory, x, y, push_x, push_y, is_inside, parameters
+                )
         set_velocity(x, y, speed, gripper, commands[robot])
 
 
 @kernel
 def avoid_neighbours(
-    observation: NDArray[np.float32], parameters: HomingParameters
+    observation: NDArray[np.float32], parameters: DrivingParameters
 ) -> tuple[float, float]:
     """Return the push away from near neighbours."""
     return away_from_neighbours(observation, parameters.avoid_range, parameters.avoid_gain)
@@ -201,7 +207,7 @@ def fetch(
     push_x: float,
     push_y: float,
     period: float,
-    parameters: HomingParameters,
+    parameters: DrivingParameters,
 ) -> tuple[float, float, float, float]:
     """Return the direction, speed and gripper of a robot on its way to the item in a column."""
     x = observation[item + row.ITEM.x]
@@ -213,13 +219,32 @@ def fetch(
 
 
 @kernel
+def search(
+    observation: NDArray[np.float32],
+    memory: NDArray[np.float64],
+    x: float,
+    y: float,
+    push_x: float,
+    push_y: float,
+    is_inside: bool,
+    parameters: DrivingParameters,
+) -> tuple[float, float, float, float]:
+    """Return the direction, speed and gripper of a robot on its search, see `search_direction`."""
+    x, y = search_direction(observation, memory, x, y, is_inside, parameters)
+    x = x + push_x
+    y = y + push_y
+    speed = min(1.0, max(length_of(x, y), 0.3))
+    return x, y, speed, LET_GO
+
+
+@kernel
 def search_direction(
     observation: NDArray[np.float32],
     memory: NDArray[np.float64],
     x: float,
     y: float,
     is_inside: bool,
-    parameters: HomingParameters,
+    parameters: DrivingParameters,
 ) -> tuple[float, float]:
     """Return the direction in which a robot searches that drives in direction (x, y)."""
     walls = observation[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
@@ -255,7 +280,7 @@ def home_direction(
     memory: NDArray[np.float64],
     x: float,
     y: float,
-    parameters: HomingParameters,
+    parameters: DrivingParameters,
 ) -> tuple[float, float]:
     """Return the direction in which a laden robot goes that drives in direction (x, y)."""
     home = length_of(memory[MEMORY.home_x], memory[MEMORY.home_y])
@@ -281,7 +306,7 @@ def freest_direction(
     memory: NDArray[np.float64],
     x: float,
     y: float,
-    parameters: HomingParameters,
+    parameters: DrivingParameters,
 ) -> tuple[float, float]:
     """Return the direction that is nearest to (x, y) and meets no item or wall."""
     length = max(length_of(x, y), 1e-9)
@@ -335,8 +360,8 @@ class Homing(Scripted):
         (3, 4)
     """
 
-    parameters_type = HomingParameters
-    parameters: HomingParameters
+    parameters_type: ClassVar[type[DrivingParameters]] = HomingParameters
+    parameters: DrivingParameters
     _fill_commands: ClassVar[Callable[..., None]] = staticmethod(act_homing)
 
     def configure(self, scenario: Scenario) -> None:

@@ -32,14 +32,15 @@ from swarm_logistics_env.policies.homing import (
     HOLD,
     LET_GO,
     LIFT,
+    DrivingParameters,
     Homing,
-    HomingParameters,
     avoid_neighbours,
     away_from_neighbours,
     fetch,
     freest_direction,
     home_direction,
     requested_item,
+    search,
     search_direction,
 )
 from swarm_logistics_env.world import observations as row
@@ -69,8 +70,8 @@ TRIES_AGAIN = 0.5  # of `cannot_deliver`: below it a robot holds items inside ag
 PULL = 0.4  # home, beside a random direction of length 1
 
 
-class HomingStockParameters(HomingParameters):
-    """Those of `Homing`, and the distances of `HomingStock`, both fitted, see above."""
+class HomingStockParameters(DrivingParameters):
+    """Those that `HomingStock` shares with `Homing`, and its distances, both fitted, see above."""
 
     near: PositiveFloat = Field(
         0.8, description="robots put items down nearer to the area than this [m]; fitted"
@@ -273,10 +274,7 @@ def search_items(
     y = memory[MEMORY.heading_y]
     if certainty == 0.0 and observation[row.LOWEST_TIMER] > 0.5:
         x, y = home_direction(observation, memory, x, y, parameters)
-    x, y = search_direction(observation, memory, x, y, is_inside, parameters)
-    x = x + push[0]
-    y = y + push[1]
-    return x, y, min(1.0, max(length_of(x, y), 0.3)), LET_GO
+    return search(observation, memory, x, y, push[0], push[1], is_inside, parameters)
 
 
 @kernel

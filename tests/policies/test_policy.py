@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_logistics_env import policies
+from swarm_logistics_env import Scenario, policies
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
@@ -17,11 +17,12 @@ from swarm_logistics_env.policies.learned import LearnedPolicy, Network
 from swarm_logistics_env.policies.policy import Scripted, identity
 from swarm_logistics_env.policies.spec import SCRIPTED, PolicySpec
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.world import observations
 
 
 def changed(value: Any) -> Any:
     """Return another value of a parameter that is allowed, too."""
-    return not value if isinstance(value, bool) else 1.25 * value + 0.01
+    return not value if isinstance(value, bool) else 0.7 * value + 0.01
 
 
 def script_of(name: str) -> Any:
@@ -32,8 +33,21 @@ def script_of(name: str) -> Any:
     return kind
 
 
+def commands_of(policy: Any) -> Any:
+    """What robots that sense anything, ten steps long, are commanded to do, (steps, N, 4)."""
+    rng = np.random.default_rng(0)
+    low, high = observations.bounds(Scenario())
+    rows = rng.uniform(low, high, (12, 200, len(low))).astype(np.float32)
+    flags = (low == 0.0) & (high == 1.0)
+    rows[:, :, flags] = rows[:, :, flags].round()
+    policy.reset(200, 0)
+    return np.array([policy.act(step) for step in rows for _ in range(10)])
+
+
 @pytest.mark.parametrize("name", SCRIPTED)
-def test_every_argument_of_a_script_changes_its_identity_and_its_repr(name: str) -> None:
+def test_every_argument_of_a_script_changes_its_identity_its_repr_and_its_commands(
+    name: str,
+) -> None:
     kind = script_of(name)
     assert kind.__init__ is Scripted.__init__, "its arguments are the fields of its record"
     defaults = kind.parameters_type().model_dump()
@@ -41,13 +55,14 @@ def test_every_argument_of_a_script_changes_its_identity_and_its_repr(name: str)
     assert identity(default) == identity(kind(**defaults))
     assert repr(default) == f"{kind.__name__}()"
     met = {identity(default)}
+    commands = commands_of(default) if defaults else None
     for field, value in defaults.items():
-        # Upwards, so that `near` stays below `far`.
-        fields: dict[str, Any] = {"near": 0.9} if field == "near" else {field: changed(value)}
+        fields = {field: changed(value)}
         policy = kind(**fields)
         assert repr(policy) == f"{kind.__name__}({field}={fields[field]!r})"
         assert identity(policy) not in met
         met.add(identity(policy))
+        assert (commands_of(policy) != commands).any(), f"{field} is accepted and ignored"
         if SCRIPTED[name] is kind:  # the text with the same parameters is the same policy
             assert PolicySpec(name=name, parameters=fields).identity() == identity(policy)
 
