@@ -85,8 +85,9 @@ def trials_of(
         IndicatorError: a row is no trial, two of a condition have one label, or some trials lasted
             longer than others where P is no rate.
     """
+    unnamed = Path(columns.table.source).stem or columns.table.source  # a policy without a name
     rows = [Row(columns, position) for position in range(len(columns.table.cells))]
-    pairs = [(trial_of(row, faults, finished, blocks, duration), row) for row in rows]
+    pairs = [(trial_of(row, unnamed, faults, finished, blocks, duration), row) for row in rows]
     if "time" in columns.by_meaning:
         trials = events_of(pairs)
     else:
@@ -99,13 +100,13 @@ def trials_of(
 
 def trial_of(
     row: Row,
+    unnamed: str,
     faults: FaultNames,
     finished: Mapping[str, bool],
     blocks: Mapping[str, int],
     duration: float | None,
 ) -> Trial:
     """Return the trial of a row, of an event log without its times; arguments as of `trials_of`."""
-    source = row.columns.table.source
     performance = performance_of(row, finished)
     n_robots = row.whole_or_none("n_robots", 1)
     fault = faults[row.text("fault")]
@@ -126,7 +127,7 @@ def trial_of(
         raise row.error("onset", f"should be before the trial ends at {duration:g} s")
     return Trial(
         row.line,
-        row.text("policy") or Path(source).stem or source,
+        row.text("policy") or unnamed,
         row.text("table"),
         n_robots,
         fault,
