@@ -94,6 +94,7 @@ def columns_of(
         texts = [", ".join(row) for row in zip(*(cells.texts for cells in block_cells))]
         by_meaning["seed"] = Cells(names["seed"], texts, table, "seed")
     varying, covariates = _parameters(table, parameters, is_log="time" in names)
+    # What somebody calls a block counts before its name in the file.
     words = {name: word for word, name in columns.items() if MEANING[word] == "seed"}
     table_columns = Columns(
         table=table,
@@ -269,16 +270,13 @@ def _refuse_thousands(cells: Cells) -> None:
 def _parameters(
     table: Table, names: Sequence[str], *, is_log: bool
 ) -> tuple[list[Cells], list[Cells]]:
-    """Return the columns that vary, of those that are nothing known: parameters, and covariates.
-
-    Args:
-        is_log: whether a row is a delivery.
-    """
+    """Return the columns that vary, of those that are nothing known: parameters, and covariates."""
     parameters = []
     covariates = []
     for name in names:
         n_values = len({*table.columns[name].texts})
         is_wide = n_values > min(MOST_LEVELS, len(table.cells) / 2)
+        # In an event log a row is a delivery, no trial.
         if is_wide and n_values >= FEWEST_OF_COVARIATE and not is_log:
             covariates.append(table.columns[name])
         elif n_values > 1:
