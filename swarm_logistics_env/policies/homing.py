@@ -360,8 +360,8 @@ class Homing(Scripted):
         (3, 4)
     """
 
-    parameters_type = HomingParameters
-    parameters: HomingParameters
+    parameters_type: ClassVar[type[DrivingParameters]] = HomingParameters
+    parameters: DrivingParameters
     _fill_commands: ClassVar[Callable[..., None]] = staticmethod(act_homing)
 
     def configure(self, scenario: Scenario) -> None:

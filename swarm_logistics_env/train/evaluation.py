@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.core.records import file_name
-from swarm_logistics_env.policies import Policy, load
+from swarm_logistics_env.policies import Policy
 from swarm_logistics_env.policies.episode import run_episode
+from swarm_logistics_env.policies.files import read_policy
 from swarm_logistics_env.policies.learned import Score
 from swarm_logistics_env.study.questions.comparison import Arm
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.verdicts.results import StudyResults
-from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.train.settings import Evaluation, Scores
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse import Fault
 
@@ -45,31 +46,25 @@ def versions() -> dict[str, str]:
 
 # Scores are measured on seeds 0, 1, .. and trainings use seeds of 63 bits: these are neither.
 FIRST_SEED = 1_000_000
-REFERENCES = ("swarm-dt", "homing")  # scripted policies that a training is shown beside
 
 
-def evaluate(policy: Policy, training: Training) -> dict[str, float]:
+def evaluate(
+    policy: Policy, scenario: Scenario, evaluation: Evaluation, threads: int
+) -> dict[str, float]:
     """Return what `policy` delivers on the evaluation's seeds, without faults and with each.
 
     Returns:
         "P": the mean P_o [items]; of each mode, as "P_FM1" and "R_FM1", the mean P_F and R, which
         is nan where nothing was delivered without faults.
     """
-    evaluation = training.evaluation
-    scenario = training.scenario.replace(n_robots=evaluation.n_robots)
     kinds: list[Sequence[Fault]] = [(), *((Fault(m, k),) for m, k in evaluation.faults.items())]
     seeds = range(FIRST_SEED, FIRST_SEED + evaluation.seeds)
-    p_o, *p_of_faults = performances(policy, scenario, kinds, seeds, training.threads)
+    p_o, *p_of_faults = performances(policy, scenario, kinds, seeds, threads)
     means = {"P": float(p_o.mean())}
     for (mode, m), p_f in zip(evaluation.faults.items(), p_of_faults):
-        r = spi.robustness(p_o, p_f, n=evaluation.n_robots, m=m).value if p_o.any() else math.nan
+        r = spi.robustness(p_o, p_f, n=scenario.n_robots, m=m).value if p_o.any() else math.nan
         means |= {f"P_{mode}": float(p_f.mean()), f"R_{mode}": r}
     return means
-
-
-def reference_means(training: Training) -> dict[str, dict[str, float]]:
-    """Return what the scripted policies measure on the evaluation's seeds, by their names."""
-    return {name: evaluate(load(name), training) for name in REFERENCES}
 
 
 def performances(
@@ -92,27 +87,28 @@ def performances(
     return delivered.reshape(len(kinds), len(seeds))
 
 
-def evaluate_score(policy: Policy, training: Training, out: Path) -> tuple[Score, ...]:
-    """Return what `training.scores` asks for; the study lies in `out`, and goes on where it was.
+def evaluate_score(
+    path: Path, scenario: Scenario, scores: Scores, threads: int
+) -> tuple[Score, ...]:
+    """Return what `scores` asks for of a policy file; the study in scores/ beside it goes on.
 
     Raises:
         TrainingError: a run failed, so that the scores would not be of all seeds.
     """
-    scores = training.scores
     sizes = [{"values": sorted(scores.sizes)}] if len(scores.sizes) > 1 else []
     faults = [{"modes": scores.modes, "robots": scores.robots}] if scores.modes else []
     if not scores.seeds or not (sizes or faults):
         return ()
     study = Study(
-        out=out,
-        name=file_name(f"scores-{training.name}"),
-        policies=[policy],
+        out=path.parent / "scores",
+        name=file_name(f"scores-{path.stem}"),
+        policies=[read_policy(path)],
         seeds=scores.seeds,
-        scenario=training.scenario.replace(n_robots=scores.n_robots),
+        scenario=scenario,
         sizes=sizes,
         faults=faults,
     )
-    study.run(processes=training.threads)
+    study.run(processes=threads)
     results = study.findings()
     errors = [outcome.error for outcome in results.outcomes.values() if outcome.error]
     if errors:

@@ -6,147 +6,24 @@ The value network reads more than a robot can sense, see `privileged`.
 from __future__ import annotations
 
 import hashlib
-import inspect
 import io
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import create_mlp
-from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.core.records import atomic_write
-from swarm_logistics_env.core.streams import key, row_keys
-from swarm_logistics_env.policies.learned import STREAM
-from swarm_logistics_env.train.privileged import PRIVILEGED, fill_privileged
-from swarm_logistics_env.train.training import Training, make_worlds
-from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.world.motion.memory import body_of
-from swarm_logistics_env.world.motion.network_inputs import INPUTS
-
-
-def check_finite(name: str, numbers: NDArray[Any]) -> None:
-    """Raise a FloatingPointError unless all the numbers are finite."""
-    finite = np.isfinite(numbers)
-    if not finite.all():
-        raise FloatingPointError(f"{name} is {numbers[~finite][0]}")
-
-
-class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environment of the type check
-    """Turns observation rows into a network's inputs, and its outputs into commands.
-
-    By the code that plays the policy afterwards, so that both see the same. What the value network
-    alone reads, `PRIVILEGED`, stands behind these inputs.
-
-    Args:
-        training: whose worlds these are; every robot is a row.
-
-    Attributes:
-        frame: of each robot's motion, with its memory.
-
-    Raises:
-        TrainingError, SetupError, ScenarioError, FaultError: the worlds cannot be.
-        FloatingPointError: an observation or a reward is not finite; of `reset` and steps.
-    """
-
-    def __init__(self, training: Training) -> None:
-        worlds = make_worlds(training)
-        self.frame = MotionView(training.scenario, training.network.listens)
-        self._privileged = np.zeros((worlds.num_envs, len(PRIVILEGED)), np.float32)
-        self._n_episodes = 0
-        self._seed = 0
-        self._n_held = training.network.decides_every - 1
-        super().__init__(
-            worlds,
-            Box(-np.inf, np.inf, (len(INPUTS) + len(PRIVILEGED),), np.float32),
-            Box(-1.0, 1.0, (len(OUTPUTS),), np.float32),
-        )
-
-    def __getstate__(self) -> dict[str, Any]:
-        # The base class stores members of the class, which cannot be pickled.
-        return {name: value for name, value in vars(self).items() if name != "class_attributes"}
-
-    def __setstate__(self, saved: dict[str, Any]) -> None:
-        # This comes first, because the base class looks up missing attributes in `venv`: endlessly
-        # if that is missing too.
-        self.__dict__.update(saved)
-        self.class_attributes = dict(inspect.getmembers(type(self)))
-
-    def seed(self, seed: int | None = None) -> list[int]:
-        """Fix all episodes from the next `reset` on."""
-        self._n_episodes = 0
-        self._seed = seed or 0
-        seeds: list[int] = self.venv.seed(seed)
-        return seeds
-
-    def reset(self) -> NDArray[np.float32]:
-        """Begin an episode in every world."""
-        observations = self.venv.reset()
-        self.frame.begin(self._keys(), self._bodies())
-        return self._read(observations)
-
-    def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
-        self._outputs = actions
-        self.venv.step_async(self.frame.command(actions))
-
-    def step_wait(self) -> Any:
-        """Step every world until the next decision."""
-        observations, rewards, dones, infos = self.venv.step_wait()
-        for _ in range(self._n_held):
-            self.frame.hold(observations)
-            self.venv.step_async(self.frame.command(self._outputs))
-            observations, more, dones, infos = self.venv.step_wait()
-            rewards = rewards + more
-        check_finite("a reward", rewards)
-        ended = np.flatnonzero(dones)
-        if ended.size:
-            last = np.stack([infos[row]["terminal_observation"] for row in ended.tolist()])
-            # The value network knows of one step before: the next episode has begun already.
-            inputs = np.hstack([self.frame.peek(last, ended), self._privileged[ended]])
-            for row, terminal_inputs in zip(ended.tolist(), inputs):
-                infos[row]["terminal_observation"] = terminal_inputs
-            self.frame.begin_rows(ended, self._keys()[ended], self._bodies()[ended])
-        return self._read(observations), rewards, dones, infos
-
-    def change_rewards(self, rewards: Mapping[str, float]) -> None:
-        """Pay by other weights from the next step on, in every world."""
-        for world in self.venv.worlds:
-            world.unwrapped.change_rewards(rewards)
-
-    def _bodies(self) -> NDArray[np.float64]:
-        # Every episode may have robots of another kind.
-        bodies = np.empty((self.num_envs, 4))
-        for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
-            bodies[rows] = body_of(world.warehouse.scenario)
-        return bodies
-
-    def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        inputs = self.frame.read(observations)
-        check_finite("an observation", inputs)
-        for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
-            warehouse = world.warehouse
-            turned = self.frame.turned[rows]
-            floor = warehouse.floor
-            to_delivery = floor.edge - floor.along(warehouse.state.robot_position)
-            fill_privileged(warehouse.address, turned, to_delivery, self._privileged[rows])
-        return np.hstack([inputs, self._privileged])
-
-    def _keys(self) -> NDArray[np.uint64]:
-        # Every episode of every row gets a stream of its own.
-        self._n_episodes += 1
-        return row_keys(
-            key(self._seed, "training episode", self._n_episodes), STREAM, self.num_envs
-        )
-
+from swarm_logistics_env.policies.learned import Network
+from swarm_logistics_env.train.privileged import PRIVILEGED
+from swarm_logistics_env.train.settings import PPOSettings
+from swarm_logistics_env.train.worlds import NetworkView, check_finite
 
 CHECKPOINT = "checkpoint.pt"
 STATE = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
@@ -156,16 +33,16 @@ STATE = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # 
 FIRST_OUTPUTS = (0.8, 0.0, 0.0)
 
 
-def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
-    """Return PPO as the training asks for it; seeds the worlds and global generators."""
-    ppo = training.ppo
-    network = training.network
+def make_learner(
+    view: NetworkView, network: Network, ppo: PPOSettings, seed: int, device: str
+) -> PPO:
+    """Return PPO as the settings ask for it; seeds the worlds and global generators."""
     learner = PPO(
         AsymmetricPolicy,
         view,
         learning_rate=lambda left: ppo.rate(1.0 - left),
         n_steps=ppo.n_steps,
-        batch_size=training.rows * ppo.n_steps // ppo.n_minibatches,
+        batch_size=view.num_envs * ppo.n_steps // ppo.n_minibatches,
         n_epochs=ppo.epochs,
         gamma=ppo.gamma,
         gae_lambda=ppo.gae_lambda,
@@ -175,13 +52,24 @@ def make_learner(training: Training, view: NetworkView, device: str) -> PPO:
         max_grad_norm=ppo.max_grad_norm,
         target_kl=ppo.target_kl,
         policy_kwargs={"net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)}},
-        seed=training.seed,
+        seed=seed,
         device=device,
     )
     with torch.no_grad():
         learner.policy.log_std.copy_(torch.tensor(ppo.deviations).log())
         learner.policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
     return learner
+
+
+def check_learner(learner: Any) -> None:
+    """Raise a FloatingPointError unless the latest losses, and all that was learned, are finite."""
+    logged = learner.logger.name_to_value
+    losses = [logged.get(f"train/{name}", 0.0) for name in ("value_loss", "policy_gradient_loss")]
+    check_finite("a loss", np.array(losses))
+    policy = learner.policy
+    averages = [mean for means in policy.optimizer.state.values() for mean in means.values()]
+    for numbers in (*policy.parameters(), policy.log_std.exp(), *averages):
+        check_finite("a number of the networks", numbers.detach().cpu().numpy())
 
 
 def device_of(name: str | None) -> str:

@@ -20,19 +20,14 @@ from stable_baselines3.common.logger import configure
 from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.core.progress_bar import ProgressBar
 from swarm_logistics_env.core.records import atomic_write, read_table, remove_parts
+from swarm_logistics_env.policies import Policy, load
 from swarm_logistics_env.policies.files import write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.study.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
-from swarm_logistics_env.train.evaluation import (
-    evaluate,
-    evaluate_score,
-    reference_means,
-    versions,
-)
+from swarm_logistics_env.train.evaluation import evaluate, evaluate_score, versions
 from swarm_logistics_env.train.learner import (
-    NetworkView,
-    check_finite,
+    check_learner,
     device_of,
     make_learner,
     read_checkpoint,
@@ -41,6 +36,7 @@ from swarm_logistics_env.train.learner import (
     tensors_of,
 )
 from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.train.worlds import NetworkView
 
 RECORD = "training.json"  # of how it was made
 # Fields that may change when a training goes on, because they change nothing of what was done.
@@ -49,7 +45,7 @@ CHECKPOINT_EVERY = 20.0  # seconds
 CURVE = "curve.csv"
 PICTURE = "curve.png"
 BEST = "best.safetensors"  # the policy as it was at the best evaluation
-MILLION = 1e6
+REFERENCES = ("swarm-dt", "homing")  # scripted policies that a training is shown beside
 
 
 def train(
@@ -138,24 +134,24 @@ def _train(
 ) -> Path:
     """Train a policy, or go on with it, and return the path of its file; see `train`."""
     state = read_checkpoint(out)
-    learner = make_learner(training, view, device)
+    learner = make_learner(view, training.network, training.ppo, training.seed, device)
     learner.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
     log = TrainingLog() if state is None else state["log"]
-    with _explain_end(training, out, learner, log):
-        if state is not None:
-            restore(learner, state)
-            check_learner(learner)
-        if learner.num_timesteps < training.agent_steps:
+    if state is not None:
+        restore(learner, state)
+    if learner.num_timesteps < training.agent_steps:
+        with _explain_end(training, out, learner, log):
             _learn(training, out, learner, log, callbacks)
     learner.env.close()
     evaluation = training.evaluation
     log.draw(out / PICTURE, f"{training.name}, N = {evaluation.n_robots}", evaluation.seeds)
-    tensors = tensors_of(learner.policy)
     card = _card(training, learner.num_timesteps, log, command)
+    tensors = tensors_of(learner.policy)
     path = out / f"{training.name}.safetensors"
     # The file is written before the scores are measured, which takes minutes.
     write_policy(path, card, tensors)
-    scores = evaluate_score(LearnedPolicy(card, tensors), training, out / "scores")
+    scenario = training.scenario.replace(n_robots=training.scores.n_robots)
+    scores = evaluate_score(path, scenario, training.scores, training.threads)
     if scores:
         write_policy(path, card.replace(scores=scores, scored_with=versions()), tensors)
     return path
@@ -166,23 +162,11 @@ def _learn(
 ) -> None:
     """Learn until the training's last agent-step."""
     log.versions = versions()
-    log.references = log.references or reference_means(training)
     total = training.agent_steps
     n_learned = learner.num_timesteps
     with ProgressBar(training.name, total, "agent-steps", done=n_learned) as progress:
         callback = TrainingCallback(training, log, out, progress)
         learner.learn(total - n_learned, [callback, *callbacks], reset_num_timesteps=False)
-
-
-def check_learner(learner: Any) -> None:
-    """Raise a FloatingPointError unless the latest losses, and all that was learned, are finite."""
-    logged = learner.logger.name_to_value
-    losses = [logged.get(f"train/{name}", 0.0) for name in ("value_loss", "policy_gradient_loss")]
-    check_finite("a loss", np.array(losses))
-    policy = learner.policy
-    averages = [mean for means in policy.optimizer.state.values() for mean in means.values()]
-    for numbers in (*policy.parameters(), policy.log_std.exp(), *averages):
-        check_finite("a number of the networks", numbers.detach().cpu().numpy())
 
 
 @contextmanager
@@ -268,7 +252,7 @@ class TrainingLog:
 
     def draw(self, picture: Path, title: str, seeds: int) -> None:
         """Draw P over agent-steps as a PNG, with a line for each scripted policy."""
-        steps = [row["agent_steps"] / MILLION for row in self.curve]
+        steps = [row["agent_steps"] / 1e6 for row in self.curve]
         p = [row["P"] for row in self.curve]
 
         def curve(canvas: Any) -> None:
@@ -295,8 +279,12 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         self._log = log
         self._out = out
         self._progress = progress
-        self._start = time.monotonic() - log.seconds
         self._saved_at = -math.inf
+
+    def _on_training_start(self) -> None:
+        log = self._log
+        log.references = log.references or {name: self._measure(load(name)) for name in REFERENCES}
+        self._start = time.monotonic() - log.seconds
         self._cpu = time.process_time()
 
     def _on_step(self) -> bool:
@@ -313,10 +301,8 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         with torch.no_grad():
             self.model.policy.log_std.clamp_(min=math.log(floor))
         curve = self._log.curve
-        if (
-            not curve
-            or self.num_timesteps >= curve[-1]["agent_steps"] + self._training.evaluation.every
-        ):
+        due = curve[-1]["agent_steps"] + self._training.evaluation.every if curve else 0
+        if self.num_timesteps >= due:
             self._evaluate()
         if time.monotonic() - self._saved_at >= CHECKPOINT_EVERY:
             self._save()
@@ -345,12 +331,15 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         save_checkpoint(self._out, self.model, self._log)
         self._saved_at = time.monotonic()
 
-    def _evaluate(self) -> None:
+    def _measure(self, policy: Policy) -> dict[str, float]:
         training = self._training
+        return evaluate(policy, training.evaluation_scenario, training.evaluation, training.threads)
+
+    def _evaluate(self) -> None:
         log = self._log
         tensors = tensors_of(self.model.policy)
-        card = _card(training, self.num_timesteps, log)
-        means = evaluate(LearnedPolicy(card, tensors), training)
+        card = _card(self._training, self.num_timesteps, log)
+        means = self._measure(LearnedPolicy(card, tensors))
         row = {
             "agent_steps": self.num_timesteps,
             "seconds": round(time.monotonic() - self._start, 1),
@@ -367,14 +356,13 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
 
 
 def _card(training: Training, agent_steps: int, log: TrainingLog, command: str = "") -> PolicyCard:
-    scenario = training.scenario.replace(n_robots=training.evaluation.n_robots)
     return PolicyCard(
         name=training.name,
         about=training.about,
         network=training.network,
         command=command,
         versions=log.versions,
-        scenario=scenario.model_dump(mode="json", exclude_defaults=True),
+        scenario=training.evaluation_scenario.model_dump(mode="json", exclude_defaults=True),
         training=training.model_dump(mode="json", exclude_defaults=True),
         seed=training.seed,
         agent_steps=agent_steps,

@@ -1,19 +1,14 @@
-"""The specification of a training, read from TOML, its presets, and the worlds it learns in."""
+"""The specification of a training, read from TOML, and its presets."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Self
 
-import numpy as np
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
 from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError, suggest
 from swarm_logistics_env.core.records import FileName, each_of, one_of, read_table
-from swarm_logistics_env.core.streams import generator
-from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.requests import faults_among, scenario_fields
 from swarm_logistics_env.environment.rewards import RewardTerms
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
@@ -28,11 +23,6 @@ from swarm_logistics_env.train.settings import (
     WorldKind,
 )
 from swarm_logistics_env.world.scenario import Scenario
-from swarm_logistics_env.world.warehouse import Fault
-from swarm_logistics_env.wrappers import IndicatorReward, Wrapper
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.adapters import SwarmVecEnv
 
 PRESETS_FOLDER = Path(__file__).parent / "presets"
 
@@ -158,6 +148,11 @@ class Training(Part):
         )
 
     @property
+    def evaluation_scenario(self) -> Scenario:
+        """The scenario with the swarm size at which it is measured during the training."""
+        return self.scenario.replace(n_robots=self.evaluation.n_robots)
+
+    @property
     def rows(self) -> int:
         """The number of robots in all worlds together."""
         return sum(kind.count * kind.n_robots for kind in self.worlds)
@@ -193,63 +188,3 @@ def load_training(source: str, *, trust_code: bool = False, **fields: object) ->
         return Training(**{"name": path.stem, **fields_of_file, **fields})
     except SwarmLogisticsError as error:  # whichever record of it refuses
         raise TrainingError(f"{path.name}: {error}") from error
-
-
-def make_worlds(training: Training) -> SwarmVecEnv:
-    """Return the worlds of a training, not yet begun.
-
-    Raises:
-        TrainingError, SetupError, ScenarioError, FaultError: they cannot be.
-    """
-    from swarm_logistics_env.adapters import SwarmVecEnv  # loads torch
-
-    worlds = training.each_world
-
-    def make_env(number: int) -> Wrapper:
-        kind, scenario = worlds[number]
-        core = SwarmLogisticsEnv(scenario, rewards=training.rewards)
-        env = EpisodeMix(core, kind.conditions or training.conditions)
-        if training.indicators is None:
-            return env
-        return IndicatorReward(env, **dict(training.indicators), own_reward=1.0)
-
-    return SwarmVecEnv(make_env=make_env, n_worlds=len(worlds), threads=training.threads)
-
-
-class EpisodeMix(Wrapper):
-    """Plays each episode under conditions drawn from several kinds, by the episode's seed.
-
-    Args:
-        env: the environment, or a wrapper of one.
-        kinds: what is drawn from; none: every episode is as the environment has it.
-
-    Raises:
-        ScenarioError, SetupError: a scenario among them cannot be.
-    """
-
-    def __init__(self, env: SwarmLogisticsEnv | Wrapper, kinds: Sequence[Conditions]) -> None:
-        super().__init__(env)
-        self._kinds = tuple(kinds)
-        weights = np.array([kind.weight for kind in kinds])
-        self._shares = weights / weights.sum()
-        base = self.unwrapped.scenario
-        for kind in kinds:
-            for name, values in kind.scenario.items():
-                for value in values:
-                    self.env.declare_spaces(base.replace(**{name: value}))
-
-    def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
-        """Return the options with this episode's conditions among them."""
-        if not self._kinds:
-            return options
-        rng = generator(seed, "kind of episode")
-        kind = self._kinds[int(rng.choice(len(self._kinds), p=self._shares))]
-        fields = {
-            name: values[int(rng.integers(len(values)))] for name, values in kind.scenario.items()
-        }
-        faults = faults_among(options, self.unwrapped.faults)
-        if kind.modes:
-            mode = kind.modes[int(rng.integers(len(kind.modes)))]
-            robots = kind.robots[int(rng.integers(len(kind.robots)))]
-            faults = (*faults, Fault(mode, robots, onset=float(rng.uniform(*kind.onset))))
-        return {**options, "scenario": {**fields, **scenario_fields(options)}, "faults": faults}

@@ -44,9 +44,7 @@ def test_an_episode_follows_from_its_seed_alone(threads: int) -> None:
     assert measured.any()
 
 
-def test_no_seed_of_a_score_is_measured_on_the_way(
-    small: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
     seeds = set()
 
     def noted(scenario: Scenario, policy: Any, seed: int, faults: Any) -> Any:
@@ -55,7 +53,7 @@ def test_no_seed_of_a_score_is_measured_on_the_way(
 
     monkeypatch.setattr(evaluation, "run_episode", noted)
     settings = Evaluation(seeds=3, n_robots=6, faults={"FM1": 1})
-    evaluation.evaluate(policies.load("swarm-dt"), small(scenario=SCENARIO, evaluation=settings))
+    evaluation.evaluate(policies.load("swarm-dt"), SCENARIO, settings, threads=2)
     assert len(seeds) == 3
     assert seeds.isdisjoint(range(MOST_SEEDS))
 

@@ -27,7 +27,6 @@ from swarm_logistics_env.train import trainer
 from swarm_logistics_env.train.evaluation import versions
 from swarm_logistics_env.train.learner import (
     CHECKPOINT,
-    NetworkView,
     make_learner,
     read_checkpoint,
     save_checkpoint,
@@ -36,6 +35,7 @@ from swarm_logistics_env.train.learner import (
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import Scores
 from swarm_logistics_env.train.trainer import train
+from swarm_logistics_env.train.worlds import NetworkView
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.world.motion import INPUTS, MotionView
 
@@ -104,7 +104,7 @@ def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_cal
 
 def test_torch_and_the_policy_file_agree(small: Any) -> None:
     training = small()
-    learner = make_learner(training, NetworkView(training), "cpu")
+    learner = make_learner(NetworkView(training), training.network, training.ppo, 0, "cpu")
     with torch.no_grad():
         for parameter in learner.policy.parameters():
             parameter.add_(0.3 * torch.randn_like(parameter))
@@ -144,7 +144,7 @@ def test_a_checkpoint_of_worlds_with_removed_robots_goes_on_to_the_same_bits(
         worlds=[{"n_robots": 16, "conditions": [{"modes": ["removed"], "robots": [8]}]}] * 3,
         scenario=small().scenario.replace(duration=60.0),
     )
-    learner = make_learner(training, NetworkView(training), "cpu")
+    learner = make_learner(NetworkView(training), training.network, training.ppo, 0, "cpu")
     learner._last_obs = learner.env.reset()  # as a rollout does
     save_checkpoint(tmp_path, learner, None)
     saved = read_checkpoint(tmp_path)

@@ -1,17 +1,13 @@
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from swarm_logistics_env.core.errors import TrainingError
-from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.train import Training, load_training, preset_names
-from swarm_logistics_env.train.settings import Conditions, PPOSettings
-from swarm_logistics_env.train.training import EpisodeMix, make_worlds
-from swarm_logistics_env.world.warehouse import Fault
+from swarm_logistics_env.train.settings import PPOSettings
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -81,52 +77,3 @@ def test_unknown_presets_and_files_are_refused(tmp_path: Path) -> None:
         load_training("deliver")
     with pytest.raises(TrainingError, match="cannot read the training"):
         load_training(str(tmp_path / "none.toml"))
-
-
-def mixed(*kinds: Conditions) -> EpisodeMix:
-    return EpisodeMix(SwarmLogisticsEnv(n_robots=4, n_items=5, duration=1.0), kinds)
-
-
-def test_episodes_are_drawn_by_weight_and_seed() -> None:
-    kinds = (
-        Conditions(weight=3.0),
-        Conditions(modes=("FM1", "FM4"), robots=(1, 3), onset=(0.0, 0.5)),
-    )
-    env, other = mixed(*kinds), mixed(*kinds)
-    met: Counter[tuple[str, object]] = Counter()
-    onsets = []
-    for seed in range(200):
-        env.reset_arrays(seed)
-        faults = env.warehouse.faults
-        met[(faults[0].mode, faults[0].robots) if faults else ("none", 0)] += 1
-        onsets += [fault.onset for fault in faults]
-    assert 0.0 <= min(onsets) < 0.1 < 0.4 < max(onsets) <= 0.5
-    assert 130 <= met["none", 0] <= 170
-    assert set(met) == {("none", 0), ("FM1", 1), ("FM1", 3), ("FM4", 1), ("FM4", 3)}
-    other.reset_arrays(199)
-    assert other.warehouse.faults == env.warehouse.faults
-
-
-def test_scenarios_are_drawn_and_options_come_first() -> None:
-    env = mixed(Conditions(scenario={"delivery_width": [1.0, 3.0]}))
-    widths = set()
-    for seed in range(20):
-        env.reset_arrays(seed)
-        widths.add(env.warehouse.scenario.delivery_width)
-    assert widths == {1.0, 3.0}
-    env.reset_arrays(0, {"scenario": {"delivery_width": 2.5}, "faults": [Fault("FM2", 1)]})
-    assert env.warehouse.scenario.delivery_width == 2.5
-    assert [fault.mode for fault in env.warehouse.faults] == ["FM2"]
-
-
-def test_kinds_of_worlds_play_their_own_conditions_or_else_those_of_the_training(
-    small: Any,
-) -> None:
-    pytest.importorskip("stable_baselines3")
-    own_conditions = [{"modes": ["FM2"], "robots": [1]}]
-    kinds = [{"n_robots": 3, "conditions": own_conditions}, {"n_robots": 5}]
-    env = make_worlds(small(worlds=kinds, conditions=[{"modes": ["FM4"], "robots": [2]}]))
-    env.seed(0)
-    env.reset()
-    faults = [[(f.mode, f.robots) for f in world.warehouse.faults] for world in env.worlds]
-    assert faults == [[("FM2", 1)], [("FM4", 2)]]

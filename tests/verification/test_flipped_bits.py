@@ -67,6 +67,7 @@ def test_a_checkpoint_with_a_flipped_bit_is_refused_before_it_is_unpickled(
     pytest.importorskip("torch")
     pytest.importorskip("stable_baselines3")
     from swarm_logistics_env.train import Training, learner
+    from swarm_logistics_env.train.worlds import NetworkView
 
     fields: dict[str, Any] = {
         "worlds": [{"n_robots": 2}],
@@ -75,7 +76,7 @@ def test_a_checkpoint_with_a_flipped_bit_is_refused_before_it_is_unpickled(
         "threads": 1,
     }
     training = Training(**fields)
-    trained = learner.make_learner(training, learner.NetworkView(training), "cpu")
+    trained = learner.make_learner(NetworkView(training), training.network, training.ppo, 0, "cpu")
     trained.env.reset()
     learner.save_checkpoint(tmp_path, trained, log={})
     path = tmp_path / learner.CHECKPOINT

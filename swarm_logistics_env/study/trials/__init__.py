@@ -1,7 +1,7 @@
 """Trials recorded anywhere: real robots, another simulator, a paper's tables.
 
-A reader makes a `Table` of a file's cells, `columns` says what each column is, `reading` makes
-trials of the rows.
+A reader makes a `Table` of a file's cells, `trial_columns` says what each column is and cuts its
+cells out, `trial_rows` makes trials of them; `reading` has them do so, one after the other.
 """
 
 from .reading import read_trials

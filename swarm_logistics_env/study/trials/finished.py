@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Sequence
 from shlex import quote
 
-from .table import Row
+from swarm_logistics_env.spi.inputs import IndicatorError
+
+from .table import Columns
+from .trial_columns import bare
 
 _CROSS = "x"  # marks yes, unless another word of the column does
 _NOT = ("not", "nicht", "pas", "non", "no", "nao")
@@ -62,31 +64,58 @@ NO_WORDS = frozenset(
 )
 
 
-def finished_words(rows: Sequence[Row]) -> dict[str, bool]:
+def finished_words(columns: Columns) -> dict[str, bool]:
     """Return what each cell of the column `finished` says; none where nothing does.
 
     Raises:
-        IndicatorError: a cell is of neither list, or is empty beside others; names its line.
+        IndicatorError: a cell is of neither list, or is empty beside others; names its line. Or a
+            column may say which trials finished, and would be a parameter.
     """
-    first_rows = {row.text("finished"): row for row in reversed(rows)}
+    if "time_to_finish" not in columns.by_meaning:
+        return {}
+    cells = columns.by_meaning.get("finished")
+    if cells is None:
+        _refuse_unnamed(columns)
+        return {}
+    first_rows = {text: row for row, text in reversed([*enumerate(cells.texts)])}
     if not any(first_rows):
         return {}
     meanings = {}
-    for cell, row in first_rows.items():
-        meaning = says_yes(cell)
-        word = _plain(cell)
+    for text, row in first_rows.items():
+        meaning = says_yes(text)
+        word = _plain(text)
         if word == _CROSS:
             other_marks = any(says_yes(other) for other in first_rows if _plain(other) != _CROSS)
             meaning = None if other_marks else True
         if meaning is None:
-            option = quote(f"finished:{cell}=no")
-            raise row.error(
-                "finished",
+            option = quote(f"finished:{text}=no")
+            raise cells.error(
+                row,
                 f"should be a word for yes or no: --value {option} where it means that a trial did "
                 "not finish, else with =yes",
             )
-        meanings[cell] = meaning
+        meanings[text] = meaning
     return meanings
+
+
+def _refuse_unnamed(columns: Columns) -> None:
+    """Ask of a column that may say which trials finished, and would be a parameter."""
+    for cells in (*columns.parameters, *columns.covariates):
+        words = {*cells.texts}
+        means = says_yes(bare(cells.name))
+        is_number = all(word.replace(".", "").isdigit() for word in words)
+        if {says_yes(word) for word in words} != {True, False} or (is_number and means is None):
+            continue
+        values = ""
+        if means is False:  # it says who did not finish
+            for word in sorted(words):
+                finished = "no" if says_yes(word) else "yes"
+                values += f" --value {quote(f'finished:{word}={finished}')}"
+        raise IndicatorError(
+            f"{cells.table.source}: {cells.name!r} may say which trials finished: say --column "
+            f"{quote(f'finished={cells.name}')}{values}, or leave it out by --ignore "
+            f"{quote(cells.name)}"
+        )
 
 
 def says_yes(cell: str) -> bool | None:
@@ -95,11 +124,6 @@ def says_yes(cell: str) -> bool | None:
     if word in YES_WORDS:
         return True
     return False if word in NO_WORDS else None
-
-
-def are_words(cells: Iterable[str]) -> bool:
-    """Return whether cells are words for yes and for no, and both are there."""
-    return {says_yes(cell) for cell in cells} == {True, False}
 
 
 def _plain(cell: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import fsum
 from shlex import quote
@@ -11,35 +11,23 @@ from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .table import BLOCK_SIGN, Columns, Row, Table
+from .table import Columns, Table
 from .trial import Trial
-from .trial_columns import MEANING, SEEDS, bare
 
 
-def numbered_blocks(rows: Sequence[Row]) -> dict[str, int]:
-    """Return a number for each block, by its name; none where blocks are numbers."""
-    if all(row.is_numbered_block() for row in rows):
-        return {}
-    names = sorted({row.text("seed") for row in rows} - {""})
-    return {name: number for number, name in enumerate(names)}
-
-
-def paired_by_blocks(
-    table: Table, columns: Columns, trials: Sequence[Trial], mapped: Mapping[str, str]
-) -> tuple[list[Trial], list[str]]:
+def paired_by_blocks(columns: Columns, trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
     """Return the trials of which each block has one in a condition, and notes on how.
 
     Args:
-        table, columns: that the trials were read from.
-        mapped: what a column is to its name in the file, as somebody says.
+        columns: that the trials were read from.
 
     Raises:
         IndicatorError: some trials have no seed, or two of a condition have the same one.
     """
-    block = columns.names.get("seed", "seed")
-    _check_seeds(table, trials, of_seeds=_are_seeds(mapped, columns.blocks))
+    block = columns.by_meaning["seed"].name if columns.blocks else "seed"
+    _check_seeds(columns.table, trials, of_seeds=columns.has_seeds)
     means, notes = _one_trial_a_block(trials, block)
-    notes += _notes_on_joined(table, columns.blocks)
+    notes += _notes_on_joined(columns)
     notes += _notes_on_partners(means, block)
     return means, notes
 
@@ -91,30 +79,21 @@ def _mean_of(trials: Sequence[Trial]) -> Trial:
     )
 
 
-def _notes_on_joined(table: Table, blocks: Sequence[str]) -> Iterator[str]:
+def _notes_on_joined(columns: Columns) -> Iterator[str]:
     """Yield which column of several that make a block has values that blocks share."""
-    if len(blocks) < 2:
+    names = [cells.name for cells in columns.blocks]
+    if len(names) < 2:
         return
-    n_blocks = len({*zip(*map(table.column, blocks))})
-    for name in blocks:
-        n_values = len({*table.column(name)})
-        if 1 < n_values < n_blocks and bare(name) not in SEEDS:
-            left_out = " ".join(f"--ignore {quote(other)}" for other in blocks if other != name)
+    n_blocks = len({*zip(*(cells.texts for cells in columns.blocks))})
+    for cells in columns.blocks:
+        n_values = len({*cells.texts})
+        if 1 < n_values < n_blocks and cells.name not in columns.seeds:
+            left_out = " ".join(f"--ignore {quote(name)}" for name in names if name != cells.name)
             yield (
-                f"Pairs are of one {BLOCK_SIGN.join(blocks)}, so verdicts are of the {n_values} "
-                f"values of {name!r} alone; {left_out} compares their means, for all such values."
+                f"Pairs are of one {columns.by_meaning['seed'].name}, so verdicts are of the "
+                f"{n_values} values of {cells.name!r} alone; {left_out} compares their means, for "
+                "all such values."
             )
-
-
-def _are_seeds(columns: Mapping[str, str], blocks: Sequence[str]) -> bool:
-    """Return whether a block is, or holds, a seed, of which a condition has one run.
-
-    Args:
-        columns: what a column is to its name in the file, as somebody says.
-        blocks: columns that make a block together.
-    """
-    words = {name: word for word, name in columns.items() if MEANING.get(word) == "seed"}
-    return any(bare(words.get(name, name)) in SEEDS for name in blocks)
 
 
 def _check_seeds(table: Table, trials: Sequence[Trial], *, of_seeds: bool) -> None:
@@ -122,9 +101,6 @@ def _check_seeds(table: Table, trials: Sequence[Trial], *, of_seeds: bool) -> No
 
     Args:
         of_seeds: whether a condition has one run of each, which blocks need not have.
-
-    Raises:
-        IndicatorError: there are some.
     """
     if all(trial.seed is None for trial in trials):
         return

@@ -5,29 +5,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .finished import are_words, finished_words, says_yes
-from .pairing import numbered_blocks, paired_by_blocks
+from .cell_checks import check_cells
+from .fault_names import FaultNames
+from .finished import finished_words
+from .pairing import paired_by_blocks
 from .readers import read_table
 from .references import notes_on_references, references_of
-from .table import Columns, Table, rows_of
+from .table import Cells, Columns
 from .trial import Column, Trial, Trials
-from .trial_columns import MORE_IS_BETTER, bare, columns_of
-from .trial_rows import check_cells, check_labels, events_of, performance_of, trial_of
-from .units import in_seconds, unit_of_time, word_of_time
-from .values import FaultNames, summed_over, with_values
+from .trial_columns import MORE_IS_BETTER, columns_of
+from .trial_rows import numbered_blocks, trials_of
+from .units import word_of_time
+from .values import summed_over, with_values
 
 if TYPE_CHECKING:
     import pandas as pd
-
-# A column is a covariate, no parameter, that has so many values at least, and more values than half
-# of the trials or than any plan has levels.
-FEWEST_OF_COVARIATE = 6
-MOST_LEVELS = 50
 
 
 def read_trials(
@@ -70,108 +66,80 @@ def read_trials(
             value.
     """
     mapped = dict(columns or {})
-    table = with_values(read_table(source, mapped, ignore), mapped, values)
+    table = read_table(source, mapped, ignore)
+    table = with_values(table, mapped, values)
     if sum_over is not None:
         table = summed_over(table, sum_over, mapped)
-    table_columns, guesses = columns_of(table, mapped, ignore, decimal, thousands)
-    rows = [*rows_of(table, table_columns)]
-    varying, covariates = _parameters(table, table_columns)
-    check_cells(table, table_columns, varying, is_summed=sum_over is not None)
-    faults = FaultNames(rows)
-    _check_columns(table, table_columns, faults, mapped)
-    blocks = numbered_blocks(rows)
-    unnamed = Path(table.source).stem or table.source
-    is_log = "time" in table_columns.names
-    finished = finished_words(rows) if "time_to_finish" in table_columns.names else {}
-    performances = ((0.0 if is_log else performance_of(row, finished)) for row in rows)
-    pairs = [
-        (trial_of(row, faults, varying, duration, blocks, unnamed, performance=p), row)
-        for row, p in zip(rows, performances)
+    table_columns = columns_of(table, mapped, ignore, decimal, thousands)
+    check_cells(table_columns, is_summed=sum_over is not None)
+    faults = FaultNames(table_columns)
+    _check_columns(table_columns, faults, mapped)
+    finished = finished_words(table_columns)
+    blocks = numbered_blocks(table_columns)
+    trials, conditions = trials_of(table_columns, faults, finished, blocks, duration)
+    means, notes_on_pairs = paired_by_blocks(table_columns, trials)
+    names = [cells.name for cells in table_columns.parameters]
+    references = tuple(references_of(table.source, means, names, reference or {}))
+    notes = [
+        *table.notes,
+        *table_columns.notes,
+        *faults.notes,
+        *_notes_on_conditions(trials, table_columns),
+        *_notes_on_left_out(table_columns.ignored, conditions),
+        *notes_on_pairs,
+        *notes_on_references(references, reference or {}),
     ]
-    if "trial" in table_columns.names and not is_log:
-        check_labels(pairs)
-    trials = events_of(pairs) if is_log else [trial for trial, _ in pairs]
-    notes = [*table.notes, *guesses, *faults.notes]
-    if "time_to_finish" not in table_columns.names:  # a rate compares trials of any length
-        _check_durations(table, trials)
-    notes += _notes_on_conditions(trials, table_columns, varying, covariates)
-    conditions = [trial.condition for trial, _ in pairs]
-    notes += _notes_on_left_out({name: table.column(name) for name in ignore}, conditions)
-    trials, notes_on_pairs = paired_by_blocks(table, table_columns, trials, mapped)
-    references = tuple(references_of(table.source, trials, varying, reference or {}))
-    notes += [*notes_on_pairs, *notes_on_references(references, reference or {})]
     return Trials(
         Path(table.source).name or table.source,
         table.digest,
-        tuple(trials),
+        tuple(means),
         tuple(notes),
-        _uses_of(table, table_columns, varying, covariates),
-        _name_of_performance(table_columns),
+        _uses_of(table_columns),
+        table_columns.performance_name,
         references,
         tuple(blocks),
     )
 
 
-def _notes_on_conditions(
-    trials: Sequence[Trial], columns: Columns, varying: Sequence[str], covariates: Sequence[str]
-) -> Iterator[str]:
+def _notes_on_conditions(trials: Sequence[Trial], columns: Columns) -> Iterator[str]:
     """Yield what P is where it is a rate, and what tells the conditions apart, or does not."""
-    if "time_to_finish" in columns.names:
-        yield f"P is {_work_by_time(columns).replace('/', 'divided by', 1)}: more is better."
-    for name in covariates:
-        yield f"{name!r} differs from trial to trial: it tells no conditions apart."
+    if "time_to_finish" in columns.by_meaning:
+        yield f"P is {columns.performance_name.replace('/', 'divided by', 1)}: more is better."
+    for cells in columns.covariates:
+        yield f"{cells.name!r} differs from trial to trial: it tells no conditions apart."
     counts = Counter(trial.condition for trial in trials)
-    if varying and min(counts.values()) == 1 < max(counts.values()):
+    names = [cells.name for cells in columns.parameters]
+    if names and min(counts.values()) == 1 < max(counts.values()):
         yield (
             f"{len(trials)} trials in {len(counts)} conditions, told apart by "
-            f"{' and '.join(varying)}, some of a single trial: leave out what was only noted, as "
-            f"by --ignore {varying[0]!r}."
+            f"{' and '.join(names)}, some of a single trial: leave out what was only noted, as "
+            f"by --ignore {names[0]!r}."
         )
 
 
-def _notes_on_left_out(
-    columns: Mapping[str, Sequence[str]], conditions: Sequence[object]
-) -> Iterator[str]:
+def _notes_on_left_out(columns: Sequence[Cells], conditions: Sequence[object]) -> Iterator[str]:
     """Yield which columns are left out though they differ from condition to condition alone."""
     n_conditions = len({*conditions})
-    for name, cells in columns.items():
-        if len({*cells}) > 1 and len({*zip(conditions, cells)}) == n_conditions:
+    for cells in columns:
+        if len({*cells.texts}) > 1 and len({*zip(conditions, cells.texts)}) == n_conditions:
             yield (
-                f"{name!r} is left out, though it differs between conditions: what comes of it "
-                "counts as theirs."
+                f"{cells.name!r} is left out, though it differs between conditions: what comes of "
+                "it counts as theirs."
             )
 
 
-def _parameters(table: Table, columns: Columns) -> tuple[list[str], list[str]]:
-    """Return the parameters that vary, and the covariates among them."""
-    varying = list[str]()
-    covariates = list[str]()
-    for name in columns.parameters:
-        values = {*table.column(name)}
-        if len(values) > 1:
-            is_wide = len(values) > min(MOST_LEVELS, len(table.cells) / 2)
-            # In an event log a row is a delivery.
-            is_covariate = len(values) >= FEWEST_OF_COVARIATE and "time" not in columns.names
-            (covariates if is_wide and is_covariate else varying).append(name)
-    return varying, covariates
-
-
-def _uses_of(
-    table: Table, columns: Columns, varying: Sequence[str], covariates: Sequence[str]
-) -> tuple[Column, ...]:
+def _uses_of(columns: Columns) -> tuple[Column, ...]:
     """Return what every column of a table was taken for."""
-    meanings = {name: meaning for meaning, name in columns.names.items()}
-    meanings |= dict.fromkeys(columns.blocks, "seed")
+    known = {cells.name: "parameter" for cells in columns.parameters}
+    known |= {cells.name: "covariate" for cells in columns.covariates}
+    known |= {cells.name: meaning for meaning, cells in columns.by_meaning.items()}
+    known |= {cells.name: "seed" for cells in columns.blocks}
+    ignored = [cells.name for cells in columns.ignored]
     uses = []
-    for name in table.header:
-        values = (*dict.fromkeys(table.column(name)),)
-        use = meanings.get(name)
-        if use is None and name in varying:
-            use = "parameter"
-        elif use is None and name in covariates:
-            use = "covariate"
-        elif use is None:
-            use = "left out" if name in columns.ignored or len(values) > 1 else "the same in all"
+    for name in columns.table.header:
+        values = (*dict.fromkeys(columns.table.columns[name].texts),)
+        use = "left out" if name in ignored or len(values) > 1 else "the same in all"
+        use = known.get(name, use)
         use = "robots" if use == "n_robots" else use
         uses.append(Column(name, use, values[:_FEW_VALUES], len(values)))
     return tuple(uses)
@@ -180,34 +148,13 @@ def _uses_of(
 _FEW_VALUES = 6  # that show what a column holds
 
 
-def _name_of_performance(columns: Columns) -> str:
-    """Return what the file calls P."""
-    names = columns.names
-    if "time_to_finish" in names:
-        return _work_by_time(columns)
-    if "time" in names:
-        return "deliveries"
-    return "P" if bare(names["performance"]) in ("p", "performance") else names["performance"]
-
-
-def _work_by_time(columns: Columns) -> str:
-    """Return what P is where it is a rate, with the unit in which it is one."""
-    name = columns.names["time_to_finish"]
-    unit = unit_of_time(name)
-    if unit and "time_to_finish" in columns.seconds:
-        name = in_seconds(name, unit)
-    return f"{columns.names.get('work', '1')} / {name}"
-
-
-def _check_columns(
-    table: Table, columns: Columns, faults: FaultNames, mapped: Mapping[str, str]
-) -> None:
+def _check_columns(columns: Columns, faults: FaultNames, mapped: Mapping[str, str]) -> None:
     """Refuse a file without the columns that no other can stand for, all of them at once.
 
     Args:
         mapped: what a column is to its name in the file, as somebody says.
     """
-    names = columns.names
+    names = columns.by_meaning
     lacking = {}
     if not {"performance", "time", "time_to_finish"} & names.keys():
         lacking["performance"] = "column 'performance', or time, for one delivery a row"
@@ -216,53 +163,20 @@ def _check_columns(
     if lacking:
         options = " ".join(f"--column {name}=NAME" for name in lacking)
         raise IndicatorError(
-            f"{table.source} has no {' and no '.join(lacking.values())}: it has "
-            f"{', '.join(map(repr, table.header))}; say which it is by {options}, or add it"
+            f"{columns.table.source} has no {' and no '.join(lacking.values())}: it has "
+            f"{', '.join(map(repr, columns.table.header))}; say which it is by {options}, or add it"
         )
     if MORE_IS_BETTER not in mapped:
-        _refuse_time_as_performance(table, columns)
-    if "time_to_finish" in names and "finished" not in names:
-        _refuse_unnamed_finished(table, columns)
+        _refuse_time_as_performance(columns)
 
 
-def _refuse_time_as_performance(table: Table, columns: Columns) -> None:
+def _refuse_time_as_performance(columns: Columns) -> None:
     """Ask of a performance that is a time by its name whether more of it is better."""
-    name = columns.names.get("performance", "")
-    word = word_of_time(name)
-    if word is None:
-        return
-    raise IndicatorError(
-        f"{table.source}: {name!r} is a time by its name ({word}): where less is better, as of the "
-        f"time until all is done, say --column time_to_finish={name!r}, and --column work=NAME if "
-        f"what was done in it varies; where more is better, --column {MORE_IS_BETTER}={name!r}"
-    )
-
-
-def _refuse_unnamed_finished(table: Table, columns: Columns) -> None:
-    """Ask of a column that may say which trials finished, and would be a parameter."""
-    for name in columns.parameters:
-        cells = {*table.column(name)}
-        means = says_yes(bare(name))
-        is_number = all(cell.replace(".", "").isdigit() for cell in cells)
-        if not are_words(cells) or (is_number and means is None):
-            continue
-        values = ""
-        if means is False:  # it says who did not finish
-            for cell in sorted(cells):
-                finished = "no" if says_yes(cell) else "yes"
-                values += f" --value {quote(f'finished:{cell}={finished}')}"
+    cells = columns.by_meaning.get("performance")
+    if cells and (word := word_of_time(cells.name)):
         raise IndicatorError(
-            f"{table.source}: {name!r} may say which trials finished: say --column "
-            f"{quote(f'finished={name}')}{values}, or leave it out by --ignore {quote(name)}"
+            f"{cells.table.source}: {cells.name!r} is a time by its name ({word}): where less is "
+            "better, as of the time until all is done, say --column "
+            f"time_to_finish={cells.name!r}, and --column work=NAME if what was done in it varies; "
+            f"where more is better, --column {MORE_IS_BETTER}={cells.name!r}"
         )
-
-
-def _check_durations(table: Table, trials: Sequence[Trial]) -> None:
-    """Refuse trials of which some lasted longer than others."""
-    for trial in trials:
-        if trial.duration != trials[0].duration:
-            raise IndicatorError(
-                f"{table.source}, {table.line_word} {trial.line}: is not as long as "
-                f"{table.line_word} {trials[0].line}: runs compared should be of one length; else "
-                "let P be a rate, and leave the column out"
-            )

@@ -63,7 +63,7 @@ class Column(NamedTuple):
 
     Attributes:
         name: in the file.
-        use: what it is, a key of `columns.COLUMN_NAMES`, or why it is left out.
+        use: what it is, a key of `trial_columns.COLUMN_NAMES`, or why it is left out.
         values: the first of its different cells.
         n_values: how many different cells it has.
     """

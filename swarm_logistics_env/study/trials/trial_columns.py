@@ -5,11 +5,12 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .table import BLOCK_SIGN, Columns, Table
-from .units import SECONDS, NamedUnit, is_per_minute, unit_of_time, without_unit
+from .table import Cells, Columns, Table
+from .units import SECONDS, NamedUnit, in_seconds, is_per_minute, unit_of_time, without_unit
 
 MORE_IS_BETTER = "more_is_better"  # for --column, of a performance that is a time by its name
 # What a column is, and the words that name it in files; small letters, "_" for all that is none.
@@ -37,6 +38,10 @@ MEANING = {word: column for column, words in COLUMN_NAMES.items() for word in (c
 TEXTS = ("fault", "policy", "trial", "table", "finished")  # columns that hold no numbers
 TIMES = ("onset", "time", "time_to_finish", "duration")
 SEEDS = ("seed", "pair")  # blocks of one run each in every condition
+# A column is a covariate, no parameter, that has so many values at least, and more values than half
+# of the trials or than any plan has levels.
+FEWEST_OF_COVARIATE = 6
+MOST_LEVELS = 50
 _ROBOT = re.compile(r"(robot|agent|drone|bot)(_?(id|no|nr|num|number|name|index|label))?|id_robot")
 # How a decimal comma looks that can stand between no thousands.
 _DECIMAL_COMMA = re.compile(r"[+-]?(\d+,(\d{1,2}|\d{4,})|0,\d+|\d{4,},\d+)")
@@ -51,8 +56,8 @@ def columns_of(
     ignore: Sequence[str],
     decimal: str | None,
     thousands: str | None,
-) -> tuple[Columns, list[str]]:
-    """Return what the columns of a table are, and notes on what was guessed.
+) -> Columns:
+    """Return what the columns of a table are, with their cells.
 
     Args:
         columns: what a column is (a word of `COLUMN_NAMES`) to its name in the table.
@@ -70,17 +75,8 @@ def columns_of(
     if decimal is not None and decimal == thousands:
         raise IndicatorError(f"--thousands {thousands}: should be another sign than --decimal")
     names, parameters, blocks = _names(table, columns, ignore)
-    notes = []
     numbers = [*(name for column, name in names.items() if column not in TEXTS), *parameters]
-    numbers = [name for name in numbers if name in table.index]
-    decimal = decimal or table.decimal or ("," if thousands == "." else None)
-    if decimal is None and (cell := _decimal_comma(table, numbers)):
-        decimal = ","
-        notes.append(f"Decimals are taken to have a comma, as in {cell}.")
-    if decimal is None and thousands is None:
-        for name in numbers:
-            _refuse_thousands(table, name)
-    ignored = [name for name in table.header if name in ignore]
+    table, notes = _with_signs(table, numbers, decimal, thousands)
     units = _units_of_times(table, names)
     seconds = {column: SECONDS[unit.unit] for column, unit in units.items() if unit.unit in SECONDS}
     notes += [
@@ -88,13 +84,36 @@ def columns_of(
         for column, factor in seconds.items()
         if factor != 1.0
     ]
-    table_columns = Columns(names, parameters, ignored, blocks, decimal or ".", thousands, seconds)
+    by_meaning = {
+        column: replace(table.columns[name], meaning=column, seconds=seconds.get(column, 1.0))
+        for column, name in names.items()
+        if name in table.columns
+    }
+    block_cells = [table.columns[name] for name in blocks]
+    if len(blocks) > 1:
+        texts = [", ".join(row) for row in zip(*(cells.texts for cells in block_cells))]
+        by_meaning["seed"] = Cells(names["seed"], texts, table, "seed")
+    varying, covariates = _parameters(table, parameters, is_log="time" in names)
+    # What somebody calls a block counts before its name in the file.
+    words = {name: word for word, name in columns.items() if MEANING[word] == "seed"}
+    table_columns = Columns(
+        table=table,
+        by_meaning=by_meaning,
+        parameters=varying,
+        covariates=covariates,
+        ignored=[table.columns[name] for name in dict.fromkeys(ignore)],
+        blocks=block_cells,
+        seeds=[name for name in blocks if bare(name) in SEEDS],
+        has_seeds=any(bare(words.get(name, name)) in SEEDS for name in blocks),
+        performance_name=_name_of_performance(names, units.get("time_to_finish")),
+        notes=notes,
+    )
     if not table.cells:
         raise IndicatorError(
             f"{table.source} holds no trial: should have a row for each below the names"
         )
-    _refuse_rows_of_robots(table, table_columns)
-    return table_columns, notes
+    _refuse_rows_of_robots(table_columns)
+    return table_columns
 
 
 def _names(
@@ -111,16 +130,14 @@ def _names(
             raise IndicatorError(f"{path} has no column {name!r}: {_one_of(name, table.header)}")
     names = {MEANING[column]: name for column, name in columns.items()}
     for column, name in table.meanings.items():
-        if name not in ignore:
+        if name in table.index and name not in ignore:
             names.setdefault(column, name)
     chosen = {*names}
     parameters = list[str]()
     of_robots = list[str]()
     blocks = [names["seed"]] if "seed" in names else []
     for name in header:
-        if not name or name in ignore or name in names.values():
-            continue
-        if name in table.left_out:
+        if not name or name in (*ignore, *names.values(), *table.left_out):
             continue
         if header.count(name) > 1:
             raise IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
@@ -139,7 +156,7 @@ def _names(
             parameters.append(name)
         elif meaning == "seed":
             blocks.append(name)
-            names[meaning] = BLOCK_SIGN.join(blocks)
+            names[meaning] = " and ".join(blocks)
         elif meaning in names:
             raise IndicatorError(
                 f"{path} has columns {names[meaning]!r} and {name!r}, both {meaning}: say "
@@ -164,7 +181,7 @@ def _with_content(table: Table, columns: Mapping[str, str]) -> list[str]:
         if meaning_of(name) != "seed"
         or name in columns.values()
         or not table.cells
-        or any(table.column(name))
+        or any(table.columns[name].texts)
     ]
 
 
@@ -202,63 +219,110 @@ def _units_of_times(table: Table, names: Mapping[str, str]) -> dict[str, NamedUn
     return units
 
 
-def _decimal_comma(table: Table, names: Sequence[str]) -> str | None:
+def _with_signs(
+    table: Table, numbers: Sequence[str], decimal: str | None, thousands: str | None
+) -> tuple[Table, list[str]]:
+    """Return a table with the signs in its numbers, and notes on what was guessed.
+
+    Args:
+        numbers: the names of columns that hold numbers.
+    """
+    notes = []
+    columns = [table.columns[name] for name in numbers if name in table.columns]
+    decimal = decimal or table.decimal or ("," if thousands == "." else None)
+    if decimal is None and (text := _decimal_comma(columns)):
+        decimal = ","
+        notes.append(f"Decimals are taken to have a comma, as in {text}.")
+    if decimal is None and thousands is None:
+        for cells in columns:
+            _refuse_thousands(cells)
+    return replace(table, decimal=decimal or ".", thousands=thousands), notes
+
+
+def _decimal_comma(columns: Sequence[Cells]) -> str | None:
     """Return a cell whose comma stands before decimals, if no cell has a point; None: none."""
-    cells = {cell for name in names for cell in table.column(name)}
-    if any("." in cell for cell in cells):
+    texts = {text for cells in columns for text in cells.texts}
+    if any("." in text for text in texts):
         return None
-    return min((cell for cell in cells if _DECIMAL_COMMA.fullmatch(cell)), default=None)
+    return min((text for text in texts if _DECIMAL_COMMA.fullmatch(text)), default=None)
 
 
-def _refuse_thousands(table: Table, name: str) -> None:
+def _refuse_thousands(cells: Cells) -> None:
     """Refuse a column in which "1.200" beside "980" may be 1200 or 1.2."""
-    first = {cell: row for row, cell in reversed([*enumerate(table.column(name))]) if cell}
-    plain_numbers = {cell: row for cell, row in first.items() if cell.isdecimal()}
-    with_points = [cell for cell in first if re.fullmatch(r"[1-9]\d{0,2}\.\d{3}", cell)]
+    first = {text: row for row, text in reversed([*enumerate(cells.texts)]) if text}
+    plain_numbers = {text: row for text, row in first.items() if text.isdecimal()}
+    with_points = [text for text in first if re.fullmatch(r"[1-9]\d{0,2}\.\d{3}", text)]
     if not (plain_numbers and with_points) or len(plain_numbers) + len(with_points) < len(first):
         return
     largest = max(plain_numbers, key=float)
     smallest = min(with_points, key=float)
     if float(largest) >= 10.0 * float(smallest):
-        raise IndicatorError(
-            f"{table.location(first[smallest])}, column {name!r}: {smallest!r}: is "
-            f"{smallest.replace('.', '')} or {float(smallest):g}, beside {largest} in "
+        table = cells.table
+        raise cells.error(
+            first[smallest],
+            f"is {smallest.replace('.', '')} or {float(smallest):g}, beside {largest} in "
             f"{table.line_word} {table.lines[plain_numbers[largest]]}: should be without a sign "
             "between thousands; or say --thousands . where it is one, --decimal . where decimals "
-            "have a point"
+            "have a point",
         )
 
 
-def _refuse_rows_of_robots(table: Table, columns: Columns) -> None:
+def _parameters(
+    table: Table, names: Sequence[str], *, is_log: bool
+) -> tuple[list[Cells], list[Cells]]:
+    """Return the columns that vary, of those that are nothing known: parameters, and covariates."""
+    parameters = []
+    covariates = []
+    for name in names:
+        n_values = len({*table.columns[name].texts})
+        is_wide = n_values > min(MOST_LEVELS, len(table.cells) / 2)
+        # In an event log a row is a delivery, no trial.
+        if is_wide and n_values >= FEWEST_OF_COVARIATE and not is_log:
+            covariates.append(table.columns[name])
+        elif n_values > 1:
+            parameters.append(table.columns[name])
+    return parameters, covariates
+
+
+def _name_of_performance(names: Mapping[str, str], unit: NamedUnit | None) -> str:
+    """Return what the file calls P; where it is a rate, with the unit in which it is one.
+
+    Args:
+        unit: of the time to finish.
+    """
+    if "time_to_finish" in names:
+        time = names["time_to_finish"]
+        if unit and unit.unit in SECONDS:
+            time = in_seconds(time, unit)
+        return f"{names.get('work', '1')} / {time}"
+    if "time" in names:
+        return "deliveries"
+    name = names.get("performance", "P")
+    return "P" if bare(name) in ("p", "performance") else name
+
+
+def _refuse_rows_of_robots(columns: Columns) -> None:
     """Refuse rows that differ in an ignored column of robots and in what each delivered alone."""
-    of_robots = [name for name in columns.ignored if is_robot(name)]
-    names = columns.names
-    if not of_robots or "time" in names:  # a row of an event log is a delivery, whoever made it
+    table = columns.table
+    of_robots = [cells for cells in columns.ignored if is_robot(cells.name)]
+    meanings = columns.by_meaning
+    if not of_robots or "time" in meanings:  # a row of an event log is a delivery, whoever made it
         return
-    compared = [table.index[name] for name in _all_but_performance(table, columns)]
+    compared = [cells for meaning, cells in meanings.items() if meaning != "performance"]
+    compared += [*columns.blocks, *columns.parameters, *columns.covariates]
     trials: dict[tuple[str, ...], int] = {}
-    for row, cells in enumerate(table.cells):
-        first = trials.setdefault(tuple(cells[column] for column in compared), row)
+    for row in range(len(table.cells)):
+        first = trials.setdefault(tuple(cells.texts[row] for cells in compared), row)
         for robot in of_robots:
-            if cells[table.index[robot]] != table.cells[first][table.index[robot]]:
+            if robot.texts[row] != robot.texts[first]:
                 hint = ""
-                if "trial" not in names:
+                if "trial" not in meanings:
                     hint = ", or name each row's trial in a column 'trial'"
                 raise IndicatorError(
                     f"{table.location(row)}: differs from {table.line_word} {table.lines[first]} "
-                    f"in {robot!r} and in what was delivered alone, so these may be robots of one "
-                    f"trial: {ONE_TRIAL_A_ROW}, as by --sum-over {robot!r}{hint}"
+                    f"in {robot.name!r} and in what was delivered alone, so these may be robots of "
+                    f"one trial: {ONE_TRIAL_A_ROW}, as by --sum-over {robot.name!r}{hint}"
                 )
-
-
-def _all_but_performance(table: Table, columns: Columns) -> list[str]:
-    """Return the columns of a table that say which trial a row is of."""
-    named_columns = [name for column, name in columns.names.items() if column != "performance"]
-    return [
-        name
-        for name in (*named_columns, *columns.blocks, *columns.parameters)
-        if name in table.index
-    ]
 
 
 def is_robot(name: str) -> bool:

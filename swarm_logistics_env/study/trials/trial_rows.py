@@ -2,132 +2,112 @@
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from shlex import quote
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .table import Columns, Formula, Row, Table
+from .fault_names import FaultNames
+from .table import Columns, Table
 from .trial import NO_FAULT_WORD, REPEATED, Trial
-from .values import NOT_KNOWN, ZERO, FaultNames
-
-# What a spreadsheet shows in place of a value, in any language: "#DIV/0!", "#NV", "Err:502".
-_ERROR = re.compile(r"#[¡¿]?[\w/ ]+[!?]|#N/[AD]|#NV|#{3,}|Err:\d{3}")
-_ROUNDED = re.compile(r"\d([.,]\d+)?[eE]\+\d\d")  # as a spreadsheet shows a long number
-_DIGITS = 15  # that a spreadsheet keeps of a number
 
 
-def check_cells(table: Table, columns: Columns, varying: Sequence[str], *, is_summed: bool) -> None:
-    """Refuse what a spreadsheet put in place of a value, and labels that only some rows have.
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of a table, read by what its columns are.
 
-    A table without rows is refused, too.
+    Attributes:
+        columns: of the table.
+        position: of the row in it.
+    """
+
+    columns: Columns
+    position: int
+
+    @property
+    def line(self) -> int:
+        """The line of the file that it begins in."""
+        return self.columns.table.lines[self.position]
+
+    def text(self, meaning: str) -> str:
+        """Return a cell by what its column is; empty where there is none."""
+        cells = self.columns.by_meaning.get(meaning)
+        return "" if cells is None else cells.texts[self.position]
+
+    def number(self, meaning: str, least: float = -math.inf) -> float:
+        """Return a cell as a number, by what its column is; a time in seconds."""
+        return self.columns.by_meaning[meaning].number(self.position, least)
+
+    def number_or_none(self, meaning: str) -> float | None:
+        """Return a cell as a number, 0 or more; None: it is empty or not there."""
+        return self.number(meaning, 0.0) if self.text(meaning) else None
+
+    def whole_or_none(self, meaning: str, least: float) -> int | None:
+        """Return a cell as a whole number, exactly; None: it is empty or not there."""
+        if not self.text(meaning):
+            return None
+        return self.columns.by_meaning[meaning].whole_number(self.position, least)
+
+    def error(self, meaning: str, should: str) -> IndicatorError:
+        """Return the error that a cell cannot be."""
+        if meaning not in self.columns.by_meaning:
+            location = self.columns.table.location(self.position)
+            return IndicatorError(f"{location}: {meaning} is missing: {should}")
+        return self.columns.by_meaning[meaning].error(self.position, should)
+
+
+def numbered_blocks(columns: Columns) -> dict[str, int]:
+    """Return a number for each block, by its name; none where blocks are numbers."""
+    seed = columns.by_meaning.get("seed")
+    if seed is None or (len(columns.blocks) == 1 and seed.are_like_numbers()):
+        return {}
+    return {name: number for number, name in enumerate(sorted({*seed.texts} - {""}))}
+
+
+def trials_of(
+    columns: Columns,
+    faults: FaultNames,
+    finished: Mapping[str, bool],
+    blocks: Mapping[str, int],
+    duration: float | None,
+) -> tuple[list[Trial], list[object]]:
+    """Return the trials of a table, and the condition of each of its rows.
 
     Args:
-        varying: names of the parameters.
-        is_summed: whether rows of robots were summed.
+        faults: of the file.
+        finished: what each cell of the column `finished` says; none where nothing does.
+        blocks: a number for each block; none where they are numbers.
+        duration: of every trial [s], where no column says it.
 
     Raises:
-        IndicatorError: there is such a cell, of which the first of its column is named.
+        IndicatorError: a row is no trial, two of a condition have one label, or some trials lasted
+            longer than others where P is no rate.
     """
-    if not table.cells:
-        raise IndicatorError(
-            f"{table.source} holds no trial: should have a row for each below the names"
-        )
-    names = columns.names
-    used = {*names.values(), *columns.blocks, *varying}
-    for name in table.header:
-        if name in used:
-            _refuse_spoiled(table, name)
-        if name in columns.blocks or name == names.get("trial"):
-            _refuse_rounded(table, name)
-        if name in columns.blocks:
-            _refuse_unknown_number(table, name)
-    labels = [names.get(label) for label in ("policy", "table", "n_robots")]
-    if is_summed or "time" in names:  # several rows make a trial
-        labels.append(names.get("trial"))
-    if len(columns.blocks) > 1:  # one alone is checked with the pairs
-        labels += columns.blocks
-    every_row = range(len(table.cells))
-    for label in filter(None, labels):
-        _refuse_gaps(table, label, every_row)
-    if {"onset", "faulty"} <= names.keys():
-        faulty = table.column(names["faulty"])
-        with_fault = [row for row in every_row if faulty[row] not in ("", *ZERO)]
-        _refuse_gaps(table, names["onset"], with_fault)
-
-
-def _refuse_spoiled(table: Table, name: str) -> None:
-    """Refuse the error of a formula, and a formula that nobody computed."""
-    for row, cell in enumerate(table.column(name)):
-        if isinstance(cell, Formula):
-            should = (
-                "should be a value, as nobody computed this formula: open the file in a "
-                "spreadsheet and save it"
-            )
-            raise table.error(row, name, cell, should)
-        if cell.startswith(("#", "Err:")) and _ERROR.fullmatch(cell):
-            should = "should be a value, where a spreadsheet shows the error of a formula"
-            raise table.error(row, name, cell, should)
-
-
-def _refuse_rounded(table: Table, name: str) -> None:
-    """Refuse labels that a spreadsheet has rounded, so that several may have become one."""
-    cells = table.column(name)
-    long = {cell for cell in cells if cell.isdecimal() and len(cell) > _DIGITS}
-    is_rounded = not any(cell[_DIGITS:].strip("0") for cell in long)
-    for row, cell in enumerate(cells):
-        if _ROUNDED.fullmatch(cell) or (is_rounded and cell in long):
-            should = (
-                f"should have all its digits, of which a spreadsheet keeps {_DIGITS}: let the "
-                "column be of texts before they are put in"
-            )
-            raise table.error(row, name, cell, should)
-
-
-def _refuse_unknown_number(table: Table, name: str) -> None:
-    """Refuse a word for no value among numbers; among names it is one."""
-    cells = table.column(name)
-    unknown = [row for row, cell in enumerate(cells) if cell and cell.casefold() in NOT_KNOWN]
-    numbers = {*cells} - {cells[row] for row in unknown} - {""}
-    if unknown and numbers and all(map(str.isdecimal, numbers)):
-        row = unknown[0]
-        raise table.error(row, name, cells[row], "should be a number, as in other rows")
-
-
-def _refuse_gaps(table: Table, name: str, rows: Sequence[int]) -> None:
-    """Refuse an empty cell where other rows have a label: it belongs to each row."""
-    cells = table.column(name)
-    empty = [row for row in rows if not cells[row]]
-    if empty and len(empty) < len(rows):
-        should = (
-            "should be there in each row, as in others, also where a group has it in its first "
-            f"row alone; --value {quote(f'{name}:=NEW')} fills all such cells"
-        )
-        raise table.error(empty[0], name, "", should)
+    unnamed = Path(columns.table.source).stem or columns.table.source  # a policy without a name
+    rows = [Row(columns, position) for position in range(len(columns.table.cells))]
+    pairs = [(trial_of(row, unnamed, faults, finished, blocks, duration), row) for row in rows]
+    if "time" in columns.by_meaning:
+        trials = events_of(pairs)
+    else:
+        check_labels(pairs)
+        trials = [trial for trial, _ in pairs]
+    if "time_to_finish" not in columns.by_meaning:  # a rate compares trials of any length
+        _check_durations(columns.table, trials)
+    return trials, [trial.condition for trial, _ in pairs]
 
 
 def trial_of(
     row: Row,
-    faults: FaultNames,
-    varying: Sequence[str],
-    duration: float | None,
-    blocks: Mapping[str, int],
     unnamed: str,
-    *,
-    performance: float = 0.0,
+    faults: FaultNames,
+    finished: Mapping[str, bool],
+    blocks: Mapping[str, int],
+    duration: float | None,
 ) -> Trial:
-    """Return the trial of a row, without the times of an event log.
-
-    Args:
-        faults: of the file.
-        varying: names of the parameters.
-        duration: of every trial [s], where no column says it.
-        blocks: a number for each block; none where they are numbers.
-        unnamed: what a policy is called that the file does not name.
-        performance: P of it.
-    """
+    """Return the trial of a row, of an event log without its times; arguments as of `trials_of`."""
+    performance = performance_of(row, finished)
     n_robots = row.whole_or_none("n_robots", 1)
     fault = faults[row.text("fault")]
     faulty = row.whole_or_none("faulty", 0) or 0
@@ -154,7 +134,7 @@ def trial_of(
         faulty,
         # Without a fault nothing fails at any time, whatever the column says.
         onset if is_fault else 0.0,
-        tuple((name, row.parameter(name)) for name in varying),
+        tuple((cells.name, cells.number(row.position)) for cells in row.columns.parameters),
         blocks.get(row.text("seed")) if blocks else row.whole_or_none("seed", 0),
         performance,
         duration=duration,
@@ -163,11 +143,7 @@ def trial_of(
 
 
 def check_labels(rows: Sequence[tuple[Trial, Row]]) -> None:
-    """Refuse runs of one condition that have one label.
-
-    Raises:
-        IndicatorError: there are some.
-    """
+    """Refuse runs of one condition that have one label."""
     labels: dict[object, Row] = {}
     for trial, row in rows:
         label = row.text("trial")
@@ -176,12 +152,10 @@ def check_labels(rows: Sequence[tuple[Trial, Row]]) -> None:
 
 
 def performance_of(row: Row, finished: Mapping[str, bool]) -> float:
-    """Return P of a row that is a run: what the column says, or work by time.
-
-    Args:
-        finished: what each cell of the column `finished` says; none where nothing does.
-    """
-    if "time_to_finish" in row.names:
+    """Return P of a row: what the column says, or work by time; 0 where the row is a delivery."""
+    if "time" in row.columns.by_meaning:
+        return 0.0
+    if "time_to_finish" in row.columns.by_meaning:
         return _rate(row, finished.get(row.text("finished")))
     return row.number("performance", 0.0)
 
@@ -197,7 +171,7 @@ def _rate(row: Row, finished: bool | None) -> float:
                 "time_to_finish",
                 f"should not be after its duration {row.number('duration'):g}",
             )
-        if "work" not in row.names:
+        if "work" not in row.columns.by_meaning:
             return 1.0 / time
         work = row.number("work", 0.0)
         if row.text("performance") and row.number("performance") < work:
@@ -247,3 +221,14 @@ def events_of(rows: Sequence[tuple[Trial, Row]]) -> list[Trial]:
         replace(trial, times=tuple(sorted(times)), performance=float(len(times)))
         for trial, times in runs.values()
     ]
+
+
+def _check_durations(table: Table, trials: Sequence[Trial]) -> None:
+    """Refuse trials of which some lasted longer than others."""
+    for trial in trials:
+        if trial.duration != trials[0].duration:
+            raise IndicatorError(
+                f"{table.source}, {table.line_word} {trial.line}: is not as long as "
+                f"{table.line_word} {trials[0].line}: runs compared should be of one length; else "
+                "let P be a rate, and leave the column out"
+            )

@@ -1,29 +1,16 @@
-"""Values as people write them: replaced where somebody says so, robots summed, words for faults."""
+"""Values as people write them: cells replaced where somebody says so, rows of robots summed."""
 
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
-from shlex import quote
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .table import Columns, Row, Table
-from .trial import NO_FAULT_WORD, REMOVED_WORD, REPEATED
+from .table import Table
 from .trial_columns import MEANING, meaning_of
 
-_NO_FAULT_WORDS = (NO_FAULT_WORD, "no fault", "no_fault", "baseline", "healthy", "0", "-")
-_FAULT_NAMES = {
-    **dict.fromkeys(_NO_FAULT_WORDS, NO_FAULT_WORD),
-    REMOVED_WORD: REMOVED_WORD,
-    REPEATED: REPEATED,
-    "none again": REPEATED,
-}
-NOT_KNOWN = ("", "na", "n/a", "nan", "null")  # what programs and people write for no value
-ZERO = ("0", "0.0")  # of robots that fail, by a row's word
 _REPLACEMENT = re.compile(r"([^:]+):(.*)=([^=]*)", re.DOTALL)
 
 
@@ -94,7 +81,7 @@ def summed_over(table: Table, robots: str, columns: Mapping[str, str]) -> Table:
     other_columns = [
         number for number in range(len(table.header)) if number not in (performance, robot)
     ]
-    view = Columns({"performance": table.header[performance]}, (), (), (), ".", None)
+    delivered = replace(table.columns[table.header[performance]], meaning="performance")
     totals: dict[tuple[str, ...], float] = {}
     first_rows: dict[tuple[str, ...], int] = {}
     rows_of_robots: dict[tuple[tuple[str, ...], str], int] = {}
@@ -107,10 +94,7 @@ def summed_over(table: Table, robots: str, columns: Mapping[str, str]) -> Table:
                 f"{table.lines[first]} too: name each row's trial in a column 'trial'"
             )
         first_rows.setdefault(trial, number)
-        delivered = Row(table, number, view, {"performance": performance}).number(
-            "performance", 0.0
-        )
-        totals[trial] = totals.get(trial, 0.0) + delivered
+        totals[trial] = totals.get(trial, 0.0) + delivered.number(number, 0.0)
     header = [name for name in table.header if name != robots]
     summed = []
     for trial, number in first_rows.items():
@@ -126,98 +110,5 @@ def summed_over(table: Table, robots: str, columns: Mapping[str, str]) -> Table:
     lines = [table.lines[number] for number in first_rows.values()]
     origins = [table.location(number) for number in first_rows.values()] if table.origins else ()
     return replace(
-        table,
-        header=header,
-        cells=summed,
-        lines=lines,
-        notes=(*table.notes, note),
-        origins=origins,
+        table, header=header, cells=summed, lines=lines, notes=(*table.notes, note), origins=origins
     )
-
-
-class FaultNames:
-    """What the faults of a file are called in the study.
-
-    Args:
-        rows: of the file.
-
-    Attributes:
-        notes: sentences on what was taken for what.
-    """
-
-    def __init__(self, rows: Sequence[Row]) -> None:
-        counts = Counter(row.text("fault") for row in rows)
-        faults = sorted(counts, key=lambda name: (-counts[name], name))
-        # Each fault in small letters to how most rows have it.
-        spelled = {name.casefold(): name for name in reversed(faults)}
-        has_column = "fault" in rows[0].names
-        harmless = _without_faulty_robots(rows) if "faulty" in rows[0].names else set[str]()
-        self.notes: list[str] = []
-        self._names: dict[str, str] = {}
-        for name in faults:
-            self._names[name] = _FAULT_NAMES.get(name.casefold(), spelled[name.casefold()])
-            if name.casefold() in NOT_KNOWN:
-                _refuse_unnamed(rows, name)
-                self._names[name] = NO_FAULT_WORD
-                if has_column:
-                    shown = repr(name) if name else "An empty cell"
-                    self.notes.append(
-                        f"{shown} in {rows[0].names['fault']!r} is taken for no fault."
-                    )
-            elif self._names[name] not in (NO_FAULT_WORD, REPEATED) and name.casefold() in harmless:
-                self._names[name] = NO_FAULT_WORD
-                self.notes.append(
-                    f"The fault {name!r} is taken for no fault, as no robot fails by it; "
-                    f"--value fault:{name}={NO_FAULT_WORD} says so."
-                )
-            elif name not in spelled.values():
-                self.notes.append(
-                    f"The faults {spelled[name.casefold()]} and {name} are taken for one."
-                )
-        self.notes += _notes_on_misspelled(Counter(self[row.text("fault")] for row in rows))
-
-    def __getitem__(self, name: str) -> str:
-        """Return what a fault is called, by its cell."""
-        return self._names[name]
-
-    @property
-    def any_fails(self) -> bool:
-        """Whether robots fail in some trial."""
-        return any(name not in (NO_FAULT_WORD, REPEATED) for name in self._names.values())
-
-
-def _refuse_unnamed(rows: Sequence[Row], name: str) -> None:
-    """Refuse a row that names no fault where others do, unless it says that no robot failed."""
-    if all(row.text("fault").casefold() in NOT_KNOWN for row in rows):
-        return
-    for row in rows:
-        if row.text("fault") == name and row.text("faulty") not in ZERO:
-            replacement = quote(f"{row.names['fault']}:{name}={NO_FAULT_WORD}")
-            raise row.error(
-                "fault",
-                f"should name what failed, as other rows do, or be {NO_FAULT_WORD}; --value "
-                f"{replacement} says so of all such cells, unless a group has its name in its "
-                "first row alone",
-            )
-
-
-def _notes_on_misspelled(counts: Counter[str]) -> Iterator[str]:
-    """Yield the faults of one row whose names are nearly those of faults of several rows."""
-    frequent = sorted(name for name, count in counts.items() if count > 1)
-    for name, count in sorted(counts.items()):
-        similar = get_close_matches(name, frequent, n=1, cutoff=0.8)
-        if count == 1 and similar:
-            yield (
-                f"The fault {name!r} stands in one row alone: if {similar[0]!r} is meant, "
-                f"--value {quote(f'fault:{name}={similar[0]}')} says so."
-            )
-
-
-def _without_faulty_robots(rows: Sequence[Row]) -> set[str]:
-    """Return the faults, in small letters, by which no robot fails, where by others some do."""
-    harmless: dict[str, bool] = {}
-    for row in rows:
-        fault = row.text("fault").casefold()
-        harmless[fault] = harmless.get(fault, True) and row.text("faulty") in ZERO
-    names = {name for name, value in harmless.items() if value}
-    return names if len(names) < len(harmless) else set()

@@ -147,7 +147,7 @@ def _is_copy(path: Path, other_path: Path) -> bool:
 def _comparable(table: Table) -> tuple[tuple[str, ...], ...]:
     """Return the names and rows of a table in one order and spelling, of whatever kind of file."""
     names = sorted({*table.header} - {""})
-    columns = [map(_spelled, table.column(name)) for name in names]
+    columns = [map(_spelled, table.columns[name].texts) for name in names]
     return (*names,), *zip(*columns)
 
 

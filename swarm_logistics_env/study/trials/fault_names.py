@@ -1,0 +1,98 @@
+"""Faults as people name them, and what the study calls them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
+from shlex import quote
+
+from .table import Cells, Columns
+from .trial import NO_FAULT_WORD, REMOVED_WORD, REPEATED
+
+_NO_FAULT_WORDS = (NO_FAULT_WORD, "no fault", "no_fault", "baseline", "healthy", "0", "-")
+_FAULT_NAMES = {
+    **dict.fromkeys(_NO_FAULT_WORDS, NO_FAULT_WORD),
+    REMOVED_WORD: REMOVED_WORD,
+    REPEATED: REPEATED,
+    "none again": REPEATED,
+}
+NOT_KNOWN = ("", "na", "n/a", "nan", "null")  # what programs and people write for no value
+ZERO = ("0", "0.0")  # of robots that fail, by a row's word
+
+
+class FaultNames:
+    """What the faults of a file are called in the study.
+
+    Attributes:
+        notes: sentences on what was taken for what.
+    """
+
+    def __init__(self, columns: Columns) -> None:
+        self.notes: list[str] = []
+        self._names = {"": NO_FAULT_WORD}
+        fault = columns.by_meaning.get("fault")
+        if fault is None:
+            return
+        faulty = columns.by_meaning.get("faulty")
+        robots = faulty.texts if faulty else [""] * len(fault.texts)  # that fail, in each row
+        counts = Counter(fault.texts)
+        faults = sorted(counts, key=lambda name: (-counts[name], name))
+        # Each fault in small letters to how most rows have it.
+        spelled = {name.casefold(): name for name in reversed(faults)}
+        harmful = {name.casefold() for name, n in zip(fault.texts, robots) if n not in ZERO}
+        harmless = spelled.keys() - harmful if harmful else set[str]()
+        for name in faults:
+            self._names[name] = _FAULT_NAMES.get(name.casefold(), spelled[name.casefold()])
+            if name.casefold() in NOT_KNOWN:
+                _refuse_unnamed(fault, robots, name)
+                self._names[name] = NO_FAULT_WORD
+                shown = repr(name) if name else "An empty cell"
+                self.notes.append(f"{shown} in {fault.name!r} is taken for no fault.")
+            elif self._names[name] not in (NO_FAULT_WORD, REPEATED) and name.casefold() in harmless:
+                self._names[name] = NO_FAULT_WORD
+                self.notes.append(
+                    f"The fault {name!r} is taken for no fault, as no robot fails by it; "
+                    f"--value fault:{name}={NO_FAULT_WORD} says so."
+                )
+            elif name not in spelled.values():
+                self.notes.append(
+                    f"The faults {spelled[name.casefold()]} and {name} are taken for one."
+                )
+        self.notes += _notes_on_misspelled(Counter(self[name] for name in fault.texts))
+
+    def __getitem__(self, name: str) -> str:
+        """Return what a fault is called, by its cell."""
+        return self._names[name]
+
+    @property
+    def any_fails(self) -> bool:
+        """Whether robots fail in some trial."""
+        return any(name not in (NO_FAULT_WORD, REPEATED) for name in self._names.values())
+
+
+def _refuse_unnamed(fault: Cells, robots: Sequence[str], name: str) -> None:
+    """Refuse a row that names no fault where others do, unless it says that no robot failed."""
+    if all(text.casefold() in NOT_KNOWN for text in fault.texts):
+        return
+    for row, text in enumerate(fault.texts):
+        if text == name and robots[row] not in ZERO:
+            replacement = quote(f"{fault.name}:{name}={NO_FAULT_WORD}")
+            raise fault.error(
+                row,
+                f"should name what failed, as other rows do, or be {NO_FAULT_WORD}; --value "
+                f"{replacement} says so of all such cells, unless a group has its name in its "
+                "first row alone",
+            )
+
+
+def _notes_on_misspelled(counts: Counter[str]) -> Iterator[str]:
+    """Yield the faults of one row whose names are nearly those of faults of several rows."""
+    frequent = sorted(name for name, count in counts.items() if count > 1)
+    for name, count in sorted(counts.items()):
+        similar = get_close_matches(name, frequent, n=1, cutoff=0.8)
+        if count == 1 and similar:
+            yield (
+                f"The fault {name!r} stands in one row alone: if {similar[0]!r} is meant, "
+                f"--value {quote(f'fault:{name}={similar[0]}')} says so."
+            )

@@ -1,0 +1,195 @@
+"""The worlds that a training learns in, and what its networks see of them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnvWrapper
+
+from swarm_logistics_env.adapters import SwarmVecEnv
+from swarm_logistics_env.core.streams import generator, key, row_keys
+from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
+from swarm_logistics_env.environment.requests import faults_among, scenario_fields
+from swarm_logistics_env.policies.learned import STREAM
+from swarm_logistics_env.train.privileged import PRIVILEGED, fill_privileged
+from swarm_logistics_env.train.settings import Conditions
+from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
+from swarm_logistics_env.world.motion.memory import body_of
+from swarm_logistics_env.world.motion.network_inputs import INPUTS
+from swarm_logistics_env.world.warehouse import Fault
+from swarm_logistics_env.wrappers import IndicatorReward, Wrapper
+
+
+def make_worlds(training: Training) -> SwarmVecEnv:
+    """Return the worlds of a training, not yet begun; it raises what `NetworkView` does."""
+    worlds = training.each_world
+
+    def make_env(number: int) -> Wrapper:
+        kind, scenario = worlds[number]
+        core = SwarmLogisticsEnv(scenario, rewards=training.rewards)
+        env = EpisodeMix(core, kind.conditions or training.conditions)
+        if training.indicators is None:
+            return env
+        return IndicatorReward(env, **dict(training.indicators), own_reward=1.0)
+
+    return SwarmVecEnv(make_env=make_env, n_worlds=len(worlds), threads=training.threads)
+
+
+class EpisodeMix(Wrapper):
+    """Plays each episode under conditions drawn from several kinds, by the episode's seed.
+
+    Args:
+        env: the environment, or a wrapper of one.
+        kinds: what is drawn from; none: every episode is as the environment has it.
+
+    Raises:
+        ScenarioError, SetupError: a scenario among them cannot be.
+    """
+
+    def __init__(self, env: SwarmLogisticsEnv | Wrapper, kinds: Sequence[Conditions]) -> None:
+        super().__init__(env)
+        self._kinds = tuple(kinds)
+        weights = np.array([kind.weight for kind in kinds])
+        self._shares = weights / weights.sum()
+        base = self.unwrapped.scenario
+        for kind in kinds:
+            for name, values in kind.scenario.items():
+                for value in values:
+                    self.env.declare_spaces(base.replace(**{name: value}))
+
+    def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
+        """Return the options with this episode's conditions among them."""
+        if not self._kinds:
+            return options
+        rng = generator(seed, "kind of episode")
+        kind = self._kinds[int(rng.choice(len(self._kinds), p=self._shares))]
+        fields = {
+            name: values[int(rng.integers(len(values)))] for name, values in kind.scenario.items()
+        }
+        faults = faults_among(options, self.unwrapped.faults)
+        if kind.modes:
+            mode = kind.modes[int(rng.integers(len(kind.modes)))]
+            robots = kind.robots[int(rng.integers(len(kind.robots)))]
+            faults = (*faults, Fault(mode, robots, onset=float(rng.uniform(*kind.onset))))
+        return {**options, "scenario": {**fields, **scenario_fields(options)}, "faults": faults}
+
+
+def check_finite(name: str, numbers: NDArray[Any]) -> None:
+    """Raise a FloatingPointError unless all the numbers are finite."""
+    finite = np.isfinite(numbers)
+    if not finite.all():
+        raise FloatingPointError(f"{name} is {numbers[~finite][0]}")
+
+
+class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environment of the type check
+    """Turns observation rows into a network's inputs, and its outputs into commands.
+
+    By the code that plays the policy afterwards, so that both see the same. What the value network
+    alone reads, `PRIVILEGED`, stands behind these inputs.
+
+    Args:
+        training: whose worlds these are; every robot is a row.
+
+    Attributes:
+        frame: of each robot's motion, with its memory.
+
+    Raises:
+        TrainingError, SetupError, ScenarioError, FaultError: the worlds cannot be.
+        FloatingPointError: an observation or a reward is not finite; of `reset` and steps.
+    """
+
+    def __init__(self, training: Training) -> None:
+        worlds = make_worlds(training)
+        self.frame = MotionView(training.scenario, training.network.listens)
+        self._privileged = np.zeros((worlds.num_envs, len(PRIVILEGED)), np.float32)
+        self._n_episodes = 0
+        self._seed = 0
+        self._n_held = training.network.decides_every - 1
+        super().__init__(
+            worlds,
+            Box(-np.inf, np.inf, (len(INPUTS) + len(PRIVILEGED),), np.float32),
+            Box(-1.0, 1.0, (len(OUTPUTS),), np.float32),
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The base class stores members of the class, which cannot be pickled.
+        return {name: value for name, value in vars(self).items() if name != "class_attributes"}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        # This comes first, because the base class looks up missing attributes in `venv`: endlessly
+        # if that is missing too.
+        self.__dict__.update(saved)
+        self.class_attributes = dict(inspect.getmembers(type(self)))
+
+    def seed(self, seed: int | None = None) -> list[int]:
+        """Fix all episodes from the next `reset` on."""
+        self._n_episodes = 0
+        self._seed = seed or 0
+        seeds: list[int] = self.venv.seed(seed)
+        return seeds
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode in every world."""
+        observations = self.venv.reset()
+        self.frame.begin(self._keys(), self._bodies())
+        return self._read(observations)
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
+        self._outputs = actions
+        self.venv.step_async(self.frame.command(actions))
+
+    def step_wait(self) -> Any:
+        """Step every world until the next decision."""
+        observations, rewards, dones, infos = self.venv.step_wait()
+        for _ in range(self._n_held):
+            self.frame.hold(observations)
+            self.venv.step_async(self.frame.command(self._outputs))
+            observations, more, dones, infos = self.venv.step_wait()
+            rewards = rewards + more
+        check_finite("a reward", rewards)
+        ended = np.flatnonzero(dones)
+        if ended.size:
+            last = np.stack([infos[row]["terminal_observation"] for row in ended.tolist()])
+            # The value network knows of one step before: the next episode has begun already.
+            inputs = np.hstack([self.frame.peek(last, ended), self._privileged[ended]])
+            for row, terminal_inputs in zip(ended.tolist(), inputs):
+                infos[row]["terminal_observation"] = terminal_inputs
+            self.frame.begin_rows(ended, self._keys()[ended], self._bodies()[ended])
+        return self._read(observations), rewards, dones, infos
+
+    def change_rewards(self, rewards: Mapping[str, float]) -> None:
+        """Pay by other weights from the next step on, in every world."""
+        for world in self.venv.worlds:
+            world.unwrapped.change_rewards(rewards)
+
+    def _bodies(self) -> NDArray[np.float64]:
+        # Every episode may have robots of another kind.
+        bodies = np.empty((self.num_envs, 4))
+        for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
+            bodies[rows] = body_of(world.warehouse.scenario)
+        return bodies
+
+    def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        inputs = self.frame.read(observations)
+        check_finite("an observation", inputs)
+        for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
+            warehouse = world.warehouse
+            turned = self.frame.turned[rows]
+            floor = warehouse.floor
+            to_delivery = floor.edge - floor.along(warehouse.state.robot_position)
+            fill_privileged(warehouse.address, turned, to_delivery, self._privileged[rows])
+        return np.hstack([inputs, self._privileged])
+
+    def _keys(self) -> NDArray[np.uint64]:
+        # Every episode of every row gets a stream of its own.
+        self._n_episodes += 1
+        return row_keys(
+            key(self._seed, "training episode", self._n_episodes), STREAM, self.num_envs
+        )
