@@ -122,7 +122,7 @@ PAYS: dict[str, tuple[dict[str, float] | None, list[Act], list[tuple[list[Act], 
         {"delivery": 0.5, "own_delivery": 2.0, "contact": -10.0}, [(give, 1, 2)], [
         ([(touch, 0), (deliver, 1, 3)], [-0.5, 2.5, 0.5, 0.5])]),
     "by every term after the last delivery": (dict.fromkeys(REWARD_TERMS, 1.0), [(give, 1, 2)], [
-        ([(touch,), (deliver, 1, NOBODY)], [1.0, 2.0, 1.0, 1.0]), ([], NOTHING)]),
+        ([(touch,), (deliver, 1, NOBODY)], [2.0, 3.0, 2.0, 2.0]), ([], NOTHING)]),
 }  # fmt: skip
 
 
