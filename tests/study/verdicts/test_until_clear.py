@@ -19,7 +19,7 @@ from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.study.questions.specification import looks_up_to
 from swarm_logistics_env.study.report.answer import answer
-from swarm_logistics_env.study.report.section import sentence
+from swarm_logistics_env.study.report.sentences import sentence
 from swarm_logistics_env.study.runs.engines import Shard
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Outcome, Run
