@@ -9,7 +9,7 @@ from verification.trace import episode_to_table, text_to_policy
 
 def test_ways_are_short(tmp_path: Path) -> None:
     episode, policy = episode_to_table(tmp_path), text_to_policy()
-    assert {"episode.run_episode", "tables.tables"} <= episode.hops.keys()
+    assert {"episode.run_episode", "tables.cell_tables"} <= episode.hops.keys()
     # A row of the store is compared with its digest; the critical size reads the cells, too.
     assert len(episode.hops) <= 13
     assert len(episode.containers) <= 5

@@ -92,8 +92,8 @@ def document(results: StudyResults) -> Document:
     figures = forest_figure(results, study_answer, points_by_line), *indicator_figures(results)
     measures = tuple(resiliences(results))
     of_faults = tuple(fault_sections(measures, results.seeds_text))
-    of_cells = tuple(cell_tables(results))
-    of_paper = tuple(cell_tables(results, for_paper=True))
+    cell_sections = tuple(cell_tables(results))
+    paper_sections = tuple(cell_tables(results, for_paper=True))
     further = tuple(further_tables(results))
     method = methods(plan, results.looks)
     setup = setup_sheet(plan)
@@ -115,7 +115,7 @@ def document(results: StudyResults) -> Document:
             f"P is {plan.what_p_is}. Square brackets hold intervals at the "
             "level that the heading gives, or at that behind them; "
             '"one run" is where a single further run falls.',
-            (*of_cells, *further),
+            (*cell_sections, *further),
         ),
         Chapter(
             "Beyond the paper",
@@ -131,7 +131,7 @@ def document(results: StudyResults) -> Document:
         study_answer,
         points_by_line,
         tuple(chapter for chapter in chapters if chapter.sections),
-        paper_tables(results, study_answer, (*of_paper, *further, *of_faults)),
+        paper_tables(results, study_answer, (*paper_sections, *further, *of_faults)),
         single_runs(results, sentences),
         results.cell_table,
         results.verdict_table,

@@ -108,8 +108,8 @@ def _views(document: Document, drawings: Mapping[str, str]) -> Iterator[View]:
         charts.append((f"P: {table}", svg, [panel], bar_and_dot))
     for figure in document.figures:
         if figure.panels:
-            legend = (f"bar: {figure.level} interval",)
-            charts.append((figure.title, drawings[figure.name], figure.panels, legend))
+            bar = (f"bar: {figure.level} interval",)
+            charts.append((figure.title, drawings[figure.name], figure.panels, bar))
     for number, (name, svg, panels, marks) in enumerate(charts):
         points = [point for panel in panels for point in panel.points]
         has_published = any(point.published is not None for point in points)

@@ -1,7 +1,7 @@
 """The sentences of a report, each under the name of its case, with slots in braces.
 
-`answer.py`, `answer_notes.py` and `section.py` decide which cases apply, and what stands in their
-slots.
+`answer.py`, `answer_notes.py`, `for_a_paper.py` and `sentences.py` decide which cases apply, and
+what stands in their slots.
 """
 
 from __future__ import annotations
