@@ -113,8 +113,9 @@ class Plan:
     @property
     def name_of_p(self) -> str:
         """P with what the file of recorded trials calls it, e.g. "P (throughput)"."""
-        is_named = self.origin is not None and self.origin.performance != "P"
-        return f"P ({self.origin.performance})" if self.origin and is_named else "P"
+        if self.origin is None or self.origin.performance == "P":
+            return "P"
+        return f"P ({self.origin.performance})"
 
     @property
     def what_p_is(self) -> str:
