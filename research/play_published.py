@@ -19,8 +19,8 @@ from more_itertools import map_reduce
 from research.tables import ROOT, rewrite, table
 from swarm_logistics_env import judge
 from swarm_logistics_env.core.errors import StudyError
-from swarm_logistics_env.study.report.collapse_tables import critical_size_in_words, share_in_words
-from swarm_logistics_env.study.report.section import NOTHING, bracketed, fixed
+from swarm_logistics_env.study.report.section import NOTHING, bracketed, fixed, share_in_words
+from swarm_logistics_env.study.report.tables import critical_size_in_words
 from swarm_logistics_env.study.verdicts.collapses import collapses, edges
 from swarm_logistics_env.study.verdicts.results import StudyResults
 

@@ -19,7 +19,7 @@ from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.report.section import Section
-from swarm_logistics_env.study.report.tables import tables
+from swarm_logistics_env.study.report.tables import cell_tables
 from swarm_logistics_env.study.report.write import section_markdown
 from swarm_logistics_env.study.tasks.task import Outcome, Run
 from swarm_logistics_env.study.verdicts.cell import Cell
@@ -86,7 +86,7 @@ def episode_to_table(out: Path) -> Trace:
     Study(out=out / "study", **SMALL).run()  # compiled, and kept away from what is traced
     traced = Study(out=out / "traced", **SMALL)
     trace.of(traced.run)
-    trace.of(lambda: [section_markdown(section) for section in tables(traced.findings())])
+    trace.of(lambda: [section_markdown(section) for section in cell_tables(traced.findings())])
     trace.containers["the table `runs` of the store"] = None
     return trace
 

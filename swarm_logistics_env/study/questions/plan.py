@@ -110,6 +110,20 @@ class Plan:
         """Every run, seed by seed, so that an interrupted study has complete seeds."""
         return tuple(Run(case, self.code, seed) for seed in self.seeds for case in self.cases)
 
+    @property
+    def name_of_p(self) -> str:
+        """P with what the file of recorded trials calls it, e.g. "P (throughput)"."""
+        if self.origin is None or self.origin.performance == "P":
+            return "P"
+        return f"P ({self.origin.performance})"
+
+    @property
+    def what_p_is(self) -> str:
+        """What the performance P is, e.g. "the number of items delivered"."""
+        if self.origin is None:
+            return self.specification.played.performance
+        return f"{self.origin.performance!r} of {self.origin.file}"
+
     def __str__(self) -> str:
         n_cells = len(self.cells)
         n_cases = len(self.cases)

@@ -13,7 +13,6 @@ from more_itertools import map_reduce
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.questions.plan import Plan
 from swarm_logistics_env.study.tasks.task_world import world_of
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -28,7 +27,7 @@ from swarm_logistics_env.study.verdicts.verdict import (
 )
 
 from . import section, templates
-from .answer_notes import notes
+from .answer_notes import notes, reasons_in_words
 from .section import Section
 from .templates import Slots, fill
 
@@ -54,11 +53,6 @@ class Line(NamedTuple):
     numbers: tuple[int, ...]
 
     @property
-    def thresholds(self) -> list[float]:
-        """What the values are tested against."""
-        return [verdict.compared.threshold for verdict in self.verdicts]
-
-    @property
     def value(self) -> str:
         """The values, one after the other; from the lowest to the highest where they are many."""
         values = [verdict.value for verdict in self.verdicts if verdict.value is not None]
@@ -71,7 +65,8 @@ class Line(NamedTuple):
         return text + section.SATURATED if is_capped else text
 
     def _fixed(self, value: float) -> str:
-        return section.fixed(value, 2, self.thresholds)
+        thresholds = [verdict.compared.threshold for verdict in self.verdicts]
+        return section.fixed(value, 2, thresholds)
 
     def interval(self, level: float) -> str:
         """Return the interval; of several values that which holds all of theirs.
@@ -167,12 +162,14 @@ class Answer(NamedTuple):
         scope: how much was asked, of which policies, and over which seeds.
         performance: P of every policy where the swarm is as it should be.
         lines: the questions.
+        reasons: why lines of it are open, in words; empty: none says why.
         notes: how to read the verdicts, and what is still open.
     """
 
     scope: str
     performance: str
     lines: tuple[Line, ...]
+    reasons: str
     notes: str
 
     @property
@@ -210,6 +207,8 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     Args:
         most: lines at most, as far as what is alike can share one; None: a line a question.
     """
+    scope = _scope(results)
+    performance = _performance(results)
     lines: list[Line] = []
     for sharing in range(4):
         groups = map_reduce(enumerate(results.verdicts), partial(_what_a_line_shares, sharing))
@@ -226,8 +225,9 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     indicators = list(DEFINITIONS)
     lines.sort(key=lambda line: (policies.index(line.policy), indicators.index(line.indicator)))
     needs_runs = any(line.needs_runs for line in lines)
-    notes_text = notes(results, needs_runs, {line.reason for line in lines})
-    return Answer(_scope(results), _performance(results), tuple(lines), notes_text)
+    reasons = reasons_in_words({line.reason for line in lines})
+    notes_text = notes(results, needs_runs, reasons)
+    return Answer(scope, performance, tuple(lines), reasons, notes_text)
 
 
 def _part_of_title(table: str) -> str:
@@ -341,14 +341,8 @@ def _performance(results: StudyResults) -> str:
         duration=case.scenario.duration,
         condition=f"N = {case.scenario.n_robots}{where}",
         means=", ".join(means),
-        p=name_of_p(results.plan),
+        p=results.plan.name_of_p,
     )
-
-
-def name_of_p(plan: Plan) -> str:
-    """Return P with what the file of imported trials calls it, e.g. "P (throughput)"."""
-    named = plan.origin is not None and plan.origin.performance != "P"
-    return f"P ({plan.origin.performance})" if plan.origin and named else "P"
 
 
 def _mean(cell: Cell) -> str:

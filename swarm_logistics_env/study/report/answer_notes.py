@@ -1,28 +1,30 @@
-"""Notes on an answer: what its symbols mean, how to read its verdicts, and what limits them."""
+"""Notes on an answer and warnings: how to read the verdicts, and what limits them."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+import numpy as np
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.study.tasks.task_world import world_of
-from swarm_logistics_env.study.verdicts.collapses import untestable
+from swarm_logistics_env.study.verdicts.cell import Cell
+from swarm_logistics_env.study.verdicts.collapses import Collapse
 from swarm_logistics_env.study.verdicts.results import StudyResults
-from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 from . import section, templates
-from .collapse_tables import collapsed_in_words, untestable_in_words
 from .templates import Slots, fill
 
 _FEW_ITEMS = 1.0  # in a run, of which shares say little
+_MOST_CONDITIONS = 2  # that a note of the answer names
 
 
-def notes(results: StudyResults, needs_runs: bool, reasons: Collection[str]) -> str:
+def notes(results: StudyResults, needs_runs: bool, reasons: str) -> str:
     """Return the notes on the answer of a study, in one line.
 
     Args:
         needs_runs: whether a line of it says how many more runs it takes.
-        reasons: why verdicts are open, names in `REASONS_TO_BE_OPEN` that its lines say.
+        reasons: why lines of it are open, in words.
     """
     slots_by_case = dict(_notes_that_apply(results, needs_runs, reasons))
     line = "; ".join(fill(templates.NOTES, slots_by_case))
@@ -30,7 +32,7 @@ def notes(results: StudyResults, needs_runs: bool, reasons: Collection[str]) -> 
 
 
 def _notes_that_apply(
-    results: StudyResults, needs_runs: bool, reasons: Collection[str]
+    results: StudyResults, needs_runs: bool, reasons: str
 ) -> Iterator[tuple[str, Slots]]:
     """Yield the notes on an answer that apply, each with its slots; `NOTES` has their order."""
     verdicts = results.verdicts
@@ -45,9 +47,7 @@ def _notes_that_apply(
         yield case, {"level": section.percent(results.level)}
     yield "adjusted", {}
     flags = {flag for verdict in verdicts for flag in verdict.flags}
-    if "assumes_normal" in flags:
-        yield "few_seeds", {}
-    for flag in ("cannot_fail", "too_few_seeds"):
+    for flag in ("assumes_normal", "cannot_fail", "too_few_seeds"):
         if flag in flags:
             yield flag, {}
     if _delivers_little(results):
@@ -66,24 +66,24 @@ def _notes_that_apply(
     if results.collapses:
         words = collapsed_in_words(results.collapses, names_policies=len(results.policies) > 1)
         yield "collapsed_runs", {"conditions": words}
-    if by_reason := untestable(results.cells):
-        words = untestable_in_words(by_reason, names_policies=len(results.policies) > 1)
+    if results.untestable:
+        words = untestable_in_words(results.untestable, names_policies=len(results.policies) > 1)
         yield "phases_untestable", {"conditions": words}
     if needs_runs:
         yield "more_runs", {"runs": "seeds" if is_paired else "trials a condition"}
     elif any(verdict.conclusion == "open" for verdict in verdicts):
         yield "open", {"runs": "seeds" if is_paired else "trials"}
-    if explained := reasons_in_words(reasons):
-        yield "open_for_a_reason", {"reasons": explained}
+    if reasons:
+        yield "open_for_a_reason", {"reasons": reasons}
     claims_of_text = results.reference.claims if results.reference else {}
     claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
     in_text = [verdict for verdict in claims if verdict.compared.question in claims_of_text]
     not_in_text = [verdict for verdict in claims if verdict not in in_text]
-    if in_text:
-        yield "claims_of_the_text", _claims(in_text)
-    if not_in_text:
-        case = "claims_beside_the_text" if claims_of_text else "claims_without_text"
-        yield case, _claims(not_in_text)
+    beside = "claims_beside_the_text" if claims_of_text else "claims_without_text"
+    for case, judged in (("claims_of_the_text", in_text), (beside, not_in_text)):
+        counts = section.count_words(v.on_claim.adjusted for v in judged if v.on_claim)
+        if judged:
+            yield case, {"claims": section.plural(len(judged), "claim"), "counts": counts}
 
 
 def reasons_in_words(reasons: Collection[str]) -> str:
@@ -104,9 +104,80 @@ def _delivers_little(results: StudyResults) -> bool:
     )
 
 
-def _claims(verdicts: Sequence[Verdict]) -> Slots:
-    words = [verdict.on_claim.adjusted for verdict in verdicts if verdict.on_claim]
-    return {
-        "claims": section.plural(len(verdicts), "claim"),
-        "counts": section.count_words(words),
-    }
+def collapsed_in_words(
+    named: Sequence[Collapse], *, names_policies: bool, most: int | None = _MOST_CONDITIONS
+) -> str:
+    """Return which share of the runs collapsed where, e.g. "at N = 128 in 16 % [10, 23]".
+
+    Args:
+        names_policies: whether to say of which policy.
+        most: how many conditions are named, those with the largest shares; None: all.
+    """
+    ordered = sorted(named, key=lambda collapse: collapse.share.value, reverse=True)
+    words = []
+    for collapse in ordered[:most]:
+        policy = f"of {collapse.cell.policy} " if names_policies else ""
+        words.append(
+            f"{policy}at {collapse.cell.words} in "
+            f"{section.share_in_words(collapse.share)}{_breaks_in_words(collapse)}"
+        )
+    left = len(ordered) - len(words)
+    listed = ", ".join(words)
+    return f"{listed} and {left} conditions more (--full)" if left > 0 else listed
+
+
+def untestable_in_words(by_reason: Mapping[str, Sequence[Cell]], *, names_policies: bool) -> str:
+    """Return which conditions were not tested, and why, e.g. "N = 4 and 2 more (counts ..)"."""
+    words = []
+    for reason, cells in by_reason.items():
+        first = f"of {cells[0].policy} at {cells[0].words}" if names_policies else cells[0].words
+        more = f" and {section.plural(len(cells) - 1, 'condition')} more" if len(cells) > 1 else ""
+        words.append(f"{first}{more} ({reason})")
+    return ", ".join(words)
+
+
+def _breaks_in_words(collapse: Collapse) -> str:
+    """Return how many of the runs collapsed in mid-run, and when; empty where none is known to."""
+    breaks = collapse.breaks
+    if not len(breaks):
+        return ""
+    when = f"after {np.median(breaks):.0f} s (median)"
+    return f" (of these {len(breaks)} of {collapse.n_collapsed} in mid-run, {when})"
+
+
+def warnings(results: StudyResults) -> Iterator[str]:
+    """Yield what a reader has to know before any verdict, one sentence each."""
+    if results.damage:
+        yield f"{results.damage}."
+    if any(cell.saturated for cell in results.cells):
+        yield (
+            f"{section.SATURATED} marks a P that is capped, because every item was delivered in at "
+            "least one run, and the indicators that rest on it. A verdict that a larger P could "
+            "turn is open."
+        )
+    if results.collapses:
+        words = collapsed_in_words(
+            results.collapses, names_policies=len(results.policies) > 1, most=None
+        )
+        yield (
+            f"Runs are of two phases, a good one and one that has collapsed: {words}. A mean P is "
+            "of both."
+        )
+    if results.exploratory:
+        yield (
+            "The verdicts are exploratory: they are over other seeds than the study declared "
+            "before its first run, so they err more often than their level."
+        )
+    if results.late_margin:
+        yield (
+            "The verdicts on the margin of equivalence are exploratory: another margin was "
+            "declared before the first run."
+        )
+    for cell in results.cells:
+        if cell.problem:
+            yield f"{cell.policy}, {cell.table}, {cell.arm.setting} is incomplete: {cell.problem}."
+    for verdict in results.verdicts:
+        if verdict.problem:
+            comparison = verdict.compared
+            name = f"{comparison.policy}, {comparison.indicator}, {comparison.label}"
+            yield f"{name} is undefined: {verdict.problem}."

@@ -19,16 +19,7 @@ from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
-from .section import (
-    NOTHING,
-    P_LEVEL,
-    Section,
-    Texts,
-    bracketed,
-    mean_p,
-    percent,
-    ratio,
-)
+from .section import NOTHING, P_LEVEL, Section, Texts, bracketed, mean_p, percent, ratio
 from .tables import CONTACTS_HEADING, contacts_text
 
 STUDY = "benchmark"

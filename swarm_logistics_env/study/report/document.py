@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from importlib.metadata import version
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.questions.plan import Origin, Plan
+from swarm_logistics_env.study.verdicts.mid_run_faults import resiliences
 from swarm_logistics_env.study.verdicts.results import StudyResults
 
 from .answer import Answer, answer
-from .figures import forest_figure, indicator_figures, trade_off_figure
-from .section import Figure, Section, Sentence, join_names, percent, sentence
-from .tables import fault_sections, tables, verdict_sections, warnings
+from .answer_notes import warnings
+from .drawing import Point
+from .fault_sections import fault_sections
+from .figures import forest_figure, forest_points, indicator_figures, trade_off_figure
+from .for_a_paper import PaperTables, paper_tables
+from .section import Figure, Section, join_names
+from .sentences import sentence, verdict_sections
+from .set_up import methods, setup_sheet
+from .single_runs import SingleRuns, single_runs
+from .tables import cell_tables, further_tables
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Chapter(NamedTuple):
@@ -26,20 +33,27 @@ class Chapter(NamedTuple):
 
 
 class Document(NamedTuple):
-    """The whole report.
+    """The whole report: all that is written, and nothing that is still to be asked.
 
     Attributes:
         title, text: its heading and the sentences below it.
         answer: what the study found.
+        points_by_line: the values of each line of the answer, as they are drawn.
         chapters: its parts, in order.
-        sentences: every verdict in words, in the order of the study.
+        paper: its tables for a paper.
+        runs: its single runs, for the page.
+        cells, claims: P of every condition and every verdict, a row each.
     """
 
     title: str
     text: tuple[str, ...]
     answer: Answer
+    points_by_line: tuple[tuple[Point, ...], ...]
     chapters: tuple[Chapter, ...]
-    sentences: tuple[Sentence, ...]
+    paper: PaperTables
+    runs: SingleRuns
+    cells: pd.DataFrame
+    claims: pd.DataFrame
 
     @property
     def summary(self) -> tuple[Section, ...]:
@@ -52,11 +66,6 @@ class Document(NamedTuple):
             for section in chapter.sections
             if section.columns or section.lines
         )
-
-    @property
-    def beyond(self) -> tuple[Section, ...]:
-        """The measures that the paper does not define."""
-        return next((c.sections for c in self.chapters if c.title == "Beyond the paper"), ())
 
     @property
     def figures(self) -> list[Figure]:
@@ -72,23 +81,22 @@ class Document(NamedTuple):
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
-    about = (
-        f"{plan.specification.name}: {len(plan.cases)} conditions, {results.seeds_text}; every "
-        "verdict holds for the conditions of the set-up sheet below and for no others."
-    )
-    text = [about]
-    if results.reference:
-        text.append(f'"paper" is {results.reference.source}.')
-    setup = setup_sheet(plan)
-    method = methods(plan, results.looks)
+    text = tuple(_text(results))
+    title = _title(results)
     study_answer = answer(results)
-    sentences = tuple(sentence(results, verdict) for verdict in results.verdicts)
     lines = tuple(warnings(results))
+    sentences = [sentence(results, verdict) for verdict in results.verdicts]
     in_words = tuple(verdict_sections(results.verdicts, sentences))
-    result_tables = tuple(tables(results))
-    of_faults = tuple(fault_sections(results))
     trade_offs = tuple(trade_off_figure(results))
-    figures = forest_figure(results, study_answer), *indicator_figures(results)
+    points_by_line = forest_points(results, study_answer)
+    figures = forest_figure(results, study_answer, points_by_line), *indicator_figures(results)
+    measures = tuple(resiliences(results))
+    of_faults = tuple(fault_sections(measures, results.seeds_text))
+    cell_sections = tuple(cell_tables(results))
+    paper_sections = tuple(cell_tables(results, for_paper=True))
+    further = tuple(further_tables(results))
+    method = methods(plan, results.looks)
+    setup = setup_sheet(plan)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
         Chapter(
@@ -104,10 +112,10 @@ def document(results: StudyResults) -> Document:
         ),
         Chapter(
             "Results",
-            f"P is {what_p_is(plan)}. Square brackets hold intervals at the "
+            f"P is {plan.what_p_is}. Square brackets hold intervals at the "
             "level that the heading gives, or at that behind them; "
             '"one run" is where a single further run falls.',
-            result_tables,
+            (*cell_sections, *further),
         ),
         Chapter(
             "Beyond the paper",
@@ -117,8 +125,17 @@ def document(results: StudyResults) -> Document:
         Chapter("Set-up", "", setup),
         Chapter("Methods", "", (Section("", lines=(method,)),)),
     ]
-    shown = tuple(chapter for chapter in chapters if chapter.sections)
-    report = Document(_title(results), tuple(text), study_answer, shown, sentences)
+    report = Document(
+        title,
+        text,
+        study_answer,
+        points_by_line,
+        tuple(chapter for chapter in chapters if chapter.sections),
+        paper_tables(results, study_answer, (*paper_sections, *further, *of_faults)),
+        single_runs(results, sentences),
+        results.cell_table,
+        results.verdict_table,
+    )
     _make_names_differ(report.figures)
     return report
 
@@ -133,6 +150,17 @@ def _title(results: StudyResults) -> str:
     return f"{names}: study {name!r}"
 
 
+def _text(results: StudyResults) -> Iterator[str]:
+    """Yield the sentences below the title."""
+    plan = results.plan
+    yield (
+        f"{plan.specification.name}: {len(plan.cases)} conditions, {results.seeds_text}; every "
+        "verdict holds for the conditions of the set-up sheet below and for no others."
+    )
+    if results.reference:
+        yield f'"paper" is {results.reference.source}.'
+
+
 def _make_names_differ(figures: Iterable[Figure]) -> None:
     """Number figures whose policies or tables differ in punctuation or case alone."""
     used_names: set[str] = set()
@@ -143,125 +171,3 @@ def _make_names_differ(figures: Iterable[Figure]) -> None:
             number += 1
             figure.name = f"{name}-{number}"
         used_names.add(figure.name.lower())
-
-
-def setup_sheet(plan: Plan) -> tuple[Section, ...]:
-    """Return everything that was held fixed and everything that was varied."""
-    if plan.origin is not None:
-        return _recorded_setup(plan, plan.origin)
-    policies = {case.policy.title: case.identity for case in plan.cases}
-    return (
-        Section("Study", lines=(f"{_version()}, code version {plan.code}.",)),
-        Section("Policies", ("policy", "identity"), tuple(sorted(policies.items()))),
-        *_failure_modes(plan),
-        Section(
-            "Base scenario",
-            ("condition", "value", "unit, meaning; source"),
-            tuple(plan.specification.scenario.conditions()),
-            tuple(_variations(plan)),
-        ),
-    )
-
-
-def _failure_modes(plan: Plan) -> Iterator[Section]:
-    modes = dict.fromkeys(fault.mode for case in plan.cases for fault in case.faults)
-    descriptions = plan.cases[0].task.failure_modes
-    if modes:
-        rows = tuple((mode, descriptions[mode]) for mode in modes)
-        yield Section("Failure modes", ("mode", "what it does to a robot"), rows)
-
-
-def _variations(plan: Plan) -> Iterator[str]:
-    study = plan.specification
-    base = study.scenario.model_dump()
-    for factor in (*study.sizes, *study.faults, *study.parameters, *study.ablations):
-        changed = plan.cases[0].task.vary(study.scenario, factor.scenario).model_dump()
-        differing = [f"{name} = {x}" for name, x in changed.items() if x != base[name]]
-        if differing:
-            title = factor.title or type(factor).__name__
-            yield f"{title} differs: {', '.join(differing)}."
-    for faults in study.faults:
-        if manner := str(faults):
-            yield f"{faults.title or 'Faults'}: robots fail {manner}."
-
-
-def what_p_is(plan: Plan) -> str:
-    """Return what the performance P of a study is, e.g. "the number of items delivered"."""
-    if plan.origin is None:
-        return plan.specification.played.performance
-    return f"{plan.origin.performance!r} of {plan.origin.file}"
-
-
-def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:
-    """Return what is known of the trials, the set-up that the user states, and the methods."""
-    shared = "Unpaired: it names no seeds"
-    if origin.paired:
-        shared = "Paired by the seeds that it names"
-    if origin.paired and origin.blocks:
-        shared = "Paired by the blocks that it names"
-    text = (
-        f"Study {plan.specification.name!r}: {len(plan.cases)} conditions, imported from "
-        f"{origin.file}. {shared}. Their conditions are known as far as the file tells them "
-        "and they are stated below."
-    )
-    unstated = () if origin.setup else ("Nothing is stated of the set-up (--setup NAME=VALUE).",)
-    return (
-        Section("Study", lines=(text, *origin.notes)),
-        Section("Set-up as stated", ("condition", "value"), origin.setup, unstated),
-    )
-
-
-def methods(plan: Plan, looks: tuple[int, ...] = ()) -> str:
-    """Return a paragraph for a paper: what was measured, how it was estimated and tested.
-
-    Args:
-        looks: numbers of seeds at which comparisons might stop; none: they are not looked at.
-    """
-    symbols = dict.fromkeys(comparison.indicator for comparison in plan.comparisons)
-    names = [DEFINITIONS[symbol].heading for symbol in symbols]
-    n = len(plan.seeds)
-    if plan.paired:
-        runs = "trials" if plan.origin else "simulated runs"
-        count = f"at least {n}" if looks else f"{n}"
-        trials = f"{count} {runs} of each of {len(plan.cases)} conditions, paired by seed"
-        if plan.origin and any(trial.n_trials > 1 for trial in plan.origin.trials):
-            trials = f"{n} blocks, by the means of their trials in {len(plan.cases)} conditions"
-        test = "the paired t-test of a logarithm"
-    else:
-        trials = f"up to {n} independent trials of each of {len(plan.cases)} conditions"
-        test = "Welch's t-test of a logarithm"
-    level = percent(CONFIDENCE)
-    side = f"{50 * (1 - CONFIDENCE):.3g} %"
-    interval = f"the {level} interval"
-    stops = ""
-    if looks:
-        interval = "the interval"
-        side = f"its share of {side}"
-        stops = (
-            f" The study was looked at after {join_names([*map(str, looks)])} seeds, and each "
-            "comparison stopped where it was clear, where its verdict could hardly change any more "
-            "or where P was shown to change within the margin; the latter two stayed open. Its "
-            "error was spent over these looks in "
-            "proportion to the seeds, so that an interval has the level of its look, which stands "
-            f"with it, and those of all looks together hold the true value with {level}."
-        )
-    if any(len(arm.case.trainings) > 1 for _, _, arm in plan.cells):
-        stops += (
-            " An interval over trainings holds for trainings like those played; that more collapse "
-            "is part of the verdict alone."
-        )
-    return (
-        f"We measured performance P in {trials}. We report {join_names(names)}, each a ratio of "
-        f"mean performances, with {interval} that inverts {test}.{stops} An indicator is called "
-        "above its threshold (supported) or below it (refuted) where this test rejects at "
-        f"{side} on that side, also if runs that stall were hidden, else open; it is "
-        "untestable where it cannot lie below, where P_o is not told from 0 or where P is the "
-        "same in nearly all pairs of runs. Beside it stands whether two one-sided tests find that "
-        "P changes by less than "
-        f"{100 * plan.specification.margin:.3g} % of P_o; p is adjusted by Holm's method over all "
-        f"comparisons of one indicator for one policy. Computed with {_version()}."
-    )
-
-
-def _version() -> str:
-    return f"swarm-logistics-env {version('swarm-logistics-env')}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,6 @@ from more_itertools import map_reduce, unique_everseen
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorKind
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE, NO_FAULT
 from swarm_logistics_env.study.verdicts.cell import Cell
-from swarm_logistics_env.study.verdicts.mid_run_faults import RateCurve, Resilience, window_of
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 
@@ -31,12 +30,12 @@ _COLUMNS = [
 ]  # fmt: skip
 
 
-def forest_points(results: StudyResults, answer: Answer) -> list[list[Point]]:
+def forest_points(results: StudyResults, answer: Answer) -> tuple[tuple[Point, ...], ...]:
     """Return the values of each line of the answer; `published` is the threshold of each."""
-    return [
-        [_point(results, verdict, "", verdict.compared.threshold) for verdict in line.verdicts]
+    return tuple(
+        tuple(_point(results, verdict, "", verdict.compared.threshold) for verdict in line.verdicts)
         for line in answer.lines
-    ]
+    )
 
 
 def forest_label(answer: Answer) -> str:
@@ -44,9 +43,11 @@ def forest_label(answer: Answer) -> str:
     return f"{', '.join(dict.fromkeys(line.indicator for line in answer.lines))}: value"
 
 
-def forest_figure(results: StudyResults, answer: Answer) -> Figure:
+def forest_figure(
+    results: StudyResults, answer: Answer, points_by_line: Sequence[Sequence[Point]]
+) -> Figure:
     """Return the lines of the answer as a forest of intervals."""
-    rows = list(zip(answer.questions, forest_points(results, answer)))
+    rows = list(zip(answer.questions, points_by_line))
     verdicts = answer.verdicts
     n_most = max(len(points) for _, points in rows)
     order = ""
@@ -147,11 +148,7 @@ def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int]
 
     by_value: dict[tuple[str, ...], list[Verdict]] = map_reduce(
         results.verdicts,
-        lambda verdict: (
-            *verdict.compared.family,
-            verdict.compared.table,
-            verdict.compared.label,
-        ),
+        lambda verdict: (*verdict.compared.family, verdict.compared.table, verdict.compared.label),
     )
     # The verdict on the lowest threshold shows the value for them all.
     lowest = [
@@ -269,48 +266,3 @@ def _caption(definitions: Sequence[Definition]) -> str:
     if not meaning:
         meaning = "(P_new - P_o) / P_o; below a threshold P falls by more than that share"
     return f"{join_names([definition.heading for definition in definitions])}; {meaning}."
-
-
-def rate_figures(measures: Iterable[Resilience], seeds: str) -> Iterator[Figure]:
-    """Yield deliveries over time around every fault in mid-run, a figure per failure mode.
-
-    Args:
-        seeds: over which the measures are, in words.
-    """
-    import pandas as pd
-
-    def figure_of(measure: Resilience) -> tuple[str | float, ...]:
-        comparison = measure.compared
-        setting = comparison.changed.setting
-        return (
-            comparison.policy, comparison.table, comparison.n_robots, setting.name, setting.onset,
-        )  # fmt: skip
-
-    for of_mode in map_reduce(measures, figure_of).values():
-        first = of_mode[0].compared
-        setting = first.changed.setting
-        window = window_of(first)
-        panels = {
-            f"m = {measure.compared.changed.setting.value:g}": measure.curves for measure in of_mode
-        }
-        rows = [
-            (title, curve.runs, *point, CONFIDENCE)
-            for title, curves in panels.items()
-            for curve in curves
-            for point in zip(*curve[1:])
-        ]
-        if rows:
-            yield Figure(
-                slug("deliveries", first.policy, first.table, setting.name, f"{setting.onset:g}s"),
-                f"{first.policy}, {first.table}, N = {first.n_robots}: deliveries in the trailing "
-                f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s (dotted "
-                f"line). Mean over {seeds} with pointwise {P_LEVEL} t-intervals.",
-                pd.DataFrame(rows, columns=["panel", "runs", *RateCurve._fields[1:], "confidence"]),
-                0.6 + 2.3 * len(panels),
-                partial(
-                    drawing.rates,
-                    panels={f"{first.policy}, {title}": panels[title] for title in panels},
-                    onset=setting.onset,
-                    y_label=f"deliveries in {window:g} s",
-                ),
-            )

@@ -1,15 +1,85 @@
-"""The sentence that a paper can quote: policy, world, P, verdicts, and what is not decided."""
+"""What a paper takes of a study: a sentence to quote, and its tables."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
+from swarm_logistics_env.study.questions.plan import Plan
 from swarm_logistics_env.study.tasks.task_world import world_of
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import UNTESTABLE, Verdict, level_of
 
 from . import section, templates
 from .answer import Answer, Line, line_of
+from .figures import parameter_label
+from .section import Section
 from .templates import Slots, fill
+
+HOLM = "Verdicts are adjusted by Holm's method over all questions on an indicator of one policy."
+
+
+class PaperTables(NamedTuple):
+    """The tables of a study for a paper.
+
+    Attributes:
+        about: what the caption of each says of P, the world and the seeds.
+        sections: the tables.
+        labels: parameters as a reader calls them, with their units, by their names.
+    """
+
+    about: str
+    sections: tuple[Section, ...]
+    labels: Mapping[str, str]
+
+
+def paper_tables(results: StudyResults, answer: Answer, sections: Iterable[Section]) -> PaperTables:
+    """Return the tables of a study for a paper: the answer, then those of these sections."""
+    about = f"P is {results.plan.what_p_is}. {_world(results.plan)}; {results.seeds_text}."
+    if results.exploratory:
+        about += f" {templates.EXPLORATORY.capitalize()}."
+    labels = {
+        verdict.after.name: parameter_label(verdict)
+        for verdict in results.verdicts
+        if verdict.after.kind == "parameter"
+    }
+    tables = [_answer(results.policies, answer), *sections]
+    return PaperTables(about, tuple(table for table in tables if table.rows), labels)
+
+
+def _answer(policies: Sequence[str], answer: Answer) -> Section:
+    """Return the answer: a row a question, or several that are alike."""
+    columns = "question", "value", answer.section.columns[2], "verdict"
+    rows = tuple(
+        (
+            question,
+            line.value,
+            line.interval(answer.level).removeprefix("in "),
+            section.with_reason(section.conclusion_text(*line.verdicts), line.reason),
+        )
+        for question, line in zip(answer.questions, answer.lines)
+    )
+    is_grouped = any(len(line.verdicts) > 1 for line in answer.lines)
+    hull = "Of several values the interval holds all of theirs." if is_grouped else ""
+    symbols = dict.fromkeys(line.indicator for line in answer.lines)
+    names = [definition.heading for symbol, definition in DEFINITIONS.items() if symbol in symbols]
+    text = ", ".join(names)
+    meaning = f"{text[:1].upper()}{text[1:]}: supported above 0, refuted below, open: undecided."
+    reasons = f"Open {answer.reasons}." if answer.reasons else ""
+    lines = (answer.performance, meaning, hull, reasons, HOLM)
+    return Section(f"{section.join_names(policies)}: indicators", columns, rows, lines)
+
+
+def _world(plan: Plan) -> str:
+    """Return the conditions, e.g. "World: a warehouse of .., 500 s; N = 25 unless .."."""
+    world = world_in_words(plan)
+    if plan.origin is not None:
+        return f"{world[:1].upper()}{world[1:]}"
+    scenario = plan.specification.scenario
+    length = f"{scenario.duration:g} s; N = {scenario.n_robots} unless said otherwise"
+    return f"World: {world}, {length}"
 
 
 def in_a_sentence(results: StudyResults, answer: Answer) -> str:
@@ -24,7 +94,7 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
     words = section.conclusion_text(*verdicts)
     lowest_text = _question_with_value(line, level_of([lowest]))
     reason = templates.REASONS_TO_BE_OPEN.get(lowest.reason, lowest.reason)
-    world = world_in_words(results)
+    world = world_in_words(results.plan)
     slots: dict[str, Slots] = {
         "performance": {
             "policies": ", ".join(results.policies),
@@ -59,10 +129,7 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
 def _question_with_value(line: Line, level: float) -> str:
     interval = line.interval(level)
     return templates.QUESTION_WITH_VALUE["interval" if interval else "value"].format(
-        question=line.question,
-        value=line.value,
-        level=section.percent(level),
-        interval=interval,
+        question=line.question, value=line.value, level=section.percent(level), interval=interval
     )
 
 
@@ -88,9 +155,8 @@ def _undecided(answer: Answer) -> str:
     return section.join_names(clauses)
 
 
-def world_in_words(results: StudyResults) -> str:
+def world_in_words(plan: Plan) -> str:
     """Return in words where a study was played, e.g. "a warehouse of 6 m x 5 m with .."."""
-    plan = results.plan
     if plan.origin is not None:
         stated = "".join(f", {name} {value}" for name, value in plan.origin.setup)
         return templates.WORLD["trials"].format(file=plan.origin.file, setup=stated)

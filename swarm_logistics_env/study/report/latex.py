@@ -7,18 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 
 from swarm_logistics_env.core.records import plain
-from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.study.verdicts.results import StudyResults
 
-from .answer_notes import reasons_in_words
-from .document import Document, what_p_is
-from .figures import CAPPED, parameter_label
-from .for_a_paper import world_in_words
-from .section import SATURATED, Section, Texts, conclusion_text, join_names, slug
-from .tables import tables
-from .templates import EXPLORATORY
+from .figures import CAPPED
+from .for_a_paper import HOLM, PaperTables
+from .section import SATURATED, Section, Texts, slug
 
-_HOLM = "Verdicts are adjusted by Holm's method over all questions on an indicator of one policy."
 _LETTERS_OF_A_COLUMN = 58  # in a column of 3.5 inch
 _LETTERS_OF_A_PAGE = 75  # across a page of one column; with more they are smaller
 _LONG = 30  # letters of a column, of which more are broken into lines
@@ -38,61 +31,18 @@ _SIGNS = "|".join(map(re.escape, sorted(_ESCAPES, key=len, reverse=True)))
 _SPECIAL = re.compile(rf"({_SIGNS})|((?<![\w.-])-\d+(?:\.\d+)?|\b[Nm] = \d+)|([^\x00-\u017f])")
 
 
-def latex_tables(results: StudyResults, report: Document) -> str:
+def latex_tables(tables: PaperTables) -> str:
     """Return the tables of a study, each a table environment with caption and label."""
-    about = f"P is {what_p_is(results.plan)}. {_world(results)}; {results.seeds_text}."
-    if results.exploratory:
-        about += f" {EXPLORATORY.capitalize()}."
-    labels = {
-        verdict.after.name: parameter_label(verdict)
-        for verdict in results.verdicts
-        if verdict.after.kind == "parameter"
-    }
-    sections = [_answer(results, report), *tables(results, for_paper=True), *report.beyond]
     keys: list[str] = []
     parts = ["% In the preamble: \\usepackage{booktabs}\n"]
-    for section in (_readable(section, labels) for section in sections if section.rows):
+    for section in (_readable(section, tables.labels) for section in tables.sections):
         key = slug(section.title).lower()
         label = f"tab:{key}"
         if key in keys:
             label += f"-{keys.count(key) + 1}"
         keys.append(key)
-        parts.append("\n".join(_table(section, about, label)) + "\n")
+        parts.append("\n".join(_table(section, tables.about, label)) + "\n")
     return "\n".join(parts)
-
-
-def _answer(results: StudyResults, report: Document) -> Section:
-    """Return the answer: a row a question, or several that are alike."""
-    answer = report.answer
-    columns = "question", "value", answer.section.columns[2], "verdict"
-    rows = tuple(
-        (
-            question,
-            line.value,
-            line.interval(answer.level).removeprefix("in "),
-            conclusion_text(*line.verdicts) + f" ({line.reason})" * bool(line.reason),
-        )
-        for question, line in zip(answer.questions, answer.lines)
-    )
-    is_grouped = any(len(line.verdicts) > 1 for line in answer.lines)
-    hull = "Of several values the interval holds all of theirs." if is_grouped else ""
-    symbols = dict.fromkeys(line.indicator for line in answer.lines)
-    names = [definition.heading for symbol, definition in DEFINITIONS.items() if symbol in symbols]
-    text = ", ".join(names)
-    meaning = f"{text[:1].upper()}{text[1:]}: supported above 0, refuted below, open: undecided."
-    reasons = reasons_in_words({line.reason for line in answer.lines})
-    lines = (answer.performance, meaning, hull, reasons and f"Open {reasons}.", _HOLM)
-    return Section(f"{join_names(results.policies)}: indicators", columns, rows, lines)
-
-
-def _world(results: StudyResults) -> str:
-    """Return the conditions, e.g. "World: a warehouse of .., 500 s; N = 25 unless .."."""
-    world = world_in_words(results)
-    if results.plan.origin is not None:
-        return f"{world[:1].upper()}{world[1:]}"
-    scenario = results.plan.specification.scenario
-    length = f"{scenario.duration:g} s; N = {scenario.n_robots} unless said otherwise"
-    return f"World: {world}, {length}"
 
 
 def _readable(section: Section, labels: Mapping[str, str]) -> Section:
@@ -132,7 +82,7 @@ def _table(section: Section, about: str, label: str) -> Iterator[str]:
     intervals = f"{levels[0]} intervals in brackets." if levels else ""
     if len(levels) > 1:
         intervals = "Intervals in brackets, at the levels in the headings."
-    caption = [f"{section.title}.", about, intervals, *(section.lines or [_HOLM])]
+    caption = [f"{section.title}.", about, intervals, *(section.lines or [HOLM])]
     if any(SATURATED in cell for row in section.rows for cell in row):
         caption.append(CAPPED)
     columns = [_aligned(column) for column in zip(*section.rows)]
@@ -180,11 +130,6 @@ def _aligned(cells: Texts) -> list[str]:
         row = re.sub(rf"\[\$({_ROOM})", r"$\1$[$", row)
         aligned.append(re.sub(rf"({_ROOM})\$([],])", r"$\2$\1$", row))
     return aligned
-
-
-def _phantom(text: str) -> str:
-    """Return room as wide as a text."""
-    return rf"\phantom{{{text}}}" if text else ""
 
 
 def _padded(number: str, column: Sequence[str]) -> str:

@@ -9,12 +9,11 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import NamedTuple
 
-from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 from .answer import Answer
 from .drawing import MARKERS, Point, limits
-from .figures import forest_label, forest_points
+from .figures import forest_label
 from .section import ratio
 
 
@@ -40,9 +39,12 @@ class _Axis(NamedTuple):
         return f'<line class="{css_class}" x1="{x}" x2="{x}" y1="{top:g}" y2="{bottom:g}"/>'
 
 
-def forest(results: StudyResults, answer: Answer) -> tuple[list[str], str]:
-    """Return a drawing of each line of the answer, and their axis with its numbers and title."""
-    rows = forest_points(results, answer)
+def forest(answer: Answer, rows: Sequence[Sequence[Point]]) -> tuple[list[str], str]:
+    """Return a drawing of each line of the answer, and their axis with its numbers and title.
+
+    Args:
+        rows: the values of each line.
+    """
     axis = _Axis(*limits([point for points in rows for point in points]))
     drawn = [_row(axis, points, line.verdicts) for points, line in zip(rows, answer.lines)]
     numbers = "".join(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,11 +15,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
 from swarm_logistics_env.study.verdicts.cell import Cell
-from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
-
-from . import templates
-from .templates import Slots, fill
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -171,6 +167,12 @@ def percent(confidence: float) -> str:
 P_LEVEL = percent(CONFIDENCE)  # of intervals of P
 
 
+def share_in_words(share: spi.Interval) -> str:
+    """Return a share with its interval, e.g. "16 % [10, 23]"."""
+    low, high = (0.0 if end is None else 100.0 * end for end in (share.low, share.high))
+    return f"{100.0 * share.value:.0f} % [{low:.0f}, {high:.0f}]"
+
+
 def levels(verdicts: Iterable[Verdict]) -> str:
     """Return the levels of the intervals of verdicts, e.g. "95 %" or "97.8 % to 99.2 %"."""
     confidences = {verdict.level for verdict in verdicts if verdict.level} or {CONFIDENCE}
@@ -233,6 +235,11 @@ def _equivalence_text(verdict: Verdict) -> str:
     return f"P changes by less than {margin}"
 
 
+def with_reason(words: str, reason: str) -> str:
+    """Return words with their reason in brackets, if there is one."""
+    return f"{words} ({reason})" if reason else words
+
+
 def decision_text(verdict: Verdict) -> str:
     """Return the unadjusted decision on the property, and Holm's in brackets where it differs."""
     plain, adjusted = verdict.on_property
@@ -285,110 +292,3 @@ def time_to_clear(cell: Cell) -> str:
     n_late = sum(map(math.isinf, times))
     text = bracketed(interval_to_clear(cell), 0)
     return f"{text} ({n_late} of {len(times)})" if n_late else text
-
-
-def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
-    """Return the verdict on one comparison in words."""
-    comparison = verdict.compared
-    swarm = f", N = {comparison.n_robots}"
-    if comparison.original.setting.kind in ("size", "policy"):
-        swarm = ""
-    head = f"{comparison.policy}, {verdict.property_name}? {comparison.label}{swarm}."
-    slots_by_case = dict(_parts(results, verdict))
-    text = " ".join(fill(templates.VERDICT, slots_by_case))
-    return Sentence(head, text, verdict.conclusion, verdict.on_property.adjusted)
-
-
-def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots]]:
-    """Yield what is known of a verdict: the templates that apply, each with its slots."""
-    estimate = verdict.estimate
-    indicator = verdict.compared.indicator
-    if estimate is None:
-        yield "undefined", {"problem": verdict.problem}
-        return
-    seeds = _seeds_of(results, estimate)
-    if estimate.identical:
-        yield "unaffected", {"indicator": indicator, "value": estimate.value, "seeds": seeds}
-        return
-    interval = limits(estimate, 3)
-    yield (
-        "interval" if interval else "no_interval",
-        {
-            "indicator": indicator,
-            "mark": SATURATED if verdict.saturated else "",
-            "value": fixed(estimate.value, 3, [estimate.threshold]),
-            "level": percent(estimate.confidence),
-            "limits": interval,
-            "seeds": seeds,
-        },
-    )
-    if not estimate.untestable:
-        plain, adjusted = verdict.on_property
-        yield (
-            "decision",
-            {
-                "plain": plain,
-                "p": _p(estimate.p_seen),
-                "adjusted": adjusted,
-                # One seed gives no p, and Holm's placeholder of 1 says nothing.
-                "adjusted_p": _p(None if estimate.p_value is None else verdict.p_adjusted),
-            },
-        )
-    if verdict.on_claim is not None:
-        plain, adjusted = verdict.on_claim
-        words = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
-        yield "claim", {"claim": verdict.claim, "words": words}
-    if verdict.equivalence is not None and verdict.on_equivalence is not None:
-        plain, adjusted = verdict.on_equivalence
-        words = plain if plain == adjusted else f"{plain} ({adjusted} under Holm)"
-        yield (
-            "equivalence",
-            {
-                "question": verdict.equivalence_name,
-                "change": _change(verdict.equivalence.change, verdict.margin),
-                "words": words,
-            },
-        )
-    if verdict.flags:
-        yield "flags", {"flags": " ".join(templates.FLAGS[flag] for flag in verdict.flags)}
-    if "hidden_stalls" in verdict.flags:
-        runs = "seeds" if results.plan.paired else "trials a condition"
-        n_runs = spi.seeds_against_stalls(estimate)
-        yield "hidden_stalls", {"p": estimate.p_value, "n_runs": n_runs, "runs": runs}
-    if estimate.collapsed is not None:
-        yield "collapsed", {"collapsed": estimate.collapsed}
-    if "hidden_collapses" in verdict.flags:
-        n_trainings = spi.trainings_against_collapses(estimate)
-        yield "hidden_collapses", {"p": estimate.p_value, "n_trainings": n_trainings}
-    if results.plan.specification.until_clear and not estimate.untestable:
-        case = "open_after_all_looks" if verdict.stopped_at is None else "clear_at_a_look"
-        yield case, {"n_seeds": estimate.n_seeds, "most": results.looks[-1]}
-    if results.exploratory:
-        yield "exploratory", {}
-
-
-def _seeds_of(results: StudyResults, estimate: Estimate) -> str:
-    """Return over which seeds an estimate is."""
-    seeds = f"{estimate.n_seeds} runs a condition, unpaired"
-    if results.plan.paired:
-        seeds = results.seeds_text
-    if results.plan.specification.until_clear:
-        seeds = f"{estimate.n_seeds} paired seeds"
-    if estimate.n_trainings is None:
-        return seeds
-    return f"{estimate.n_trainings} trainings x {seeds}"
-
-
-def _change(change: Estimate, margin: float) -> str:
-    """Return a change of P with its interval, and the level of that."""
-    text = bracketed(change, 3, [-margin, margin])
-    if change.low is None or change.identical:
-        return text
-    return f"{text} ({percent(change.confidence)})"
-
-
-def _p(p: float | None) -> str:
-    """Return a p-value in brackets, e.g. " (p = 0.013)"; empty: there is none."""
-    if p is None:
-        return ""
-    return " (p < 0.001)" if p < 0.001 else f" (p = {p:.3f})"

@@ -1,54 +1,31 @@
-"""Tables: results, agreement with published values, faults; warnings."""
+"""Tables: results, agreement with published values, and how near each policy is to its edge."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 
-import numpy as np
 from more_itertools import map_reduce
 
-from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.spi.estimate import Estimate
-from swarm_logistics_env.study.questions.comparison import CONFIDENCE, Arm, Family
+from swarm_logistics_env.study.questions.comparison import Arm
 from swarm_logistics_env.study.verdicts.agreement import Agreement
 from swarm_logistics_env.study.verdicts.cell import Cell
-from swarm_logistics_env.study.verdicts.mid_run_faults import (
-    RUNS_ARE_MISSING,
-    RepairCurve,
-    Resilience,
-    resiliences,
-)
+from swarm_logistics_env.study.verdicts.collapses import Edge
 from swarm_logistics_env.study.verdicts.reference import Reference
 from swarm_logistics_env.study.verdicts.results import StudyResults
-from swarm_logistics_env.study.verdicts.verdict import UNAFFECTED, UNDEFINED, Verdict, level_of
+from swarm_logistics_env.study.verdicts.verdict import UNDEFINED, Verdict, level_of
 
 from . import section
-from .collapse_tables import collapsed_in_words, edge_sections
-from .figures import rate_figures
-from .section import NOTHING, Section, Sentence, Texts
+from .section import NOTHING, Section, Texts
 
 CellColumn = tuple[str, Callable[[Cell], str]]
 # What stands behind a table's title, its columns, and the arms of its rows; None: all.
 Layout = tuple[str, list[CellColumn], set[Arm] | None]
 
 
-def verdict_sections(
-    verdicts: Sequence[Verdict], sentences: Sequence[Sentence]
-) -> Iterator[Section]:
-    """Yield the verdicts in words, those of one policy and indicator together."""
-    families: dict[Family, list[tuple[Verdict, Sentence]]] = map_reduce(
-        zip(verdicts, sentences), lambda pair: pair[0].compared.family
-    )
-    for (policy, indicator), pairs in families.items():
-        yield Section(
-            f"{policy}: {DEFINITIONS[indicator].heading}",
-            sentences=tuple(sentence for _, sentence in pairs),
-        )
-
-
-def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Section]:
-    """Yield the tables of a study's results, policy by policy; then how near each comes.
+def cell_tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Section]:
+    """Yield the tables of a study's cells with what is judged of each, policy by policy.
 
     Args:
         for_paper: whether P alone stands beside each indicator, and Holm's verdicts alone.
@@ -56,8 +33,10 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
     verdicts_of: dict[tuple[str, str], list[Verdict]] = map_reduce(
         results.verdicts, lambda verdict: (verdict.compared.policy, verdict.compared.table)
     )
-    for policy, table in dict.fromkeys((cell.policy, cell.table) for cell in results.cells):
-        cells = [cell for cell in results.cells if (cell.policy, cell.table) == (policy, table)]
+    cells_of: dict[tuple[str, str], list[Cell]] = map_reduce(
+        results.cells, lambda cell: (cell.policy, cell.table)
+    )
+    for (policy, table), cells in cells_of.items():
         has_published = any(cell.published is not None for cell in cells)
         has_contacts = any(cell.contacts.value >= 0.0 for cell in cells)  # NaN: not counted
         has_looks = bool(results.looks)
@@ -78,16 +57,19 @@ def tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[Sectio
             )
             headings = tuple(heading for heading, _ in columns)
             yield Section(f"{policy}: {table}{title}", headings, rows)
+
+
+def further_tables(results: StudyResults) -> Iterator[Section]:
+    """Yield agreement with the reference, times until all is delivered, and how near the edge."""
     yield from map(_agreement, results.agreements)
     yield from _text_sections(results)
     yield from _times_to_clear(results.cells)
-    yield from edge_sections(results.edges)
+    yield from _edge_sections(results.edges)
 
 
 def _holm(verdict: Verdict) -> str:
     """Return Holm's verdict, and why it is untestable, or open beside an interval on one side."""
-    word = verdict.on_property.adjusted
-    return f"{word} ({verdict.reason})" if verdict.reason else word
+    return section.with_reason(verdict.on_property.adjusted, verdict.reason)
 
 
 def _layouts(
@@ -277,115 +259,37 @@ def _agreement(agreement: Agreement) -> Section:
     return Section(f"{agreement.policy}: agreement with the published values", lines=tuple(lines))
 
 
-def warnings(results: StudyResults) -> Iterator[str]:
-    """Yield what a reader has to know before any verdict, one sentence each."""
-    if results.damage:
-        yield f"{results.damage}."
-    if any(cell.saturated for cell in results.cells):
-        yield (
-            f"{section.SATURATED} marks a P that is capped, because every item was delivered in at "
-            "least one run, and the indicators that rest on it. A verdict that a larger P could "
-            "turn is open."
+def _edge_sections(edges: Sequence[Edge]) -> Iterator[Section]:
+    """Yield how near each policy is to the size at which half of its runs collapse."""
+    for edge in edges:
+        first = edge.cells[0]
+        share = f"runs collapsed, {section.P_LEVEL}"
+        columns = "N", share, "S of all runs", "S of the runs that did not"
+        line = (
+            f"{critical_size_in_words(edge)} (logistic in log N, quasi-likelihood). Two phases "
+            "are named where a test with 5 % of error over the sizes says so; the other sizes are "
+            "told by the one that shows them most clearly."
         )
-    if results.collapses:
-        words = collapsed_in_words(
-            results.collapses, names_policies=len(results.policies) > 1, most=None
+        title = f"{first.policy}: how near the edge, {first.table}"
+        yield Section(title, columns, tuple(_rows_of_edge(edge)), (line,))
+
+
+def critical_size_in_words(edge: Edge) -> str:
+    """Return at which size half of the runs collapse; nothing is told beyond the largest."""
+    largest = edge.cells[-1].words
+    if edge.size.value > edge.cells[-1].arm.setting.value:
+        return f"Less than half of the runs collapse up to {largest}"
+    if edge.size.low == 0.0 and edge.size.high == math.inf:
+        return (
+            f"Half of the runs collapse at about N = {section.fixed(edge.size.value, 0)}, without "
+            "interval: the sizes do not show both that few and that nearly all runs collapse"
         )
-        yield (
-            f"Runs are of two phases, a good one and one that has collapsed: {words}. A mean P is "
-            "of both."
-        )
-    if results.exploratory:
-        yield (
-            "The verdicts are exploratory: they are over other seeds than the study declared "
-            "before its first run, so they err more often than their level."
-        )
-    if results.late_margin:
-        yield (
-            "The verdicts on the margin of equivalence are exploratory: another margin was "
-            "declared before the first run."
-        )
-    for cell in results.cells:
-        if cell.problem:
-            yield f"{cell.policy}, {cell.table}, {cell.arm.setting} is incomplete: {cell.problem}."
-    for verdict in results.verdicts:
-        if verdict.problem:
-            comparison = verdict.compared
-            name = f"{comparison.policy}, {comparison.indicator}, {comparison.label}"
-            yield f"{name} is undefined: {verdict.problem}."
+    return f"Half of the runs collapse at N = {section.bracketed(edge.size, 0)}"
 
 
-_SINGLE_TEXT = (
-    "Until the first window in which a run delivers as much again as the paired run with the "
-    "robots removed; those that never do are censored (Kaplan and Meier). Deliveries scatter, so "
-    "what counts is the distance from the null: pairs without a fault that differ in behaviour."
-)
-
-
-def fault_sections(results: StudyResults) -> Iterator[Section]:
-    """Yield the measures of faults in mid-run, and the curves of what is delivered around them."""
-    all_measures = list(resiliences(results))
-    measures = [measure for measure in all_measures if measure.problem != RUNS_ARE_MISSING]
-    if not measures:
-        return
-    faults = [
-        (measure.compared.policy, str(measure.compared.changed.setting)) for measure in measures
-    ]
-    yield _resilience_table(faults, measures, results.seeds_text)
-    figures = tuple(rate_figures(all_measures, results.seeds_text))
-    if figures:
-        yield Section("", figures=figures)
-    columns = ("policy", "fault", "median [s]", "not back", "null's median [s]", "null not back")
-    rows = tuple(
-        (*fault, *_back(measure.single[0]), *_back(measure.single[1]))
-        for fault, measure in zip(faults, measures)
-        if measure.single
-    )
-    problems = [
-        f"{policy}, {fault}: no time to come back: {measure.problem}."
-        for (policy, fault), measure in zip(faults, measures)
-        if measure.problem
-    ]
-    yield Section("Time until single runs are back", columns, rows, (_SINGLE_TEXT, *problems))
-
-
-def _resilience_table(
-    faults: Sequence[tuple[str, str]], measures: Sequence[Resilience], seeds: str
-) -> Section:
-    indices = [
-        index
-        for measure in measures
-        for index in (measure.against_removed, measure.against_whole)
-        if index
-    ]
-    level = section.percent(indices[0].confidence if indices else CONFIDENCE)
-    columns = (
-        "policy", "fault", f"over the removed robots' [{level}]", "above 1",
-        f"over the whole swarm's [{level}]", "above 1 - m/N",
-    )  # fmt: skip
-    rows = tuple(
-        (*fault, *_index(measure.against_removed), *_index(measure.against_whole))
-        for fault, measure in zip(faults, measures)
-    )
-    line = (
-        "Deliveries after the onset over those of the paired reference. Reference with the robots "
-        "removed at the onset: fault tolerance local in time; whole swarm: robustness local in "
-        f"time. Verdicts unadjusted; {seeds}."
-    )
-    return Section("Resilience: deliveries after the onset", columns, rows, (line,))
-
-
-def _index(estimate: Estimate | None) -> Texts:
-    """Return an index with its interval, and its decision."""
-    if estimate is None:
-        return NOTHING, "undefined"
-    word = UNAFFECTED if estimate.identical else estimate.verdict
-    mark = section.SATURATED if "capped" in estimate.flags else ""
-    return section.bracketed(estimate, 3), word + mark
-
-
-def _back(curve: RepairCurve) -> Texts:
-    """Return the median time until runs are back, and how many never are."""
-    median = curve.curve.median()
-    time = "not reached" if median is None else f"{median:g}"
-    return time, f"{np.count_nonzero(~curve.back)} of {curve.back.size} runs"
+def _rows_of_edge(edge: Edge) -> Iterator[tuple[str, ...]]:
+    of_all = edge.scalabilities([cell.by_seed.ravel() for cell in edge.cells])
+    of_good = edge.scalabilities(edge.good_runs)
+    for cell, share, *values in zip(edge.cells, edge.shares, of_all, of_good):
+        shown = (NOTHING if value is None else section.fixed(value, 3) for value in values)
+        yield cell.words, section.share_in_words(share), *shown

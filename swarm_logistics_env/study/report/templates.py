@@ -1,7 +1,7 @@
 """The sentences of a report, each under the name of its case, with slots in braces.
 
-`answer.py`, `answer_notes.py` and `section.py` decide which cases apply, and what stands in their
-slots.
+`answer.py`, `answer_notes.py`, `for_a_paper.py` and `sentences.py` decide which cases apply, and
+what stands in their slots.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ NOTES = {
     "intervals": "{level} intervals",
     "intervals_of_several_levels": "{level} intervals, or as said behind them",
     "adjusted": "verdicts are Holm-adjusted",
-    "few_seeds": "provisional (below ten seeds)",
+    "assumes_normal": "provisional (below ten seeds)",
     "cannot_fail": "untestable where it cannot lie below the threshold, as P cannot below 0",
     "too_few_seeds": "two seeds give no verdict",
     "few_items": "P is small: a longer duration tells more",
@@ -116,10 +116,7 @@ FOR_A_PAPER = {
     "end": ".",
 }
 METHOD = "Holm's method, {error} error"
-WORLD = {
-    "task": "the task {task}",
-    "trials": "trials of {file}{setup}",
-}
+WORLD = {"task": "the task {task}", "trials": "trials of {file}{setup}"}
 QUESTION_WITH_VALUE = {
     "value": "{question} = {value}",
     "interval": "{question} = {value}, {level} interval {interval}",

@@ -21,11 +21,13 @@ from .page import html
 from .section import Section
 
 
-def write_report(
-    results: StudyResults,
-    directory: Path,
-    report: Document | None = None,
-    style: FigureStyle = PAGE_STYLE,
+def write_report(results: StudyResults, directory: Path) -> tuple[Path, ...]:
+    """Write the report on a study's results, as `write_document` does."""
+    return write_document(document(results), directory)
+
+
+def write_document(
+    report: Document, directory: Path, style: FigureStyle = PAGE_STYLE
 ) -> tuple[Path, ...]:
     """Write report.md, cells.csv, claims.csv, tables.tex, every figure's data, and with the extra
     `study` report.html and every figure as SVG, PDF and PNG; return the paths of report and tables.
@@ -33,38 +35,34 @@ def write_report(
     Raises:
         StudyError: a file cannot be written.
     """
-    report = report or document(results)
     advice = how_to_get_figures()
-    names = "report.md", "cells.csv", "claims.csv", "tables.tex"
-    paths = tuple(directory / name for name in names)
     pictures = directory / "figures"
-    page = directory / "report.html"
+    figures = () if advice else report.figures
+    texts = {"tables.tex": latex_tables(report.paper)}
+    texts["report.md"] = markdown(report, pictures=None if advice else pictures.name, note=advice)
+    tables = {"cells.csv": report.cells, "claims.csv": report.claims}
+    tables |= {f"{pictures.name}/{figure.name}.csv": figure.data for figure in report.figures}
     try:
         pictures.mkdir(parents=True, exist_ok=True)
-        drawn = () if advice else report.figures
-        drawings = {figure.name: images(figure.draw, figure.height, style) for figure in drawn}
-        write_csv(paths[1], results.cell_table, StudyError)
-        write_csv(paths[2], results.verdict_table, StudyError)
-        for figure in report.figures:
-            write_csv(pictures / f"{figure.name}.csv", figure.data, StudyError)
-        latex = latex_tables(results, report)
-        write_text(paths[3], latex)
-        if advice:
-            write_text(paths[0], markdown(report, note=advice))
-            return paths
+        drawings = {figure.name: images(figure.draw, figure.height, style) for figure in figures}
+        if not advice:
+            svgs = {name: drawing.svg for name, drawing in drawings.items()}
+            if style != PAGE_STYLE:
+                svgs = {figure.name: svg_image(figure.draw, figure.height) for figure in figures}
+            texts["report.html"] = html(report, svgs, texts["tables.tex"])
+        for name, table in tables.items():
+            write_csv(directory / name, table, StudyError)
         for name, drawing in drawings.items():
             write_text(pictures / f"{name}.svg", drawing.svg)
             for ending, content in (("pdf", drawing.pdf), ("png", drawing.png)):
                 with atomic_write(pictures / f"{name}.{ending}", StudyError) as part:
                     part.write_bytes(content)
-        write_text(paths[0], markdown(report, pictures=pictures.name))
-        svgs = {name: drawing.svg for name, drawing in drawings.items()}
-        if style != PAGE_STYLE:
-            svgs = {figure.name: svg_image(figure.draw, figure.height) for figure in drawn}
-        write_text(page, html(results, report, svgs, latex))
+        for name, text in texts.items():
+            write_text(directory / name, text)
     except OSError as error:
         raise StudyError(f"cannot write {error.filename}: {error.strerror}") from error
-    return page, *paths
+    names = "report.html", "report.md", "cells.csv", "claims.csv", "tables.tex"
+    return tuple(directory / name for name in names if name in texts or name in tables)
 
 
 def write_text(path: Path, text: str) -> None:

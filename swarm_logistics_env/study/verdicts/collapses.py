@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +13,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
-from swarm_logistics_env.spi.phases import (
-    FEWEST_RUNS,
-    LEVEL,
-    collapsed_runs,
-    critical_size,
-)
+from swarm_logistics_env.spi.phases import FEWEST_RUNS, LEVEL, collapsed_runs, critical_size
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
 from swarm_logistics_env.study.tasks.task import Outcome
 
@@ -61,6 +57,20 @@ class Edge:
     shares: tuple[spi.Interval, ...]
     good_runs: tuple[Numbers, ...]
     size: spi.Interval
+
+    def scalabilities(self, runs: Sequence[Numbers]) -> Iterator[float | None]:
+        """Yield S of mean P from the size before, for each size; None: it has none.
+
+        Args:
+            runs: P of runs at each size, shape (n,).
+        """
+        yield None
+        sizes = [cell.arm.setting.value for cell in self.cells]
+        for (size, before), (next_size, after) in pairwise(zip(sizes, runs)):
+            if len(before) and len(after) and before.mean() > 0.0:
+                yield (after.mean() / before.mean() - 1.0) / (next_size / size - 1.0)
+            else:
+                yield None
 
 
 def collapses(cells: Sequence[Cell]) -> tuple[Collapse, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from swarm_logistics_env.study.tasks.task import Outcome, Outcomes
 
 from .agreement import Agreement, agreements
 from .cell import Cell
-from .collapses import Collapse, Edge, collapses, edges
+from .collapses import Collapse, Edge, collapses, edges, untestable
 from .columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from .reference import PAPER, Reference
 from .until_clear import LatestLook, latest_look
@@ -111,6 +111,11 @@ class StudyResults:
     def collapses(self) -> tuple[Collapse, ...]:
         """The conditions whose runs are of two phases."""
         return collapses(self.cells)
+
+    @cached_property
+    def untestable(self) -> Mapping[str, Sequence[Cell]]:
+        """The conditions with enough runs that were not tested for two phases, by the reason."""
+        return untestable(self.cells)
 
     @cached_property
     def edges(self) -> tuple[Edge, ...]:

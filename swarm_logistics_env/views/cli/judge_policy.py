@@ -16,7 +16,6 @@ from swarm_logistics_env.spi.estimate import LEAST_SEEDS
 from swarm_logistics_env.study.questions.presets import load_preset
 from swarm_logistics_env.study.questions.specification import FIRST_LOOK
 from swarm_logistics_env.study.report import benchmark
-from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.section import slug
 from swarm_logistics_env.study.report.write import write_report
 from swarm_logistics_env.study.runs.engines import engine_named
@@ -237,4 +236,4 @@ def _show_benchmark(results: StudyResults, out: Path) -> None:
     show(benchmark.table(results, entries.references))
     score = benchmark.score(results, entries.references)
     show(benchmark.leaderboard({**entries.scores, results.policies[0]: score}))
-    echo(f"Report: {write_report(results, out, document(results))[0]}")
+    echo(f"Report: {write_report(results, out)[0]}")

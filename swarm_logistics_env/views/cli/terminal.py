@@ -16,15 +16,15 @@ from typer import echo
 from swarm_logistics_env import spi
 from swarm_logistics_env.core.records import plain
 from swarm_logistics_env.study.report.answer import MOST_LINES, answer
-from swarm_logistics_env.study.report.digest import digest
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.drawing import PAGE_STYLE, FigureStyle
 from swarm_logistics_env.study.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.study.report.section import NOTHING, Section, Texts, levels, number
+from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.report.write import (
     how_to_get_figures,
     section_markdown,
-    write_report,
+    write_document,
 )
 from swarm_logistics_env.study.runs.engines import Tally
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -90,12 +90,10 @@ def show_report(
     # Printed first: the answer is shown even where no file can be written.
     console = Console()
     width = console.width if console.is_terminal else _PLAIN_WIDTH
-    if full:
-        text = digest(answer(results, most=None), width, None)
-    else:
-        text = digest(report.answer, width, MOST_LINES)
+    shown = answer(results, most=None) if full else report.answer
+    text = terminal_answer(shown, width, None if full else MOST_LINES)
     echo("\n".join(map(plain, text.split("\n"))))
-    echo(f"Report: {write_report(results, out, report, style)[0]}")
+    echo(f"Report: {write_document(report, out, style)[0]}")
     if advice := how_to_get_figures():
         echo(advice)
     else:
@@ -127,7 +125,7 @@ class AnswerSoFar:
         if not seeds:
             lines = f"{now}: {so_far.performance}"
         elif not self._looked:
-            lines = f"{now}, a first look:\n{digest(so_far, _PLAIN_WIDTH, MOST_LINES)}\n"
+            lines = f"{now}, a first look:\n{terminal_answer(so_far, _PLAIN_WIDTH, MOST_LINES)}\n"
             self._looked = True
         else:
             n_clear = sum(verdict.stopped_at is not None for verdict in verdicts)

@@ -13,8 +13,8 @@ import pytest
 from swarm_logistics_env import judge as judge_trials
 from swarm_logistics_env import spi
 from swarm_logistics_env.study.report.answer import MOST_LINES, Line, answer
-from swarm_logistics_env.study.report.digest import digest
 from swarm_logistics_env.study.report.section import limits
+from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.study.verdicts.verdict import UNAFFECTED, Decision
@@ -64,10 +64,10 @@ def test_digest_fits_the_screen_and_nothing_is_cut(
     width: int, few: StudyResults, compared: StudyResults
 ) -> None:
     for results in (few, compared):
-        lines = digest(answer(results), width).splitlines()
+        lines = terminal_answer(answer(results), width).splitlines()
         assert len(lines) <= MOST_LINES
         assert not any("…" in line for line in lines if "N 5→" not in line)
-        all_lines = digest(answer(results, most=None), width, most=None).splitlines()
+        all_lines = terminal_answer(answer(results, most=None), width, most=None).splitlines()
         assert max(map(len, [*lines, *all_lines])) <= width
         assert len(all_lines) >= len(results.verdicts)
         # No line is folded within the values of a question, where there is room for them.
@@ -164,7 +164,7 @@ def test_p_of_a_policy_is_that_of_its_first_table() -> None:
 
 
 def test_policies_stand_one_below_the_other_each_with_its_p(compared: StudyResults) -> None:
-    text = digest(answer(compared), 80)
+    text = terminal_answer(answer(compared), 80)
     assert re.search(r"at N = 25, no fault: swarm-dt 39\.\d \[[\d., ]+\],\s+swarm-dt-follow", text)
     assert all(
         re.match(r"swarm-dt(-follow)?: ", question) for question in answer(compared).questions
@@ -194,5 +194,5 @@ def test_a_study_that_compares_policies_alone_says_p_of_each_in_its_first_table(
         ablations=[{"title": title, "policy": "homing"} for title in ("as it is", "again")],
     )
     study.run()
-    text = digest(answer(study.findings()), 80)
+    text = terminal_answer(answer(study.findings()), 80)
     assert re.search(r"at N = 4, as it is: swarm-dt [\d.]+ \[.*\], homing\s+[\d.]+ \[", text)

@@ -47,7 +47,7 @@ def results() -> StudyResults:
 
 @pytest.fixture(scope="module")
 def latex(results: StudyResults) -> str:
-    return latex_tables(results, document(results))
+    return latex_tables(document(results).paper)
 
 
 def rows_of(latex: str, label: str) -> list[str]:
@@ -109,7 +109,7 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     faults = [{"modes": ["FM1"], "robots": [2]}]
     study = Study(policies=["homing"], seeds=6, faults=faults, indicators=["R"])
     few = judged(study, lambda _, setting, seed: delivered(p[int(setting.value)][seed]))
-    latex, reason = latex_tables(few, document(few)), "so few runs may hide stalled ones"
+    latex, reason = latex_tables(document(few).paper), "so few runs may hide stalled ones"
     (row,) = rows_of(latex, "tab:homing-indicators")
     assert row.endswith("open (stalls) \\\\")
     assert f"open: undecided. Open (stalls): {reason}. Verdicts are" in latex
@@ -117,7 +117,7 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     assert "xploratory" not in latex + in_a_sentence(few, answer(few))
     undeclared = replace(few, exploratory=True)
     words = "xploratory: over other seeds than were declared before the first run."
-    assert latex_tables(undeclared, document(undeclared)).count(f" E{words} ") == 2
+    assert latex_tables(document(undeclared).paper).count(f" E{words} ") == 2
     assert in_a_sentence(undeclared, answer(undeclared)).endswith(f"; e{words}")
 
 
@@ -136,7 +136,7 @@ def test_no_table_of_a_judged_policy_is_wider_than_the_page(page: str, tmp_path:
         return delivered(draw.poisson(30.0 + 0.3 * setting.value), digest=f"{setting} {seed}")
 
     results = judged(study, play)  # type: ignore[arg-type]
-    latex = latex_tables(results, document(results))
+    latex = latex_tables(document(results).paper)
     assert " to 99.17" in latex
     assert "Overfull" not in compiled(latex, page, tmp_path)
 

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from swarm_logistics_env import spi
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
-from swarm_logistics_env.study.report.digest import digest
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.study.report.latex import latex_tables
@@ -26,6 +25,7 @@ from swarm_logistics_env.study.report.section import (
     levels,
     percent,
 )
+from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.report.write import markdown, write_report
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Outcome
@@ -107,10 +107,10 @@ def test_every_surface_names_the_level_that_it_prints(
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     full_document = document(stopped)
     surfaces = {
-        "terminal": digest(answer(stopped), 80),
+        "terminal": terminal_answer(answer(stopped), 80),
         "report": markdown(full_document),
         "page": page.split("<script", maxsplit=1)[0],
-        "tables": latex_tables(stopped, full_document).replace("\\,\\%", " %"),
+        "tables": latex_tables(full_document.paper).replace("\\,\\%", " %"),
         "sentence": in_a_sentence(stopped, answer(stopped)),
         "captions": " ".join(figure.caption for figure in full_document.figures),
     }

@@ -11,7 +11,7 @@ from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.drawing import svg_image
 from swarm_logistics_env.study.report.figures import trade_off_figure
 from swarm_logistics_env.study.report.section import NOTHING
-from swarm_logistics_env.study.report.tables import CONTACTS_HEADING, tables
+from swarm_logistics_env.study.report.tables import CONTACTS_HEADING, cell_tables
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Outcome
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -62,7 +62,7 @@ def test_a_condition_with_a_run_that_nobody_counted_is_missing_not_0() -> None:
     assert cells["homing", "N = 10"].fast_contacts is None
     assert cells["homing", "N = 5"].fast_contacts == 0.5
     assert cells["homing", "N = 5"].overlap_share is None
-    table = next(iter(tables(mixed)))
+    table = next(iter(cell_tables(mixed)))
     column = table.columns.index(CONTACTS_HEADING)
     assert [row[column] for row in table.rows] == ["9.0 [6.5, 11.5]", NOTHING, "9.0 [6.5, 11.5]"]
 
@@ -71,4 +71,4 @@ def test_without_any_count_there_is_neither_picture_nor_column() -> None:
     study = Study(policies=["homing"], seeds=3, sizes=[{"values": [5, 10]}])
     older = judged(study, lambda *_: delivered(7))
     assert list(trade_off_figure(older)) == []
-    assert all(CONTACTS_HEADING not in table.columns for table in tables(older))
+    assert all(CONTACTS_HEADING not in table.columns for table in cell_tables(older))

@@ -12,11 +12,12 @@ from xml.etree import ElementTree
 import pytest
 
 from swarm_logistics_env.study.report.answer import answer
-from swarm_logistics_env.study.report.digest import digest
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.drawing import images
 from swarm_logistics_env.study.report.latex import latex_tables
-from swarm_logistics_env.study.report.section import Section, limits, sentence, word_to_count
+from swarm_logistics_env.study.report.section import Section, limits, word_to_count
+from swarm_logistics_env.study.report.sentences import sentence
+from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.report.write import markdown, section_markdown, write_report
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from tests.conftest import drawn_in_all_formats
@@ -62,8 +63,8 @@ def test_a_report_is_as_recorded(tmp_path: Path) -> None:
     report = document(results)
     texts = {
         "report.md": markdown(report).partition("\n## Set-up")[0],
-        "tables.tex": latex_tables(results, report),
-        "answer.txt": digest(answer(results), 80),
+        "tables.tex": latex_tables(report.paper),
+        "answer.txt": terminal_answer(answer(results), 80),
     }
     for name, text in texts.items():
         made = tmp_path / name

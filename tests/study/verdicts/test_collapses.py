@@ -9,7 +9,7 @@ import pytest
 from swarm_logistics_env import judge
 from swarm_logistics_env.spi import Phases
 from swarm_logistics_env.study.report.answer import answer
-from swarm_logistics_env.study.report.collapse_tables import collapsed_in_words
+from swarm_logistics_env.study.report.answer_notes import collapsed_in_words
 from swarm_logistics_env.study.verdicts.collapses import collapses
 
 

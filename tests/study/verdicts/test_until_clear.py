@@ -19,7 +19,7 @@ from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.study.questions.specification import looks_up_to
 from swarm_logistics_env.study.report.answer import answer
-from swarm_logistics_env.study.report.section import sentence
+from swarm_logistics_env.study.report.sentences import sentence
 from swarm_logistics_env.study.runs.engines import Shard
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Outcome, Run
@@ -73,9 +73,9 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     ) * 3
     assert (doubled.p_adjusted, doubled.stopped_at) == (None, 10)
     assert (half.conclusion, half.p_adjusted is None) == ("supported", False)
-    (line, _), last = answer(study.findings())[2:]
-    assert line.verdict_text == "untestable: it cannot be below 0"
-    assert "untestable where it cannot lie below the threshold" in last
+    study_answer = answer(study.findings())
+    assert study_answer.lines[0].verdict_text == "untestable: it cannot be below 0"
+    assert "untestable where it cannot lie below the threshold" in study_answer.notes
     text = sentence(study.findings(), doubled).text
     assert "it cannot lie below the threshold, so it is not tested" in text
     assert "djusted" not in text

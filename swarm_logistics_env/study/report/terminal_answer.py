@@ -14,7 +14,7 @@ from .answer import MOST_LINES, Answer, Line
 _NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
-def digest(answer: Answer, width: int, most: int | None = MOST_LINES) -> str:
+def terminal_answer(answer: Answer, width: int, most: int | None = MOST_LINES) -> str:
     """Return the answer for a terminal.
 
     Args:
