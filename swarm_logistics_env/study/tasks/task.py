@@ -335,6 +335,7 @@ DEFAULT = "warehouse"
 TASKS = {
     DEFAULT: "swarm_logistics_env.study.tasks.warehouse_task:WAREHOUSE",
     "clearing": "swarm_logistics_env.study.tasks.warehouse_task:CLEARING",
+    "on-time": "swarm_logistics_env.study.tasks.warehouse_task:ON_TIME",
     "recorded trials": "swarm_logistics_env.study.tasks.warehouse_task:RECORDED",
 }
 

@@ -20,6 +20,7 @@ Judged = TypeVar("Judged")
 Columns: TypeAlias = Mapping[str, tuple[type, Callable[[Judged], object], str]]
 # Mean over runs of what `OrderMeasures` has; the columns are there where any cell has a value.
 ORDER_MEASURES = {
+    "on_time": "orders that were served by their due time",
     "share_on_time": "share of the orders that were served by their due time",
     "mean_tardiness": "mean time by which orders were late [s]",
     "p95_tardiness": "95th percentile of it [s]",

@@ -95,25 +95,39 @@ def _as_text(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else orders_title(floor_title(str(value)))
 
 
+# Robots that could exist. Frozen, so that what is tuned or trained on it can be compared. Each
+# number has its source; radius, mass, turn rate and ranges are the defaults.
+_REALISTIC: dict[str, Any] = {
+    "drive": "differential",  # chosen: harder than DOTS, which drive in every direction
+    "max_speed": 1.0,  # DOTS: the developers' documents
+    "max_acceleration": 2.0,  # simulator: its header
+    "ranger_noise": 0.03,  # chosen: a fourth of a robot's radius
+    "position_noise": 0.05,  # chosen: a fifth of a robot's diameter
+    "sensor_dropout": 0.02,  # chosen: one reading of 50
+    "radio_loss": 0.1,  # chosen: one message of ten
+    "heading_drift": 0.05,  # chosen: 3 degrees/s, a gyro that nobody calibrated
+    "handling_time": 1.0,  # chosen: to lift, to put down, to deliver
+    "dock_capacity": 1.0,  # chosen: whoever takes deliveries needs 1 s for each
+}
+# Chosen, so that 25 robots are late now and then: three bursts of 30 orders, one every 1.3 s.
+_ORDERS: dict[str, Any] = {
+    **_REALISTIC,
+    "duration": 600.0,
+    "restock": True,
+    "orders": "bursts",
+    "order_rate": 0.15,
+    "order_cycle": 200.0,
+    "order_due": 60.0,
+    "n_requests": 5,
+    "request_timeout": 60.0,
+}
 SCENARIO_PRESETS: dict[str, Scenario] = {
     "paper": Scenario(),
     # Table I delivers 74 of its items, so it cannot have held 60.
     "paper_scalability": Scenario(n_items=100),
     "dots": Scenario(max_speed=1.0, max_acceleration=2.0),
-    # Frozen, so that what is tuned or trained on it can be compared. Each number has its source;
-    # radius, mass, turn rate and ranges are the defaults.
-    "realistic": Scenario(
-        drive="differential",  # chosen: harder than DOTS, which drive in every direction
-        max_speed=1.0,  # DOTS: the developers' documents
-        max_acceleration=2.0,  # simulator: its header
-        ranger_noise=0.03,  # chosen: a fourth of a robot's radius
-        position_noise=0.05,  # chosen: a fifth of a robot's diameter
-        sensor_dropout=0.02,  # chosen: one reading of 50
-        radio_loss=0.1,  # chosen: one message of ten
-        heading_drift=0.05,  # chosen: 3 degrees/s, a gyro that nobody calibrated
-        handling_time=1.0,  # chosen: to lift, to put down, to deliver
-        dock_capacity=1.0,  # chosen: whoever takes deliveries needs 1 s for each
-    ),
+    "realistic": Scenario(**_REALISTIC),
+    "orders": Scenario(**_ORDERS),
     # DotBots, third version. Published: radius (pydotbot, dotbot.sim.collisions), cruise speed and
     # the spin at 200 mm/s a wheel (DotBot-libs, drv/steering.h). Chosen: all else; ranges are the
     # paper's, smaller as the robots are, and so many requests that a trial has deliveries to count.

@@ -44,13 +44,15 @@ class OrderMeasures:
     that were delivered and those that were overdue at the end; the latter as if served then.
 
     Attributes:
-        share_on_time: share of the orders with a due time that were served by then.
+        on_time: orders with a due time that were served by then.
+        share_on_time: their share of all that have one.
         mean_tardiness: mean time by which these were late, 0 for those on time [s].
         p95_tardiness: 95th percentile of the same [s].
         longest_queue: most orders that were open or waited at a time; None: none came by itself.
         put_back: requests that were not served within `request_timeout`; None: none was put back.
     """
 
+    on_time: NonNegativeInt | None = None
     share_on_time: NonNegativeFloat | None = None
     mean_tardiness: NonNegativeFloat | None = None
     p95_tardiness: NonNegativeFloat | None = None
@@ -208,9 +210,11 @@ def order_measures(
     )
     if not tardiness.size:
         return counts
+    n_on_time = int((tardiness <= _GRACE).sum())
     return replace(
         counts,
-        share_on_time=round(float((tardiness <= _GRACE).mean()), 9),
+        on_time=n_on_time,
+        share_on_time=round(n_on_time / tardiness.size, 9),
         mean_tardiness=round(float(tardiness.mean()), 9),
         p95_tardiness=round(float(np.quantile(tardiness, 0.95)), 9),
     )
