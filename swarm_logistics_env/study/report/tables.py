@@ -38,14 +38,12 @@ def cell_tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[S
     )
     for (policy, table), cells in cells_of.items():
         has_published = any(cell.published is not None for cell in cells)
-        has_contacts = any(cell.contacts.value >= 0.0 for cell in cells)  # NaN: not counted
         has_looks = bool(results.looks)
         verdicts = verdicts_of.get((policy, table), [])
         columns = [_SETTING, *_performance_columns(published=has_published, looks=has_looks)]
         if not for_paper:
             columns.append((f"one run [{section.P_LEVEL}]", _one_run))
-            if has_contacts:
-                columns.append((CONTACTS_HEADING, contacts_text))
+            columns += _counted_columns(cells)
         decision = _holm if for_paper else section.decision_text
         answers = partial(_answers, decision, published=has_published, looks=has_looks)
         layouts = _layouts(verdicts, columns, answers, repeats_p=for_paper)
@@ -107,6 +105,37 @@ def _performance_columns(*, published: bool, looks: bool) -> Iterator[CellColumn
     yield f"{heading} [{section.P_LEVEL}]", section.mean_p
     if looks:  # conditions have seeds as many as were needed
         yield "seeds", lambda cell: str(cell.n_seeds)
+
+
+def _counted_columns(cells: Sequence[Cell]) -> Iterator[CellColumn]:
+    """Yield what was counted beside P in any of these cells."""
+    if any(cell.contacts.value >= 0.0 for cell in cells):  # NaN: not counted
+        yield CONTACTS_HEADING, contacts_text
+    if any(cell.mean_of("stands_still") is not None for cell in cells):
+        yield "runs that stand still", _standstills
+    if any(cell.mean_of("share_on_time") is not None for cell in cells):
+        yield "on time", partial(_percent_of, measure="share_on_time")
+        yield "95 % late by at most [s]", partial(_rounded_mean, measure="p95_tardiness")
+    if any(cell.mean_of("longest_queue") is not None for cell in cells):
+        yield "longest queue", partial(_rounded_mean, measure="longest_queue")
+
+
+def _standstills(cell: Cell) -> str:
+    """Return the share of runs that deliver nothing at their end, and the longest standstill."""
+    longest = cell.mean_of("longest_standstill")
+    if longest is None:
+        return NOTHING
+    return f"{_percent_of(cell, 'stands_still')} (longest {longest:.0f} s)"
+
+
+def _percent_of(cell: Cell, measure: str) -> str:
+    share = cell.mean_of(measure)
+    return NOTHING if share is None else f"{100.0 * share:.0f} %"
+
+
+def _rounded_mean(cell: Cell, measure: str) -> str:
+    mean = cell.mean_of(measure)
+    return NOTHING if mean is None else f"{mean:.0f}"
 
 
 _SETTING: CellColumn = ("", lambda cell: cell.words)
