@@ -53,6 +53,17 @@ def test_the_way_grows_by_what_a_robot_drives_and_so_does_the_depth() -> None:
     assert along[x < 2.0].max() <= 0.0 <= along[x > 2.0].min()
 
 
+def test_no_way_jumps_along_free_floor() -> None:
+    floor = world_of(floor="::::::::A\n:==:==::A\n:==:::=:A\n::::=:::A").floor
+    points = np.random.default_rng(0).uniform((0.0, 0.0), (4.5, 2.0), (3000, 2))
+    for step in ((0.01, 0.0), (0.0, 0.01)):
+        beside = points + step
+        free = floor.is_free(points) & floor.is_free(beside)
+        change = floor.along(beside[free]) - floor.along(points[free])
+        # Beside a rack a way is that of the centre of a cell, half a cell away.
+        assert np.abs(change).max() < 0.25 + 0.01
+
+
 def test_a_hall_of_forty_metres_has_ways() -> None:
     rows = ["A" + ":" * 79] * 80
     assert -world_of(floor="\n".join(rows)).floor.along([[39.9, 20.0]])[0] == pytest.approx(
