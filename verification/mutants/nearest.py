@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from importlib.util import resolve_name
+from os.path import commonprefix
 from pathlib import Path
 from typing import NamedTuple
 
@@ -52,8 +53,13 @@ class Nearest:
         module = _dotted(Path(PACKAGE) / file)
         folder = self._folder_of_tests(Path(file).parent)
         defined = self._names[module].defined
-        # A test that uses more of what the module defines is more about it.
-        ranked = sorted(self._tests, key=lambda test: -len(defined & self._tests[test].used))
+
+        def rank(test: Path) -> tuple[int, int]:
+            """A test that uses more of what the module defines, or is called as it, is nearer."""
+            common = commonprefix([Path(file).stem, test.stem.removeprefix("test_")])
+            return -len(defined & self._tests[test].used), -len(common)
+
+        ranked = sorted(self._tests, key=rank)
         importing = [test for test in ranked if module in self._imports_of_tests[test]]
         users = [user for user, modules in self._imports.items() if module in modules]
         candidates = [
