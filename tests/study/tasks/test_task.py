@@ -43,6 +43,7 @@ def test_a_file_names_its_task_by_import_path_and_the_store_finds_it_again(tmp_p
         ('policies = ["swarm-dt", "mine:Policy"]', "policy 'mine:Policy'"),
         ('policies = [{ name = "mine:Policy", parameters = { a = 1 } }]', "policy 'mine:Policy'"),
         ('scenario = { bodies = "mine:Bodies" }', "bodies 'mine:Bodies'"),
+        ('sizes = [{ values = [2, 4], scenario = { bodies = "my.py:B" } }]', "bodies 'my.py:B'"),
     ],
 )
 def test_whatever_is_code_in_a_file_is_refused(line: str, name: str, tmp_path: Path) -> None:
