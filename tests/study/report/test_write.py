@@ -92,26 +92,35 @@ UNPAIRED = re.sub(r"^[^,]*,", "", PAIRED, flags=re.MULTILINE)
         (
             {"seeds": 20},
             (),
-            ["in 20 simulated runs of each of 2 conditions, paired by seed. We report robustness R,",
-             "the 95 % interval that inverts the paired t-test of a logarithm. An indicator is",
-             "where this test rejects at 2.5 % on that side,", "less than 10 % of P_o"],
+            [
+                "in 20 simulated runs of each of 2 conditions, paired by seed.",
+                "We report robustness R,",
+                "the 95 % interval that inverts the paired t-test of a logarithm. An indicator is",
+                "where this test rejects at 2.5 % on that side,",
+                "less than 10 % of P_o",
+            ],
         ),
         (
             {"seeds": 20},
             (10, 20),
-            ["in at least 20 simulated runs", "the interval that inverts", "after 10 and 20 seeds",
-             "hold the true value with 95 %. An", "rejects at its share of 2.5 % on that side"],
+            [
+                "in at least 20 simulated runs",
+                "the interval that inverts",
+                "after 10 and 20 seeds",
+                "hold the true value with 95 %. An indicator",
+                "rejects at its share of 2.5 % on that side",
+            ],
         ),
         (
             {"seeds": 2, "policies": ["ppo-robust@all"]},
             (),
             ["logarithm. An interval over trainings holds for trainings like those played;"],
         ),
-        (PAIRED, (), ["in 8 trials of each of 2 conditions, paired by seed.", "the paired t-test"]),
-        (BLOCKS, (), ["in 7 blocks, by the means of their trials in 2 conditions.", "the paired t-"]),
-        (UNPAIRED, (), ["in up to 8 independent trials of each of 2 conditions.", "Welch's t-test"]),
+        (PAIRED, (), ["in 8 trials of each of 2 conditions, paired by seed.", "paired t-test"]),
+        (BLOCKS, (), ["in 7 blocks, by the means of their trials in 2 conditions.", "paired t"]),
+        (UNPAIRED, (), ["in up to 8 independent trials of each of 2 conditions.", "Welch's t"]),
     ],
-)  # fmt: skip
+)
 def test_a_paper_is_told_what_was_tested_and_how(
     study: dict[str, Any] | str, looks: tuple[int, ...], sentences: list[str], tmp_path: Path
 ) -> None:
