@@ -62,13 +62,16 @@ def test_shares_of_collapsed_runs_have_exact_intervals_by_size() -> None:
     good = [*range(90, 110)]
     bad = [3, 4, 5, 6, 7] * 4
     p = good + good[:10] + bad[:10] + bad
-    (edge,) = edges(judge(pd.DataFrame({"robots": np.repeat([4, 8, 16], 20), "P": p})).cells)
+    frame = pd.DataFrame({"robots": np.repeat([4, 8, 16], 20), "P": p})
+    (edge,) = edges(judge(frame).cells)
     for share, count in zip(edge.shares, (0, 10, 20), strict=True):
         interval = binomtest(count, 20).proportion_ci(method="exact")
         assert (share.low, share.high) == pytest.approx((interval.low, interval.high))
         assert share.value == count / 20
     assert [runs.tolist() for runs in edge.good_runs] == [good, good[:10], []]
     assert edge.size.value == pytest.approx(8.0)
+    (edge_of_two,) = edges(judge(frame[frame.robots < 16]).cells)
+    assert edge_of_two.shares == edge.shares[:2]
 
 
 def test_counts_too_small_for_phases_are_untestable_in_answer_and_table() -> None:
