@@ -94,4 +94,4 @@ def test_a_paper_is_told_what_was_tested_and_how(
         plan = Study(**{**study, "faults": faults, "indicators": ["R"]}).plan()
     paragraph = methods(plan, looks)
     assert [sentence for sentence in sentences if sentence not in paragraph] == [], paragraph
-    assert paragraph.count("trainings") == 2 * ("policies" in study)
+    assert ("trainings" in paragraph) == ("policies" in study)
