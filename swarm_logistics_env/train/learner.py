@@ -23,7 +23,7 @@ from swarm_logistics_env.core.records import atomic_write
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import PPOSettings
-from swarm_logistics_env.train.worlds import NetworkView, check_finite
+from swarm_logistics_env.train.training_worlds import NetworkView, check_finite
 
 CHECKPOINT = "checkpoint.pt"
 STATE = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner

@@ -36,7 +36,7 @@ from swarm_logistics_env.train.learner import (
     tensors_of,
 )
 from swarm_logistics_env.train.training import Training
-from swarm_logistics_env.train.worlds import NetworkView
+from swarm_logistics_env.train.training_worlds import NetworkView
 
 RECORD = "training.json"  # of how it was made
 # Fields that may change when a training goes on, because they change nothing of what was done.

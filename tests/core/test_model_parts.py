@@ -111,9 +111,10 @@ def apply(rows: Any, network: Any) -> Any:
     return network(torch.as_tensor(rows))
 
 
-@functools.cache  # torch calls a type by another name when it is traced again in one process
-def traced(*functions: Any) -> Any:
-    return torch.jit.trace(nn.Sequential(linear(), *map(Holding, functions)), ROWS)
+def traced(seed: int, *functions: Any) -> Any:
+    network = nn.Sequential(linear(seed), *map(Holding, functions))
+    torch.jit.trace(network, ROWS)  # later ones call the type by a name with another number
+    return torch.jit.trace(network, ROWS)
 
 
 def generator(draws: int) -> Any:
@@ -147,7 +148,8 @@ CASES: dict[str, tuple[Callable[[Any], Any], Any, Any]] = {
     "decorated": (lambda seed: torch.no_grad()(calling(linear(seed))), 0, 1),
     "partial": (lambda seed: functools.partial(apply, network=linear(seed)), 0, 1),
     "bound": (lambda seed: linear(seed).forward, 0, 1),
-    "traced": (lambda functions: traced(*functions), [torch.tanh, torch.relu],
+    "traced weights": (traced, 0, 1),
+    "traced": (lambda functions: traced(0, *functions), [torch.tanh, torch.relu],
                [torch.relu, torch.tanh]),
     "compiled": (lambda part: torch.compile(Holding(part), backend="eager"), 0.5, 1.0),
     "graph": (lambda kind: torch.fx.symbolic_trace(nn.Sequential(linear(), kind())), nn.Tanh,

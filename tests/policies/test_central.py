@@ -85,6 +85,18 @@ def test_one_robot_fetches_and_the_others_wait_under_different_items() -> None:
     assert len(set(away.argmin(axis=1)[is_under])) == is_under.sum() >= 3
 
 
+def test_the_nearest_is_sent_and_stays_unless_another_is_half_a_metre_nearer() -> None:
+    world, policy = begun()
+    state: Any = world.state
+    state.item_position[state.requested] = 3.0, 2.0
+    sent = []
+    for x in (4.3, 3.8, 3.3):
+        state.robot_position[:] = [[4.0, 2.0], *[[5.5, 2.0]] * 4, [x, 2.0]]
+        decide(policy, world.observe(), state)
+        sent.append(policy._worker)
+    assert sent == [0, 0, 5]
+
+
 def test_where_items_are_few_the_others_line_up_at_the_wall() -> None:
     scenario = SMALL.replace(n_robots=12, n_items=3)
     world = Warehouse(scenario)

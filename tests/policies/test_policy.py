@@ -17,6 +17,7 @@ from swarm_logistics_env.policies.learned import LearnedPolicy, Network
 from swarm_logistics_env.policies.policy import Scripted, identity
 from swarm_logistics_env.policies.spec import SCRIPTED, PolicySpec
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.parallel_policies import RandomActions
 from swarm_logistics_env.world import observations
 
 
@@ -117,6 +118,12 @@ def test_every_argument_of_a_policy_of_a_network_changes_its_identity() -> None:
     identities = [identity(policy) for policy in made]
     assert len(set(identities)) == len(made)
     assert identities == [identity(policy) for policy in made]
+
+
+def test_a_policy_of_the_package_without_a_record_is_known_by_what_it_holds() -> None:
+    first, second, changed = (RandomActions() for _ in range(3))
+    changed._spaces = [None]
+    assert identity(first) == identity(second) != identity(changed)
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,7 @@ def test_a_phase_that_lost_less_than_a_quarter_has_not_collapsed() -> None:
     [
         ([1.0] * 30, "fewer than 10 runs lie below the largest P"),
         ([3.0, 9.0] * 4, "fewer than 10 runs lie below the largest P"),
+        ([*range(10)], "fewer than 10 runs lie below the largest P"),
         ([0.0] * 29 + [5.0], "counts are too small"),
         ([0.0] * 36 + [1.0] * 17 + [2.0] * 7, "counts are too small"),
         ([0.0] * 36 + [0.1] * 17 + [0.1 + 0.2] * 3 + [0.3] * 4, "counts are too small"),
@@ -70,6 +71,7 @@ def test_what_cannot_show_two_phases_is_untestable_and_says_why(
     assert (phases.p_value, phases.boundary) == (1.0, None)
     assert phases.untestable.startswith(reason)
     assert spi.collapsed_runs({25: runs}) is None
+    assert not spi.two_phases([*range(11)]).untestable
 
 
 def test_the_planted_critical_size_is_covered() -> None:

@@ -12,7 +12,7 @@ import torch
 from swarm_logistics_env.train.learner import make_learner
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import PPOSettings
-from swarm_logistics_env.train.worlds import NetworkView
+from swarm_logistics_env.train.training_worlds import NetworkView
 from swarm_logistics_env.world.motion.network_inputs import INPUTS
 
 

@@ -35,7 +35,7 @@ from swarm_logistics_env.train.learner import (
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import Scores
 from swarm_logistics_env.train.trainer import train
-from swarm_logistics_env.train.worlds import NetworkView
+from swarm_logistics_env.train.training_worlds import NetworkView
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.world.motion import INPUTS, MotionView
 

@@ -67,7 +67,7 @@ def test_a_checkpoint_with_a_flipped_bit_is_refused_before_it_is_unpickled(
     pytest.importorskip("torch")
     pytest.importorskip("stable_baselines3")
     from swarm_logistics_env.train import Training, learner
-    from swarm_logistics_env.train.worlds import NetworkView
+    from swarm_logistics_env.train.training_worlds import NetworkView
 
     fields: dict[str, Any] = {
         "worlds": [{"n_robots": 2}],

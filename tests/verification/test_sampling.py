@@ -115,7 +115,7 @@ def tree(tmp_path: Path) -> Path:
 
 
 def test_nearest_tests_follow_a_folder_that_is_renamed(tree: Path) -> None:
-    in_room = ["tests/old/test_other.py", "tests/old/test_user.py"]
+    in_room = ["tests/old/test_user.py", "tests/old/test_other.py"]  # the first is of a user
     assert Nearest(tree).of("old/sizes.py") == [MIRROR, "tests/test_door.py", *in_room]
     for folder in (tree / PACKAGE, tree / "tests"):
         (folder / "old").rename(folder / "new")

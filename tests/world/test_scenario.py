@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from swarm_logistics_env import Scenario, Warehouse, run_episode
 from swarm_logistics_env.core.errors import ScenarioError
 from swarm_logistics_env.policies import load
-from swarm_logistics_env.world.scenario import SOURCES
+from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, SOURCES
 
 
 @given(
@@ -99,17 +99,50 @@ def test_the_preset_of_dotbots_delivers_with_the_packages_own_bodies_too() -> No
     assert run_episode(scenario.replace(duration=60.0), load("homing"), seed=0).delivered > 0
 
 
-def test_presets_and_that_an_episode_has_enough_steps_for_its_duration() -> None:
-    paper = Scenario.preset("paper")
-    assert paper == Scenario()
-    assert (paper.warehouse_width, paper.warehouse_height, paper.storage_width) == (10.0, 10.0, 8.0)
-    assert (paper.n_robots, paper.n_items, paper.duration) == (25, 60, 500.0)
-    assert (paper.n_steps, paper.n_substeps) == (5000, 5)
-    assert Scenario.preset("paper_scalability") == Scenario(n_items=100)
-    realistic = Scenario.preset("realistic")
-    assert (realistic.handling_steps, realistic.dock_period) == (10, 1.0)
-    assert (realistic.max_speed, realistic.max_acceleration, realistic.max_turn_rate) == (1, 2, 6)
-    for duration, period, steps in ((0.7, 0.1, 7), (0.75, 0.1, 8), (2.0, 0.3, 7)):
-        assert Scenario(duration=duration, control_period=period).n_steps == steps
+# Every value that a result, a stored study or a policy was measured with.
+PAPER: dict[str, Any] = {
+    "n_robots": 25, "n_items": 60, "floor": None, "cell_size": 0.5,
+    "warehouse_width": 10.0, "warehouse_height": 10.0, "delivery_width": 2.0, "duration": 500.0,
+    "restock": False, "n_requests": 1, "demand": "closed", "request_docks": "any",
+    "dock_capacity": None, "handling_time": 0.0, "n_obstacles": 0, "obstacle_radius": 0.3,
+    "bodies": "chipmunk", "robot_radius": 0.125, "robot_mass": 3.0,
+    "max_speed": 2.0, "max_acceleration": 20.0, "max_turn_rate": 6.0,
+    "ranger_range": 2.0, "view_range": 1.0, "radio_range": 4.0, "pickup_range": 0.25,
+    "drive": "holonomic", "heading_drift": 0.02, "speed_mix": (1.0,), "sensing_mix": (1.0,),
+    "memory_size": 2, "timer_limit": 10.0, "relay": "none",
+    "ranger_noise": 0.0, "position_noise": 0.0, "sensor_dropout": 0.0, "radio_loss": 0.0,
+    "message_size": 0, "item_radius": 0.125, "control_period": 0.1, "physics_period": 0.02,
+}  # fmt: skip
+PRESETS: dict[str, dict[str, Any]] = {
+    "paper": {},
+    "paper_scalability": {"n_items": 100},
+    "dots": {"max_speed": 1.0, "max_acceleration": 2.0},
+    "realistic": {
+        "drive": "differential", "max_speed": 1.0, "max_acceleration": 2.0, "ranger_noise": 0.03,
+        "position_noise": 0.05, "sensor_dropout": 0.02, "radio_loss": 0.1, "heading_drift": 0.05,
+        "handling_time": 1.0, "dock_capacity": 1.0,
+    },
+    "dotbots": {
+        "n_robots": 20, "n_items": 20, "warehouse_width": 2.0, "warehouse_height": 2.0,
+        "delivery_width": 0.4, "duration": 120.0, "restock": True, "n_requests": 5,
+        "drive": "differential", "robot_radius": 0.05, "robot_mass": 0.2, "max_speed": 0.3,
+        "max_acceleration": 2.0, "max_turn_rate": 4.9, "ranger_range": 0.8, "view_range": 0.4,
+        "radio_range": 1.6, "pickup_range": 0.1, "heading_drift": 0.0, "item_radius": 0.05,
+    },
+}  # fmt: skip
+
+
+def test_presets_are_those_that_results_were_measured_with() -> None:
+    measured = {name: {**PAPER, **changes} for name, changes in PRESETS.items()}
+    assert {name: dict(preset) for name, preset in SCENARIO_PRESETS.items()} == measured
     with pytest.raises(ScenarioError, match="no scenario preset 'papr'; did you mean 'paper'"):
         Scenario.preset("papr")
+
+
+def test_an_episode_has_enough_steps_for_its_duration() -> None:
+    paper = Scenario.preset("paper")
+    assert (paper.storage_width, paper.n_steps, paper.n_substeps) == (8.0, 5000, 5)
+    realistic = Scenario.preset("realistic")
+    assert (realistic.handling_steps, realistic.dock_period) == (10, 1.0)
+    for duration, period, steps in ((0.7, 0.1, 7), (0.75, 0.1, 8), (2.0, 0.3, 7)):
+        assert Scenario(duration=duration, control_period=period).n_steps == steps

@@ -81,7 +81,8 @@ def run_tests(
         **os.environ,
         "NUMBA_CACHE_DIR": str(copy.parent / kernels),
         "PYTHONPATH": str(copy),
-        "PYTHONDONTWRITEBYTECODE": "1",
+        # Bytecode is kept: to compile package and tests takes longer than most of the tests.
+        "PYTHONDONTWRITEBYTECODE": "",
         "HYPOTHESIS_PROFILE": "mutants",
     }
     plugin: list[str] = []

@@ -1,7 +1,7 @@
 """The tests nearest to a module, by names alone, so that a folder that is renamed needs no edit.
 
 First the mirror (`tests/a/test_b.py` of `a/b.py`), then tests that import the module or what it
-defines, then the tests of its folder, then the mirrors of the modules that import it.
+defines, then the mirrors of the modules that import it, then the tests of its folder.
 """
 
 from __future__ import annotations
@@ -52,15 +52,21 @@ class Nearest:
         module = _dotted(Path(PACKAGE) / file)
         folder = self._folder_of_tests(Path(file).parent)
         defined = self._names[module].defined
-        # A test that uses more of what the module defines is more about it.
-        ranked = sorted(self._tests, key=lambda test: -len(defined & self._tests[test].used))
+
+        def rank(test: Path) -> tuple[int, bool]:
+            """Order tests by what they use of the module, then by names: judging, test_judge."""
+            first_letters = test.stem.removeprefix("test_")[:4]
+            is_called_so = Path(file).stem.startswith(first_letters)
+            return -len(defined & self._tests[test].used), not is_called_so
+
+        ranked = sorted(self._tests, key=rank)
         importing = [test for test in ranked if module in self._imports_of_tests[test]]
         users = [user for user, modules in self._imports.items() if module in modules]
         candidates = [
             self._mirror(module),
             *sorted(importing, key=lambda test: test.parent != folder),
-            *(test for test in ranked if test.parent == folder),
             *(self._mirror(user) for user in users),
+            *(test for test in ranked if test.parent == folder),
         ]
         tests = dict.fromkeys(test for test in candidates if test in self._tests)
         return [str(test.relative_to(self._root)) for test in tests][:MOST_FILES]

@@ -3,8 +3,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
+
+from swarm_logistics_env.spi import Interval
+from swarm_logistics_env.study.report import drawing
 
 DRAW = """
 import os
@@ -35,7 +41,55 @@ def test_figures_are_drawn_whatever_backend_is_set(backend: str, left: str | Non
 
 
 def test_thirty_six_series_have_marks_of_their_own() -> None:
-    from swarm_logistics_env.study.report.drawing import COLOURS, marker_of
-
-    marks = {(COLOURS[index % len(COLOURS)], marker_of(index)) for index in range(36)}
+    colours = drawing.COLOURS
+    marks = {(colours[index % len(colours)], drawing.marker_of(index)) for index in range(36)}
     assert len(marks) == 36
+
+
+POINT = drawing.Point("homing", 0, "N = 5", 4.0, 3.0, 6.0, decided=True)
+PANEL = drawing.Panel("P", "P", (POINT,), (1.0,), "N")
+
+
+@pytest.mark.parametrize(
+    ("draw", "arguments", "mark", "bars"),
+    [
+        (drawing.intervals, ([PANEL],), (0, 4), [[(0, 3), (0, 6)]]),
+        (drawing.forest, ([("S", [POINT])], "S"), (4, 0), [[(3, 0), (6, 0)]]),
+        (
+            drawing.trade_off,
+            ({"N = 5": [(POINT, Interval(2.0, 1.0, 5.0))]},),
+            (2, 4),
+            [[(1, 4), (5, 4)], [(2, 3), (2, 6)]],
+        ),
+    ],
+)
+def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
+    draw: Callable[..., None], arguments: Any, mark: Any, bars: Any
+) -> None:
+    canvas = Figure()
+    draw(canvas, *arguments)
+    (axes,) = canvas.axes
+    marks = [line.get_xydata().tolist() for line in axes.lines]
+    assert [[*mark]] in marks
+    lines = [line for bar in axes.collections for line in bar.get_segments()]
+    assert [[tuple(end) for end in line] for line in lines] == bars
+
+
+@pytest.mark.parametrize(
+    ("points", "low", "high"),
+    [
+        ([POINT], 0.0, 6.0),
+        ([POINT._replace(value=-4.0, low=-6.0, high=-3.0)], -6.0, 0.0),
+        ([POINT._replace(published=9.0)], 0.0, 9.0),
+        ([POINT._replace(runs=(2.0, None, 7.0))], 0.0, 7.0),
+        ([POINT._replace(value=None, low=None, high=None)], 0.0, 0.0),
+        # An interval far from all values would hide them: a part of it is left out.
+        ([POINT._replace(value=2.0, low=-10.0, high=30.0)], -4.0, 6.0),
+        ([POINT._replace(value=0.1, low=-10.0, high=30.0)], -1.0, 1.1),
+    ],
+)
+def test_axes_hold_zero_all_values_and_a_margin(
+    points: list[drawing.Point], low: float, high: float
+) -> None:
+    margin = 0.06 * max(high - low, 0.5)
+    assert drawing.limits(points) == pytest.approx((low - margin, high + margin))

@@ -58,12 +58,17 @@ def emptied(results: StudyResults, key: str) -> StudyResults:
     return judge(results.plan, {**results.outcomes, (key, 0): full})
 
 
-def times_back(results: StudyResults) -> tuple[str, ...]:
-    """The row of the table of times until single runs are back."""
-    title = "Time until single runs are back"
+def only_row(results: StudyResults, title: str) -> tuple[str, ...]:
+    """The row of a table of the report, behind policy and fault."""
     (section,) = (part for part in document(results).summary if part.title == title)
     (row,) = section.rows
-    return row
+    assert len(row) == len(section.columns)
+    assert row[:2] == ("swarm-dt", str(only(results).compared.changed.setting))
+    return row[2:]
+
+
+def times_back(results: StudyResults) -> tuple[str, ...]:
+    return only_row(results, "Time until single runs are back")
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +83,7 @@ def test_swarm_that_comes_back_has_a_time_and_its_null_a_shorter_one(
     assert len(fault.back) == len(null.back) == SEEDS
     median, nothing = fault.curve.median() or 0.0, null.curve.median() or 0.0
     assert nothing < 100 < 500 < median < 700
-    _, _, shown, _, shown_null, _ = times_back(repaired)
+    shown, _, shown_null, _ = times_back(repaired)
     assert (shown, shown_null) == (f"{median:g}", f"{nothing:g}")
 
 
@@ -88,7 +93,13 @@ def test_swarm_that_never_comes_back_is_censored() -> None:
     assert against is not None
     assert against.value == pytest.approx(0.3, abs=0.03)
     assert against.verdict == "refuted"
-    assert times_back(results)[2:4] == ("not reached", f"{SEEDS} of {SEEDS} runs")
+    assert times_back(results)[:2] == ("not reached", f"{SEEDS} of {SEEDS} runs")
+    whole = only(results).against_whole
+    assert whole is not None
+    row = only_row(results, "Resilience: deliveries after the onset")
+    assert row[0].startswith(f"{against.value:.3f} [{against.low:.3f}, ")
+    assert row[2].startswith(f"{whole.value:.3f} [{whole.low:.3f}, ")
+    assert row[1::2] == ("refuted", "refuted")
 
 
 def test_no_loss_leaves_robustness_local_in_time_but_for_a_cap() -> None:

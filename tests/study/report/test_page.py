@@ -20,6 +20,8 @@ import pytest
 
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.policies.episode import Play
+from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.page import html as html_page
 from swarm_logistics_env.study.report.page import marked_up
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
@@ -28,6 +30,7 @@ from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.views.watch import Session, messages
 from swarm_logistics_env.views.watch.messages import recorded_page
 from tests.conftest import SMALL
+from tests.made_up import delivered, judged
 from verification.browser import Browser
 
 HOSTILE = "</script><script>alert(1)</script>"
@@ -101,6 +104,17 @@ class Scale:
 
     def values(self, positions: Iterable[float]) -> list[float]:
         return [(position - self.start) / self.factor for position in positions]
+
+
+def test_of_many_deliveries_a_page_draws_some_seeds_alone() -> None:
+    study = Study(seeds=2, faults=[{"modes": ["FM4"], "robots": [1]}], indicators=["R"])
+    results = judged(study, lambda *_: delivered(38_000))
+    report = document(results)
+    page = html_page(results, report, {figure.name: "<svg/>" for figure in report.figures}, "")
+    (text,) = re.findall(r' id="data">(.*?)</script>', page, re.DOTALL)
+    for condition in json.loads(text)["conditions"]:
+        assert len(condition["p"]) == 2
+        assert [len(gaps) for gaps in condition["curves"]] == [38_000]
 
 
 def test_every_seed_stands_behind_its_interval(made: Made) -> None:

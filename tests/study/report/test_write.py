@@ -11,18 +11,14 @@ from xml.etree import ElementTree
 
 import pytest
 
-from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.drawing import images
-from swarm_logistics_env.study.report.latex import latex_tables
 from swarm_logistics_env.study.report.section import Section, limits, word_to_count
 from swarm_logistics_env.study.report.sentences import sentence
-from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.report.write import markdown, section_markdown, write_report
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from tests.conftest import drawn_in_all_formats
 from tests.made_up import paper
-from tests.study.report.conftest import NARROW
 
 FROZEN = Path(__file__).parents[2] / "frozen"
 
@@ -55,24 +51,6 @@ def directory(few: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Pa
     with drawn_in_all_formats():
         write_report(few, directory)
     return directory
-
-
-def test_a_report_is_as_recorded(tmp_path: Path) -> None:
-    """Every number and sentence, but for the sheet of the set-up."""
-    results = paper(seeds=12, noise=2.0, full=NARROW, unaffected=frozenset({"FM2"}))
-    report = document(results)
-    texts = {
-        "report.md": markdown(report).partition("\n## Set-up")[0],
-        "tables.tex": latex_tables(report.paper),
-        "answer.txt": terminal_answer(answer(results), 80),
-    }
-    for name, text in texts.items():
-        made = tmp_path / name
-        made.write_text(f"{text.rstrip()}\n", encoding="utf-8")
-        lines = (FROZEN / name).read_text(encoding="utf-8").splitlines()
-        assert made.read_text(encoding="utf-8").splitlines() == lines, (
-            f"if {made} is as it should be, put it into {FROZEN}"
-        )
 
 
 def test_equal_rows_give_equal_bytes(few: StudyResults, directory: Path, tmp_path: Path) -> None:

@@ -81,6 +81,20 @@ def test_trials_are_judged_as_their_store_is(tmp_path: Path, text: str) -> None:
     assert repr(judged) == repr(stored)
 
 
+@pytest.mark.parametrize("asks_ft", [True, False])
+def test_without_trials_of_removed_robots_it_is_told_that_ft_is_not_asked(
+    asks_ft: bool, tmp_path: Path
+) -> None:
+    text = "robots,fault,faulty,p\n8,none,,9\n8,none,,8\n8,jam,1,7\n8,jam,1,6\n"
+    if asks_ft:
+        text += "8,removed,1,8\n8,removed,1,7\n"
+    plan = imported(tmp_path, text).plan()
+    indicators = {comparison.indicator for comparison in plan.comparisons}
+    assert indicators == ({"R", "FT"} if asks_ft else {"R"})
+    assert plan.origin is not None
+    assert any(note.startswith("No FT: it needs") for note in plan.origin.notes) != asks_ft
+
+
 def test_each_value_of_what_else_varies_has_a_table_of_its_own(tmp_path: Path) -> None:
     rows = ["table,policy,robots,fault,faulty,width,p"]
     for n in (8, 16):

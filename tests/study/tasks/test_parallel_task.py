@@ -94,6 +94,32 @@ def test_an_event_is_at_the_end_of_its_step_and_tells_runs_apart() -> None:
     assert run.digest != played(1.0, 0.0, 2.0, 1.0, 0.0).digest
 
 
+@pytest.mark.parametrize(("duration", "steps"), [(0.1, 1), (2.2, 4), (2.3, 5)])
+def test_a_run_has_the_nearest_number_of_steps_and_one_at_least(
+    duration: float, steps: int
+) -> None:
+    run = only_run(task_of(period=0.5), scenario={"duration": duration}).play()
+    assert (run.error, run.ended_at) == (None, 0.5 * steps)
+
+
+class Told(Walker):
+    """Remembers what it was told before its first step."""
+
+    def configure(self, env: Lane, agents: Any) -> None:
+        self.configured = env.length, [*agents]
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        self.told = n_robots, seed
+
+
+def test_a_policy_is_told_the_world_the_swarm_and_its_seed() -> None:
+    policy = Told()
+    task = task_of(policies={"told": lambda: policy})
+    task.play(Case(PolicySpec(name="told"), "", task.default, task=task), 0, 5)
+    assert policy.configured == (6, ["robot_0", "robot_1", "robot_2"])
+    assert policy.told == (3, 5)
+
+
 def test_equal_seeds_give_equal_bits_in_other_processes(study: Study) -> None:
     script = (
         "import sys; from swarm_logistics_env.study.studies import Study\n"

@@ -355,6 +355,25 @@ def test_what_differs_in_every_row_tells_no_conditions_apart(tmp_path: Path) -> 
     assert len({row.parameters for row in few.rows}) == 3
 
 
+def test_every_column_is_told_with_what_it_was_taken_for(tmp_path: Path) -> None:
+    text = "seed,robots,fault,faulty,p,width,charge,hall,note\n"
+    for row in range(24):
+        text += f"{row // 4},{4 + row % 2},none,0,{row},{row // 2 % 2},5{row},3,{row % 5}\n"
+    columns = read(tmp_path, text, ignore=["note"], reference={"width": 1.0}).columns
+    assert {column.name: (column.use, column.n_values) for column in columns} == {
+        "seed": ("seed", 6),
+        "robots": ("robots", 2),
+        "fault": ("fault", 1),
+        "faulty": ("faulty", 1),
+        "p": ("performance", 24),
+        "width": ("parameter", 2),
+        "charge": ("covariate", 24),
+        "hall": ("the same in all", 1),
+        "note": ("left out", 5),
+    }
+    assert columns[4].values == ("0", "1", "2", "3", "4", "5")
+
+
 @pytest.mark.parametrize("word", ["", "None", "no fault", "baseline", "healthy", "0", "-", "NA"])
 def test_words_for_no_fault(tmp_path: Path, word: str) -> None:
     rows = read(tmp_path, f"robots,fault,faulty,p\n8,{word},0,9\n8,jam,1,7\n").rows

@@ -129,3 +129,14 @@ def test_a_shape_is_read_at_once_or_as_the_refusal_says(shape: Shape, tmp_path: 
         expected = [p + 1.0 for p in WHOLE], [p + 1.0 for p in BROKEN]
     assert (sound.tolist(), broken.tolist()) == (list(expected[0]), list(expected[1]))
     assert {row.n_robots for row in trials.rows} == {8}
+
+
+@pytest.mark.parametrize("has_trial", [False, True])
+def test_who_leaves_out_the_robots_is_told_of_a_column_that_is_missing(
+    has_trial: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "trials.csv"
+    path.write_text(f"{'trial' if has_trial else 'day'},robot,N,P\n3,0,2,4\n3,1,2,5\n4,0,2,4\n")
+    with pytest.raises(spi.IndicatorError, match="by --sum-over 'robot'") as refused:
+        read_trials(path, ignore=["robot"])
+    assert ("name each row's trial in a column 'trial'" in str(refused.value)) != has_trial

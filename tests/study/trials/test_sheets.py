@@ -221,6 +221,29 @@ def test_an_empty_label_is_filled_where_somebody_says_so(tmp_path: Path) -> None
     assert trials.notes == ("An empty cell in 'fault' is taken for no fault.",)
 
 
+@pytest.mark.parametrize(
+    ("faults", "note"),
+    [
+        (
+            ["calm,0", "wheel,1"],
+            (
+                "The fault 'calm' is taken for no fault, as no robot fails by it; --value "
+                "fault:calm=none says so."
+            ),
+        ),
+        (["none,0", *["wheel,1"] * 2, "Wheel,1"], "The faults wheel and Wheel are taken for one."),
+        (["NA,0", "wheel,1"], "'NA' in 'mode' is taken for no fault."),
+        (["none,0", "wheel,1"], ""),
+    ],
+)
+def test_what_a_fault_is_taken_for_is_told(faults: list[str], note: str, tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("robots,mode,faulty,p\n" + "".join(f"4,{fault},9\n" for fault in faults))
+    trials = read_trials(path)
+    assert trials.notes == ((note,) if note else ())
+    assert {row.fault for row in trials.rows} == {"none", "wheel"}
+
+
 def test_days_are_blocks_however_they_are_written(tmp_path: Path) -> None:
     for first, second in (
         ("2024-03-05", "2024-03-06"), ("05.03.2024", "06.03.2024"), ("5.3.24", "6.3.24"),

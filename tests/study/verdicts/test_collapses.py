@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import binomtest
 
 from swarm_logistics_env import judge
 from swarm_logistics_env.spi import Phases
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.answer_notes import collapsed_in_words
-from swarm_logistics_env.study.verdicts.collapses import collapses
+from swarm_logistics_env.study.verdicts.collapses import collapses, edges
 
 
 def test_runs_that_break_off_are_told_from_those_that_never_began() -> None:
@@ -55,6 +56,22 @@ def test_without_times_nothing_is_said_of_mid_run() -> None:
     collapse, _ = judge(frame).collapses
     assert len(collapse.breaks) == 0
     assert "mid-run" not in collapsed_in_words([collapse], names_policies=False)
+
+
+def test_shares_of_collapsed_runs_have_exact_intervals_by_size() -> None:
+    good = [*range(90, 110)]
+    bad = [3, 4, 5, 6, 7] * 4
+    p = good + good[:10] + bad[:10] + bad
+    frame = pd.DataFrame({"robots": np.repeat([4, 8, 16], 20), "P": p})
+    (edge,) = edges(judge(frame).cells)
+    for share, count in zip(edge.shares, (0, 10, 20), strict=True):
+        interval = binomtest(count, 20).proportion_ci(method="exact")
+        assert (share.low, share.high) == pytest.approx((interval.low, interval.high))
+        assert share.value == count / 20
+    assert [runs.tolist() for runs in edge.good_runs] == [good, good[:10], []]
+    assert edge.size.value == pytest.approx(8.0)
+    (edge_of_two,) = edges(judge(frame[frame.robots < 16]).cells)
+    assert edge_of_two.shares == edge.shares[:2]
 
 
 def test_counts_too_small_for_phases_are_untestable_in_answer_and_table() -> None:

@@ -25,6 +25,7 @@ from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts import results
 from swarm_logistics_env.study.verdicts.collapses import collapses, edges
 from swarm_logistics_env.views.cli import judge_trials
+from swarm_logistics_env.views.cli.judging import names_policy
 from swarm_logistics_env.world.scenario import Scenario
 from tests.views.cli.conftest import Command
 
@@ -71,6 +72,18 @@ def material(
 
 
 TRIALS = "judge lab.csv --column performance=boxes"
+
+
+def test_what_is_judged_is_a_policy_or_trials() -> None:
+    for folder in ("trials", "homing"):
+        Path(folder).mkdir()
+    Path("no_suffix").touch()
+    policies = ["homing", "mine", "judged_policy.py", "judged_policy:Mine", "my_package.mine:Mine"]
+    trials = ["lab.csv", "missing.XLSX", "trials", "no_suffix", "notes.txt"]
+    assert {name: names_policy(name) for name in policies + trials} == {
+        **dict.fromkeys(policies, True),
+        **dict.fromkeys(trials, False),
+    }
 
 
 def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None:

@@ -38,8 +38,8 @@ def test_bodies_need_nothing_that_draws(name: str) -> None:
     assert printed.split()[-1] == name
 
 
-def placed(drive: Any, positions: Any) -> Any:
-    """Return bodies of robots that look along x, in a room of 10 m x 10 m."""
+def placed(drive: Any, positions: Any, heading: float = 0.0) -> Any:
+    """Return bodies of robots that look in one direction, in a room of 10 m x 10 m."""
     from swarm_logistics_env.world.bodies.mujoco_bodies import MujocoBodies
 
     position = np.array(positions, float)
@@ -49,7 +49,7 @@ def placed(drive: Any, positions: Any) -> Any:
     )
     bodies = MujocoBodies()
     nothing = np.zeros((0, 2)), np.zeros((0, 4))
-    bodies.place(Placement(scenario, 0, position, np.zeros(n), *nothing))
+    bodies.place(Placement(scenario, 0, position, np.full(n, heading), *nothing))
     return bodies
 
 
@@ -77,6 +77,16 @@ def test_a_single_robot_goes_as_far_as_in_the_packages_own_engine(drive: str) ->
         assert np.linalg.norm(world.state.robot_velocity[0]) < 0.05
     assert ways["mujoco"] == pytest.approx(ways["chipmunk"], rel=0.05)
     assert starts["mujoco"] == pytest.approx(starts["chipmunk"], rel=0.15)
+
+
+@pytest.mark.parametrize(("drive", "left"), [("holonomic", 0.3), ("differential", 0.0)])
+def test_a_robot_goes_whither_it_wants_in_its_own_frame(drive: str, left: float) -> None:
+    bodies = placed(drive, [[5.0, 5.0]], heading=0.7)
+    for _ in range(20):
+        poses = bodies.move(orders((0.6, 0.3, 0.0)))
+    ahead = np.array([np.cos(0.7), np.sin(0.7)])
+    aside = np.array([-np.sin(0.7), np.cos(0.7)])
+    assert poses.velocity[0] == pytest.approx(0.6 * ahead + left * aside, abs=0.01)
 
 
 @pytest.mark.parametrize("drive", DRIVES)

@@ -45,12 +45,32 @@ def test_a_way_beside_a_rack_is_that_of_its_cell() -> None:
     assert at_the_rack == middle
 
 
-def test_the_way_grows_by_what_a_robot_drives_and_so_does_the_depth() -> None:
-    floor = world_of(floor="::::AAAA\n::::AAAA\n::::AAAA").floor
-    x = np.linspace(0.3, 3.4, 40)
-    along = floor.along(np.stack([x, np.full(40, 0.75)], axis=1))
-    assert np.diff(along) == pytest.approx(np.diff(x), abs=1e-9)
-    assert along[x < 2.0].max() <= 0.0 <= along[x > 2.0].min()
+@pytest.mark.parametrize(
+    ("floor", "axis"),
+    [("::::AAAA\n" * 3, 0), ("AAAA::::\n" * 3, 0), (":::\n" * 4 + "AAA\n" * 4, 1),
+     ("AAA\n" * 4 + ":::\n" * 4, 1)],
+)  # fmt: skip
+def test_the_way_grows_by_what_a_robot_drives_and_so_does_the_depth(floor: str, axis: int) -> None:
+    points = np.full((40, 2), 0.75)
+    points[:, axis] = np.linspace(0.3, 3.4, 40)
+    ways = world_of(floor=floor.strip()).floor
+    along = ways.along(points)
+    if along[0] > 0.0:
+        along = along[::-1]
+    assert np.diff(along) == pytest.approx(np.diff(points[:, axis]), abs=1e-9)
+    assert along[0] < 0.0 < along[-1]
+    assert (along > 0.0).sum() == pytest.approx(20, abs=3)
+
+
+def test_no_way_jumps_along_free_floor() -> None:
+    floor = world_of(floor="::::::::A\n:==:==::A\n:==:::=:A\n::::=:::A").floor
+    points = np.random.default_rng(0).uniform((0.0, 0.0), (4.5, 2.0), (3000, 2))
+    for step in ((0.01, 0.0), (0.0, 0.01)):
+        beside = points + step
+        free = floor.is_free(points) & floor.is_free(beside)
+        change = floor.along(beside[free]) - floor.along(points[free])
+        # Beside a rack a way is that of the centre of a cell, half a cell away.
+        assert np.abs(change).max() < 0.25 + 0.01
 
 
 def test_a_hall_of_forty_metres_has_ways() -> None:

@@ -33,6 +33,11 @@ def test_noise_leaves_beams_that_meet_nothing_as_they_are() -> None:
     assert (noisy >= 0.0).all()
 
 
+def test_what_is_not_there_has_no_noise(build: Build) -> None:
+    rows = build([(5.0, 5.0)], [(1.0, 1.0)], position_noise=0.1).step(np.zeros((1, 4)))
+    assert not rows[0, row.ITEMS : row.LOWEST_TIMER].any()
+
+
 def test_what_is_missed_is_drawn_for_each_robot_thing_and_sense_alone(build: Build) -> None:
     positions = np.array([(1.0, 5.0), (1.4, 5.0), (2.0, 5.0)])
     world = build(

@@ -11,7 +11,7 @@ pytest.importorskip("stable_baselines3")
 
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.train.settings import Conditions
-from swarm_logistics_env.train.worlds import EpisodeMix, NetworkView, make_worlds
+from swarm_logistics_env.train.training_worlds import EpisodeMix, NetworkView, make_worlds
 from swarm_logistics_env.world.motion.memory import BODY, MEMORY, OPEN, body_of
 from swarm_logistics_env.world.warehouse import Fault
 
