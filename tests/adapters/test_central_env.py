@@ -19,6 +19,7 @@ from swarm_logistics_env.adapters import CentralEnv
 from swarm_logistics_env.core.errors import CommandError, SetupError, SwarmLogisticsError
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
 from tests.wrappers.conftest import BRIEF, brief, eastward
+from tests.wrappers.test_conformance import ORDERS
 
 
 def in_wrappers(env: Any) -> Any:
@@ -35,7 +36,7 @@ def test_gymnasiums_check_passes(n_robots: int, monkeypatch: pytest.MonkeyPatch)
     with warnings.catch_warnings():
         # No name in a registry stands for it.
         warnings.filterwarnings("ignore", ".*Not able to test alternative render modes")
-        wrapped = in_wrappers(brief(n_robots=n_robots, message_size=1))
+        wrapped = in_wrappers(brief(n_robots=n_robots, message_size=1, **ORDERS))
         check_env(CentralEnv(wrapped, flat=n_robots > 1))
 
 

@@ -38,12 +38,17 @@ _OF_KIND: dict[st.SearchStrategy[Any], str] = {
     st.booleans(): "restock",
     st.floats(0.01, 8.0): "warehouse_width warehouse_height delivery_width max_speed pickup_range "
     "ranger_range view_range radio_range timer_limit",
-    st.floats(0.05, 2.0): "duration robot_mass max_acceleration max_turn_rate",
+    st.floats(0.05, 2.0): "duration robot_mass max_acceleration max_turn_rate request_timeout "
+    "order_cycle order_due",
+    st.floats(0.1, 20.0): "order_rate",
     st.floats(0.01, 0.3): "robot_radius item_radius",
-    st.floats(0.0, 1.0): "ranger_noise position_noise sensor_dropout radio_loss",
+    st.floats(0.0, 1.0): "ranger_noise position_noise sensor_dropout radio_loss request_loss "
+    "request_delay",
     st.lists(st.floats(0.1, 1.0), min_size=1, max_size=3): "speed_mix sensing_mix",
     st.sampled_from(["holonomic", "differential"]): "drive",
     st.sampled_from(["none", "gossip"]): "relay",
+    st.sampled_from(["next", "poisson", "bursts", "day", "time,item/0,1/0.2,A"]): "orders",
+    st.sampled_from(["oldest", "urgent", "all"]): "announced",
     st.sampled_from([0.02, 0.1, 0.2]): "control_period",
 }
 sensible = {name: kind for kind, names in _OF_KIND.items() for name in names.split()}

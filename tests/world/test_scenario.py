@@ -104,6 +104,9 @@ PAPER: dict[str, Any] = {
     "n_robots": 25, "n_items": 60, "floor": None, "cell_size": 0.5,
     "warehouse_width": 10.0, "warehouse_height": 10.0, "delivery_width": 2.0, "duration": 500.0,
     "restock": False, "n_requests": 1, "demand": "closed", "request_docks": "any",
+    "request_timeout": None, "request_delay": 0.0, "request_loss": 0.0,
+    "orders": "next", "order_rate": 0.1, "order_cycle": 100.0, "order_due": None,
+    "announced": "oldest",
     "dock_capacity": None, "handling_time": 0.0, "n_obstacles": 0, "obstacle_radius": 0.3,
     "bodies": "chipmunk", "robot_radius": 0.125, "robot_mass": 3.0,
     "max_speed": 2.0, "max_acceleration": 20.0, "max_turn_rate": 6.0,
@@ -113,14 +116,19 @@ PAPER: dict[str, Any] = {
     "ranger_noise": 0.0, "position_noise": 0.0, "sensor_dropout": 0.0, "radio_loss": 0.0,
     "message_size": 0, "item_radius": 0.125, "control_period": 0.1, "physics_period": 0.02,
 }  # fmt: skip
+REALISTIC: dict[str, Any] = {
+    "drive": "differential", "max_speed": 1.0, "max_acceleration": 2.0, "ranger_noise": 0.03,
+    "position_noise": 0.05, "sensor_dropout": 0.02, "radio_loss": 0.1, "heading_drift": 0.05,
+    "handling_time": 1.0, "dock_capacity": 1.0,
+}  # fmt: skip
 PRESETS: dict[str, dict[str, Any]] = {
     "paper": {},
     "paper_scalability": {"n_items": 100},
     "dots": {"max_speed": 1.0, "max_acceleration": 2.0},
-    "realistic": {
-        "drive": "differential", "max_speed": 1.0, "max_acceleration": 2.0, "ranger_noise": 0.03,
-        "position_noise": 0.05, "sensor_dropout": 0.02, "radio_loss": 0.1, "heading_drift": 0.05,
-        "handling_time": 1.0, "dock_capacity": 1.0,
+    "realistic": REALISTIC,
+    "orders": {
+        **REALISTIC, "duration": 600.0, "restock": True, "orders": "bursts", "order_rate": 0.15,
+        "order_cycle": 200.0, "order_due": 60.0, "n_requests": 5, "request_timeout": 60.0,
     },
     "dotbots": {
         "n_robots": 20, "n_items": 20, "warehouse_width": 2.0, "warehouse_height": 2.0,

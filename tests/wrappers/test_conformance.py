@@ -49,14 +49,21 @@ STACKS: dict[str, Callable[[Any], Any]] = {
     "motion": lambda env: MotionFrame(in_all(env)),
     "fixed": lambda env: FixedAgents(in_all(env)),
     "numbers": lambda env: DiscreteActions(in_all(env)),
+    "orders": in_all,
     "numbers of motion": lambda env: FixedAgents(DiscreteActions(MotionFrame(in_all(env)))),
 }
+ORDERS: dict[str, Any] = {
+    "orders": "bursts", "order_rate": 1.0, "order_cycle": 2.0, "order_due": 1.0,
+    "announced": "urgent", "request_timeout": 0.5, "request_delay": 0.2, "request_loss": 0.3,
+    "restock": True,
+}  # fmt: skip
 each_stack = pytest.mark.parametrize("stack", STACKS)
 
 
 def stacked(stack: str, n_robots: int = 4, **fields: Any) -> Any:
     usual = {"n_robots": n_robots, "warehouse_width": 6.0, "warehouse_height": 5.0, "duration": 4.0}
-    return STACKS[stack](small(**{**usual, "n_items": 10, **fields}))
+    orders = ORDERS if stack == "orders" else {}
+    return STACKS[stack](small(**{**usual, "n_items": 10, **orders, **fields}))
 
 
 @pytest.fixture

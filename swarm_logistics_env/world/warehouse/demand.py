@@ -45,7 +45,7 @@ def was_told(world: World, robot: int, item: int) -> bool:
     """Return whether word of a request for `item` reached a robot: it may be late or lost."""
     parameters = world.parameters
     requested = world.progress.requested
-    key = world.robots.request_key[robot]
+    key = world.robots.hearing_key[robot]
     is_told = False
     for index in range(len(requested)):
         order = world.orders.open[index]

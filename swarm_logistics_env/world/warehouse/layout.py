@@ -60,7 +60,7 @@ def lay_out(state: WarehouseState, scenario: Scenario, seed: int) -> None:
     )
     state.robot_heading_drift = heading_drifts(scenario, seed)
     state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
-    state.robots.request_key[:] = row_keys(seed, "requests told", scenario.n_robots)
+    state.robots.hearing_key[:] = row_keys(seed, "requests told", scenario.n_robots)
     items = state.items
     items.request_key[:] = row_keys(seed, "requests 0", scenario.n_items)
     items.demand_key[0] = key(seed, "demand")

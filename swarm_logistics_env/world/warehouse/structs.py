@@ -102,7 +102,7 @@ class Robots(NamedTuple):
     message_before: Annotated[Numbers, "K N", "message_size"]  # of the same steps
     frozen_beams: Annotated[Numbers, "N", "beams"]  # [m] that frozen rangers repeat, or NaN
     sensor_key: Annotated[Keys, "N"]  # of the streams of its sensors' noise
-    request_key: Annotated[Keys, "N"]  # of the streams of the requests that it is not told of
+    hearing_key: Annotated[Keys, "N"]  # of the streams of the requests that it is not told of
 
 
 class Items(NamedTuple):
