@@ -18,7 +18,6 @@ from swarm_logistics_env.world.warehouse import Warehouse
 from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 from swarm_logistics_env.world.warehouse.faults import FaultLike
 from swarm_logistics_env.world.warehouse.orders import OrderMeasures
-from swarm_logistics_env.world.warehouse.state import NOBODY
 
 _MOST_STEPS = 100  # in one call: the interpreter answers a Ctrl-C between calls
 
@@ -31,8 +30,7 @@ class Episode:
         seed: the seed it was run with.
         delivery_times: (P,) when each item was delivered [s], ascending.
         ended_at: the duration, or when the last item was delivered [s].
-        all_delivered: nothing was asked for at the end, so P is capped by the number of items, or
-            of orders.
+        all_delivered: nothing was left to ask for, so P is capped by the number of items.
         failed_robots: the robots that any fault named, ascending.
         anchoring_seconds: robot-seconds that working robots spent touching failed ones.
         digest: hash of every robot's position at every control step and of all deliveries, in
@@ -221,7 +219,7 @@ def run_episode(
         seed=seed,
         delivery_times=delivery_times,
         ended_at=round(state.time, 9),
-        all_delivered=state.requested == NOBODY,
+        all_delivered=world.all_delivered,
         failed_robots=world.struck_robots,
         anchoring_seconds=round(state.anchoring_seconds, 9),
         digest=digest.hexdigest(),

@@ -91,11 +91,6 @@ class Deliveries:
         return len(self.delivery_times) if self.untimed is None else self.untimed
 
     @property
-    def capped(self) -> bool:
-        """Whether P would be larger if there had been more to deliver."""
-        return self.all_delivered and self.untimed is None
-
-    @property
     def longest_standstill(self) -> float | None:
         """The longest time without a delivery, from start to end [s]; None: times are unknown."""
         if self.untimed is not None and not self.delivery_times.size:
@@ -130,6 +125,11 @@ class Outcome(OrderMeasures, ContactMeasures, Deliveries):
 
     A measure is None where nobody counted, too, as in runs of version 0.3.
     """
+
+    @property
+    def capped(self) -> bool:
+        """Whether P would be larger if there had been more to deliver."""
+        return bool(self.all_served) or (self.all_delivered and self.untimed is None)
 
 
 class _Fields(Protocol):

@@ -195,7 +195,7 @@ class ClearingTask(WarehouseTask):
 class OnTimeTask(WarehouseTask):
     """Episodes of orders that are due: P is how many were served in time.
 
-    P has no cap where orders come by themselves: they are as many whatever the swarm does.
+    A run that serves all of them in time is capped by their number.
     """
 
     name = "on-time"
@@ -220,7 +220,8 @@ class OnTimeTask(WarehouseTask):
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one episode; see `Task.play`."""
         outcome = super().play(case, seed, policy_seed)
-        return replace(outcome, untimed=outcome.on_time or 0)
+        is_capped = outcome.share_on_time == 1.0
+        return replace(outcome, untimed=outcome.on_time or 0, all_served=is_capped)
 
     def largest_performance(self, scenario: TaskScenario) -> float:
         """Return infinity: how many orders come is drawn."""

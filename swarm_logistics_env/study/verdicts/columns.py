@@ -26,6 +26,7 @@ ORDER_MEASURES = {
     "p95_tardiness": "95th percentile of it [s]",
     "longest_queue": "most orders that were open or waited at a time",
     "put_back": "requests that were not served within `request_timeout`",
+    "all_served": "share of runs with nothing left to serve at the end, so that P is capped",
 }
 CELL_COLUMNS: Columns[Cell] = {
     "policy": (str, lambda cell: cell.policy, "label of the policy"),

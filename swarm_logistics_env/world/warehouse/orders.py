@@ -50,6 +50,8 @@ class OrderMeasures:
         p95_tardiness: 95th percentile of the same [s].
         longest_queue: most orders that were open or waited at a time; None: none came by itself.
         put_back: requests that were not served within `request_timeout`; None: none was put back.
+        all_served: whether nothing was asked for at the end, so that P is capped by the orders;
+            None: none came by itself.
     """
 
     on_time: NonNegativeInt | None = None
@@ -58,6 +60,7 @@ class OrderMeasures:
     p95_tardiness: NonNegativeFloat | None = None
     longest_queue: NonNegativeInt | None = None
     put_back: NonNegativeInt | None = None
+    all_served: bool | None = None
 
 
 _GRACE = 1e-6  # [s]; times are sums of periods
@@ -205,8 +208,11 @@ def order_measures(
     due = np.concatenate([due_times, rows[is_overdue, DUE]])
     served = np.concatenate([delivery_times, np.full(is_overdue.sum(), time)])
     tardiness = np.maximum(served - due, 0.0)[np.isfinite(due)]
+    longest_queue = orders.longest_queue.item() or None
     counts = OrderMeasures(
-        longest_queue=orders.longest_queue.item() or None, put_back=orders.n_put_back.item() or None
+        longest_queue=longest_queue,
+        put_back=orders.n_put_back.item() or None,
+        all_served=None if longest_queue is None else bool((rows[:, ITEM_ORDERED] == NOBODY).all()),
     )
     if not tardiness.size:
         return counts
