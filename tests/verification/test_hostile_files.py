@@ -199,9 +199,7 @@ def assert_same_or_missing(original: Path, out: Path) -> None:
 
 @given(source=st.randoms(use_true_random=False))
 @store_examples
-def test_any_store_is_read_or_refused(
-    judged_store: Path, source: random.Random
-) -> None:
+def test_any_store_is_read_or_refused(judged_store: Path, source: random.Random) -> None:
     check_spoilt(judged_store, lambda store: store.write_bytes(mangled(source, store.read_bytes())))
 
 

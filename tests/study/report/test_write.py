@@ -56,6 +56,7 @@ def directory(few: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return directory
 
 
+@pytest.mark.unmeasured
 def test_a_report_is_as_recorded(tmp_path: Path) -> None:
     """Every number and sentence, but for the sheet of the set-up."""
     results = paper(seeds=12, noise=2.0, full=NARROW, unaffected=frozenset({"FM2"}))
@@ -74,6 +75,7 @@ def test_a_report_is_as_recorded(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.unmeasured
 def test_equal_rows_give_equal_bytes(tmp_path: Path) -> None:
     study = Study(seeds=3, sizes=[{"values": [5, 10]}])
     results = judged(study, lambda _, setting, seed: delivered(5 * (setting.value or 10) + seed))

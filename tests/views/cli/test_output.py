@@ -39,6 +39,7 @@ app()
 """
 
 
+@pytest.mark.unmeasured
 @given(st.text(), st.sampled_from(ENCODINGS))
 def test_every_text_is_written_in_every_encoding(text: str, encoding: str) -> None:
     written = io.BytesIO()
@@ -55,6 +56,7 @@ def test_every_text_is_written_in_every_encoding(text: str, encoding: str) -> No
 
 
 # The other charmaps are written as cp1252 is; the test above takes all of them.
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("encoding", "is_terminal"),
     [("ascii", False), ("cp1252", True), ("utf-16", False), ("utf-8", False), ("utf-8", True)],
