@@ -33,25 +33,30 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
 # Whether compiling is told would depend on the machine's speed, and tests read what is printed.
 fast_kernels._SILENCE = math.inf
 
-# PDF and PNG take three quarters of the time of a report, so most tests draw figures as SVG alone.
+# To draw is half of the time of a report, and few tests look at what is drawn.
 _draw_file = drawing._file
 
 
-def _draw_svg_alone(canvas: Any, ending: str) -> bytes:
-    return _draw_file(canvas, ending) if ending == "svg" else b""
+def _draw_nothing(_: Any, ending: str) -> bytes:
+    return b'<svg xmlns="http://www.w3.org/2000/svg"/>' if ending == "svg" else b""
 
 
-vars(drawing).update(_file=_draw_svg_alone)
+vars(drawing).update(_file=_draw_nothing)
 
 
 @contextlib.contextmanager
-def drawn_in_all_formats() -> Iterator[None]:
-    """Draw figures as PDF and PNG as well, for a test that looks at these."""
-    vars(drawing).update(_file=_draw_file)
+def figures_drawn(*formats: str) -> Iterator[None]:
+    """Draw figures in these formats, without any in all three, for a test that looks at them."""
+
+    def draw(canvas: Any, ending: str) -> bytes:
+        function = _draw_file if ending in (formats or drawing._METADATA) else _draw_nothing
+        return function(canvas, ending)
+
+    vars(drawing).update(_file=draw)
     try:
         yield
     finally:
-        vars(drawing).update(_file=_draw_svg_alone)
+        vars(drawing).update(_file=_draw_nothing)
 
 
 ROOT = Path(__file__).parents[1]
@@ -78,8 +83,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Measure coverage with the tests that mirror the package alone: measured ones are slower."""
-    with contextlib.nullcontext() if mirrors(item.path) else _uncovered():
+    """Measure coverage with quick tests that mirror the package alone: measured ones are slower."""
+    is_measured = mirrors(item.path) and not item.get_closest_marker("unmeasured")
+    with contextlib.nullcontext() if is_measured else _uncovered():
         return (yield)
 
 

@@ -18,7 +18,7 @@ from swarm_logistics_env.study.questions.specification import MOST_SEEDS
 from swarm_logistics_env.train import evaluation
 from swarm_logistics_env.train.settings import Evaluation
 from swarm_logistics_env.train.trainer import TrainingLog
-from tests.conftest import drawn_in_all_formats
+from tests.conftest import figures_drawn
 
 SCENARIO = Scenario(
     n_robots=6, n_items=9, warehouse_width=3.0, warehouse_height=3.0, duration=20.0, restock=True
@@ -71,6 +71,6 @@ def test_the_best_evaluation_is_the_highest_and_the_curve_is_written(tmp_path: P
     with (tmp_path / "curve.csv").open(newline="") as file:
         assert [float(row["P"]) for row in csv.DictReader(file)] == [1.0, 40.0, 90.0, 80.0]
     pytest.importorskip("matplotlib")
-    with drawn_in_all_formats():
+    with figures_drawn():
         log.draw(tmp_path / "curve.png", "ppo", seeds=4)
     assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")

@@ -29,6 +29,7 @@ from swarm_logistics_env.study.trials import read_trials
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.world.observations import N_COLUMNS
+from tests.conftest import SMALL
 from tests.made_up import alter, made_old
 
 STUDY = """\
@@ -151,6 +152,15 @@ def test_any_table_is_imported_or_refused(source: random.Random, table: str) -> 
                 assert stored == sorted(float(row[index]) for row in rows if any(row))
 
 
+@pytest.fixture(scope="module")
+def judged_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Directory of a study of every indicator in few runs, which takes little time to judge."""
+    directory = tmp_path_factory.mktemp("judged")
+    few = {"sizes": [{"values": [2, 4]}], "faults": [{"modes": ["FM4"], "robots": [1]}]}
+    assert Study(out=directory, **{**SMALL, **few, "ablations": []}).run().failed == 0
+    return directory
+
+
 def check_spoilt(original: Path, spoil: Callable[[Path], object]) -> None:
     """Read a copy of the study's store that was spoilt in every way; it stays where it is."""
 
@@ -189,8 +199,8 @@ def assert_same_or_missing(original: Path, out: Path) -> None:
 
 @given(source=st.randoms(use_true_random=False))
 @store_examples
-def test_any_store_is_read_or_refused(played: Path, source: random.Random) -> None:
-    check_spoilt(played, lambda store: store.write_bytes(mangled(source, store.read_bytes())))
+def test_any_store_is_read_or_refused(judged_store: Path, source: random.Random) -> None:
+    check_spoilt(judged_store, lambda store: store.write_bytes(mangled(source, store.read_bytes())))
 
 
 COLUMNS = ["key", "run", "failed", "outcome", "wall_seconds"]
@@ -206,7 +216,7 @@ NOTES = ["", "x", "null", "{}", "[]", "-1", '{"a": 1}', "[[1]]", "1e9", b"\xff",
 )
 @store_examples
 def test_a_store_of_wrong_contents_is_read_or_refused(
-    played: Path, column: str, value: Any, index: int, source: random.Random
+    judged_store: Path, column: str, value: Any, index: int, source: random.Random
 ) -> None:
     def spoil(store: Path) -> None:
         with contextlib.closing(sqlite3.connect(store)) as database, database:
@@ -216,7 +226,7 @@ def test_a_store_of_wrong_contents_is_read_or_refused(
         if source.random() < 0.5:  # in a store that has no digests
             made_old(store)
 
-    check_spoilt(played, spoil)
+    check_spoilt(judged_store, spoil)
 
 
 @given(
@@ -226,7 +236,7 @@ def test_a_store_of_wrong_contents_is_read_or_refused(
 )
 @store_examples
 def test_a_store_of_wrong_notes_is_read_or_refused(
-    played: Path, name: str, value: str | bytes | None, source: random.Random
+    judged_store: Path, name: str, value: str | bytes | None, source: random.Random
 ) -> None:
     def spoil(store: Path) -> None:
         with contextlib.closing(sqlite3.connect(store)) as database, database:
@@ -241,7 +251,7 @@ def test_a_store_of_wrong_notes_is_read_or_refused(
         if source.random() < 0.5:  # as if that had been written
             alter(store, "DELETE FROM notes WHERE value IS NULL")
 
-    check_spoilt(played, spoil)
+    check_spoilt(judged_store, spoil)
 
 
 # A file that carries a pickle is refused unread, see tests/policies/test_files.py.

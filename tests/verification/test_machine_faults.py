@@ -45,7 +45,13 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 CAP_DAC_OVERRIDE, PR_CAPBSET_DROP = 1, 24
-COMMAND = [sys.executable, "-c", "from swarm_logistics_env.views.cli import app; app()"]
+SCRIPT = """
+import sys
+sys.modules["matplotlib"] = None  # a report without figures
+from swarm_logistics_env.views.cli import app
+app()
+"""
+COMMAND = [sys.executable, "-c", SCRIPT]
 
 
 def command(words: str, limit: int | None = None) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
 from dataclasses import replace
@@ -59,11 +60,11 @@ def test_what_is_alike_shares_a_line_and_no_question_is_lost(few: StudyResults) 
     assert questions == ["FT FM4, 1, 2, 3 of 25", "R FM4, 1, 2, 3 of 25"]
 
 
-@pytest.mark.parametrize("width", [60, 80])
+@pytest.mark.unmeasured
 def test_digest_fits_the_screen_and_nothing_is_cut(
-    width: int, few: StudyResults, compared: StudyResults
+    few: StudyResults, compared: StudyResults
 ) -> None:
-    for results in (few, compared):
+    for results, width in itertools.product((few, compared), (60, 80)):
         lines = terminal_answer(answer(results), width).splitlines()
         assert len(lines) <= MOST_LINES
         assert not any("…" in line for line in lines if "N 5→" not in line)

@@ -29,7 +29,7 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.views.watch import Session, messages
 from swarm_logistics_env.views.watch.messages import recorded_page
-from tests.conftest import SMALL
+from tests.conftest import SMALL, figures_drawn
 from tests.made_up import delivered, judged
 from verification.browser import Browser
 
@@ -57,7 +57,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
         scenario={**area, "n_robots": 4, "n_items": 8, "duration": 30.0},
         faults=[{"modes": ["FM4"], "robots": [1, 2]}],
     ).run()
-    assert app.run(["study", "report", str(out)]) == 0
+    with figures_drawn("svg"):
+        assert app.run(["study", "report", str(out)]) == 0
     page = (out / "report.html").read_text()
     (text,) = re.findall(r' id="data">(.*?)</script>', page, re.DOTALL)
     return Made(out / "report.html", Study.stored(out).findings(), page, json.loads(text))

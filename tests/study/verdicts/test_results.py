@@ -17,6 +17,7 @@ from swarm_logistics_env.study.verdicts.columns import CELL_COLUMNS, VERDICT_COL
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
+from tests.conftest import SMALL
 from tests.made_up import decided, judged, paper, published
 
 
@@ -150,12 +151,13 @@ def test_one_failed_run_blocks_its_family_under_holm(paper_results: StudyResults
     assert {t.on_threshold.plain for t in tests if t.problem} == {"undefined"}
 
 
+@pytest.mark.unmeasured
 def test_two_seeds_and_a_cap_everywhere_give_no_verdict() -> None:
     def capped(policy: str, setting: Setting, seed: int) -> Outcome:
         digest = f"{setting} {seed}"
         return Outcome(delivery_times=np.arange(60.0), all_delivered=True, digest=digest)
 
-    for results in (paper(seeds=2), judged(Study.preset("paper", seeds=10), capped)):
+    for results in (paper(seeds=2), judged(Study(**{**SMALL, "seeds": 10}), capped)):
         for test in results.verdicts:
             assert test.estimate is not None
             word = "untestable" if test.estimate.untestable else "open"
@@ -173,6 +175,7 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     }
 
 
+@pytest.mark.unmeasured
 def test_every_column_has_a_value_somewhere(paper_results: StudyResults) -> None:
     # Every column has a value somewhere in a whole study, but for what only others have.
     claimed = paper(unaffected=frozenset({"FM2"}), seeds=40)

@@ -123,6 +123,7 @@ def calls_of(*functions: Callable[..., Any], during: Callable[[], object]) -> li
     return [counts[function.__code__] for function in functions]
 
 
+@pytest.mark.unmeasured
 def test_one_judgement_computes_everything_once_and_hands_it_on(command: Command) -> None:
     once = RecordedStudy.of.__func__, results.judge, collapses, edges, answer, Runs.__init__  # type: ignore[attr-defined]
     *counts, n_tests = calls_of(*once, two_phases, during=lambda: command(TRIALS))
@@ -232,12 +233,7 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     assert "1 were kept" in last
 
 
-def test_other_seeds_are_judged_in_a_directory_of_their_own(command: Command) -> None:
-    printed = command("judge homing --processes 1 --seeds 3 --first-seed 500")
-    assert Study.stored("results/judged/homing-first-seed-500").plan().seeds == range(500, 503)
-    assert " --first-seed 503 --seeds " in printed
-
-
+@pytest.mark.unmeasured
 def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
     words = "judge judged_policy:Mine --processes 1 --seeds 30 --out"
     printed = command(f"{words} clear")
@@ -267,27 +263,33 @@ def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(command:
     assert not Path("short").exists()
 
 
-def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse(command: Command) -> None:
-    assert ", all items after " in command("judge homing --clearing --seeds 3 --processes 1")
-    report = Path("results/judged/homing-clearing/report.md").read_text()
+def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse_over_other_seeds(
+    command: Command,
+) -> None:
+    world = "homing --clearing --set n_items=5"
+    printed = command(f"judge {world} --seeds 3 --first-seed 500 --processes 1")
+    assert ", all items after " in printed
+    folder = Path("results/judged/homing-clearing-n-items-5-first-seed-500")
+    assert f" {world} --first-seed 503 --seeds 60 --out {folder}-60" in printed
+    assert Study.stored(folder).plan().seeds == range(500, 503)
+    report = (folder / "report.md").read_text()
     assert "Time until all items are delivered" in report
     assert "items delivered per minute" in report
 
 
+@pytest.mark.unmeasured
 def test_a_policy_is_judged_on_other_bodies_and_floors(command: Command) -> None:
-    printed = command("judge homing --bodies mujoco --seeds 3 --processes 1")
-    folder = "results/judged/homing-bodies-mujoco"
-    more = f"homing --bodies mujoco --first-seed 30003 --seeds 60 --out {folder}-60"
-    assert more in printed
-    report = Path(folder, "report.md").read_text()
+    Path("hall.toml").write_text("floor = 'two_docks'\nn_robots = 3\nduration = 5\n")
+    command("judge homing --scenario hall.toml --bodies mujoco --seeds 3 --processes 1")
+    folder = Path("results/judged/homing-scenario-hall-toml-bodies-mujoco")
+    report = (folder / "report.md").read_text()
     assert "| bodies | mujoco (default chipmunk) |" in report
+    assert "| floor | two_docks (default None) |" in report
     refused = command("judge homing --benchmark --bodies mujoco", code=2)
     assert "--bodies: the benchmark has" in refused
-    plan = "--set floor=two_docks --set n_robots=3 --set duration=5"
-    command(f"judge homing {plan} --seeds 3 --processes 1 --out floor")
-    assert "| floor | two_docks (default None) |" in Path("floor", "report.md").read_text()
 
 
+@pytest.mark.unmeasured
 def test_a_policy_file_is_judged_in_the_world_in_which_it_was_trained(command: Command) -> None:
     training = """name = "mine"
 agent_steps = 400

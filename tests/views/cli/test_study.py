@@ -22,7 +22,7 @@ from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.study.studies import Study
-from tests.conftest import drawn_in_all_formats
+from tests.conftest import figures_drawn
 from tests.views.cli.conftest import Command
 
 FILE = """
@@ -83,11 +83,12 @@ def test_study_run_prints_and_writes_the_report(file: Path, command: Command) ->
 def test_figures_are_drawn_as_wide_and_in_the_letters_that_a_paper_needs(
     command: Command,
 ) -> None:
-    command(f"{RUN} --out out")
+    with figures_drawn("svg"):
+        command(f"{RUN} --out out")
     page = Path("out/report.html").read_text()
     drawing, picture = Path("out/figures/answer.svg"), Path("out/figures/answer.png")
     assert 'width="374.4pt"' in drawing.read_text()  # 72 a inch
-    with drawn_in_all_formats():
+    with figures_drawn():
         command("study report out --figure-width 3.5 --font serif")
     assert 'width="252pt"' in drawing.read_text()
     assert "font-family: 'STIXGeneral'" in drawing.read_text()
@@ -106,6 +107,7 @@ def test_study_plan_prints_conditions_once_and_what_they_take(file: Path, comman
     assert list(Path().iterdir()) == [file]
 
 
+@pytest.mark.unmeasured
 def test_every_study_that_is_shipped_or_an_example_is_planned(command: Command) -> None:
     # Those in tasks/ need packages that nothing else does.
     files = sorted(EXAMPLES.glob("*.toml")) + sorted(EXAMPLES.glob("questions/*.toml"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.compiler.addresses import unpacked_at
+from swarm_logistics_env.compiler.kernels import kernel
+from swarm_logistics_env.compiler.packing import packed
 from swarm_logistics_env.core.errors import ScenarioError
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.warehouse.floor_cells import (
@@ -21,12 +25,37 @@ from swarm_logistics_env.world.warehouse.floor_cells import (
 from swarm_logistics_env.world.warehouse.pose import Pose
 from swarm_logistics_env.world.warehouse.rangers import scan_boxes
 from swarm_logistics_env.world.warehouse.state import NOBODY
+from swarm_logistics_env.world.warehouse.structs import Floor, Sensed, World
 
 
 def world_of(floor: str, n_robots: int = 1, n_items: int = 1, **fields: Any) -> Warehouse:
     world = Warehouse(Scenario(floor=floor, n_robots=n_robots, n_items=n_items, **fields))
     world.reset(0)
     return world
+
+
+# As `test_layout.restock_at`: Python hands over no structure, which takes the compiler seconds.
+@kernel
+def free_way_at(address: int, x: float, y: float, dx: float, dy: float, reach: float) -> float:
+    return free_way(unpacked_at(Floor, address), x, y, dx, dy, reach)
+
+
+@kernel
+def is_near_solid_at(address: int, x: float, y: float, distance: float) -> bool:
+    return is_near_solid(unpacked_at(Floor, address), x, y, distance)
+
+
+@kernel
+def scan_boxes_at(
+    address: int, x: float, y: float, heading: float, reach: float, scan: Sensed
+) -> None:
+    pose = Pose(x, y, math.cos(heading), math.sin(heading))
+    scan_boxes(pose, reach, unpacked_at(World, address), scan)
+
+
+@kernel
+def is_in_sight_at(address: int, x: float, y: float, other_x: float, other_y: float) -> bool:
+    return is_in_sight(unpacked_at(World, address), x, y, other_x, other_y)
 
 
 def put(world: Warehouse, robots: list[list[float]], items: list[list[float]]) -> None:
@@ -107,11 +136,11 @@ def test_items_robots_and_obstacles_start_in_their_cells_and_leave_ways() -> Non
 
 def test_a_robot_finds_room_above_a_small_item_beside_a_rack() -> None:
     scenario = Scenario(floor="aisles", n_items=60, item_radius=0.05)
-    world, cells = Warehouse(scenario), floor_of(scenario)
+    world, words = Warehouse(scenario), packed(floor_of(scenario))
     for seed in range(5):
         world.reset(seed)
         for x, y in world.state.item_position.tolist():
-            assert not is_near_solid(cells, x, y, scenario.robot_radius - 1e-9)
+            assert not is_near_solid_at(words.ctypes.data, x, y, scenario.robot_radius - 1e-9)
 
 
 def test_what_comes_back_lies_in_storage_again() -> None:
@@ -143,11 +172,12 @@ def test_a_ray_goes_as_far_as_fine_steps_find_floor(
     except ValueError:
         return
     cells, reach = floor_of(scenario), 2.0
+    words = packed(cells)
     column, line = int(x / 0.5), int(y / 0.5)
     if cells.is_solid[line, column]:
         return
     step = np.array([np.cos(angle), np.sin(angle)])
-    distance = free_way(cells, x, y, float(step[0]), float(step[1]), reach)
+    distance = free_way_at(words.ctypes.data, x, y, float(step[0]), float(step[1]), reach)
     along = np.arange(0.0, reach, 2e-4)
     points = np.array([x, y]) + along[:, None] * step
     inside = ((points > 0.0) & (points < 3.0)).all(axis=1)
@@ -158,7 +188,7 @@ def test_a_ray_goes_as_far_as_fine_steps_find_floor(
     assert distance == pytest.approx(first, abs=3e-4) or distance < first
     end = points[min(np.searchsorted(along, distance + 2e-3), len(along) - 1)]
     if distance < reach - 1e-2 and distance < first - 1e-3:
-        assert is_near_solid(cells, float(end[0]), float(end[1]), 5e-3)
+        assert is_near_solid_at(words.ctypes.data, float(end[0]), float(end[1]), 5e-3)
 
 
 @pytest.mark.parametrize("floor", ["aisles", "two_docks", "bottleneck", "large", "noise"])
@@ -170,16 +200,16 @@ def test_beams_meet_what_rays_meet_cell_after_cell(floor: str, reach: float) -> 
         signs[:, :4] = "A"
         floor = "\n".join("".join(line) for line in signs.tolist())
     world = world_of(floor, ranger_range=reach)
+    words = packed(world._world.floor)
     sides = world.scenario.warehouse_width, world.scenario.warehouse_height
     points = rng.uniform((0.0, 0.0), sides, (400, 2))
     beams = 2.0 * np.pi * np.arange(row.N_BEAMS) / row.N_BEAMS
     for x, y in points[world.floor.is_free(points)].tolist():
         heading = rng.uniform(-np.pi, np.pi)
-        pose = Pose(x, y, np.cos(heading), np.sin(heading))
         scan = np.full(row.N_BEAMS, reach, np.float32)
-        scan_boxes(pose, reach, world._world, scan)
+        scan_boxes_at(world.address, x, y, heading, reach, scan)
         steps = np.column_stack([np.cos(beams + heading), np.sin(beams + heading)])
-        rays = [free_way(world._world.floor, x, y, dx, dy, reach) for dx, dy in steps.tolist()]
+        rays = [free_way_at(words.ctypes.data, x, y, dx, dy, reach) for dx, dy in steps.tolist()]
         assert scan == pytest.approx(rays, abs=1e-6)
 
 
@@ -190,7 +220,7 @@ def test_sight_is_the_same_from_both_ends() -> None:
     points = points[world.floor.is_free(points)]
     for start, end in zip(points[::2].tolist(), points[1::2].tolist(), strict=False):
         forth, back = (*start, *end), (*end, *start)
-        assert is_in_sight(world._world, *forth) == is_in_sight(world._world, *back)
+        assert is_in_sight_at(world.address, *forth) == is_in_sight_at(world.address, *back)
 
 
 def test_a_pickle_goes_on_with_the_same_bits() -> None:

@@ -10,8 +10,18 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
+from swarm_logistics_env.compiler.addresses import unpacked_at
+from swarm_logistics_env.compiler.kernels import kernel
+from swarm_logistics_env.compiler.packing import packed
 from swarm_logistics_env.world.observations import TURN_RATE
 from swarm_logistics_env.world.warehouse.commands import drive
+from swarm_logistics_env.world.warehouse.structs import World
+
+
+@kernel
+def drive_at(address: int) -> None:
+    """Drive the robots of the world at an address: as `test_layout.restock_at`."""
+    drive(unpacked_at(World, address))
 
 
 @given(
@@ -32,7 +42,8 @@ def test_a_robot_drives_along_its_mean_direction_at_most_at_its_top_speed(
     robots.heading[:], able.obeys[:], wanted[:] = heading, [True, False], 9.0
     able.max_speed[:], able.max_turn_rate[:] = 2.0, 6.0
     world.commands.now[:] = commands
-    drive(world)
+    words = packed(world)
+    drive_at(words.ctypes.data)
     forward, left, turn = np.clip(commands[:3], -1.0, 1.0)
     velocity = complex(forward, left if is_holonomic else 0.0)
     velocity *= (

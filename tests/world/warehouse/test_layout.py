@@ -10,13 +10,23 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env.compiler.addresses import unpacked_at
+from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.core.errors import ScenarioError
 from swarm_logistics_env.world.warehouse import layout
 from swarm_logistics_env.world.warehouse.state import DELIVERED
+from swarm_logistics_env.world.warehouse.structs import World
 from tests.world.warehouse.conftest import Build
 
 NOTHING = np.zeros((0, 2))
 SEEDS = st.integers(-(2**70), 2**70)
+
+
+@kernel
+def restock_at(address: int, item: int) -> bool:
+    """Put an item back into the world at an address: Python hands over no structure, which takes
+    the compiler ten seconds."""
+    return layout.place_restocked(unpacked_at(World, address), item)
 
 
 def narrowest(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
@@ -96,7 +106,7 @@ def test_a_restocked_item_stands_clear_and_each_elsewhere() -> None:
     taken, places = np.vstack([items.position[1:], robots.position]), []
     for count in range(1, 30):
         world.state.progress.n_delivered[0] = count
-        assert layout.place_restocked(world._world, 0)
+        assert restock_at(world.address, 0)
         places.append(items.position[0].copy())
     assert narrowest(np.array(places), taken) >= 0.25
     assert 0.125 <= np.min(places) <= np.max(places) <= 3.0 - 0.125
@@ -125,7 +135,7 @@ def test_no_item_comes_back_into_an_obstacle() -> None:
     state.item_status[0] = DELIVERED
     for count in range(1, 60):
         state.progress.n_delivered[0] = count
-        assert layout.place_restocked(world._world, 0)
+        assert restock_at(world.address, 0)
         places.append(state.item_position[0].copy())
     clear = world.scenario.obstacle_radius + world.scenario.item_radius
     assert narrowest(np.array(places), state.obstacle_position) >= clear
