@@ -25,6 +25,7 @@ ORDER_MEASURES = {
     "mean_tardiness": "mean time by which orders were late [s]",
     "p95_tardiness": "95th percentile of it [s]",
     "longest_queue": "most orders that were open or waited at a time",
+    "turned_away": "orders that found no item or no room to wait",
     "put_back": "requests that were not served within `request_timeout`",
     "all_served": "share of runs with nothing left to serve at the end, so that P is capped",
 }

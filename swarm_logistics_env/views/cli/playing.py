@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -18,6 +19,7 @@ from swarm_logistics_env.policies.episode import Play, run_episode
 from swarm_logistics_env.world.scenario import SOURCES
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
 from swarm_logistics_env.world.warehouse.faults import ROLES
+from swarm_logistics_env.world.warehouse.orders import OrderMeasures
 
 from .policy_choice import (
     EnvOption,
@@ -109,12 +111,27 @@ def run_command(
     if len(times):
         wait = np.diff(times, prepend=0.0).max()
         echo(f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, longest wait {wait:.1f} s")
+    for line in _orders_in_words(episode.orders):
+        echo(line)
     if episode.failed_robots:
         echo(
             f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "
             f"them for {episode.anchoring_seconds:.1f} robot-seconds"
         )
     echo(f"{episode.ended_at / wall:.0f} times real time ({wall:.2f} s)")
+
+
+def _orders_in_words(measures: OrderMeasures) -> Iterator[str]:
+    """Yield a line on what was counted of orders, if anything was."""
+    if measures.share_on_time is not None:
+        yield (
+            f"{measures.share_on_time:.0%} of the orders on time, "
+            f"95 % at most {measures.p95_tardiness:.0f} s late"
+        )
+    if measures.longest_queue is not None:
+        yield f"longest queue {measures.longest_queue}, {measures.turned_away} turned away"
+    if measures.put_back is not None:
+        yield f"{measures.put_back} requests put back"
 
 
 def watch_command(

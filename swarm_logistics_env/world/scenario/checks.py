@@ -129,13 +129,14 @@ def _check_ordered_items(orders: OrderFile, n_items: int, restock: bool) -> None
         line_of_item[item] = line
     n_classes = len(orders.classes)
     for number, name in enumerate(orders.classes):
-        n_of_class = len(range(number, n_items, n_classes))
+        of_class = set(range(number, n_items, n_classes))
+        n_of_class = len(of_class if restock else of_class.difference(line_of_item))
         n_ordered = int((orders.kind == number).sum())
         if n_of_class == 0 or (n_ordered > n_of_class and not restock):
             raise ValueError(
                 f"item = {name!r} is ordered {n_ordered} times: there are {n_of_class} items of "
-                f"that class ({n_items} items in {n_classes} classes): should be fewer, or "
-                "restock be True"
+                f"that class that no other row names ({n_items} items in {n_classes} classes): "
+                "should be fewer, or restock be True"
             )
 
 

@@ -64,10 +64,13 @@ def is_known_request(world: World, robot: int, item: int) -> bool:
 
 @kernel
 def is_ordered(world: World, item: int) -> bool:
-    """Return whether `item` is asked for, or an order for it waits."""
+    """Return whether `item` is asked for, or an order for it waits, or will come by its number."""
+    orders = world.orders
     is_on_order = is_requested(world, item)
-    for index in range(world.orders.n_waiting[0]):
-        is_on_order |= world.orders.waiting[index, ITEM_ORDERED] == item
+    for index in range(orders.n_waiting[0]):
+        is_on_order |= orders.waiting[index, ITEM_ORDERED] == item
+    for index in range(orders.n_listed[0], len(orders.listed)):
+        is_on_order |= orders.listed[index, ITEM_ORDERED] == item
     return is_on_order
 
 

@@ -49,7 +49,8 @@ class OrderMeasures:
         mean_tardiness: mean time by which these were late, 0 for those on time [s].
         p95_tardiness: 95th percentile of the same [s].
         longest_queue: most orders that were open or waited at a time; None: none came by itself.
-        put_back: requests that were not served within `request_timeout`; None: none was put back.
+        turned_away: orders that found no item or no room to wait; None: none came by itself.
+        put_back: requests that were not served within `request_timeout`; None: there is none.
         all_served: whether nothing was asked for at the end, so that P is capped by the orders;
             None: none came by itself.
     """
@@ -59,6 +60,7 @@ class OrderMeasures:
     mean_tardiness: NonNegativeFloat | None = None
     p95_tardiness: NonNegativeFloat | None = None
     longest_queue: NonNegativeInt | None = None
+    turned_away: NonNegativeInt | None = None
     put_back: NonNegativeInt | None = None
     all_served: bool | None = None
 
@@ -164,6 +166,7 @@ def put_back_late(world: World) -> None:
     if longest == math.inf:
         return
     orders = world.orders
+    orders.is_timed[0] = True
     requested = world.progress.requested
     order = world.claims.order
     index = 0
@@ -208,12 +211,14 @@ def order_measures(
     due = np.concatenate([due_times, rows[is_overdue, DUE]])
     served = np.concatenate([delivery_times, np.full(is_overdue.sum(), time)])
     tardiness = np.maximum(served - due, 0.0)[np.isfinite(due)]
-    longest_queue = orders.longest_queue.item() or None
-    counts = OrderMeasures(
-        longest_queue=longest_queue,
-        put_back=orders.n_put_back.item() or None,
-        all_served=None if longest_queue is None else bool((rows[:, ITEM_ORDERED] == NOBODY).all()),
-    )
+    counts = OrderMeasures(put_back=orders.n_put_back.item() if orders.is_timed.item() else None)
+    if orders.longest_queue.item() > 0:
+        counts = replace(
+            counts,
+            longest_queue=orders.longest_queue.item(),
+            turned_away=orders.n_turned_away.item(),
+            all_served=bool((rows[:, ITEM_ORDERED] == NOBODY).all()),
+        )
     if not tardiness.size:
         return counts
     n_on_time = int((tardiness <= _GRACE).sum())

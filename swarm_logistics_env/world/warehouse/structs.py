@@ -164,6 +164,7 @@ class Orders(NamedTuple):
     n_put_back: Annotated[Integers, 1]  # requests that were not served in time
     n_turned_away: Annotated[Integers, 1]  # orders that found no item or no room to wait
     longest_queue: Annotated[Integers, 1]  # most orders that were open or waited at a time
+    is_timed: Annotated[Flags, 1]  # requests were put back in time, if there were any
     is_served: Annotated[Flags, 1]  # nothing is asked for, and nothing will be
 
 

@@ -178,7 +178,7 @@ def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) ->
         written = [row.outcome for row in sorted(runs._rows(), key=lambda row: row.rowid)]
         assert not any(name in written[0] for name in COUNTED)
         older, newer = (runs.outcomes([run(seed)])[CASE.key, seed] for seed in range(2))
-        assert [getattr(older, name) for name in COUNTED] == [None] * 12
+        assert [getattr(older, name) for name in COUNTED] == [None] * 13
         assert (newer.contacts_per_robot_minute, newer.fast_contacts) == (0.0, None)
         other.absorb(runs)
         assert other.outcomes([run(1)])[CASE.key, 1].overlap_share == 0.25

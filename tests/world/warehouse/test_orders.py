@@ -189,6 +189,19 @@ def test_classes_and_docks_of_a_file_are_kept() -> None:
         assert world.state.requested_docks.tolist()[:3] == [1, NOBODY, 0]
 
 
+def test_an_order_for_a_class_leaves_the_items_that_later_rows_name() -> None:
+    orders = file_of("0,A,,", "0,A,,", "0.3,0,,")
+    for seed in range(4):
+        world = Warehouse(Scenario(n_robots=1, n_items=3, orders=orders, announced="all"))
+        world.reset(seed)
+        assert sorted(requested_items(world)) == [1, 2]
+        world.step(np.zeros((1, 4)))
+        for _ in range(3):
+            world.step(np.zeros((1, 4)))
+        assert requested_items(world)[2] == 0
+        assert world.state.order_measures.turned_away == 0
+
+
 def test_an_order_counts_as_late_from_its_due_time_until_it_is_served(build: Build) -> None:
     orders = file_of("0,0,5,", "0,1,0.25,", "0,2,0.3,", "0,3,,")
     robots = [(INSIDE, 5.0), (INSIDE, 7.0)]
@@ -265,7 +278,7 @@ BAD_ORDERS: dict[str, str] = {
     file_of("0,60,,"): "line 2: item = 60: should be at most 59",
     file_of("0,7,,", "1,7,,"): "line 3: item = 7 is ordered in line 2 already",
     file_of("0,1,A", header="time,item,dock"): "line 2: dock = 'A': should be empty",
-    file_of(*["0,A,,"] * 61): "item = 'A' is ordered 61 times: there are 60 items",
+    file_of(*["0,A,,"] * 60, "9,7,,"): "item = 'A' is ordered 60 times: there are 59 items",
     "time,item/": "0 orders: should be 1 to 100000",
 }
 
