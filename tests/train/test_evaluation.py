@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from swarm_logistics_env.study.questions.specification import MOST_SEEDS
 from swarm_logistics_env.train import evaluation
 from swarm_logistics_env.train.settings import Evaluation, Scores
 from swarm_logistics_env.train.trainer import TrainingLog
-from tests.conftest import figures_drawn
+from tests.conftest import PACKAGE, figures_drawn
 
 SCENARIO = Scenario(
     n_robots=6, n_items=9, warehouse_width=3.0, warehouse_height=3.0, duration=20.0, restock=True
@@ -70,10 +71,13 @@ def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPat
     ],
 )
 def test_scores_are_of_several_sizes_and_of_faults(
-    fields: dict[str, Any], conditions: set[str], small: Any, tmp_path: Path
+    fields: dict[str, Any], conditions: set[str], tmp_path: Path
 ) -> None:
-    training = small(scores=Scores(seeds=1, n_robots=3, **fields))
-    scores = evaluation.evaluate_score(policies.load("swarm-dt"), training, tmp_path)
+    path = tmp_path / "policy.safetensors"
+    shutil.copy(PACKAGE / "policies" / "weights" / "ppo-delivery.safetensors", path)
+    settings = Scores(seeds=1, n_robots=3, **fields)
+    scenario = SCENARIO.replace(n_robots=3, duration=10.0)
+    scores = evaluation.evaluate_score(path, scenario, settings, threads=1)
     assert {score.condition for score in scores if score.measure == "P"} == conditions
 
 
