@@ -121,9 +121,11 @@ def test_every_argument_of_a_policy_of_a_network_changes_its_identity() -> None:
 
 
 def test_a_policy_of_the_package_without_a_record_is_known_by_what_it_holds() -> None:
-    first, second, changed = (RandomActions() for _ in range(3))
-    changed._spaces = [None]
-    assert identity(first) == identity(second) != identity(changed)
+    policy: Any = RandomActions()
+    before = identity(policy)
+    assert identity(policy) == before
+    policy._spaces = [None]
+    assert identity(policy) != before
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,9 @@ from swarm_logistics_env import Fault, Scenario, policies, run_episode
 from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.study.questions.specification import MOST_SEEDS
 from swarm_logistics_env.train import evaluation
-from swarm_logistics_env.train.settings import Evaluation
+from swarm_logistics_env.train.settings import Evaluation, Scores
 from swarm_logistics_env.train.trainer import TrainingLog
-from tests.conftest import figures_drawn
+from tests.conftest import PACKAGE, figures_drawn
 
 SCENARIO = Scenario(
     n_robots=6, n_items=9, warehouse_width=3.0, warehouse_height=3.0, duration=20.0, restock=True
@@ -56,6 +57,28 @@ def test_no_seed_of_a_score_is_measured_on_the_way(monkeypatch: pytest.MonkeyPat
     evaluation.evaluate(policies.load("swarm-dt"), SCENARIO, settings, threads=2)
     assert len(seeds) == 3
     assert seeds.isdisjoint(range(MOST_SEEDS))
+
+
+@pytest.mark.parametrize(
+    ("fields", "conditions"),
+    [
+        (
+            {"sizes": (3,), "modes": ("FM4",), "robots": (1,)},
+            {"N = 3, no fault", "N = 3, FM4, m = 1", "N = 3, removed, m = 1"},
+        ),
+        ({"sizes": (2, 3), "modes": ()}, {"N = 2", "N = 3"}),
+        ({"sizes": (3,), "modes": ()}, set()),
+    ],
+)
+def test_scores_are_of_several_sizes_and_of_faults(
+    fields: dict[str, Any], conditions: set[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "policy.safetensors"
+    shutil.copy(PACKAGE / "policies" / "weights" / "ppo-delivery.safetensors", path)
+    settings = Scores(seeds=1, n_robots=3, **fields)
+    scenario = SCENARIO.replace(n_robots=3, duration=10.0)
+    scores = evaluation.evaluate_score(path, scenario, settings, threads=1)
+    assert {score.condition for score in scores if score.measure == "P"} == conditions
 
 
 def test_the_best_evaluation_is_the_highest_and_the_curve_is_written(tmp_path: Path) -> None:

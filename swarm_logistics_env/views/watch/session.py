@@ -242,7 +242,7 @@ class Session:
             self.beside = Play(scenario, self.load(against), seed, faults)
         self.run = run
         self.seed = seed
-        self._due = 0.0  # control periods
+        self._due: float = 0.0  # control periods
         self.policy = policy
         self.against = against
         self.events: list[Event] = []

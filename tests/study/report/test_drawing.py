@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -69,9 +70,10 @@ def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
     canvas = Figure()
     draw(canvas, *arguments)
     (axes,) = canvas.axes
-    marks = [line.get_xydata().tolist() for line in axes.lines]
+    marks = [np.asarray(line.get_xydata()).tolist() for line in axes.lines]
     assert [[*mark]] in marks
-    lines = [line for bar in axes.collections for line in bar.get_segments()]
+    collections: list[Any] = [*axes.collections]
+    lines = [line for bar in collections for line in bar.get_segments()]
     assert [[tuple(end) for end in line] for line in lines] == bars
 
 

@@ -111,7 +111,7 @@ def test_of_many_deliveries_a_page_draws_some_seeds_alone() -> None:
     study = Study(seeds=2, faults=[{"modes": ["FM4"], "robots": [1]}], indicators=["R"])
     results = judged(study, lambda *_: delivered(38_000))
     report = document(results)
-    page = html_page(results, report, {figure.name: "<svg/>" for figure in report.figures}, "")
+    page = html_page(report, {figure.name: "<svg/>" for figure in report.figures}, "")
     (text,) = re.findall(r' id="data">(.*?)</script>', page, re.DOTALL)
     for condition in json.loads(text)["conditions"]:
         assert len(condition["p"]) == 2

@@ -129,6 +129,8 @@ def test_a_shape_is_read_at_once_or_as_the_refusal_says(shape: Shape, tmp_path: 
         expected = [p + 1.0 for p in WHOLE], [p + 1.0 for p in BROKEN]
     assert (sound.tolist(), broken.tolist()) == (list(expected[0]), list(expected[1]))
     assert {row.n_robots for row in trials.rows} == {8}
+    encoding = "The file is no UTF-8: it is read as Windows-1252 (cp1252)."
+    assert (encoding in trials.notes) == (shape.name == "cp1252")
 
 
 @pytest.mark.parametrize("has_trial", [False, True])

@@ -98,9 +98,13 @@ def test_the_way_home_is_the_way_in() -> None:
     frame.read(outside)
     assert home.tolist() == [0.0, 0.0]
     for _ in range(3):
-        frame.read(inside)
+        inputs = frame.read(inside)
     # Two readings ago, fading in ten seconds.
-    np.testing.assert_allclose(home, np.array([0.6, 0.8]) * math.exp(-0.02))
+    certainty = math.exp(-0.02)
+    np.testing.assert_allclose(home, np.array([0.6, 0.8]) * certainty)
+    length = math.hypot(told(inputs, "home_along"), told(inputs, "home_aside"))
+    assert length == pytest.approx(math.tanh(certainty))
+    assert told(inputs, "home_certainty") == pytest.approx(math.tanh(certainty / 3.0))
     outside[0, row.VELOCITY : row.VELOCITY + 2] = -1.0, 0.0
     frame.read(outside)
     np.testing.assert_allclose(home, np.array([0.6, 0.8]) * math.exp(-0.03) + [1.0, 0.0])

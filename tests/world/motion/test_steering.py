@@ -38,9 +38,10 @@ def test_it_drives_at_the_mean_heading_of_its_turn(
     """A turn of .6 rad at most; its speed is the way that it makes in the wanted direction."""
     memory = np.zeros(N_COLUMNS)
     memory[MEMORY.widest_turn] = 0.6
-    command = np.array([math.cos(direction), math.sin(direction), 0.0, 1.0])
-    steer(memory, command)
-    assert command.tolist() == pytest.approx([speed, 0.0, turn / 0.6, 1.0])
+    for share in (1.0, 0.5):
+        command = np.array([share * math.cos(direction), share * math.sin(direction), 0.0, 1.0])
+        steer(memory, command)
+        assert command.tolist() == pytest.approx([share * speed, 0.0, turn / 0.6, 1.0])
 
 
 @pytest.mark.compiled

@@ -37,6 +37,16 @@ def test_a_late_radio_is_silent_where_the_limit_fell_below_what_it_has_to_tell(
     assert rows[1, row.LOWEST_TIMER] == 0.0
 
 
+def test_a_late_message_is_that_of_two_seconds_ago(build: Build) -> None:
+    faults = [Fault("radio_delayed", (0,))]
+    world = build([(8.1, 5.0), (7.0, 5.0)], [FAR], faults, message_size=1)
+    sent = np.linspace(-1.0, 1.0, 70)
+    rows = [world.step([(0.0, 0.0, 0.0, 0.0, number)] * 2) for number in sent]
+    heard_by = np.array(rows)[:, :, row.MESSAGES]
+    assert heard_by[:, 0] == pytest.approx(sent)
+    assert heard_by[:, 1] == pytest.approx([*[0.0] * 20, *sent[:-20]])
+
+
 def test_who_is_seen_and_not_heard_tells_neither_its_timer_nor_a_message(build: Build) -> None:
     fields: dict[str, Any] = {"view_range": 2.0, "radio_range": 1.0, "message_size": 1}
     world = build([(8.5, 5.0), (7.0, 5.0), (7.8, 5.0)], [FAR], **fields)
