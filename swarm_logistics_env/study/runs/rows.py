@@ -131,4 +131,4 @@ def record_of(row: StoredRow) -> dict[str, Any]:
         result = dict.fromkeys(result) | {"error": outcome.error}
     case = case_of(row.run)
     case |= {name: canonical_json(case[name]) for name in ("scenario", "faults")}
-    return {"run": row.key} | case | result
+    return {"run": row.key, **case, **result}

@@ -76,6 +76,7 @@ class Session:
         self.set_speed(speed)
         self.selected: int | None = None
         self.note = self.failure = ""
+        self._due = 0.0  # control periods
         self._begin(scenario, seed, policy, against)
 
     @property
@@ -242,7 +243,7 @@ class Session:
             self.beside = Play(scenario, self.load(against), seed, faults)
         self.run = run
         self.seed = seed
-        self._due: float = 0.0  # control periods
+        self._due = 0.0
         self.policy = policy
         self.against = against
         self.events: list[Event] = []

@@ -128,7 +128,7 @@ def order_file(text: str) -> OrderFile:
     cells = [(rows.line_num, _cells_of(names, row, rows.line_num)) for row in rows if row]
     if not 0 < len(cells) <= MOST_ROWS:
         raise ValueError(f"{len(cells)} orders: should be 1 to {MOST_ROWS}")
-    cells.sort(key=lambda order: _number(*order, "time", least=0.0))
+    cells.sort(key=lambda order: _number(order[0], order[1], "time", least=0.0))
     classes = tuple(sorted({row["item"] for _, row in cells if not row["item"].isdecimal()}))
     order_rows = [_order(line, row, classes) for line, row in cells]
     time, item, kind, dock, due, priority, line = zip(*order_rows, strict=True)

@@ -90,6 +90,7 @@ class WarehouseState:
         robots.frozen_beams[...] = np.nan
         self.progress.asked_last[0] = NOBODY
         self.orders.shape[:] = scenario.order_shape
+        self.orders.open[:, DUE] = np.inf
         for prefix, structure in (("robot_", self.robots), ("", self.able), ("item_", self.items)):
             for name, array in structure._asdict().items():
                 setattr(self, prefix + name, array)

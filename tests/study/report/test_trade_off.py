@@ -64,7 +64,7 @@ def test_a_condition_with_a_run_that_nobody_counted_is_missing_not_0() -> None:
     assert np.isnan(cells["homing", "N = 10"].contacts.value)
     assert cells["homing", "N = 10"].fast_contacts is None
     assert cells["homing", "N = 5"].fast_contacts == 0.5
-    assert cells["homing", "N = 5"].overlap_share is None
+    assert cells["homing", "N = 5"].mean_of("overlap_share") is None
     table = next(iter(cell_tables(mixed)))
     column = table.columns.index(CONTACTS_HEADING)
     assert [row[column] for row in table.rows] == ["9.0 [6.5, 11.5]", NOTHING, "9.0 [6.5, 11.5]"]

@@ -36,7 +36,8 @@ DOCKS = "#######/#:::.A#/#:::.B#/#######"
 def waiting_items(world: Warehouse) -> list[int]:
     """Return the items that orders wait for, in the order in which these came."""
     orders = world.state.orders
-    return orders.waiting[: orders.n_waiting[0], ITEM_ORDERED].astype(int).tolist()
+    items: list[int] = orders.waiting[: orders.n_waiting[0], ITEM_ORDERED].astype(int).tolist()
+    return items
 
 
 def requested_items(world: Warehouse) -> list[int]:
@@ -109,7 +110,7 @@ def test_each_request_is_lost_for_each_robot_for_itself_and_for_good() -> None:
     requested = row.ITEMS + row.ITEM.requested + row.ITEM_WIDTH * np.arange(row.N_ITEMS_IN_VIEW)
     for _ in range(3):
         # Of those that see the item at all.
-        is_told = rows[:, requested].any(1)
+        is_told = np.any(rows[:, requested], axis=1)
         item = world.state.item_position[world.state.requested]
         squares = ((world.state.robot_position[:, None] - world.state.item_position) ** 2).sum(2)
         rank = (squares < ((world.state.robot_position - item) ** 2).sum(1)[:, None]).sum(1)
@@ -121,7 +122,7 @@ def test_each_request_is_lost_for_each_robot_for_itself_and_for_good() -> None:
     world.change(request_loss=1.0)
     assert not world.step(np.zeros((60, 4)))[:, requested].any()
     world.change(request_loss=0.0)
-    is_told = world.step(np.zeros((60, 4)))[:, requested].any(1)
+    is_told = np.any(world.step(np.zeros((60, 4)))[:, requested], axis=1)
     assert is_told[sees].all()
 
 
@@ -224,7 +225,8 @@ def test_requests_one_after_another_are_due_from_when_they_are_asked_for(build: 
     steps(world, HOLD, times=9)
     assert world.state.orders.open[0, DUE] == pytest.approx(0.6)
     measures = world.state.order_measures
-    assert (measures.share_on_time, measures.mean_tardiness) == (0.5, pytest.approx(0.15))
+    assert measures.share_on_time == 0.5
+    assert measures.mean_tardiness == pytest.approx(0.15)
 
 
 def test_nothing_is_left_once_the_file_is_served(build: Build) -> None:
