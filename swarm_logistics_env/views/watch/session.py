@@ -57,6 +57,8 @@ class Session:
         SetupError: `speed` is not one of `SPEEDS`.
     """
 
+    _due: float  # control periods to play
+
     def __init__(
         self,
         scenario: Scenario,
@@ -242,7 +244,7 @@ class Session:
             self.beside = Play(scenario, self.load(against), seed, faults)
         self.run = run
         self.seed = seed
-        self._due: float = 0.0  # control periods
+        self._due = 0.0
         self.policy = policy
         self.against = against
         self.events: list[Event] = []
