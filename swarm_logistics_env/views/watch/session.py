@@ -57,6 +57,8 @@ class Session:
         SetupError: `speed` is not one of `SPEEDS`.
     """
 
+    _due: float  # control periods to play
+
     def __init__(
         self,
         scenario: Scenario,

@@ -58,6 +58,14 @@ def test_without_times_nothing_is_said_of_mid_run() -> None:
     assert "mid-run" not in collapsed_in_words([collapse], names_policies=False)
 
 
+def test_collapses_name_their_policies_where_there_are_several() -> None:
+    p = np.repeat([*range(90, 110), 3, 4, 5, 6, 7], 2)
+    frame = pd.DataFrame({"robots": [4, 8] * 25, "delivered": p})
+    assert "; runs collapse at N = 4 in 20 % [7, 41]" in answer(judge(frame)).notes
+    both = pd.concat([frame.assign(policy=name) for name in ("A", "B")])
+    assert "; runs collapse of A at N = 4 in 20 % [7, 41]" in answer(judge(both)).notes
+
+
 def test_shares_of_collapsed_runs_have_exact_intervals_by_size() -> None:
     good = [*range(90, 110)]
     bad = [3, 4, 5, 6, 7] * 4

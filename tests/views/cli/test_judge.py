@@ -289,7 +289,6 @@ def test_a_policy_is_judged_on_other_bodies_and_floors(command: Command) -> None
     assert "--bodies: the benchmark has" in refused
 
 
-@pytest.mark.unmeasured
 def test_a_policy_file_is_judged_in_the_world_in_which_it_was_trained(command: Command) -> None:
     training = """name = "mine"
 agent_steps = 400

@@ -39,7 +39,6 @@ app()
 """
 
 
-@pytest.mark.unmeasured
 @given(st.text(), st.sampled_from(ENCODINGS))
 def test_every_text_is_written_in_every_encoding(text: str, encoding: str) -> None:
     written = io.BytesIO()
