@@ -78,7 +78,6 @@ class Session:
         self.set_speed(speed)
         self.selected: int | None = None
         self.note = self.failure = ""
-        self._due = 0.0  # control periods
         self._begin(scenario, seed, policy, against)
 
     @property
