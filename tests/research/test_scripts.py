@@ -11,10 +11,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from research import play_bodies, play_floors, play_medians, play_published, play_readings, tables
+from research import (
+    play_bodies,
+    play_floors,
+    play_medians,
+    play_orders,
+    play_published,
+    play_readings,
+    tables,
+)
 from swarm_logistics_env import Scenario
 from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.world.scenario import CHIPMUNK
+from tests.made_up import delivered, judged
 
 
 def test_a_change_has_its_sign_and_an_interval_its_side() -> None:
@@ -103,3 +112,15 @@ def test_the_median_of_an_even_number_is_the_lower_one(
     printed = capsys.readouterr().out.splitlines()
     assert printed[0] == "b: training seed 1, mean share 0.800"
     assert printed[-1] == "Median: d"
+
+
+def test_both_rules_of_requests_stand_side_by_side(tmp_path: Path) -> None:
+    def outcome(policy: str, setting: Any, seed: int) -> Any:
+        return delivered(40 + seed % 3 - (20 if setting.name == "dead" else 0))
+
+    study = tables.example(tmp_path, "request_timeout", seeds=3, policies=["homing"])
+    rows = play_orders.robustness_by_rule(judged(study, outcome)).splitlines()
+    assert rows[0].endswith("| R, one request until it is served | R, put back after 60 s |")
+    faults = [row.split(" | ")[1] for row in rows[2:6]]
+    assert faults == ["FM3", "FM4", "FM4_jam", "dead carriers"]
+    assert "-0.4" in rows[5]
