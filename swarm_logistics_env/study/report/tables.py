@@ -43,7 +43,11 @@ def cell_tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[S
         columns = [_SETTING, *_performance_columns(published=has_published, looks=has_looks)]
         if not for_paper:
             columns.append((f"one run [{section.P_LEVEL}]", _one_run))
-            columns += _counted_columns(cells)
+            columns += [
+                (heading, text)
+                for heading, measure, text in _COUNTED
+                if any(cell.mean_of(measure) is not None for cell in cells)
+            ]
         decision = _holm if for_paper else section.decision_text
         answers = partial(_answers, decision, published=has_published, looks=has_looks)
         layouts = _layouts(verdicts, columns, answers, repeats_p=for_paper)
@@ -107,19 +111,6 @@ def _performance_columns(*, published: bool, looks: bool) -> Iterator[CellColumn
         yield "seeds", lambda cell: str(cell.n_seeds)
 
 
-def _counted_columns(cells: Sequence[Cell]) -> Iterator[CellColumn]:
-    """Yield what was counted beside P in any of these cells."""
-    if any(cell.contacts.value >= 0.0 for cell in cells):  # NaN: not counted
-        yield CONTACTS_HEADING, contacts_text
-    if any(cell.mean_of("stands_still") is not None for cell in cells):
-        yield "runs that stand still", _standstills
-    if any(cell.mean_of("share_on_time") is not None for cell in cells):
-        yield "on time", partial(_percent_of, measure="share_on_time")
-        yield "95 % late by at most [s]", partial(_rounded_mean, measure="p95_tardiness")
-    if any(cell.mean_of("longest_queue") is not None for cell in cells):
-        yield "longest queue", partial(_rounded_mean, measure="longest_queue")
-
-
 def _standstills(cell: Cell) -> str:
     """Return the share of runs that deliver nothing at their end, and the longest standstill."""
     longest = cell.mean_of("longest_standstill")
@@ -145,6 +136,16 @@ CONTACTS_HEADING = f"contacts a robot-minute [{section.P_LEVEL}]"
 def contacts_text(cell: Cell) -> str:
     """Return the mean contacts per robot-minute of a cell with its limits."""
     return section.bracketed(cell.contacts, 1) if cell.contacts.value >= 0.0 else NOTHING
+
+
+# What stands beside P where it was counted in all runs of a cell: heading, measure, text.
+_COUNTED: tuple[tuple[str, str, Callable[[Cell], str]], ...] = (
+    (CONTACTS_HEADING, "contacts_per_robot_minute", contacts_text),
+    ("runs that stand still", "stands_still", _standstills),
+    ("on time", "share_on_time", partial(_percent_of, measure="share_on_time")),
+    ("95 % late by at most [s]", "p95_tardiness", partial(_rounded_mean, measure="p95_tardiness")),
+    ("longest queue", "longest_queue", partial(_rounded_mean, measure="longest_queue")),
+)
 
 
 def _published_text(cell: Cell) -> str:
