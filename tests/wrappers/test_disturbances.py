@@ -125,7 +125,9 @@ OTHER: dict[str, Any] = {
     "ranger_range": 3.0, "view_range": 5.0, "radio_range": 6.0, "pickup_range": 0.5,
     "timer_limit": 20.0, "relay": "gossip", "drive": "differential", "speed_mix": (1.0, 0.5),
     "sensing_mix": (0.5,), "ranger_noise": 0.1, "position_noise": 0.1, "sensor_dropout": 0.2,
-    "radio_loss": 0.2, "demand": "zipf", "dock_capacity": 0.5,
+    "radio_loss": 0.2, "demand": "zipf", "dock_capacity": 0.5, "request_timeout": 0.5,
+    "request_delay": 0.5, "request_loss": 0.5, "order_rate": 1.0, "order_cycle": 2.0,
+    "order_due": 1.0,
 }  # fmt: skip
 
 

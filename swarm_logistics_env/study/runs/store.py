@@ -284,7 +284,7 @@ class Runs:
     def _explained(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # sqlite3 decodes what is damaged
             raise StudyError(f"cannot use the store {self.path}: {error}") from error
 
     def _prepare(self, *, read_only: bool) -> None:

@@ -41,7 +41,7 @@ StudyArgument = Annotated[
     Argument(
         metavar="FILE|PRESET",
         # Literal, as to import the presets would slow every command.
-        help="TOML file of a study, or a preset: benchmark, paper-fit, paper, quick, "
+        help="TOML file of a study, or a preset: benchmark, orders, paper-fit, paper, quick, "
         "resilience, scorecard.",
     ),
 ]
