@@ -224,8 +224,8 @@ class Runs:
 
         rows = sorted(self._rows(None if keys is None else set(keys)), key=lambda row: row.key)
         table = pd.DataFrame([record_of(row) for row in rows], dtype=object)
-        is_nowhere = [name for name in OF_ORDERS if name in table and table[name].isna().all()]
-        return table.drop(columns=is_nowhere)
+        without_values = [name for name in OF_ORDERS if name in table and table[name].isna().all()]
+        return table.drop(columns=without_values)
 
     def note(self, name: str, value: str) -> None:
         """Note a fact about the study; an earlier one of this name is replaced."""

@@ -364,5 +364,5 @@ def frame(rows: Sequence[Judged], columns: Columns[Judged]) -> pd.DataFrame:
             for name, (kind, value, _) in columns.items()
         }
     )
-    is_nowhere = [name for name in table if name in ORDER_MEASURES and table[name].isna().all()]
-    return table.drop(columns=is_nowhere)
+    without_values = [name for name in table if name in ORDER_MEASURES and table[name].isna().all()]
+    return table.drop(columns=without_values)

@@ -114,25 +114,28 @@ def is_gone(world: World, item: int) -> bool:
 
 @kernel
 def draw_orders(world: World) -> None:
-    """Let the orders come that were drawn for the time since the step before."""
+    """Let the orders come that were drawn for the time since the step before.
+
+    Draws are a mean of 1 apart in the number of draws to be expected, so that another rate holds
+    from the next step on.
+    """
     orders = world.orders
     parameters = world.parameters
     key = world.items.order_key[0]
-    latest = world.progress.time[0] + _GRACE
     n_parts = len(orders.shape)
     highest = orders.shape[0]
     for part in range(n_parts):
         highest = max(highest, orders.shape[part])
+    rate = parameters.order_rate * highest  # of draws, the most at any time [1/s]
+    if world.progress.step[0] > 0:
+        orders.n_expected[0] += rate * parameters.control_period
     order = world.claims.order
-    while True:
-        came = orders.next_draw[0]
-        if came > latest:
-            return
+    while orders.next_draw[0] <= orders.n_expected[0]:
+        came = world.progress.time[0] - (orders.n_expected[0] - orders.next_draw[0]) / rate
         count = 2 * orders.n_drawn[0]
-        gap = -math.log(1.0 - uniform(key, count)) / (parameters.order_rate * highest)
         part = int(came / parameters.order_cycle * n_parts) % n_parts
         comes = count > 0 and uniform(key, count + 1) * highest < orders.shape[part]
-        orders.next_draw[0] = came + gap
+        orders.next_draw[0] -= math.log(1.0 - uniform(key, count))
         orders.n_drawn[0] += 1
         if comes:  # the first draw, at the start, is that of the first gap alone
             order[CAME] = came

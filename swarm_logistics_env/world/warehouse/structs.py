@@ -155,7 +155,8 @@ class Orders(NamedTuple):
     waiting: Annotated[Numbers, "waiting", N_ORDER_COLUMNS]  # in the order in which they came
     listed: Annotated[Numbers, "orders of a file", N_ORDER_COLUMNS]  # by `CAME`
     shape: Annotated[Numbers, "parts of a cycle"]  # factors of `order_rate`
-    next_draw: Annotated[Numbers, 1]  # [s] when the next order may come, if they are drawn
+    n_expected: Annotated[Numbers, 1]  # draws to be expected so far, at the highest rate
+    next_draw: Annotated[Numbers, 1]  # at which of these the next order may come
     n_waiting: Annotated[Integers, 1]
     n_drawn: Annotated[Integers, 1]  # times at which an order might have come so far
     n_listed: Annotated[Integers, 1]  # orders of the file that came so far

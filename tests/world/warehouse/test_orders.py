@@ -152,6 +152,20 @@ def test_drawn_orders_come_at_the_rate_and_in_the_hours_that_are_set(orders: str
     )
 
 
+def test_another_rate_holds_from_the_next_step_on() -> None:
+    world = Warehouse(
+        Scenario(n_robots=1, n_items=2, orders="poisson", order_rate=1e-6, restock=True)
+    )
+    world.reset(0)
+    for _ in range(10):
+        world.step(np.zeros((1, 4)))
+    assert requested_items(world) == []
+    world.change(order_rate=100.0)
+    for _ in range(10):
+        world.step(np.zeros((1, 4)))
+    assert len(waiting_items(world)) > 50
+
+
 def test_orders_of_a_file_come_at_their_times_and_the_oldest_is_asked_for(build: Build) -> None:
     orders = file_of("0.25,2,,", "0,1,,", "0.25,0,,", "9,1,,")
     world = build([(1.0, 1.0)], [FAR] * 3, orders=orders, restock=True)
