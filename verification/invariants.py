@@ -309,7 +309,7 @@ class Watch:
         self._demand(not names, f"observations leave their ranges: {', '.join(names)}")
         first_flag = row.ITEMS + row.ITEM_FEATURES.index("requested")
         flags = rows[:, first_flag : row.NEIGHBOURS : len(row.ITEM_FEATURES)]
-        self._demand(flags.sum(axis=1) <= scenario.n_requests, "a robot sees too many requests")
+        self._demand(flags.sum(axis=1) <= scenario.n_open, "a robot sees too many requests")
 
 
 def _distances(places: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
