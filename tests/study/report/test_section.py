@@ -22,6 +22,7 @@ from swarm_logistics_env.study.report.section import (
     bracketed,
     conclusion_text,
     fixed,
+    join_names,
     levels,
     percent,
 )
@@ -179,3 +180,11 @@ def test_a_paper_is_told_the_world_and_what_is_not_decided() -> None:
     assert sentence.startswith(f"swarm-dt in {world}: P [95 %]")
     n_open = sum(verdict.conclusion == "open" for verdict in results.verdicts)
     assert ("not decided: R of " in sentence) == (n_open > 0)
+
+
+def test_names_are_joined_as_a_sentence_has_them() -> None:
+    assert [join_names(names) for names in (["a"], ["a", "b"], ["a", "b", "c"])] == [
+        "a",
+        "a and b",
+        "a, b and c",
+    ]

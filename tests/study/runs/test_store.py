@@ -171,7 +171,7 @@ def test_store_keeps_outcomes_exactly_and_reading_leaves_it_as_it_is(tmp_path: P
 
 
 def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) -> None:
-    counted = replace(outcome(1.0), contacts_per_robot_minute=0.0, overlap_share=0.25)
+    counted = replace(outcome(1.0), contacts_per_robot_minute=0.0, overlap_share=0.25, on_time=3)
     with Runs(tmp_path / FILE_NAME) as runs, Runs(None) as other:
         runs.add([(run(0), outcome(1.0))])  # as an older version, which knew none of the fields
         runs.add([(run(1), counted)])
@@ -187,6 +187,8 @@ def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) ->
     assert table["contacts_per_robot_minute"].isna().tolist() == [True, False]
     assert table["overlap_share"].iloc[1] == 0.25
     assert table["mean_acceleration"].isna().all()
+    assert table["on_time"].iloc[1] == 3
+    assert "longest_queue" not in table  # of orders, which no run had
 
 
 @pytest.mark.parametrize(
