@@ -79,8 +79,8 @@ def _notes_that_apply(
     claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
     in_text = [verdict for verdict in claims if verdict.compared.question in claims_of_text]
     not_in_text = [verdict for verdict in claims if verdict not in in_text]
-    beside = "claims_beside_the_text" if claims_of_text else "claims_without_text"
-    for case, judged in (("claims_of_the_text", in_text), (beside, not_in_text)):
+    case_of_others = "claims_beside_the_text" if claims_of_text else "claims_without_text"
+    for case, judged in (("claims_of_the_text", in_text), (case_of_others, not_in_text)):
         counts = section.count_words(v.on_claim.adjusted for v in judged if v.on_claim)
         if judged:
             yield case, {"claims": section.plural(len(judged), "claim"), "counts": counts}

@@ -130,16 +130,16 @@ def _notes_on_left_out(columns: Sequence[Cells], conditions: Sequence[object]) -
 
 def _uses_of(columns: Columns) -> tuple[Column, ...]:
     """Return what every column of a table was taken for."""
-    known = {cells.name: "parameter" for cells in columns.parameters}
-    known |= {cells.name: "covariate" for cells in columns.covariates}
-    known |= {cells.name: meaning for meaning, cells in columns.by_meaning.items()}
-    known |= {cells.name: "seed" for cells in columns.blocks}
+    use_by_name = {cells.name: "parameter" for cells in columns.parameters}
+    use_by_name |= {cells.name: "covariate" for cells in columns.covariates}
+    use_by_name |= {cells.name: meaning for meaning, cells in columns.by_meaning.items()}
+    use_by_name |= {cells.name: "seed" for cells in columns.blocks}
     ignored = [cells.name for cells in columns.ignored]
     uses = []
     for name in columns.table.header:
         values = (*dict.fromkeys(columns.table.columns[name].texts),)
         use = "left out" if name in ignored or len(values) > 1 else "the same in all"
-        use = known.get(name, use)
+        use = use_by_name.get(name, use)
         use = "robots" if use == "n_robots" else use
         uses.append(Column(name, use, values[:_FEW_VALUES], len(values)))
     return tuple(uses)

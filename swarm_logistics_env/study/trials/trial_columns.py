@@ -270,7 +270,7 @@ def _refuse_thousands(cells: Cells) -> None:
 def _parameters(
     table: Table, names: Sequence[str], *, is_log: bool
 ) -> tuple[list[Cells], list[Cells]]:
-    """Return the columns that vary, of those that are nothing known: parameters, and covariates."""
+    """Return the columns without a meaning of ours that vary: parameters, and covariates."""
     parameters = []
     covariates = []
     for name in names:

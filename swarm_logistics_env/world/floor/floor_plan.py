@@ -54,9 +54,9 @@ def plan_text(floor: str) -> str:
     """
     if floor in plan_names():
         return floor
-    if "\n" not in floor and _is_file(floor):
+    if "\n" not in floor and is_file(floor):
         try:
-            floor = _read_text(Path(floor))
+            floor = read_text(Path(floor))
         except (OSError, UnicodeError) as error:
             raise ValueError(f"cannot read the plan: {error}") from None
     elif "\n" not in floor and not _looks_like_rows(floor):
@@ -69,7 +69,8 @@ def plan_text(floor: str) -> str:
     return _ROW_END.join(rows)
 
 
-def _read_text(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """Return a file's text, in UTF-8 or, with a byte-order mark, UTF-16."""
     content = path.read_bytes()
     is_utf_16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     return content.decode("utf-16" if is_utf_16 else "utf-8-sig")
@@ -120,7 +121,8 @@ def _with_sizes(fields: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[st
     return {**chosen, **sizes, "floor": text}
 
 
-def _is_file(text: str) -> bool:
+def is_file(text: str) -> bool:
+    """Return whether a text is the path of a file."""
     try:
         return Path(text).is_file()
     except (OSError, ValueError):  # too long for a path, or with a null

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.core.errors import suggest
+from swarm_logistics_env.world.floor.floor_plan import is_file, read_text
 
 NEXT = "next"  # an item is asked for when one was delivered
 ANY = -1  # of docks, items and classes: none is named
@@ -82,9 +83,9 @@ def orders_text(orders: str) -> str:
     names = (NEXT, *ORDER_SHAPES)
     if orders in names:
         return orders
-    if _is_file(orders):
+    if is_file(orders):
         try:
-            orders = Path(orders).read_text(encoding="utf-8-sig")
+            orders = read_text(Path(orders))
         except (OSError, UnicodeError) as error:
             raise ValueError(f"cannot read the orders: {error}") from None
     elif "\n" not in orders and not _looks_like_rows(orders):
@@ -100,13 +101,6 @@ def orders_text(orders: str) -> str:
 def _looks_like_rows(text: str) -> bool:
     header = text.split(_ROW_END, 1)[0].lower().replace(";", ",")
     return _ROW_END in text and not {"time", "item"}.isdisjoint(header.split(","))
-
-
-def _is_file(text: str) -> bool:
-    try:
-        return Path(text).is_file()
-    except (OSError, ValueError):  # too long for a path, or with a null
-        return False
 
 
 def orders_title(text: str) -> str:

@@ -66,9 +66,9 @@ def test_no_way_jumps_along_free_floor() -> None:
     floor = world_of(floor="::::::::A\n:==:==::A\n:==:::=:A\n::::=:::A").floor
     points = np.random.default_rng(0).uniform((0.0, 0.0), (4.5, 2.0), (3000, 2))
     for step in ((0.01, 0.0), (0.0, 0.01)):
-        beside = points + step
-        free = floor.is_free(points) & floor.is_free(beside)
-        change = floor.along(beside[free]) - floor.along(points[free])
+        moved_points = points + step
+        free = floor.is_free(points) & floor.is_free(moved_points)
+        change = floor.along(moved_points[free]) - floor.along(points[free])
         # Beside a rack a way is that of the centre of a cell, half a cell away.
         assert np.abs(change).max() < 0.25 + 0.01
 
