@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from swarm_logistics_env.spi.equivalence import MARGIN
 
 from .plan import Plan
+from .specification import text_if_any
 
 _Count = Annotated[int, Field(gt=0, strict=True)]
 
@@ -20,6 +21,7 @@ class Declaration(BaseModel):
         first_seed, seeds: the smallest seed, and how many there are of every condition.
         looks: numbers of seeds, from the first on, at which comparisons may stop; empty: none.
         margin: of equivalence, as a share of P_o.
+        performance: what P of a run is; None: what the task counts.
     """
 
     model_config = ConfigDict(frozen=True, from_attributes=True)
@@ -28,6 +30,7 @@ class Declaration(BaseModel):
     seeds: _Count
     looks: tuple[_Count, ...] = ()
     margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
+    performance: Annotated[str | None, BeforeValidator(text_if_any)] = None
 
     def covers(self, plan: Plan) -> bool:
         """Return whether the verdicts of a plan were declared, and so are not exploratory."""
@@ -35,4 +38,5 @@ class Declaration(BaseModel):
             return True  # nothing is added to what was imported
         # A part of the declared seeds is a choice as well, made with the results at hand.
         seeds = range(self.first_seed, self.first_seed + self.seeds)
-        return plan.seeds == seeds and self.looks in ((), plan.specification.looks)
+        is_same_p = self.performance == text_if_any(plan.specification.performance)
+        return plan.seeds == seeds and is_same_p and self.looks in ((), plan.specification.looks)

@@ -113,7 +113,10 @@ class Plan:
     @property
     def name_of_p(self) -> str:
         """P with what the file of recorded trials calls it, e.g. "P (throughput)"."""
-        if self.origin is None or self.origin.performance == "P":
+        if self.origin is None:
+            performance = self.specification.performance
+            return f"P ({performance})" if performance else "P"
+        if self.origin.performance == "P":
             return "P"
         return f"P ({self.origin.performance})"
 
@@ -121,7 +124,8 @@ class Plan:
     def what_p_is(self) -> str:
         """What the performance P is, e.g. "the number of items delivered"."""
         if self.origin is None:
-            return self.specification.played.performance
+            performance = self.specification.performance
+            return performance.words if performance else self.specification.played.performance
         return f"{self.origin.performance!r} of {self.origin.file}"
 
     def __str__(self) -> str:
@@ -172,7 +176,13 @@ def make_plan(
     if unknown := [part for part in parts if part not in identities]:
         raise StudyError(f"the study does not know the identity of its {unknown[0]}")
     cases = [
-        Case(policy, identities[part], specification.scenario, task=task)
+        Case(
+            policy,
+            identities[part],
+            specification.scenario,
+            task=task,
+            performance=specification.performance,
+        )
         for part, policy in parts.items()
     ]
     # What two factors compare alike is compared once, or Holm's family would count it twice.
@@ -188,6 +198,9 @@ def make_plan(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "
             "indicators that judge them"
         )
+    if specification.performance:
+        for arm in dict.fromkeys(arm for comparison in comparisons for arm in comparison.arms):
+            specification.performance.refuse_unmeasured(arm.case.scenario)
     # Only comparisons with the robots removed have a time to come back, which needs the null.
     nulls = {
         (comparison.table, comparison.original): Arm(

@@ -29,6 +29,7 @@ from swarm_logistics_env.core.records import FileName, Record, each_of, file_nam
 from swarm_logistics_env.policies.spec import PolicySpec, display_name
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
+from swarm_logistics_env.study.tasks.performance import Performance
 from swarm_logistics_env.study.tasks.task import (
     DEFAULT,
     Task,
@@ -180,6 +181,11 @@ class Ablation(Factor):
     fall: Annotated[float, Field(ge=0, lt=1)] = 0.0
 
 
+def text_if_any(performance: Performance | str | None) -> str | None:
+    """Return a performance as a text; None stays None."""
+    return None if performance is None else str(performance)
+
+
 class Specification(Record):
     """All that a study asks: which policies, under which conditions, over how many seeds.
 
@@ -199,6 +205,8 @@ class Specification(Record):
         until_clear: whether the study is looked at after 10, 20, .. up to `seeds` seeds, and each
             comparison stops where its verdict is clear under Holm; only the conditions that open
             ones need are played further. The error over all looks stays at 5 %.
+        performance: what P of a run is, as "on_time" or "p95_tardiness:60" (`Performance`); None:
+            what the task counts. Runs are the same, so that they can be judged by another one, too.
         margin: the largest change of P that counts as none, as a share of P_o, in (0, 1); every R,
             FT and A is tested for it as well.
         reference: published results, which the report shows beside those of the study.
@@ -224,6 +232,9 @@ class Specification(Record):
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(each_of(Ablation))] = ()
     indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
     until_clear: bool = False
+    performance: Annotated[
+        Performance | None, BeforeValidator(Performance.of), PlainSerializer(text_if_any)
+    ] = None
     margin: Annotated[float, Field(gt=0, lt=1)] = MARGIN
     reference: Literal["paper"] | None = None
 

@@ -13,7 +13,7 @@ from more_itertools import map_reduce
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.tasks.task_world import world_of
+from swarm_logistics_env.study.tasks.task_world import counted_in
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import (
@@ -331,7 +331,7 @@ def _performance(results: StudyResults) -> str:
     means = [_mean(cell) for cell in by_policy.values()]
     if len(by_policy) > 1 or len(results.policies) > 1:
         means = [f"{policy} {mean}" for policy, mean in zip(by_policy, means)]
-    counted = world_of(case.task).counted
+    counted = counted_in(case)
     template = "count" if counted else "no_count"
     if any(cell.mean.low is not None for cell in by_policy.values()):
         template += "_with_interval"
@@ -348,7 +348,7 @@ def _performance(results: StudyResults) -> str:
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
     slots: dict[str, Slots] = {}
-    if cell.by_seed.any():
+    if cell.by_seed.any() or cell.arm.case.performance:
         slots["mean"] = {"mean": section.mean_p(cell)}
         if cell.problem:
             slots["problem"] = {"problem": cell.problem}

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.study.tasks.task_world import world_of
+from swarm_logistics_env.study.tasks.task_world import counted_in
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.collapses import Collapse
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -62,7 +62,8 @@ def _notes_that_apply(
     if trainings:
         yield "collapsed", {"collapsed": max(trainings, key=lambda collapsed: collapsed.number)}
     if any(verdict.saturated for verdict in verdicts):
-        yield "capped", {"mark": section.SATURATED}
+        case = "capped_measure" if results.plan.specification.performance else "capped"
+        yield case, {"mark": section.SATURATED}
     if results.collapses:
         words = collapsed_in_words(results.collapses, names_policies=len(results.policies) > 1)
         yield "collapsed_runs", {"conditions": words}
@@ -99,7 +100,7 @@ def _delivers_little(results: StudyResults) -> bool:
     """Return whether swarms that are as they should be, and count, deliver hardly anything."""
     originals = [results.cells_of(v.compared)[v.compared.original] for v in results.verdicts]
     return any(
-        cell.n_seeds and world_of(cell.arm.case.task).counted and cell.mean.value < _FEW_ITEMS
+        cell.n_seeds and counted_in(cell.arm.case) and cell.mean.value < _FEW_ITEMS
         for cell in originals
     )
 
@@ -150,10 +151,12 @@ def warnings(results: StudyResults) -> Iterator[str]:
     if results.damage:
         yield f"{results.damage}."
     if any(cell.saturated for cell in results.cells):
+        reason = "every item was delivered in at least one run"
+        if results.plan.specification.performance:
+            reason = "no run can have more than at least one has"
         yield (
-            f"{section.SATURATED} marks a P that is capped, because every item was delivered in at "
-            "least one run, and the indicators that rest on it. A verdict that a larger P could "
-            "turn is open."
+            f"{section.SATURATED} marks a P that is capped, because {reason}, and the indicators "
+            "that rest on it. A verdict that a larger P could turn is open."
         )
     if results.collapses:
         words = collapsed_in_words(
@@ -165,8 +168,8 @@ def warnings(results: StudyResults) -> Iterator[str]:
         )
     if results.exploratory:
         yield (
-            "The verdicts are exploratory: they are over other seeds than the study declared "
-            "before its first run, so they err more often than their level."
+            "The verdicts are exploratory: they are over other seeds or another P than the "
+            "study declared before its first run, so they err more often than their level."
         )
     if results.late_margin:
         yield (

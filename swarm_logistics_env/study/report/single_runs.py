@@ -11,7 +11,7 @@ from more_itertools import map_reduce
 from pydantic import JsonValue
 
 from swarm_logistics_env.study.questions.comparison import Arm, Comparison
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.task import Case, Outcome
 from swarm_logistics_env.study.tasks.task_world import world_of
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -53,7 +53,9 @@ def single_runs(results: StudyResults, sentences: Sequence[Sentence]) -> SingleR
     seeds = plan.seeds[: max(1, _MOST_DOTS // len(arms))]
     runs = {
         key: [
-            _mean_p([results.succeeded.get((case.key, seed)) for case in arm.case.trainings])
+            _mean_p(
+                arm.case, [results.succeeded.get((case.key, seed)) for case in arm.case.trainings]
+            )
             for seed in seeds
         ]
         for key, arm in arms.items()
@@ -129,9 +131,9 @@ def _conditions(results: StudyResults, arms: Mapping[str, Arm], runs: Runs) -> I
         }
 
 
-def _mean_p(outcomes: Sequence[Outcome | None]) -> float | None:
+def _mean_p(case: Case, outcomes: Sequence[Outcome | None]) -> float | None:
     """Return mean P over the trainings at one seed; None: a run failed, or is missing."""
-    p = [outcome.delivered for outcome in outcomes if outcome is not None]
+    p = [case.p_of(outcome) for outcome in outcomes if outcome is not None]
     return round(float(np.mean(p)), 4) if len(p) == len(outcomes) else None
 
 

@@ -33,8 +33,8 @@ SCOPE = {
 # The second line of the answer: P where the swarm is as it should be.
 PERFORMANCE = {
     "nothing": "P: no run has succeeded.",
-    "count": "P, {counted} in {duration:g} s, at {condition}: {means}.",
-    "count_with_interval": "P [{level}], {counted} in {duration:g} s, at {condition}: {means}.",
+    "count": "{p}, {counted} in {duration:g} s, at {condition}: {means}.",
+    "count_with_interval": "{p} [{level}], {counted} in {duration:g} s, at {condition}: {means}.",
     "no_count": "{p} at {condition}: {means}.",
     "no_count_with_interval": "{p} [{level}] at {condition}: {means}.",
 }
@@ -83,10 +83,11 @@ NOTES = {
     "too_few_seeds": "two seeds give no verdict",
     "few_items": "P is small: a longer duration tells more",
     "damage": "{damage}",
-    "exploratory": "exploratory: other seeds than were declared, whose report this replaces",
+    "exploratory": "exploratory: other seeds or P than were declared, whose report this replaces",
     "late_margin": "equivalence is exploratory: another margin was declared",
     "collapsed": "of the trainings at worst {collapsed}",
     "capped": "{mark} P is capped: --clearing or --restock has no cap",
+    "capped_measure": "{mark} P is capped: no run can have more of this measure",
     "collapsed_runs": "runs collapse {conditions}",
     "phases_untestable": "two phases untestable: {conditions}",
     "open": "open: undecided by these {runs}",
@@ -103,7 +104,7 @@ REASONS_TO_BE_OPEN = {
     "Holm": "decided alone, not among all questions on the indicator",
 }
 
-EXPLORATORY = "exploratory: over other seeds than were declared before the first run"
+EXPLORATORY = "exploratory: over other seeds or P than were declared before the first run"
 
 # The sentence that a paper can quote: the cases that apply, one after the other.
 FOR_A_PAPER = {

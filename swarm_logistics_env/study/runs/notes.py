@@ -34,7 +34,7 @@ class StoredSpecification(BaseModel):
         How far it is played, and how it is judged, may change: `Declaration` tells whether verdicts
         are exploratory then, and `StudyResults.late_margin` whether equivalence is.
         """
-        free = {"seeds", "first_seed", "until_clear", "margin", "reference"}
+        free = {"seeds", "first_seed", "until_clear", "margin", "performance", "reference"}
         new = specification.model_dump(mode="json", exclude=free)
         if new["task"] != self.task:
             return ["task"]  # whose scenarios have other fields

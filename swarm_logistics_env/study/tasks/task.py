@@ -27,6 +27,8 @@ from swarm_logistics_env.policies.spec import Makers, PolicySpec
 from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 from swarm_logistics_env.world.warehouse.orders import OrderMeasures
 
+from .performance import Performance
+
 Seconds: TypeAlias = NDArray[np.float64]
 Fields: TypeAlias = Mapping[str, object]  # of a record, by name
 
@@ -237,6 +239,7 @@ class Case:
         behaviour: 0: the policy's randomness follows from the run's seed; another number: from
             that number as well, so that the same worlds are met by another behaviour.
         task: that plays it.
+        performance: what P of a run is; None: what the task counts. Its runs are the same.
     """
 
     policy: PolicySpec
@@ -246,6 +249,7 @@ class Case:
     behaviour: int = 0
     _: KW_ONLY
     task: Task = field(compare=False, repr=False)
+    performance: Performance | None = field(default=None, compare=False)
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -270,6 +274,14 @@ class Case:
     def content_text(self) -> str:
         """The content as it stands in the JSON that a run's key is the digest of."""
         return canonical_json(self.content)[1:-1]
+
+    def p_of(self, outcome: Outcome) -> float:
+        """Return P of a run of this case."""
+        return self.performance.of_run(outcome) if self.performance else outcome.delivered
+
+    def is_capped(self, outcome: Outcome) -> bool:
+        """Return whether P of a run of this case would be larger if there had been more to do."""
+        return self.performance.is_capped(outcome) if self.performance else outcome.capped
 
     @cached_property
     def trainings(self) -> tuple[Case, ...]:
@@ -335,7 +347,6 @@ DEFAULT = "warehouse"
 TASKS = {
     DEFAULT: "swarm_logistics_env.study.tasks.warehouse_task:WAREHOUSE",
     "clearing": "swarm_logistics_env.study.tasks.warehouse_task:CLEARING",
-    "on-time": "swarm_logistics_env.study.tasks.warehouse_task:ON_TIME",
     "recorded trials": "swarm_logistics_env.study.tasks.warehouse_task:RECORDED",
 }
 

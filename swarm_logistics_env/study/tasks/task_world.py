@@ -31,6 +31,19 @@ class TaskWorld:
         return None
 
 
+def counted_in(case: Case) -> str:
+    """Return what P of a case counts, as "items"; empty: it is no count."""
+    return case.performance.counted if case.performance else world_of(case.task).counted
+
+
+def largest_performance(case: Case) -> float:
+    """Return the largest P that a run of a case can have; infinite: none is."""
+    if case.performance is None:
+        return world_of(case.task).largest_performance(case.scenario)
+    largest = case.performance.largest
+    return math.inf if largest is None else largest
+
+
 def world_of(task: Task) -> TaskWorld:
     """Return what a task says of its world."""
     return task if isinstance(task, TaskWorld) else TaskWorld()

@@ -192,45 +192,6 @@ class ClearingTask(WarehouseTask):
         """Return None: `watch` shows runs of the warehouse's own task."""
 
 
-class OnTimeTask(WarehouseTask):
-    """Episodes of orders that are due: P is how many were served in time.
-
-    A run that serves all of them in time is capped by their number.
-    """
-
-    name = "on-time"
-    performance = "the number of orders that were served by their due time"
-    counted = "orders"
-    default = Scenario.preset("orders")
-
-    def vary(self, base: TaskScenario, fields: Fields) -> Scenario:
-        """Return `base` with `fields` changed.
-
-        Raises:
-            ScenarioError: a field cannot be, or no order is ever due.
-        """
-        varied = super().vary(base, fields)
-        if not varied.has_due_times:
-            raise ScenarioError(
-                "order_due = None: should be a time [s] in the task 'on-time', which counts the "
-                "orders that were served by then"
-            )
-        return varied
-
-    def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
-        """Play one episode; see `Task.play`."""
-        outcome = super().play(case, seed, policy_seed)
-        is_capped = outcome.share_on_time == 1.0
-        return replace(outcome, untimed=outcome.on_time or 0, all_served=is_capped)
-
-    def largest_performance(self, scenario: TaskScenario) -> float:
-        """Return infinity: how many orders come is drawn."""
-        return math.inf
-
-    def watch_command(self, case: Case) -> None:
-        """Return None: `watch` shows runs of the warehouse's own task."""
-
-
 class RecordedScenario(Record):
     """What a file says of the conditions of a trial.
 
@@ -300,5 +261,4 @@ class RecordedTrials:
 
 WAREHOUSE = WarehouseTask()
 CLEARING = ClearingTask()
-ON_TIME = OnTimeTask()
 RECORDED = RecordedTrials()

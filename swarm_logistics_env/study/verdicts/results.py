@@ -161,7 +161,9 @@ def judge(
         look: the latest look at these outcomes, of a study until it is clear; None: it is computed.
     """
     specification = plan.specification
-    reference = PAPER if specification.reference else None
+    # What is published is of the items delivered.
+    is_compared = specification.reference and specification.performance is None
+    reference = PAPER if is_compared else None
     declared = declared or Declaration.model_validate(specification)
     is_exploratory = not declared.covers(plan)
     verdicts: Iterable[Verdict] = ()

@@ -31,6 +31,7 @@ from .study_commands import (
     FullOption,
     JudgedOption,
     LimitOption,
+    PerformanceOption,
     ProcessesOption,
     run_study,
     say_what_a_pilot_shows,
@@ -51,7 +52,7 @@ STUDY = "scorecard"
 JUDGE_SEEDS = 60  # of a policy that is judged
 # The parameters of the command that the benchmark gives itself.
 FIXED_BY_BENCHMARK = (
-    "seeds", "first_seed", "clearing", "preset", "scenario_file", "changes", "bodies"
+    "seeds", "first_seed", "clearing", "performance", "preset", "scenario_file", "changes", "bodies"
 )  # fmt: skip
 
 PolicyArgument = Annotated[
@@ -82,6 +83,7 @@ def judge_policy_command(
         float | None, Option(help="Play for so long; the same command goes on.")
     ] = None,
     clearing: ClearingOption = False,
+    performance: PerformanceOption = None,
     preset: PresetOption = None,
     scenario_file: ScenarioOption = None,
     changes: SetOption = None,
@@ -115,7 +117,7 @@ def judge_policy_command(
     if not as_benchmark:
         scenario = _scenario_without_cap(preset, scenario_file, changes, bodies, spec)
         options = options_of_world(preset, scenario_file, changes, bodies)
-        world = JudgedWorld(scenario, clearing, options, first_seed)
+        world = JudgedWorld(scenario, clearing, options, first_seed, performance)
     for training in spec.trainings or (spec,):
         training.load()  # what is wrong with it is said before anything is written
     if world is None:
@@ -179,12 +181,14 @@ class JudgedWorld(NamedTuple):
         clearing: whether P is the rate at which its items are cleared.
         options: what was typed to choose the scenario, e.g. ["--preset", "realistic"].
         first_seed: the smallest seed; None: that of the study.
+        performance: what P of a run is; None: what the task counts.
     """
 
     scenario: Scenario
     clearing: bool
     options: list[str]
     first_seed: int | None = None
+    performance: str | None = None
 
     @property
     def words(self) -> list[str]:
@@ -195,6 +199,8 @@ class JudgedWorld(NamedTuple):
         ]
         if self.first_seed is not None:
             words.append(f"first-seed {self.first_seed}")
+        if self.performance:
+            words.insert(0, self.performance)
         if self.clearing:
             words.insert(0, "clearing")
         return [slug(word)[:40] for word in words]
@@ -202,7 +208,8 @@ class JudgedWorld(NamedTuple):
     @property
     def options_again(self) -> list[str]:
         """The options that judge in the same world at other seeds."""
-        return ["--clearing", *self.options] if self.clearing else self.options
+        options = ["--clearing", *self.options] if self.clearing else self.options
+        return ["--performance", self.performance, *options] if self.performance else options
 
 
 def _study_in(
@@ -217,6 +224,7 @@ def _study_in(
         policy.trusted,
         until_clear=until_clear and most_seeds > FIRST_LOOK,
         first_seed=world.first_seed,
+        performance=world.performance,
     )
     ask_in_world(study, world.scenario)
     if world.clearing:

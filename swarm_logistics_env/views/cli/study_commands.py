@@ -88,6 +88,13 @@ ClearingOption = Annotated[
         "--clearing", help="P is the rate until all items are delivered, so that it has no cap."
     ),
 ]
+PerformanceOption = Annotated[
+    str | None,
+    Option(
+        help="Measure that is P, e.g. on_time; where less is better with the value that counts as "
+        "P = 0, e.g. p95_tardiness:60 or longest_standstill:120."
+    ),
+]
 
 study_app = typer.Typer(name="study", help="Judge a swarm by its indicators.")
 
@@ -112,6 +119,7 @@ def run_command(
         bool, Option("--restock", help="Delivered items come back, so that P has no cap.")
     ] = False,
     clearing: ClearingOption = False,
+    performance: PerformanceOption = None,
     changes: SetOption = None,
     bodies: BodiesOption = None,
     processes: ProcessesOption = None,
@@ -139,14 +147,17 @@ def run_command(
     fields = changed_fields(changes, bodies)
     policy_specs = policies_of(policies or (), trust_code, frame, normalize, env)
     study = study_of(
-        study_name, out, seeds, policy_specs, trust_code, first_seed=first_seed, until_clear=looks
-    )
+        study_name, out, seeds, policy_specs, trust_code,
+        first_seed=first_seed, until_clear=looks, performance=performance,
+    )  # fmt: skip
     if clearing:
         switch_to_clearing(study)
     if restock:
         study.specification = study.specification.varying({"restock": True})
     change_scenario(study, fields)
-    words = ["clearing"] * clearing + ["restock"] * restock + changes_in_words(fields)
+    names = [*(["clearing"] if clearing else []), *(["restock"] if restock else [])]
+    names += [slug(performance)] if performance else []
+    words = [*names, *changes_in_words(fields)]
     out = out or _default_directory(study, words, has_own_policies=bool(policies))
     study.out = out / part.directory if part else out
     player = engine_named(engine or _engine_for(processes, address), processes, address, run_limit)
@@ -154,8 +165,9 @@ def run_command(
     echo()
     if study.is_exploratory():
         say(
-            "This study declared other seeds before its first run: every verdict is exploratory. "
-            "For verdicts that stand, run a new study on fresh seeds: --first-seed and --out.\n"
+            "This study declared other seeds or another P before its first run: every verdict is "
+            "exploratory. For verdicts that stand, run a new study on fresh seeds: --first-seed "
+            "and --out.\n"
         )
     if policies:
         say_what_a_pilot_shows(study)
@@ -198,7 +210,10 @@ def say_what_a_pilot_shows(study: Study) -> None:
         return
     for title, case in case_by_title.items():
         outcomes = [Run(training, plan.code, plan.seeds[0]).play() for training in case.trainings]
-        if any(outcome.capped for outcome in outcomes):
+        is_capped = any(case.is_capped(outcome) for outcome in outcomes)
+        if is_capped and case.performance:
+            say(f"{title} has the largest P possible in a first run: most verdicts will be open.")
+        elif is_capped:
             say(
                 f"{title} delivers every item before the end, so that P is capped and most "
                 "verdicts will be open. Nothing is capped where items come back, or where P is the "

@@ -117,7 +117,7 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     assert in_a_sentence(few, answer(few)).endswith(f"open ({reason}; Holm's method, 5 % error).")
     assert "xploratory" not in latex + in_a_sentence(few, answer(few))
     undeclared = replace(few, exploratory=True)
-    words = "xploratory: over other seeds than were declared before the first run."
+    words = "xploratory: over other seeds or P than were declared before the first run."
     assert latex_tables(document(undeclared).paper).count(f" E{words} ") == 2
     assert in_a_sentence(undeclared, answer(undeclared)).endswith(f"; e{words}")
 

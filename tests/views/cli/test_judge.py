@@ -277,6 +277,17 @@ def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse_over_other_seeds
     assert "items delivered per minute" in report
 
 
+def test_a_policy_is_judged_by_another_measure_of_the_same_runs(command: Command) -> None:
+    world = "homing --performance longest_standstill:20 --set n_items=5 --set duration=20"
+    printed = command(f"judge {world} --seeds 3 --processes 1")
+    assert "P (longest_standstill:20)" in printed
+    folder = Path("results/judged/homing-longest-standstill-20-n-items-5-duration-20")
+    assert f"judge {world} --first-seed 3 --seeds 60 --out {folder}-60" in printed
+    report = (folder / "report.md").read_text()
+    assert "x is the longest time without a delivery" in report
+    assert "no measure 'late'" in command("judge homing --performance late", code=2)
+
+
 @pytest.mark.unmeasured
 def test_a_policy_is_judged_on_other_bodies_and_floors(command: Command) -> None:
     Path("hall.toml").write_text("floor = 'two_docks'\nn_robots = 3\nduration = 5\n")
