@@ -282,7 +282,7 @@ def test_a_policy_is_judged_by_another_measure_of_the_same_runs(command: Command
     printed = command(f"judge {world} --seeds 3 --processes 1")
     assert "P (longest_standstill:20)" in printed
     folder = Path("results/judged/homing-longest-standstill-20-n-items-5-duration-20")
-    assert f"judge {world} --first-seed 3 --seeds 60 --out {folder}-60" in printed
+    assert f"judge {world} --first-seed 30003 --seeds 60 --out {folder}-60" in printed
     report = (folder / "report.md").read_text()
     assert "x is the longest time without a delivery" in report
     assert "no measure 'late'" in command("judge homing --performance late", code=2)
