@@ -33,7 +33,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help first-look paper paper-fit tables test interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
+.PHONY: help first-look paper paper-fit tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
@@ -57,6 +57,7 @@ help:
 	@echo "make dotbots         bodies in the DotBots' simulator: the tests, and 20 DotBots for 20 s (half a minute, once pydotbot is installed)"
 	@echo "make bodies          how far results carry to MuJoCo and to the DotBots' simulator: the tables of docs/bodies.md (two core-hours)"
 	@echo "make docs            the documentation site, site/index.html"
+	@echo "make daily           once a day: tests of whole commands, pages, examples and processes, which the gate leaves out"
 	@echo "make docs-check      once a day: what every page prints, and every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
 	@echo "make format          sort imports and format"
@@ -83,8 +84,12 @@ test: lint
 	$(DEV)/bin/mypy & types=$$!; \
 	$(DEV)/bin/python -m verification.trajectories && \
 	$(DEV)/bin/swarm-logistics run --policy ppo-robust --set duration=5 && wait $$types
-	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup --cov --cov-report=
+	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup -m "not daily" --cov --cov-report=
 	$(DEV)/bin/python -m coverage report --fail-under=94
+
+# Once a day: whole commands, pages, examples and processes, whose parts the gate tests.
+daily: $(DEV)/installed
+	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup -m daily
 
 # Once a day: compiled kernels read beyond an array in silence, the interpreter raises an IndexError.
 interpreted: $(DEV)/installed

@@ -83,9 +83,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Measure coverage with quick tests that mirror the package alone: measured ones are slower."""
-    is_measured = mirrors(item.path) and not item.get_closest_marker("unmeasured")
-    with contextlib.nullcontext() if is_measured else _uncovered():
+    """Measure coverage with tests that mirror the package alone: measured ones are slower."""
+    with contextlib.nullcontext() if mirrors(item.path) else _uncovered():
         return (yield)
 
 

@@ -9,6 +9,7 @@ import sys
 from typing import Any
 
 import numpy as np
+import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, policies, swarm_logistics_v0
 from swarm_logistics_env.wrappers import FaultInjection, ParameterChange, SwarmSize
@@ -44,6 +45,7 @@ def trajectory(with_another: bool) -> str:
     return f"{digest.hexdigest()} {state.delivered} {state.step} {len(env.failed_robots)}"
 
 
+@pytest.mark.daily
 def test_a_trajectory_is_the_same_in_another_process_and_beside_another_world() -> None:
     first = trajectory(False)
     _, delivered, *counts = first.split()

@@ -47,6 +47,7 @@ def test_what_examples_import_is_in_the_list_of_stable_names() -> None:
                     assert imported in stable or is_module, f"{path.name}: {imported}"
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("page", blocks.pages(), ids=lambda page: page.name)
 def test_page_runs_and_prints_what_it_shows(page: Path) -> None:
     if page.name in ONCE_A_DAY and os.environ.get("HYPOTHESIS_PROFILE") != "nightly":

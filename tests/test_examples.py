@@ -22,6 +22,7 @@ def main(name: str, **sizes: Any) -> Any:
     return runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](**sizes)
 
 
+@pytest.mark.daily
 def test_evolution_ends_with_a_front_of_both_indicators(tmp_path: Path) -> None:
     pytest.importorskip("cma", reason="needs cma")
     picture = tmp_path / "front.png"
@@ -36,6 +37,7 @@ def test_the_search_for_constants_ends_with_a_change() -> None:
     assert main("tune_swarm_dt", rounds=2, seeds=2, confirm=2, scenario=scenario).n_seeds == 2
 
 
+@pytest.mark.daily
 def test_what_stable_baselines3_learns_is_a_policy(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("stable_baselines3", reason="needs the extra train")
     learned, scripted = main("ppo_swarm", total_timesteps=5_120, duration=10.0)
@@ -43,6 +45,7 @@ def test_what_stable_baselines3_learns_is_a_policy(capsys: pytest.CaptureFixture
     assert len(learned) == len(scripted) == 3
 
 
+@pytest.mark.daily
 def test_a_loop_of_ones_own_learns_on_the_frame_of_motion() -> None:
     torch = pytest.importorskip("torch", reason="needs the extra train")
     pytest.importorskip("stable_baselines3", reason="needs the extra train")
@@ -84,6 +87,7 @@ def test_own_failure_mode_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [estimate.indicator for estimate in estimates] == ["R", "FT"]
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize(("driving", "code"), [(0.0, 1), (1.0, 0)])
 def test_gate_judges_the_change(
     driving: float, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -114,6 +114,7 @@ def test_verdicts_follow_from_the_frozen_runs(name: str) -> None:
         )
 
 
+@pytest.mark.daily
 def test_runs_played_anew_equal_the_frozen_ones() -> None:
     faults = [{"modes": ["FM4"], "robots": [2]}]
     few = shipped(

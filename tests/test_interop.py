@@ -87,6 +87,7 @@ def test_the_worlds_of_the_task_are_those_that_all_learn_in(name: str) -> None:
     assert Scenario(**fields) == shared.WORLDS[name]
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize(
     ("library", "module", "learner"),
     [

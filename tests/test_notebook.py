@@ -23,6 +23,7 @@ def values(notebook: Any) -> list[dict[str, str]]:
     ]
 
 
+@pytest.mark.daily
 def test_it_runs_and_shows_what_it_made(tmp_path: Path) -> None:
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     nbclient.NotebookClient(

@@ -11,6 +11,7 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+import pytest
 import yaml
 
 PACKAGE = "swarm_logistics_env"
@@ -29,6 +30,7 @@ def left_out(folder: str, names: list[str]) -> set[str]:
     return hidden | {n for n in names if n in at_top or n.endswith(".egg-info")}
 
 
+@pytest.mark.daily
 def test_wheel_and_sdist_hold_the_package_and_what_the_gate_needs(tmp_path: Path) -> None:
     copy, out = tmp_path / "source", tmp_path / "dist"
     shutil.copytree(ROOT, copy, symlinks=True, ignore=left_out)

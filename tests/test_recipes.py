@@ -224,6 +224,7 @@ def test_a_recipe_names_the_files_that_it_changes(recipe: str) -> None:
     assert {file for file, *_ in EDITS[recipe]} == {*re.findall(r"`([^`]+)`", files)} | read
 
 
+@pytest.mark.daily
 def test_what_the_recipes_add_works(tmp_path: Path) -> None:
     printed = run(
         tmp_path,

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from benchmarks.floor import ForceFloor, record
 from benchmarks.results import Contestant, in_turns, rows, save, shown
@@ -28,6 +29,7 @@ def test_ratios_are_medians_over_turns_and_are_shown_and_written(tmp_path: Path)
     assert [row["cost_to_base"] for row in written["contestants"]] == [None, 2.0]
 
 
+@pytest.mark.daily
 def test_the_floor_moves_robots_exactly_as_the_world_does() -> None:
     scenario = Scenario(n_robots=5, n_items=1)
     recording = record(scenario, 20)

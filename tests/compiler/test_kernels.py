@@ -41,6 +41,7 @@ def finished(process: subprocess.Popen[str]) -> list[str]:
     return [*printed.splitlines(), errors]
 
 
+@pytest.mark.daily
 def test_two_processes_that_start_at_once_keep_one_cache(tmp_path: Path) -> None:
     both = [finished(each) for each in [started(FIRST_CALLS, tmp_path) for _ in range(2)]]
     assert both[0][0] == both[1][0]
@@ -129,6 +130,7 @@ def test_an_older_file_is_not_run_where_there_was_room_for_the_index_alone(
     assert files.load("integers") is None
 
 
+@pytest.mark.daily
 def test_a_process_starts_with_damaged_code_and_keeps_what_it_compiles(tmp_path: Path) -> None:
     first = finished(started(FIRST_CALLS, tmp_path))
     file = min(tmp_path.rglob("*pair_key*.nbc"))
@@ -152,6 +154,7 @@ def test_a_kernel_compiles_where_the_disk_is_full(monkeypatch: pytest.MonkeyPatc
     fast_kernels._warn_of_no_cache.cache_clear()
 
 
+@pytest.mark.daily
 def test_compiling_tells_a_person_once_and_never_from_a_worker(tmp_path: Path) -> None:
     quiet = started(LONG, tmp_path / "worker", **{numba_fence.QUIET: "1"})
     message = finished(started(LONG, tmp_path))[-1]

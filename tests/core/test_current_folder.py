@@ -83,6 +83,7 @@ def marks(folder: Path) -> list[str]:
     return sorted(mark.name for mark in (folder.parent / "marks").iterdir())
 
 
+@pytest.mark.daily
 def test_commands_and_their_workers_import_nothing_of_the_current_folder(folder: Path) -> None:
     (folder / ".numba_config.yaml").write_text("CACHE_DIR: compiled\n")
     run_in(
@@ -139,6 +140,7 @@ sizes = [{ values = [2, 3] }]
 """
 
 
+@pytest.mark.daily
 def test_what_is_named_finds_its_neighbours_whenever_it_and_its_workers_import_them(
     folder: Path,
 ) -> None:

@@ -285,6 +285,7 @@ class Last(nn.Module):
 """
 
 
+@pytest.mark.daily
 def test_shards_of_several_starts_merge_and_an_edited_layer_is_played_anew(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(textwrap.dedent(SCRIPT))
     (tmp_path / "layers.py").write_text(LAST)

@@ -59,6 +59,7 @@ def test_outputs_have_the_bits_of_products_added_one_after_the_other(
     np.testing.assert_array_equal(outputs.view(np.uint32), expected.view(np.uint32))
 
 
+@pytest.mark.daily
 @pytest.mark.compiled
 @pytest.mark.parametrize("width", [register_blocks.NARROW, register_blocks.WIDE])
 def test_registers_and_loops_have_the_same_bits(width: int) -> None:

@@ -199,6 +199,7 @@ class Eastward:
         return np.stack([rows[:, -1] < 3.0, *np.zeros((3, len(rows)))], axis=1)
 
 
+@pytest.mark.daily
 def test_a_policy_with_a_sensor_of_its_own_is_judged_as_any_other(tmp_path: Path) -> None:
     driver = Eastward()
     policy = policies.within(driver, Beacon)

@@ -103,6 +103,7 @@ def test_what_is_no_model_or_one_of_other_spaces_is_refused(model: Path, tmp_pat
         policies.from_sb3(model)
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize(
     ("algorithm", "form"),
     [("PPO", MotionFrame), ("A2C", MotionFrame), ("DQN", lambda env: DiscreteActions(env)),

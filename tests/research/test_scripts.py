@@ -54,6 +54,7 @@ def test_a_run_falls_back_below_half_of_the_best_smaller_size() -> None:
     assert list(play_floors.fallen_back(cells, "homing")) == [none] * 3 + ["4 of 6 [22, 96] %"]
 
 
+@pytest.mark.daily
 def test_both_engines_of_a_world_stand_side_by_side(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -102,6 +102,7 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return page
 
 
+@pytest.mark.daily
 def test_a_second_call_plays_nothing_and_leaves_the_page_as_it_is(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -178,6 +179,7 @@ def test_jackknife_of_a_mean_is_its_t_interval() -> None:
     assert interval == pytest.approx(spi.mean_interval(sample))
 
 
+@pytest.mark.daily
 @EACH
 def test_page_quotes_what_was_played(
     question: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

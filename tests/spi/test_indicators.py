@@ -107,7 +107,7 @@ PERFORMANCES = st.lists(st.integers(0, 60), min_size=3, max_size=12)
 VALUES = st.floats(0.1, 40.0) | st.sampled_from([0.1, 0.2, 0.3, 0.6, 1.0, 2.0, 4.0])
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 @given(
     symbol=st.sampled_from([*DEFINITIONS]),
     samples=st.tuples(PERFORMANCES, PERFORMANCES, PERFORMANCES),

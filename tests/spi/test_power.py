@@ -107,7 +107,7 @@ def test_what_cannot_be_is_named() -> None:
         spi.lower_decile_of_power(PILOT, 0.1, 1)
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 @pytest.mark.parametrize("n_pilot", [5, 10, 20])
 def test_a_promised_power_of_80_percent_is_kept_on_average(n_pilot: int) -> None:
     mean, sd, effect = 40.0, 6.0, 0.08

@@ -66,7 +66,7 @@ def test_statistic_is_students_of_the_logarithm_of_raised_means(threshold: float
 counts = st.integers(0, 60)
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 @given(
     pairs=st.lists(st.tuples(counts, counts), min_size=2, max_size=12),
     threshold=st.floats(-1.0, 2.0),

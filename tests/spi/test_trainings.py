@@ -37,7 +37,7 @@ def test_trainings_or_seeds_that_do_not_differ_leave_the_interval_of_the_others(
         assert spi.mean_interval(p) == pytest.approx(spi.mean_interval(p_of_training))
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 @given(st.integers(0, 10_000), st.booleans(), st.floats(-0.4, 0.4))
 def test_interval_and_verdict_agree_at_any_threshold(
     seed: int, paired: bool, threshold: float

@@ -97,7 +97,7 @@ def stored(directory: Path) -> int:
         return 0
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_another_thread_may_ask_a_study_and_play_it(tmp_path: Path) -> None:
     for out in (None, tmp_path / "out"):
         study, answers = Study(out=out, **SMALL), list[Any]()
@@ -113,7 +113,7 @@ def test_another_thread_may_ask_a_study_and_play_it(tmp_path: Path) -> None:
         assert answers == [0, len(study.findings().verdicts)]
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_study_killed_at_five_random_moments_goes_on(played: Path, tmp_path: Path) -> None:
     out, total, n_stored = tmp_path / "out", stored(played), 0
     moments = random.Random(0)
@@ -225,6 +225,7 @@ def test_failed_runs_are_rows_block_their_verdicts_and_are_tried_again(
     assert study.indicators()["value"].notna().all()
 
 
+@pytest.mark.daily
 def test_run_whose_worker_is_killed_is_tried_again_once(
     sizes: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

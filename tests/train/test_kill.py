@@ -61,7 +61,7 @@ def left_in(directory: Path) -> tuple[list[dict[str, bytes]], list[list[str]]]:
     return weights, [[row[0], *row[3:]] for row in rows]
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_a_training_that_was_killed_ends_as_one_that_was_not(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -179,6 +179,7 @@ def assert_told(world: Warehouse, expected: list[float]) -> None:
     assert world.state.robot_told.tolist() == pytest.approx(expected, nan_ok=True)
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("first", sorted(FAILURE_MODES))
 def test_any_two_modes_add_up(first: str) -> None:
     scenario = Scenario(

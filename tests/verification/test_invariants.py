@@ -49,6 +49,7 @@ def test_a_crowd_presses_nobody_out_at_the_longest_stride(mass: float) -> None:
 
 
 # The point that all robots drive to [m]; where it is NaN, each stays where it is.
+@pytest.mark.daily
 @pytest.mark.parametrize("target", [(5.0, 5.0), (10.0, np.nan), (0.0, 0.0)], ids=str)
 @pytest.mark.parametrize("n_robots", [25, 150])
 def test_a_jam_keeps_bodies_apart(n_robots: int, target: tuple[float, float]) -> None:
@@ -132,6 +133,7 @@ print(*peaks)
 """
 
 
+@pytest.mark.daily
 def test_the_peak_memory_of_a_world_is_flat_over_its_second_half() -> None:
     pytest.importorskip("resource")  # not on Windows
     root = Path(verification.__file__).parents[1]

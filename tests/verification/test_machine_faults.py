@@ -84,6 +84,7 @@ def complaint(done: Any) -> str:
     return last
 
 
+@pytest.mark.daily
 def test_a_disk_that_is_full_keeps_what_is_finished_and_the_study_goes_on(
     undisturbed: str, tmp_path: Path
 ) -> None:
@@ -107,6 +108,7 @@ def test_a_disk_that_is_full_keeps_what_is_finished_and_the_study_goes_on(
     assert exported(out)[1] == undisturbed
 
 
+@pytest.mark.daily
 @pytest.mark.skipif(sys.platform != "linux", reason="root writes everywhere")
 def test_a_folder_that_is_read_only_is_named_and_stays_as_it_is(tmp_path: Path) -> None:
     played, empty = tmp_path / "played", tmp_path / "empty"
@@ -158,6 +160,7 @@ class Hungry(SwarmDT):
 """
 
 
+@pytest.mark.daily
 def test_a_worker_out_of_memory_is_a_failed_run_and_nothing_more(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

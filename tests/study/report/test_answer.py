@@ -60,7 +60,7 @@ def test_what_is_alike_shares_a_line_and_no_question_is_lost(few: StudyResults) 
     assert questions == ["FT FM4, 1, 2, 3 of 25", "R FM4, 1, 2, 3 of 25"]
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_digest_fits_the_screen_and_nothing_is_cut(
     few: StudyResults, compared: StudyResults
 ) -> None:

@@ -24,6 +24,7 @@ print(os.environ["MPLBACKEND"], matplotlib.rcParams["backend"])
 """
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize(
     ("backend", "left"),
     [

@@ -127,7 +127,7 @@ def test_latex_takes_the_tables_unedited(latex: str, page: str, tmp_path: Path) 
     compiled(latex, page, tmp_path)
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_no_table_of_a_judged_policy_is_wider_than_the_page(tmp_path: Path) -> None:
     """Of the scorecard until it is clear, whose intervals have several levels."""
     study = Study.preset("scorecard", policies=["homing"], seeds=60, until_clear=True)

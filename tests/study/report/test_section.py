@@ -139,7 +139,7 @@ def test_every_surface_names_the_level_that_it_prints(
         assert {row["confidence"] for row in csv.DictReader(lines)} == {"0.95"}
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_what_is_asked_is_answered_before_what_else_is_known() -> None:
     results = paper(seeds=100)
     equivalent = [test for test in results.verdicts if test.conclusion == "equivalent"]

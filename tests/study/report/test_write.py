@@ -53,7 +53,7 @@ def directory(few: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return directory
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_equal_rows_give_equal_bytes(tmp_path: Path) -> None:
     study = Study(seeds=3, sizes=[{"values": [5, 10]}])
     results = judged(study, lambda _, setting, seed: delivered(5 * (setting.value or 10) + seed))

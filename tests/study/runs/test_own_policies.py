@@ -57,6 +57,7 @@ def play(world: dict[str, Any], policies: list[Any], out: Path | None, processes
     return tally.played, tally.kept, delivered, tally.changes
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("processes", [1, 2])
 def test_an_edited_helper_is_played_and_told_and_what_is_the_same_counts(
     world: dict[str, Any], scaled: Path, tmp_path: Path, processes: int
@@ -76,6 +77,7 @@ def test_an_edited_helper_is_played_and_told_and_what_is_the_same_counts(
     assert play(world, [name], out, processes)[:2] == (0, 4)
 
 
+@pytest.mark.daily
 def test_factories_and_objects_of_one_class_are_what_each_is(
     world: dict[str, Any], scaled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -198,6 +200,7 @@ class Mine:
 """
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("processes", ["1", "2"])
 def test_an_edited_cell_is_played_from_standard_input_without_a_guard(
     tmp_path: Path, processes: str

@@ -140,6 +140,7 @@ class Hanging(SwarmDT):
         return super().act(observations)
 
 
+@pytest.mark.daily
 def test_a_run_that_hangs_is_ended_and_has_failed(sizes: dict[str, Any]) -> None:
     before = {process.pid for process in multiprocessing.active_children()}
     study = Study(**{**sizes, "policies": [Hanging()], "seeds": 2, "sizes": [{"values": [2, 3]}]})

@@ -58,7 +58,7 @@ def test_deliveries_of_a_block_have_no_times_of_one_run(tmp_path: Path) -> None:
 STUDIES, P = 400, 40.0
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 @pytest.mark.parametrize(("n_maps", "n_trials", "deviation"), [(4, 5, 0.15), (10, 3, 0.3)])
 def test_verdicts_hold_where_a_fault_costs_more_in_some_maps(
     n_maps: int, n_trials: int, deviation: float

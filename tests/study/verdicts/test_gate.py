@@ -81,7 +81,7 @@ def test_regression_is_found_and_nothing_else(text: str, old: Any, new: Any, fai
     assert fails(text, results(old), results(new)) == failing
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_a_gate_over_several_comparisons_keeps_its_error_over_all_of_them() -> None:
     faults = {"modes": ["FM1", "FM2", "FM4"], "robots": [1, 2]}
     plan = Study(seeds=8, scenario={"n_robots": 10}, faults=[faults]).plan()

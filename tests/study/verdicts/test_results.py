@@ -151,7 +151,7 @@ def test_one_failed_run_blocks_its_family_under_holm(paper_results: StudyResults
     assert {t.on_threshold.plain for t in tests if t.problem} == {"undefined"}
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_two_seeds_and_a_cap_everywhere_give_no_verdict() -> None:
     def capped(policy: str, setting: Setting, seed: int) -> Outcome:
         digest = f"{setting} {seed}"
@@ -175,7 +175,7 @@ def test_a_study_without_runs_has_whole_tables_of_what_is_missing() -> None:
     }
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_every_column_has_a_value_somewhere(paper_results: StudyResults) -> None:
     # Every column has a value somewhere in a whole study, but for what only others have.
     claimed = paper(unaffected=frozenset({"FM2"}), seeds=40)

@@ -202,7 +202,7 @@ def test_stopped_before_the_first_look_it_has_a_value_of_every_question_and_no_v
     assert {test.conclusion for test in verdicts.values()} == {"undefined"}
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_at_each_look_holm_steps_down_through_what_is_open() -> None:
     looks, softened = looks_up_to(30), 0
     for number in range(4):

@@ -123,7 +123,7 @@ def calls_of(*functions: Callable[..., Any], during: Callable[[], object]) -> li
     return [counts[function.__code__] for function in functions]
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_one_judgement_computes_everything_once_and_hands_it_on(command: Command) -> None:
     once = RecordedStudy.of.__func__, results.judge, collapses, edges, answer, Runs.__init__  # type: ignore[attr-defined]
     *counts, n_tests = calls_of(*once, two_phases, during=lambda: command(TRIALS))
@@ -233,7 +233,7 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     assert "1 were kept" in last
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
     words = "judge judged_policy:Mine --processes 1 --seeds 30 --out"
     printed = command(f"{words} clear")
@@ -288,7 +288,7 @@ def test_a_policy_is_judged_by_another_measure_of_the_same_runs(command: Command
     assert "no measure 'late'" in command("judge homing --performance late", code=2)
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_a_policy_is_judged_on_other_bodies_and_floors(command: Command) -> None:
     Path("hall.toml").write_text("floor = 'two_docks'\nn_robots = 3\nduration = 5\n")
     command("judge homing --scenario hall.toml --bodies mujoco --seeds 3 --processes 1")

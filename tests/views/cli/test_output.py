@@ -55,7 +55,7 @@ def test_every_text_is_written_in_every_encoding(text: str, encoding: str) -> No
 
 
 # The other charmaps are written as cp1252 is; the test above takes all of them.
-@pytest.mark.unmeasured
+@pytest.mark.daily
 @pytest.mark.parametrize(
     ("encoding", "is_terminal"),
     [("ascii", False), ("cp1252", True), ("utf-16", False), ("utf-8", False), ("utf-8", True)],
@@ -106,6 +106,7 @@ def closing(*numbers: int) -> Any:
     return close
 
 
+@pytest.mark.daily
 @pytest.mark.skipif(sys.platform == "win32", reason="closes streams as a POSIX shell does")
 @pytest.mark.parametrize("closed", [(1,), (0, 1, 2), ()])
 def test_nothing_is_lost_where_nobody_reads(closed: Sequence[int], folder: Path) -> None:

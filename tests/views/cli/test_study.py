@@ -107,7 +107,7 @@ def test_study_plan_prints_conditions_once_and_what_they_take(file: Path, comman
     assert list(Path().iterdir()) == [file]
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_every_study_that_is_shipped_or_an_example_is_planned(command: Command) -> None:
     # Those in tasks/ need packages that nothing else does.
     files = sorted(EXAMPLES.glob("*.toml")) + sorted(EXAMPLES.glob("questions/*.toml"))

@@ -67,6 +67,7 @@ def device(size: tuple[int, int]) -> dict[str, float]:
     return {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize(
     ("size", "room", "is_stacked", "least"),
     [
@@ -97,6 +98,7 @@ def test_arenas_take_the_room_that_the_window_has_and_nothing_is_cut_off(
         served.stop()
 
 
+@pytest.mark.daily
 def test_on_a_phone_a_note_covers_nothing_and_a_page_that_is_refused_says_why(
     served: Served, browser: Browser, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -152,6 +154,7 @@ def test_page_warns_of_a_policy_that_failed_and_of_nothing_before(
         served.stop()
 
 
+@pytest.mark.daily
 def test_recording_plays_from_a_file(browser: Browser, tmp_path: Path) -> None:
     session = Session(SMALL, faults=[Fault("FM4", [1], onset=5.0)])
     file = tmp_path / "run.html"

@@ -52,6 +52,7 @@ asyncio.run(use())
 """
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("names", [["ppo-delivery"], ["central", "homing"]])
 def test_nothing_is_compiled_once_the_address_is_known(names: list[str]) -> None:
     done = subprocess.run(

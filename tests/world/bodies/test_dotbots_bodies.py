@@ -136,6 +136,7 @@ def test_racks_and_obstacles_are_refused() -> None:
         Warehouse(ROOM.replace(n_obstacles=1, obstacle_radius=0.05)).reset(seed=0)
 
 
+@pytest.mark.daily
 def test_twenty_dotbots_deliver_and_equal_seeds_give_equal_bits(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

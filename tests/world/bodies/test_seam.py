@@ -66,7 +66,7 @@ def worlds(draw: st.DrawFn) -> tuple[Scenario, tuple[Planned, ...], int]:
     return scenario, planned, draw(st.integers(0, 2**32))
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 @given(case=worlds())
 @settings(max_examples=60 if settings().max_examples < 2000 else 2000)
 def test_orders_and_poses_are_as_the_reference_says(

@@ -141,6 +141,7 @@ def test_pictures_are_as_recorded(scene: Callable[[], Frame], tmp_path: Path) ->
     assert (change > 16).mean() <= 0.02, message
 
 
+@pytest.mark.daily
 def test_frames_are_the_same_in_two_processes() -> None:
     script = (
         "import sys; from swarm_logistics_env.world.rendering import Renderer\n"

@@ -112,6 +112,7 @@ print(sys.argv[1] == "reset" or sum(n_steps) == world.state.step)
 """
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("call", ["step", "reset"])
 def test_two_threads_at_one_world_do_not_end_the_process(call: str) -> None:
     command = [sys.executable, "-c", PROGRAM, call]

@@ -192,6 +192,7 @@ print(rows.any())
 """
 
 
+@pytest.mark.daily
 @pytest.mark.compiled
 def test_a_program_ends_while_its_pool_is_at_work() -> None:
     command = [sys.executable, "-c", PROGRAM]

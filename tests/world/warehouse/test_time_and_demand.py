@@ -149,7 +149,7 @@ def requests_of(demand: str, seed: int, n_items: int, count: int) -> list[int]:
     return [int(item) for item in np.searchsorted(shares / shares[-1], draws, side="right")]
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 @settings(max_examples=12, deadline=None)
 @given(data=st.data(), seed=st.integers(0, 2**32))
 def test_random_worlds_keep_their_order_and_their_bits(data: st.DataObject, seed: int) -> None:
