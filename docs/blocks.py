@@ -161,6 +161,7 @@ def run_in_small(texts: Mapping[str, str]) -> None:
     """Run the shell commands of the pages one after another in a folder with all their files.
 
     Not run is what serves a page until somebody stops it, and what takes other numbers of seeds.
+    Python is run where it names what a command of its page reads.
     """
     with _working_folder() as folder:
         for path in (ROOT / "examples").glob("*.py"):
@@ -169,7 +170,14 @@ def run_in_small(texts: Mapping[str, str]) -> None:
             if file := _FILE.match(block.code):
                 (folder / file[1]).write_text(block.code, encoding="utf-8")
         for name, text in texts.items():
-            for arguments in commands(text, ("sh", "")):
+            page_commands = commands(text, ("sh", ""))
+            words = {f'"{word}"' for arguments in page_commands for word in arguments}
+            python = [block for block in blocks(text) if block.language == "python"]
+            if any(word in block.code for block in python for word in words):
+                names: dict[str, Any] = {"__name__": "page"}
+                for block in python:
+                    _output(block, names)
+            for arguments in page_commands:
                 command = f"{name}: swarm-logistics {shlex.join(arguments)}"
                 is_served = arguments[0] == "watch" and "--save" not in arguments
                 if is_served or {"--until-clear", "--shard"} & set(arguments):

@@ -130,7 +130,8 @@ def counts() -> dict[str, list[str]]:
     words = Counter(word(n_holding, n_sets) for _, n_holding, n_sets in of_sets)
     n_sets = of_sets[0][2]
     of_text = (
-        len(claims), words["supported"], n_untestable, words["contradicted"], words["open"], n_sets,
+        len(claims), words["supported"] - n_untestable, n_untestable, words["contradicted"],
+        words["open"], n_sets,
     )  # fmt: skip
     seeds = {line["study"]: line["seeds"] for line in read("estimates")}
     coverage = section.percent(_coverage_over_trainings())

@@ -166,8 +166,8 @@ def realistic_block(results: StudyResults) -> str:
     return table(
         ("", "P", f"times P of `{best}`", "contacts a robot-minute"),
         rows,
-        f"{seeds_from(results)}, of each training. `{best}` is the best script that senses what is "
-        "near; `central` and `central-stock` see everything.",
+        f"{seeds_from(results)}, of each training. `{best}` is the best of these scripts that "
+        "sense what is near; `central` and `central-stock` see everything.",
     )
 
 

@@ -65,6 +65,12 @@ def test_changed_output_is_noticed() -> None:
     assert blocks.record(page) == page.replace("3", "2")
 
 
+def test_a_command_of_a_page_reads_what_python_of_the_page_writes() -> None:
+    python = 'from pathlib import Path\n\nPath("few.json").write_text(\'{"n_robots": 3}\')\n'
+    command = "swarm-logistics list scenario --scenario few.json\n"
+    blocks.run_in_small({"page.md": f"```python\n{python}```\n\n```sh\n{command}```\n"})
+
+
 @EACH
 def test_what_a_page_names_exists_and_its_files_can_be_read(name: str, tmp_path: Path) -> None:
     text, file = (DOCS / name).read_text(encoding="utf-8"), tmp_path / "block.toml"

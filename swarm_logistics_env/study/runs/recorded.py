@@ -145,8 +145,10 @@ def _order(row: Trial) -> tuple[object, ...]:
 
 
 def _named(trials: Sequence[Trial]) -> Trial:
-    """Return what a condition is, by one of its trials, with the first line that it stands in."""
-    return replace(trials[0], line=min(row.line for row in trials), times=None)
+    """Return what a condition is, with its first line and the most trials that a block has."""
+    line = min(row.line for row in trials)
+    n_trials = max(row.n_trials for row in trials)
+    return replace(trials[0], line=line, times=None, n_trials=n_trials)
 
 
 def _without_removed(trials: Trials) -> Iterator[str]:

@@ -133,11 +133,12 @@ def _names(
         if name in table.index and name not in ignore:
             names.setdefault(column, name)
     chosen = {*names}
+    settled = {*ignore, *names.values(), *table.left_out}
     parameters = list[str]()
     of_robots = list[str]()
     blocks = [names["seed"]] if "seed" in names else []
     for name in header:
-        if not name or name in (*ignore, *names.values(), *table.left_out):
+        if not name or name in settled:
             continue
         if header.count(name) > 1:
             raise IndicatorError(f"{path} has two columns {name!r}: should have one of that name")

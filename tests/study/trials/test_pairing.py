@@ -38,6 +38,57 @@ def test_trials_of_a_block_count_as_one_and_blocks_alike(tmp_path: Path) -> None
     assert read_trials(path, columns={"block": "seed"}).performance(n_robots=4)[0] == 4.0
 
 
+MAPS = """policy,robots,seed,map,performance
+A,4,,hall,1
+A,4,,yard,2
+A,8,,yard,4
+A,8,,hall,3
+B,4,,hall,5
+B,8,,hall,6
+B,8,,roof,7
+"""
+
+
+def test_any_text_is_a_block_and_an_empty_column_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(MAPS)
+    trials = read_trials(path)
+    assert [row.seed for row in trials.rows] == [0, 2, 2, 0, 0, 0, 1]
+    assert trials.performance(policy="A", n_robots=8).tolist() == [3.0, 4.0]
+    assert trials.notes == (
+        "A has runs of 2 of the file's 3 blocks (map).",
+        "B has runs of 2 of the file's 3 blocks (map).",
+        (
+            "B: no partner of the same map in some condition for 1 of its runs: they count for P, "
+            "and are left out where such a condition is compared."
+        ),
+    )
+
+
+def test_a_seed_and_a_map_make_a_block_together(tmp_path: Path) -> None:
+    text = "robots,seed,map,p\n4,0,hall,1\n4,1,hall,2\n4,0,yard,3\n8,0,yard,4\n"
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    trials = read_trials(path)
+    assert [row.seed for row in trials.rows] == [0, 2, 1, 1]
+    shared, partners = trials.notes
+    assert shared == (
+        "Pairs are of one seed and map, so verdicts are of the 2 values of 'map' alone; --ignore "
+        "seed compares their means, for all such values."
+    )
+    assert "of the same seed and map in some condition" in partners
+
+
+@pytest.mark.parametrize("names", [["seed", "crate"], ["crate", "seed"]])
+def test_a_column_that_is_called_the_seed_makes_a_block_with_a_seed_on_either_side(
+    names: list[str],
+) -> None:
+    values = {"robots": [4, 4, 8, 8], "seed": [0, 1, 0, 1], "crate": ["a", "b", "a", "b"], "P": 1}
+    trials = read_trials(pd.DataFrame(values)[["robots", *names, "P"]], columns={"seed": "crate"})
+    assert [(row.seed, row.parameters) for row in trials.rows] == [(0, ()), (1, ())] * 2
+    assert [column.use for column in trials.columns] == ["robots", "seed", "seed", "performance"]
+
+
 def test_a_single_block_pairs_nothing(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     path.write_text("robots,map,P\n4,hall,1\n4,hall,2\n8,hall,5\n")

@@ -307,43 +307,6 @@ def test_a_label_may_stand_in_several_conditions_once_each(tmp_path: Path) -> No
         read(tmp_path, f"{rows}8,jam,1,1,6\n")
 
 
-MAPS = """policy,robots,seed,map,performance
-A,4,,hall,1
-A,4,,yard,2
-A,8,,yard,4
-A,8,,hall,3
-B,4,,hall,5
-B,8,,hall,6
-B,8,,roof,7
-"""
-
-
-def test_any_text_is_a_block_and_an_empty_column_is_none(tmp_path: Path) -> None:
-    trials = read(tmp_path, MAPS)
-    assert [row.seed for row in trials.rows] == [0, 2, 2, 0, 0, 0, 1]
-    assert trials.performance(policy="A", n_robots=8).tolist() == [3.0, 4.0]
-    assert trials.notes == (
-        "A has runs of 2 of the file's 3 blocks (map).",
-        "B has runs of 2 of the file's 3 blocks (map).",
-        (
-            "B: no partner of the same map in some condition for 1 of its runs: they count for P, "
-            "and are left out where such a condition is compared."
-        ),
-    )
-
-
-def test_a_seed_and_a_map_make_a_block_together(tmp_path: Path) -> None:
-    text = "robots,seed,map,p\n4,0,hall,1\n4,1,hall,2\n4,0,yard,3\n8,0,yard,4\n"
-    trials = read(tmp_path, text)
-    assert [row.seed for row in trials.rows] == [0, 2, 1, 1]
-    shared, partners = trials.notes
-    assert shared == (
-        "Pairs are of one seed and map, so verdicts are of the 2 values of 'map' alone; --ignore "
-        "seed compares their means, for all such values."
-    )
-    assert "of the same seed and map in some condition" in partners
-
-
 def test_what_differs_in_every_row_tells_no_conditions_apart(tmp_path: Path) -> None:
     rows = [f"{n},{temperature},9" for temperature, n in enumerate([4, 4, 4, 8, 8, 8])]
     trials = read(tmp_path, "\n".join(["robots,temperature,p", *rows]))

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import http.client
 import json
 import os
 import random
 import signal
 import socket
-import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
-from urllib.parse import urlsplit
 
 import aiohttp
 import pytest
 
 from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.views.watch import Session, server
-from swarm_logistics_env.views.watch.server import LOOPBACK, WatchServer, serve
-from tests.views.watch.conftest import SMALL, Served
+from swarm_logistics_env.views.watch.server import WatchServer, serve
+from tests.views.watch.conftest import LONG, SMALL, Served, ask, messages, wait_until
 
 
 @pytest.fixture(scope="module")
@@ -32,48 +28,6 @@ def shared() -> Iterator[Served]:
     running_server = Served()
     yield running_server
     running_server.stop()
-
-
-LONG = 300.0  # [s]; ends what hangs
-
-
-def ask(served: Served, name: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
-    """Ask for a file below the token, or for a path that begins with /."""
-    path = name if name.startswith("/") else f"/{served.server.token}/{name}"
-    host = urlsplit(served.server.address).hostname or ""
-    connection = http.client.HTTPConnection(host, served.server.port, timeout=LONG)
-    connection.request("GET", path, headers=headers)
-    answer = connection.getresponse()
-    response = answer.status, answer.read(), dict(answer.getheaders())
-    connection.close()
-    return response
-
-
-def messages(
-    served: Served, orders: list[str], enough: int | Callable[[dict[str, Any]], bool]
-) -> list[dict[str, Any]]:
-    """Send orders and return the messages that come, until a problem or `enough` of them.
-
-    Args:
-        enough: how many, or whether a message is the last.
-    """
-
-    def is_last(got: list[dict[str, Any]]) -> bool:
-        if isinstance(enough, int):
-            return len(got) >= enough
-        return bool(got) and enough(got[-1])
-
-    async def talk() -> list[dict[str, Any]]:
-        got: list[dict[str, Any]] = []
-        live = f"{served.server.address}live"
-        async with aiohttp.ClientSession() as client, client.ws_connect(live) as page:
-            for order in orders:
-                await page.send_str(order)
-            while not is_last(got) and not (got and "problem" in got[-1]):
-                got.append(json.loads((await page.receive(LONG)).data))
-        return got
-
-    return asyncio.run(talk())
 
 
 def test_page_and_scripts_come_with_a_content_policy(shared: Served) -> None:
@@ -285,112 +239,6 @@ def test_a_policy_that_fails_is_told_to_the_page_and_the_server_stays(
         }.items()
     finally:
         served.stop()
-
-
-def silent(served: Served, request: str) -> socket.socket:
-    """Return a connection that asks once, and neither reads nor answers after that."""
-    connection = socket.socket()
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    connection.settimeout(LONG)
-    connection.connect((LOOPBACK, served.server.port))
-    connection.sendall(request.format(token=served.server.token, port=served.server.port).encode())
-    return connection
-
-
-def n_open(served: Served) -> int:
-    """Return how many connections the server has."""
-    inner = served.server._runner.server
-    assert inner is not None
-    return len(inner.connections)
-
-
-PAGE = (
-    "GET /{token}/live HTTP/1.1\r\nHost: localhost:{port}\r\nUpgrade: websocket\r\n"
-    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
-)
-SILENT = {
-    "pages": PAGE,
-    "files": "GET /{token}/draw.js HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n" * 20,
-    "half a request": "GET /{token}/ HTTP/1.1\r\nHost: loc",
-    "nothing": "",
-}
-
-
-def wait_until(is_true: Callable[[], bool]) -> None:
-    """Wait for something that comes, however slow the machine is."""
-    is_over = time.monotonic() + LONG
-    while not is_true():
-        assert time.monotonic() < is_over
-        time.sleep(0.01)
-
-
-@pytest.mark.parametrize("kind", SILENT)
-def test_connections_that_neither_read_nor_answer_end_and_shut_nobody_out(
-    kind: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(server, "_SHORTEST_SILENCE", 0.0)
-    if kind == "pages":
-        monkeypatch.setattr(server, "_HEARTBEAT", 0.5)
-    served = Served()
-    waiting = [silent(served, SILENT[kind]) for _ in range(16 if kind == "pages" else 100)]
-    try:
-        if kind == "pages":
-            for connection in waiting:
-                with contextlib.suppress(ConnectionError):
-                    while connection.recv(1 << 16):  # until it is closed
-                        pass
-            monkeypatch.setattr(server, "_HEARTBEAT", LONG)
-        else:
-            assert ask(served, "")[0] == 200
-            assert len(messages(served, [], 3)) == 3
-            with monkeypatch.context() as hurried:
-                hurried.setattr(server, "_LONGEST_SILENCE", 0.0)
-                wait_until(lambda: n_open(served) == 0)
-        assert len(messages(served, [], 3)) == 3
-    finally:
-        served.stop()
-        for connection in waiting:
-            connection.close()
-    assert len(capfd.readouterr().err) < 1000
-
-
-def test_of_pages_that_open_in_one_moment_all_are_answered(
-    served: Served, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(server, "_SHORTEST_SILENCE", LONG)
-    request = "GET /{token}/ HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n"
-    asking = [silent(served, "") for _ in range(200)]
-    text = request.format(token=served.server.token, port=served.server.port).encode()
-    for connection in asking:
-        connection.sendall(text)
-    answers = []
-    for connection in asking:
-        with connection, connection.makefile("rb") as answer:
-            answers.append(answer.read().partition(b"\r\n")[0])
-    assert answers == [b"HTTP/1.1 200 OK"] * 200
-
-
-def test_a_page_that_reads_nothing_is_dropped_and_holds_up_no_other(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(server, "_PATIENCE", LONG)
-    monkeypatch.setattr(
-        server, "frame_message", lambda session: {"long": f"{time.time()}" * 20_000}
-    )
-    served = Served()
-    slow = silent(served, PAGE)
-    try:
-        wait_until(lambda: len(served.server._pages) == 1)
-        (page,) = served.server._pages
-        wait_until(lambda: page._transport.get_write_buffer_size() > 0)
-        assert len(messages(served, [], 6)) == 6
-        assert page in served.server._pages
-        monkeypatch.setattr(server, "_PATIENCE", 0.0)
-        wait_until(lambda: not served.server._pages)
-    finally:
-        served.stop()
-        slow.close()
 
 
 def test_a_note_ends_and_who_opens_a_page_later_does_not_see_it(

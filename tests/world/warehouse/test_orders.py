@@ -17,7 +17,6 @@ from swarm_logistics_env.world.warehouse.orders import OrderMeasures
 from swarm_logistics_env.world.warehouse.state import CARRIED, DELIVERED, NOBODY
 from swarm_logistics_env.world.warehouse.structs import CAME, DUE, ITEM_ORDERED
 from tests.world.warehouse.conftest import (
-    EAST,
     FAR,
     HOLD,
     INSIDE,
@@ -245,13 +244,15 @@ def test_requests_one_after_another_are_due_from_when_they_are_asked_for(build: 
 
 def test_nothing_is_left_once_the_file_is_served(build: Build) -> None:
     world = build(
-        [(INSIDE, 5.0)], [(INSIDE, 5.1), FAR], orders=file_of("0.2,0,,", "0.4,0,,"), restock=True
-    )
-    steps(world, HOLD)
-    assert (requested_items(world), world.all_delivered) == ([], False)
-    while not world.all_delivered and world.state.step < 50:
-        steps(world, HOLD if world.state.item_position[0, 0] > 8 else EAST)
-    assert world.state.delivered >= 1
+        [(INSIDE, 5.0), (INSIDE, 3.0)], [(INSIDE, 5.1), (INSIDE, 3.1)],
+        orders=file_of("0.2,0,,", "0.4,1,,"), restock=True,
+    )  # fmt: skip
+    left = []
+    for _ in range(4):
+        steps(world, HOLD, HOLD)
+        left.append((world.state.delivered, world.all_delivered))
+    assert left == [(0, False), (1, False), (1, False), (2, True)]
+    assert (requested_items(world), waiting_items(world)) == ([], [])
 
 
 @pytest.mark.parametrize("number", range(6))
