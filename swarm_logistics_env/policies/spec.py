@@ -41,6 +41,7 @@ from swarm_logistics_env.policies.sb3_files import (
     refuse_untrusted,
 )
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
+from swarm_logistics_env.policies.told import Told
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
 SUFFIXES = (SUFFIX, SB3_SUFFIX)  # of policy files
@@ -55,6 +56,7 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
     "homing": Homing,
     "homing-stock": HomingStock,
+    "homing-told": Told,
     "central": Central,
     "central-stock": CentralStock,
 }

@@ -12,7 +12,7 @@ from pydantic import JsonValue
 
 from swarm_logistics_env.study.questions.comparison import Arm, Comparison
 from swarm_logistics_env.study.tasks.task import Case, Outcome
-from swarm_logistics_env.study.tasks.task_world import world_of
+from swarm_logistics_env.study.tasks.task_world import p_of, world_of
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 
@@ -133,7 +133,7 @@ def _conditions(results: StudyResults, arms: Mapping[str, Arm], runs: Runs) -> I
 
 def _mean_p(case: Case, outcomes: Sequence[Outcome | None]) -> float | None:
     """Return mean P over the trainings at one seed; None: a run failed, or is missing."""
-    p = [case.p_of(outcome) for outcome in outcomes if outcome is not None]
+    p = [p_of(case, outcome) for outcome in outcomes if outcome is not None]
     return round(float(np.mean(p)), 4) if len(p) == len(outcomes) else None
 
 

@@ -239,7 +239,7 @@ class Case:
         behaviour: 0: the policy's randomness follows from the run's seed; another number: from
             that number as well, so that the same worlds are met by another behaviour.
         task: that plays it.
-        performance: what P of a run is; None: what the task counts. Its runs are the same.
+        performance: what P of a run is; None: what the task counts.
     """
 
     policy: PolicySpec
@@ -274,14 +274,6 @@ class Case:
     def content_text(self) -> str:
         """The content as it stands in the JSON that a run's key is the digest of."""
         return canonical_json(self.content)[1:-1]
-
-    def p_of(self, outcome: Outcome) -> float:
-        """Return P of a run of this case."""
-        return self.performance.of_run(outcome) if self.performance else outcome.delivered
-
-    def is_capped(self, outcome: Outcome) -> bool:
-        """Return whether P of a run of this case would be larger if there had been more to do."""
-        return self.performance.is_capped(outcome) if self.performance else outcome.capped
 
     @cached_property
     def trainings(self) -> tuple[Case, ...]:

@@ -1,10 +1,10 @@
-"""What a task says of its world: in words, the largest P possible, and how to watch a run."""
+"""What a task says of its world, and what P of its runs is: what it counts, or another measure."""
 
 from __future__ import annotations
 
 import math
 
-from .task import Case, Task, TaskScenario
+from .task import Case, Outcome, Task, TaskScenario
 
 
 class TaskWorld:
@@ -29,6 +29,16 @@ class TaskWorld:
     def watch_command(self, case: Case) -> str | None:
         """Return the command that shows a run of a case, but for its seed; None: there is none."""
         return None
+
+
+def p_of(case: Case, outcome: Outcome) -> float:
+    """Return P of a run of a case."""
+    return case.performance.of_run(outcome) if case.performance else outcome.delivered
+
+
+def is_capped(case: Case, outcome: Outcome) -> bool:
+    """Return whether P of a run of a case would be larger if there had been more to do."""
+    return case.performance.is_capped(outcome) if case.performance else outcome.capped
 
 
 def counted_in(case: Case) -> str:

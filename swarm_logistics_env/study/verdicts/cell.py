@@ -15,7 +15,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE, Arm
 from swarm_logistics_env.study.tasks.task import Outcome
-from swarm_logistics_env.study.tasks.task_world import largest_performance
+from swarm_logistics_env.study.tasks.task_world import is_capped, largest_performance, p_of
 
 from .reference import Reference
 
@@ -78,7 +78,7 @@ class Cell:
     @cached_property
     def by_seed(self) -> NDArray[np.float64]:
         """P seed by seed, shape (n_seeds,); of K trainings (K, n_seeds) if no run is missing."""
-        p = np.array([self.arm.case.p_of(outcome) for outcome in self.outcomes], np.float64)
+        p = np.array([p_of(self.arm.case, outcome) for outcome in self.outcomes], np.float64)
         several = len(self.arm.case.trainings)
         return p.reshape(several, -1) if several > 1 and not self.problem else p
 
@@ -90,7 +90,7 @@ class Cell:
     @property
     def saturated(self) -> bool:
         """Whether a run delivered every item, so that P is capped."""
-        return any(self.arm.case.is_capped(outcome) for outcome in self.outcomes)
+        return any(is_capped(self.arm.case, outcome) for outcome in self.outcomes)
 
     @cached_property
     def mean(self) -> Interval:

@@ -20,6 +20,7 @@ from swarm_logistics_env.study.runs.notes import merge
 from swarm_logistics_env.study.runs.store import Runs, export
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Run
+from swarm_logistics_env.study.tasks.task_world import is_capped
 from swarm_logistics_env.study.verdicts.gate import SUBJECTS, Gate, GateAnswer, answers, match
 from swarm_logistics_env.study.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 from swarm_logistics_env.study.verdicts.verdict import why_untestable
@@ -143,21 +144,19 @@ def run_command(
     part = Shard.parse(shard) if shard else None
     if until_clear and seeds is None:
         seeds = MOST_SEEDS_UNTIL_CLEAR
-    looks = until_clear or None
     fields = changed_fields(changes, bodies)
     policy_specs = policies_of(policies or (), trust_code, frame, normalize, env)
     study = study_of(
         study_name, out, seeds, policy_specs, trust_code,
-        first_seed=first_seed, until_clear=looks, performance=performance,
+        first_seed=first_seed, until_clear=until_clear or None, performance=performance,
     )  # fmt: skip
     if clearing:
         switch_to_clearing(study)
     if restock:
         study.specification = study.specification.varying({"restock": True})
     change_scenario(study, fields)
-    names = [*(["clearing"] if clearing else []), *(["restock"] if restock else [])]
-    names += [slug(performance)] if performance else []
-    words = [*names, *changes_in_words(fields)]
+    options = {"clearing": clearing, "restock": restock, slug(performance or ""): performance}
+    words = [*(name for name, is_typed in options.items() if is_typed), *changes_in_words(fields)]
     out = out or _default_directory(study, words, has_own_policies=bool(policies))
     study.out = out / part.directory if part else out
     player = engine_named(engine or _engine_for(processes, address), processes, address, run_limit)
@@ -210,10 +209,10 @@ def say_what_a_pilot_shows(study: Study) -> None:
         return
     for title, case in case_by_title.items():
         outcomes = [Run(training, plan.code, plan.seeds[0]).play() for training in case.trainings]
-        is_capped = any(case.is_capped(outcome) for outcome in outcomes)
-        if is_capped and case.performance:
+        has_cap = any(is_capped(case, outcome) for outcome in outcomes)
+        if has_cap and case.performance:
             say(f"{title} has the largest P possible in a first run: most verdicts will be open.")
-        elif is_capped:
+        elif has_cap:
             say(
                 f"{title} delivers every item before the end, so that P is capped and most "
                 "verdicts will be open. Nothing is capped where items come back, or where P is the "
