@@ -19,7 +19,11 @@ from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
 from swarm_logistics_env.environment.spaces import ITEM_COLUMNS, ROBOT_FEATURES
-from swarm_logistics_env.study.questions.benchmark_cells import SPACE, development_comparisons
+from swarm_logistics_env.study.questions.benchmark_cells import (
+    SPACE,
+    development_cells,
+    words_of,
+)
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.questions.specification import Specification
 from swarm_logistics_env.study.verdicts.columns import (
@@ -110,7 +114,7 @@ def reference() -> dict[str, str]:
         "factors": sections(Specification, FACTORS),
         "studies": "\n".join(f"* `{name}`: {about(study)}" for name, study in PRESETS.items()),
         "benchmark": table(("dimension", "values, equally likely"), benchmark_dimensions()),
-        "development": "\n".join(f"* {part.title}" for part in development_comparisons()),
+        "development": "\n".join(f"1. {words_of(cell)}" for cell in development_cells()),
         "performance": columns_of(CELL_COLUMNS),
         "indicators": columns_of(VERDICT_COLUMNS),
     }

@@ -14,7 +14,7 @@ import numpy as np
 
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.study import Study
-from swarm_logistics_env.study.questions.benchmark_cells import BASE, development_comparisons
+from swarm_logistics_env.study.questions.benchmark_cells import BASE, development_cells
 from swarm_logistics_env.study.report.benchmark import share
 
 
@@ -26,13 +26,11 @@ def shares(files: list[str]) -> dict[str, float]:
         seeds=4,
         first_seed=700_000,
         scenario=BASE,
-        ablations=development_comparisons(),
+        ablations=development_cells(),
         out=Path("results", "medians", "-".join(Path(file).stem for file in files)),
     )
     study.run(processes=2)
-    p_of = {
-        (cell.arm.setting.name, cell.table): cell.mean.value for cell in study.findings().cells
-    }
+    p_of = {(cell.arm.setting.name, cell.table): cell.mean.value for cell in study.findings().cells}
     titles = [part.title for part in study.specification.ablations]
     p = np.array([[p_of[file, title] for title in titles] for file in files])
     return dict(zip(files, share(p, p.mean(axis=0)).mean(axis=1).tolist()))

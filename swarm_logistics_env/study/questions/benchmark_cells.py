@@ -1,18 +1,18 @@
 """The benchmark's third edition: its space of worlds, its reference, and how cells are drawn.
 
 A cell is a world of robots that could exist, with or without a fault, in which a policy is set
-beside one reference script at the same seeds. All of this was declared before anything was played:
+beside one reference script at the same seeds. All of this was declared before an entry was played:
 
 * Each dimension of `SPACE` takes one of its values, independent of the others, in the preset
   `realistic` with items that come back. `orders` stays "next", as orders that come by themselves
-  cap P. Worlds that cannot be built, or in which robots or items stand too dense
-  or too thin (`ROOM_OF_ROBOT`, `MOST_COVER`), are drawn again.
+  cap P. Worlds that cannot be built, or in which robots or items stand too dense or too thin
+  (`ROOM_OF_ROBOT`, `MOST_COVER`), are drawn again.
 * The development half is drawn from the word "development", the same for everybody: practise it.
 * The held-out half is drawn from the digest of the entry (`entry_digest`): of a network its weights
   and settings, of a script its class and parameters, of code its content, of several trainings of
   one recipe all of them together. So it is known only when the entry is frozen, and each entry is
   played in cells of its own, with the reference beside it. Whoever freezes many entries and shows
-  the kindest draws from many digests; a table of entries names the digest of each.
+  the one with the kindest cells deceives; a table of entries names the digest of each.
 * Values follow from hashes of the digest, a dimension and a cell's number alone. No library draws
   them, so that they stay the same.
 """
@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from itertools import count
-from typing import Any, NamedTuple
+from typing import Any
 
 from swarm_logistics_env.core import streams
 from swarm_logistics_env.core.errors import ScenarioError, StudyError
@@ -30,6 +30,7 @@ from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.study.tasks.task import digest_of
 from swarm_logistics_env.world.scenario import Scenario
 
+from .comparison import Setting
 from .specification import Ablation, FieldTable, Specification
 
 EDITION = 3
@@ -79,41 +80,23 @@ SPACE: dict[str, tuple[Any, ...]] = {
 }  # fmt: skip
 
 
-class DrawnCell(NamedTuple):
-    """A world, and what fails in it.
-
-    Attributes:
-        scenario: the fields that differ from `BASE`, and the numbers of robots and items.
-        mode: the failure mode; empty: nothing fails.
-        robots: how many fail, 1 or more.
-        onset: when they fail [s].
-    """
-
-    scenario: FieldTable
-    mode: str
-    robots: int
-    onset: float
-
-    def __str__(self) -> str:
-        world = ", ".join(f"{name} = {value}" for name, value in self.scenario.items())
-        if not self.mode:
-            return world
-        start = f" from {self.onset:g} s" if self.onset else ""
-        return f"{world}; {self.mode}, m = {self.robots}{start}"
-
-
-def drawn_cells(source: str, n: int) -> tuple[DrawnCell, ...]:
-    """Return n cells of the space.
+def drawn_cells(half: str, source: str, n: int) -> tuple[Ablation, ...]:
+    """Return n cells of the space, as parts of a study that have the reference beside a policy.
 
     Args:
+        half: how their titles begin.
         source: text that they follow from, as a digest. The first cells do not depend on n.
     """
     seed = int(digest_of(f"benchmark {EDITION}", source), 16)
-    return tuple(_drawn_cell(seed, number) for number in range(n))
+    reference = PolicySpec.of(REFERENCE)
+    return tuple(
+        Ablation(title=f"{half} {number + 1}", policy=reference, **_drawn_fields(seed, number))
+        for number in range(n)
+    )
 
 
-def _drawn_cell(seed: int, number: int) -> DrawnCell:
-    """Return the first cell of a sequence of draws that can be built and is not too dense."""
+def _drawn_fields(seed: int, number: int) -> dict[str, Any]:
+    """Return the world and the fault of the first draw that can be built and is not too dense."""
     for attempt in count():
         choice = {
             dimension: values[streams.key(seed, dimension, number, attempt) % len(values)]
@@ -128,11 +111,15 @@ def _drawn_cell(seed: int, number: int) -> DrawnCell:
             break
     usual = BASE.model_dump(mode="json")
     counts = "n_robots", "n_items"
-    shown = {
+    changed = {
         name: value for name, value in fields.items() if name in counts or value != usual[name]
     }
-    failing = max(1, round(choice["share_failing"] * scenario.n_robots))
-    return DrawnCell(shown, choice["mode"], failing, choice["onset"])
+    return {
+        "scenario": changed,
+        "mode": choice["mode"],
+        "robots": max(1, round(choice["share_failing"] * scenario.n_robots)),
+        "onset": choice["onset"],
+    }
 
 
 def _fields(choice: dict[str, Any]) -> FieldTable:
@@ -171,29 +158,19 @@ def entry_digest(policy: PolicySpec) -> str:
     return digest_of(*identities)
 
 
-def comparisons_of(half: str, source: str) -> tuple[Ablation, ...]:
-    """Return the cells of a half as parts of a study, in which the reference is beside a policy.
-
-    Args:
-        half: DEVELOPMENT or HELD_OUT.
-        source: text that the cells follow from.
-    """
-    return tuple(
-        Ablation(
-            title=f"{half} {number}: {cell}",
-            policy=REFERENCE,
-            scenario=cell.scenario,
-            mode=cell.mode,
-            robots=cell.robots,
-            onset=cell.onset,
-        )
-        for number, cell in enumerate(drawn_cells(source, N_CELLS[half]), start=1)
-    )
-
-
-def development_comparisons() -> tuple[Ablation, ...]:
+def development_cells() -> tuple[Ablation, ...]:
     """Return the development half, which is the same for everybody."""
-    return comparisons_of(DEVELOPMENT, "development")
+    return drawn_cells(DEVELOPMENT, "development", N_CELLS[DEVELOPMENT])
+
+
+def words_of(cell: Ablation) -> str:
+    """Return the world of a cell and what fails in it, e.g. "n_robots = 5; FM1, m = 1".
+
+    What is not named is as in `BASE`.
+    """
+    world = ", ".join(f"{name} = {value}" for name, value in cell.scenario.items())
+    fault = Setting("fault", cell.mode, cell.robots, cell.onset)
+    return f"{world}; {fault}" if cell.mode else world
 
 
 def benchmark_study(policy: PolicySpec) -> Specification:
@@ -212,5 +189,5 @@ def benchmark_study(policy: PolicySpec) -> Specification:
         seeds=SEEDS,
         first_seed=FIRST_SEED,
         scenario=BASE,
-        ablations=(*development_comparisons(), *comparisons_of(HELD_OUT, digest)),
+        ablations=(*development_cells(), *drawn_cells(HELD_OUT, digest, N_CELLS[HELD_OUT])),
     )

@@ -32,6 +32,7 @@ from swarm_logistics_env.study.questions.benchmark_cells import (
     HELD_OUT,
     N_CELLS,
     REFERENCE,
+    words_of,
 )
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
 from swarm_logistics_env.study.verdicts.cell import Cell
@@ -54,7 +55,7 @@ COLUMNS = (
 class PlayedCell(NamedTuple):
     """A cell of the benchmark: a policy's runs, and the reference's at the same seeds."""
 
-    title: str
+    title: str  # with its world and fault
     entry: Cell
     reference: Cell
 
@@ -65,16 +66,20 @@ class PlayedCell(NamedTuple):
         return share(p, self.reference.by_seed.mean())
 
     @property
+    def still(self) -> float:
+        """Share of the policy's runs that stand still."""
+        return np.mean([run.stands_still for run in self.entry.outcomes]).item()
+
+    @property
     def row(self) -> Texts:
         """Title, P of both, share, contacts and runs that stand still."""
-        still = self.entry.mean_of("stands_still")
         return (
             self.title,
             mean_p(self.entry),
             mean_p(self.reference),
             f"{np.exp(np.log(self.shares).mean()):.2f}",
             contacts_text(self.entry),
-            _in_percent(still),
+            _in_percent(self.still),
         )
 
 
@@ -95,6 +100,7 @@ def played_cells(results: StudyResults, half: str) -> list[PlayedCell]:
     Raises:
         StudyError: runs are missing, or failed.
     """
+    words = {cell.title: words_of(cell) for cell in results.plan.specification.ablations}
     played = []
     for verdict in results.verdicts:
         comparison = verdict.compared
@@ -105,7 +111,8 @@ def played_cells(results: StudyResults, half: str) -> list[PlayedCell]:
                     problem = f"{cell.arm.setting.name}, {comparison.table}: {cell.problem}"
                     raise StudyError(f"{problem}, so there is no score")
             pair = cells[comparison.original], cells[comparison.changed]
-            played.append(PlayedCell(comparison.table, *pair))
+            title = f"{comparison.table}: {words[comparison.table]}"
+            played.append(PlayedCell(title, *pair))
     return played
 
 
@@ -115,8 +122,8 @@ class Entry(Record):
     Args:
         digest: from which its held-out cells were drawn; empty: the reference.
         held_out, development: the share of each training (rows) in each cell.
-        contacts: per robot-minute, the mean of the held-out cells; None: not counted.
-        standing_still: share of the runs in held-out cells that stand still; None: unknown.
+        contacts: per robot-minute, the mean of the held-out cells; None: of the reference.
+        standing_still: share of the runs in held-out cells that stand still; None: as contacts.
     """
 
     error_type = StudyError
@@ -135,14 +142,12 @@ class Entry(Record):
             StudyError: runs are missing, or failed.
         """
         held_out = played_cells(results, HELD_OUT)
-        contacts = float(np.mean([cell.entry.contacts.value for cell in held_out]))
-        still = float(np.mean([cell.entry.mean_of("stands_still") for cell in held_out]))
         return cls(
             digest=digest,
             held_out=_table_of_shares(held_out),
             development=_table_of_shares(played_cells(results, DEVELOPMENT)),
-            contacts=None if np.isnan(contacts) else contacts,
-            standing_still=still,
+            contacts=np.mean([cell.entry.contacts.value for cell in held_out]).item(),
+            standing_still=np.mean([cell.still for cell in held_out]).item(),
         )
 
     @classmethod
@@ -179,8 +184,9 @@ def geometric_mean(shares: Sequence[Sequence[float]]) -> spi.Interval:
     Args:
         shares: above 0, of trainings (rows) in cells (columns).
     """
-    logarithms = interval_of_mean(np.log(shares), CONFIDENCE)
-    return spi.Interval(*(None if x is None else float(np.exp(x)) for x in logarithms))
+    mean, low, high = interval_of_mean(np.log(shares), CONFIDENCE)
+    limits = (None if limit is None else float(np.exp(limit)) for limit in (low, high))
+    return spi.Interval(float(np.exp(mean)), *limits)
 
 
 def read_entries() -> dict[str, Entry]:
@@ -218,7 +224,7 @@ def table(results: StudyResults, entry: Entry) -> Section:
                 f"policy's digest {entry.digest[:8]}. Development: "
                 f"{bracketed(entry.development_score, 2)}."
             ),
-            f"Worst held-out cell: {held_out[worst].title}: share {entry.by_cell[worst]:.2f}.",
+            f"Worst cell, share {entry.by_cell[worst]:.2f}: {held_out[worst].title}.",
             f"In held-out cells {_in_percent(entry.standing_still)} of the runs stand still.",
         ),
     )

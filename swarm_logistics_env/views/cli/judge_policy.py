@@ -18,7 +18,7 @@ from swarm_logistics_env.study.questions.presets import load_preset
 from swarm_logistics_env.study.questions.specification import FIRST_LOOK
 from swarm_logistics_env.study.report import benchmark
 from swarm_logistics_env.study.report.section import slug
-from swarm_logistics_env.study.report.write import write_report
+from swarm_logistics_env.study.report.write import section_markdown, write_text
 from swarm_logistics_env.study.runs.engines import engine_named
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -242,8 +242,12 @@ def _suggest_more_seeds(options: Sequence[str], directory: Path, seeds: int) -> 
 
 
 def _show_benchmark(results: StudyResults, digest: str, out: Path) -> None:
-    """Print the table of a policy in the benchmark and its place, and write the report."""
+    """Print and write the table of a policy in the benchmark, and its place among the entries."""
     entry = benchmark.Entry.of(results, digest)
-    show(benchmark.table(results, entry))
-    show(benchmark.leaderboard({**benchmark.read_entries(), results.policies[0]: entry}))
-    echo(f"Report: {write_report(results, out)[0]}")
+    entries = {**benchmark.read_entries(), results.policies[0]: entry}
+    sections = benchmark.table(results, entry), benchmark.leaderboard(entries)
+    for section in sections:
+        show(section)
+    report = out / "benchmark.md"
+    write_text(report, "\n".join(map(section_markdown, sections)))
+    echo(f"Report: {report}")

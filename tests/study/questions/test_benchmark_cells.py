@@ -22,9 +22,10 @@ from swarm_logistics_env.study.questions.benchmark_cells import (
     N_CELLS,
     REFERENCE,
     benchmark_study,
-    development_comparisons,
+    development_cells,
     drawn_cells,
     entry_digest,
+    words_of,
 )
 from swarm_logistics_env.study.questions.plan import make_plan
 from swarm_logistics_env.study.tasks.task import digest_of
@@ -47,23 +48,24 @@ class Standing:
 
 
 def test_cells_follow_from_their_source_alone() -> None:
-    cells = drawn_cells("a", 6)
-    assert cells == drawn_cells("a", 6)
-    assert cells[:3] == drawn_cells("a", 3)
-    assert len({*map(str, cells), *map(str, drawn_cells("b", 6))}) == 12
+    cells = drawn_cells("Any", "a", 6)
+    assert cells == drawn_cells("Any", "a", 6)
+    assert cells[:3] == drawn_cells("Any", "a", 3)
+    assert len({*map(words_of, cells), *map(words_of, drawn_cells("Any", "b", 6))}) == 12
 
 
 def test_the_development_half_is_the_declared_one() -> None:
     """Whoever changes the space or the drawing makes another edition."""
-    titles = [part.title for part in development_comparisons()]
-    assert titles[2] == (
-        "Development 3: n_robots = 25, n_items = 50, drive = holonomic, heading_drift = 0.02"
-    )
-    assert digest_of(*titles)[:16] == "8653080716b00e00"
+    cells = development_cells()
+    assert cells[2].title == "Development 3"
+    words = list(map(words_of, cells))
+    assert words[2] == "n_robots = 25, n_items = 50, drive = holonomic, heading_drift = 0.02"
+    assert words[1].endswith("max_acceleration = 4.0; FM1+FM4_jam, m = 1 from 250 s")
+    assert digest_of(*words)[:16] == "1e086b027688bd07"
 
 
 def test_worlds_are_as_declared_and_their_runs_begin() -> None:
-    worlds = [BASE.replace(**cell.scenario) for cell in drawn_cells("any", 150)]
+    worlds = [BASE.replace(**cell.scenario) for cell in drawn_cells("Any", "any", 150)]
     for world in worlds:
         floor = world.warehouse_width * world.warehouse_height
         assert 1.0 <= floor / world.n_robots <= 10.0
@@ -81,15 +83,14 @@ def test_worlds_are_as_declared_and_their_runs_begin() -> None:
 
 
 def test_each_entry_has_held_out_cells_of_its_own_and_the_same_development_half() -> None:
-    titles = {
-        name: [part.title for part in benchmark_study(PolicySpec.of(name)).ablations]
-        for name in ("swarm-dt", "homing")
-    }
     n_development = N_CELLS[DEVELOPMENT]
-    development = {tuple(parts[:n_development]) for parts in titles.values()}
-    assert development == {tuple(part.title for part in development_comparisons())}
-    held_out = [title for parts in titles.values() for title in parts[n_development:]]
-    assert all(title.startswith(HELD_OUT) for title in held_out)
+    held_out: list[str] = []
+    for name in ("swarm-dt", "homing"):
+        study = benchmark_study(PolicySpec.of(name))
+        assert study.ablations[:n_development] == development_cells()
+        drawn = study.ablations[n_development:]
+        assert all(cell.title.startswith(HELD_OUT) for cell in drawn)
+        held_out += map(words_of, drawn)
     assert len(set(held_out)) == 2 * N_CELLS[HELD_OUT]
 
 

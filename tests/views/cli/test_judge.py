@@ -81,7 +81,7 @@ def material(
     for half in benchmark_cells.N_CELLS:
         monkeypatch.setitem(benchmark_cells.N_CELLS, half, 2)
     monkeypatch.setattr(benchmark, "ENTRIES", tmp_path_factory.mktemp("entries") / "entries")
-    shares = [[0.5, 0.7]]
+    shares = ((0.5, 0.7),)
     benchmark.write_entries({"swarm-dt": Entry(digest="f", held_out=shares, development=shares)})
 
 
@@ -358,11 +358,12 @@ def test_a_policy_is_judged_in_a_world_of_a_preset_and_a_file(command: Command) 
 
 def test_the_benchmark_gives_a_table_and_a_place_and_goes_on(command: Command) -> None:
     printed = command("judge homing --benchmark --processes 1")
-    assert "Worst held-out cell: Held out " in printed
+    assert "Worst cell, share " in printed
     assert "entries by score" in printed
     digest = benchmark_cells.entry_digest(PolicySpec.of("homing"))[:8]
     assert f"drawn from the policy's digest {digest}" in " ".join(printed.split())
-    assert Path(f"results/benchmark/homing-{digest}/report.html").exists()
+    report = Path(f"results/benchmark/homing-{digest}/benchmark.md")
+    assert "| swarm-dt | 0.59 [" in report.read_text()
     again = command("judge homing --benchmark --processes 1")
     assert "0 runs played" in again
     first, second = (text.split("entries")[1].split("Report:")[0] for text in (printed, again))
