@@ -68,7 +68,7 @@ class PlayedCell(NamedTuple):
     @property
     def still(self) -> float:
         """Share of the policy's runs that stand still."""
-        return np.mean([run.stands_still for run in self.entry.outcomes]).item()
+        return float(np.mean([bool(run.stands_still) for run in self.entry.outcomes]))
 
     @property
     def row(self) -> Texts:
