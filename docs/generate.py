@@ -19,6 +19,11 @@ from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
 from swarm_logistics_env.environment.spaces import ITEM_COLUMNS, ROBOT_FEATURES
+from swarm_logistics_env.study.questions.benchmark_cells import (
+    SPACE,
+    development_cells,
+    words_of,
+)
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.questions.specification import Specification
 from swarm_logistics_env.study.verdicts.columns import (
@@ -108,9 +113,23 @@ def reference() -> dict[str, str]:
         "scenarios": f"Presets of the scenario: {', '.join(SCENARIO_PRESETS)}.",
         "factors": sections(Specification, FACTORS),
         "studies": "\n".join(f"* `{name}`: {about(study)}" for name, study in PRESETS.items()),
+        "benchmark": table(("dimension", "values, equally likely"), benchmark_dimensions()),
+        "development": "\n".join(f"1. {words_of(cell)}" for cell in development_cells()),
         "performance": columns_of(CELL_COLUMNS),
         "indicators": columns_of(VERDICT_COLUMNS),
     }
+
+
+def benchmark_dimensions() -> Iterator[tuple[str, str]]:
+    """Yield each dimension of the benchmark's worlds with its values; what differs from usual."""
+    for dimension, values in SPACE.items():
+        texts = [
+            ", ".join(f"{name} = {x}" for name, x in value.items()) or "as usual"
+            if isinstance(value, dict)
+            else str(value) or "none"
+            for value in values
+        ]
+        yield f"`{dimension}`", "; ".join(texts)
 
 
 def commands(command: Any, name: str) -> Iterator[tuple[str, str, str]]:

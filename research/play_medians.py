@@ -1,9 +1,10 @@
 """Which of several trainings is the median one: `python -m research.play_medians FILE ...`.
 
-Declared before the trainings: each is played in all conditions of the development tables of the
-benchmark, over 4 seeds of its own. In each condition P is set beside the mean of all trainings, so
-that no rich condition rules; the training whose mean of these shares is the median (of an even
-number the lower one of the two) is shipped under the recipe's name.
+Declared before the trainings: each is played in the development half of the benchmark, over 4 seeds
+of its own. In each cell P is set beside the mean of all trainings, so that no rich cell rules; the
+training whose mean of these shares is the median (of an even number the lower one of the two) is
+shipped under the recipe's name. The networks that are shipped now were chosen so in the development
+conditions of the second edition.
 """
 
 import sys
@@ -13,33 +14,26 @@ import numpy as np
 
 from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.study import Study
-from swarm_logistics_env.study.questions.presets import load_preset
+from swarm_logistics_env.study.questions.benchmark_cells import BASE, development_cells
+from swarm_logistics_env.study.report.benchmark import share
 
 
 def shares(files: list[str]) -> dict[str, float]:
-    """Return the share of each policy, averaged over the development conditions."""
-    benchmark = load_preset("benchmark")
-    tables = {
-        kind: [part for part in getattr(benchmark, kind) if part.title.startswith("Development")]
-        for kind in ("sizes", "faults", "parameters")
-    }
+    """Return the share of each policy, averaged over the development cells."""
     study = Study(
         name="medians",
         policies=[{"name": file, "label": file} for file in files],
         seeds=4,
         first_seed=700_000,
-        scenario=benchmark.scenario,
+        scenario=BASE,
+        ablations=development_cells(),
         out=Path("results", "medians", "-".join(Path(file).stem for file in files)),
-        **tables,
     )
     study.run(processes=2)
-    p_of = {
-        (cell.policy, cell.table, cell.arm.setting): cell.mean.value
-        for cell in study.findings().cells
-    }
-    conditions = dict.fromkeys((table, setting) for _, table, setting in p_of)
-    p = np.array([[p_of[file, *condition] for condition in conditions] for file in files])
-    return dict(zip(files, np.mean(p / p.mean(axis=0), axis=1).tolist()))
+    p_of = {(cell.arm.setting.name, cell.table): cell.mean.value for cell in study.findings().cells}
+    titles = [part.title for part in study.specification.ablations]
+    p = np.array([[p_of[file, title] for title in titles] for file in files])
+    return dict(zip(files, share(p, p.mean(axis=0)).mean(axis=1).tolist()))
 
 
 def main(files: list[str]) -> None:

@@ -30,15 +30,29 @@ def mean_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:
     Raises:
         IndicatorError: p empty, negative or not finite; confidence outside (0, 1).
     """
-    checked = performance("p", p, or_trainings=True)
-    if checked.ndim == 1 or checked.shape[1] == 1:
-        return t_interval(checked.ravel(), confidence, least=0.0)
+    return interval_of_mean(performance("p", p, or_trainings=True), confidence, least=0.0)
+
+
+def interval_of_mean(
+    sample: Numbers, confidence: float = 0.95, *, least: float = -math.inf
+) -> Interval:
+    """Mean of numbers that may be negative, with its interval, as `mean_interval`.
+
+    Args:
+        sample: shape (n,) or (K, n).
+        least: where the interval is cut off, as no value lies below.
+
+    Raises:
+        IndicatorError: confidence outside (0, 1).
+    """
+    if sample.ndim == 1 or 1 in sample.shape:
+        return t_interval(sample.ravel(), confidence, least=least)
     from scipy.special import stdtrit
 
     between_0_and_1("confidence", confidence)
-    mean, variance, df = map(float, mean_over_trainings([checked], paired=True))
+    mean, variance, df = map(float, mean_over_trainings([sample], paired=True))
     half = float(stdtrit(df, 0.5 + confidence / 2)) * math.sqrt(variance)
-    return Interval(mean, max(0.0, mean - half), mean + half)
+    return Interval(mean, max(least, mean - half), mean + half)
 
 
 def prediction_interval(p: ArrayLike, confidence: float = 0.95) -> Interval:

@@ -23,6 +23,7 @@ from research import (
     tables,
 )
 from swarm_logistics_env import spi
+from swarm_logistics_env.study.questions.benchmark_cells import DEVELOPMENT, HELD_OUT, REFERENCE
 from swarm_logistics_env.study.report import benchmark, section
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.train.evaluation import FIRST_SEED as FIRST_OF_TRAININGS
@@ -48,7 +49,7 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     blocks = (f"<!-- tables: {name} -->\nold\n<!-- end of tables -->\n" for name in names)
     page.write_text("Before.\n\n" + "Between.\n".join(blocks) + "After.\n")
     paper: dict[str, Any] = {"name": "paper", "reference": "paper"}
-    widths = {"name": "delivery_width", "values": [2.0, 1.5], "title": "Held out: narrow"}
+    widths = {"name": "delivery_width", "values": [2.0, 1.5], "title": "narrow"}
     without_faults = {**paper, "sizes": [{"values": [5, 10]}], "parameters": [widths]}
     fault = {"faults": [{"modes": ["FM4"], "robots": [1, 2]}]}
     sizes: dict[str, Any] = {"sizes": [{"values": [5, 25]}]}
@@ -65,7 +66,14 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             without_faults,
         ],
         "benchmark": [
-            {"policies": [policy], "parameters": [widths]} for policy in ("homing", "swarm-dt")
+            {
+                "policies": [policy],
+                "ablations": [
+                    {"policy": REFERENCE, "title": f"{half} 1", "scenario": few}
+                    for half in (DEVELOPMENT, HELD_OUT)
+                ],
+            }
+            for policy in ("homing", "swarm-dt")
         ],
     }
     examples = {

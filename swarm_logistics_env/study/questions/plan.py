@@ -12,7 +12,7 @@ from more_itertools import map_reduce
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.spi.definitions import comparing
-from swarm_logistics_env.study.tasks.task import Case, Fields, Run, TaskFault
+from swarm_logistics_env.study.tasks.task import Case, Fields, Run, TaskFault, TaskScenario
 from swarm_logistics_env.study.trials import Trial
 
 from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
@@ -273,17 +273,10 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
     """
     task, table = base.task, _title(faults, "Fault tolerance and robustness", str(faults))
     original = _arm(base, NO_FAULT, faults.scenario)
-    scenario = original.case.scenario
-    if (m := max(faults.robots)) >= scenario.n_robots:
-        raise StudyError(
-            f"faults.robots = {m}: should be less than n_robots = {scenario.n_robots}, or no "
-            "working robot is left"
-        )
-    if (onset := max(faults.onsets)) >= scenario.duration:
-        raise StudyError(
-            f"faults.onsets = {onset:g} s: should be less than duration = "
-            f"{scenario.duration:g} s, or nothing fails"
-        )
+    most = max(faults.robots)
+    latest = max(faults.onsets)
+    fields = "faults.robots", "faults.onsets"
+    _refuse_impossible_fault(original.case.scenario, most, latest, fields)
 
     def arm(mode: str, m: int, onset: float, lasts: float | None, manner: Fields) -> Arm:
         failing = [task.fault(name, m, onset, lasts, manner) for name in mode.split(BOTH)]
@@ -302,6 +295,22 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
     yield from compared(table, arms)
 
 
+def _refuse_impossible_fault(
+    scenario: TaskScenario, robots: int, onset: float, fields: tuple[str, str]
+) -> None:
+    """Raise StudyError, which names these fields, if no robot would be left or none would fail."""
+    if robots >= scenario.n_robots:
+        raise StudyError(
+            f"{fields[0]} = {robots}: should be less than n_robots = {scenario.n_robots}, or no "
+            "working robot is left"
+        )
+    if onset >= scenario.duration:
+        raise StudyError(
+            f"{fields[1]} = {onset:g} s: should be less than duration = "
+            f"{scenario.duration:g} s, or nothing fails"
+        )
+
+
 def _adaptability(parameter: Parameter, base: Case) -> Iterator[Comparison]:
     """Yield the comparisons of a parameter's first value with each other one."""
     name = parameter.name
@@ -314,10 +323,24 @@ def _adaptability(parameter: Parameter, base: Case) -> Iterator[Comparison]:
 
 
 def _ablation(ablation: Ablation, base: Case, ablated: Case) -> Iterator[Comparison]:
+    task = base.task
     table = _title(ablation, "Ablation")
-    n_robots = base.task.vary(base.scenario, ablation.scenario).n_robots
+    scenario = task.vary(base.scenario, ablation.scenario)
+    faults: list[TaskFault] = []
+    if ablation.mode:
+        fields = "ablations.robots", "ablations.onset"
+        _refuse_impossible_fault(scenario, ablation.robots, ablation.onset, fields)
+        faults = [
+            task.fault(name, ablation.robots, ablation.onset, None, {})
+            for name in ablation.mode.split(BOTH)
+        ]
     original, changed = (
-        _arm(case, Setting("policy", case.policy.title, n_robots), ablation.scenario)
+        _arm(
+            case,
+            Setting("policy", case.policy.title, scenario.n_robots),
+            ablation.scenario,
+            *faults,
+        )
         for case in (base, ablated)
     )
     # "P falls by more than a share" is the opposite of "the change is above minus that share".

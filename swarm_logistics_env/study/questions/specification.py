@@ -175,10 +175,16 @@ class Ablation(Factor):
     Args:
         policy: the policy without the part.
         fall: the claim is that P falls by more than this share of P, in [0, 1).
+        mode: failure mode of some robots under both policies, as in `Faults`; empty: none fails.
+        robots: number of these robots, below the swarm size.
+        onset: when they fail [s].
     """
 
     policy: PolicySource
     fall: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    mode: str = ""
+    robots: PositiveInt = 1
+    onset: NonNegativeFloat = 0.0
 
 
 def text_if_any(performance: Performance | str | None) -> str | None:
@@ -300,9 +306,9 @@ class Specification(Record):
     def _names_are_known(self) -> Self:
         task = self.played
         parameters = [factor.name for factor in self.parameters]
-        modes = (
-            mode for factor in self.faults for modes in factor.modes for mode in modes.split(BOTH)
-        )
+        combined = [modes for factor in self.faults for modes in factor.modes]
+        combined += [ablation.mode for ablation in self.ablations if ablation.mode]
+        modes = (mode for modes in combined for mode in modes.split(BOTH))
         _refuse_unknown("failure mode", modes, {*task.failure_modes} - {task.removed})
         if "n_robots" in parameters:
             raise ValueError("swarm sizes belong in `sizes`, where S judges them")

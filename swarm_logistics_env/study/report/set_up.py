@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from importlib.metadata import version
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.study.questions.comparison import CONFIDENCE
+from swarm_logistics_env.study.questions.comparison import CONFIDENCE, Setting
 from swarm_logistics_env.study.questions.plan import Origin, Plan
 
 from .section import Section, join_names, percent
@@ -50,6 +50,10 @@ def _variations(plan: Plan) -> Iterator[str]:
     for faults in study.faults:
         if manner := str(faults):
             yield f"{faults.title or 'Faults'}: robots fail {manner}."
+    for ablation in study.ablations:
+        if ablation.mode:
+            fault = Setting("fault", ablation.mode, ablation.robots, ablation.onset)
+            yield f"{ablation.title or 'Ablation'}: {fault}, under both policies."
 
 
 def _recorded_setup(plan: Plan, origin: Origin) -> tuple[Section, ...]:

@@ -13,11 +13,12 @@ from typer import Argument, Exit, Option, echo
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.spi.estimate import LEAST_SEEDS
+from swarm_logistics_env.study.questions.benchmark_cells import benchmark_study, entry_digest
 from swarm_logistics_env.study.questions.presets import load_preset
 from swarm_logistics_env.study.questions.specification import FIRST_LOOK
 from swarm_logistics_env.study.report import benchmark
 from swarm_logistics_env.study.report.section import slug
-from swarm_logistics_env.study.report.write import write_report
+from swarm_logistics_env.study.report.write import section_markdown, write_text
 from swarm_logistics_env.study.runs.engines import engine_named
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -92,7 +93,8 @@ def judge_policy_command(
         bool,
         Option(
             "--benchmark",
-            help="Play the benchmark of robustness, in which some failures are new to all.",
+            help="Play the benchmark of robustness, in worlds that are drawn from the policy's "
+            "digest, so that it cannot have met them.",
         ),
     ] = False,
     processes: ProcessesOption = None,
@@ -121,8 +123,9 @@ def judge_policy_command(
     for training in spec.trainings or (spec,):
         training.load()  # what is wrong with it is said before anything is written
     if world is None:
-        directory = out or Path("results", "benchmark", slug(spec.title))
-        study = study_of(benchmark.STUDY, directory, None, [spec], spec.trusted)
+        name = f"{slug(spec.title)}-{entry_digest(spec)[:8]}"
+        directory = out or Path("results", "benchmark", name)
+        study = Study(out=directory, **dict(benchmark_study(spec)))
     else:
         directory = out or Path("results", "judged", "-".join([slug(spec.title), *world.words]))
         study = _study_in(world, directory, spec, most_seeds, until_clear=until_clear)
@@ -132,7 +135,7 @@ def judge_policy_command(
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
     if world is None and not (tally.left or tally.failed):
-        _show_benchmark(results, directory)
+        _show_benchmark(results, entry_digest(spec), directory)
     else:
         show_report(results, directory, full=full, is_finished=not tally.left)
     is_open = any(verdict.on_property.adjusted == "open" for verdict in results.verdicts)
@@ -238,10 +241,13 @@ def _suggest_more_seeds(options: Sequence[str], directory: Path, seeds: int) -> 
     say("What is open needs more seeds, which nobody has looked at:", command)
 
 
-def _show_benchmark(results: StudyResults, out: Path) -> None:
-    """Print the table of a policy in the benchmark and its place, and write the report."""
-    entries = benchmark.Entries.read()
-    show(benchmark.table(results, entries.references))
-    score = benchmark.score(results, entries.references)
-    show(benchmark.leaderboard({**entries.scores, results.policies[0]: score}))
-    echo(f"Report: {write_report(results, out)[0]}")
+def _show_benchmark(results: StudyResults, digest: str, out: Path) -> None:
+    """Print and write the table of a policy in the benchmark, and its place among the entries."""
+    entry = benchmark.Entry.of(results, digest)
+    entries = {**benchmark.read_entries(), results.policies[0]: entry}
+    sections = benchmark.table(results, entry), benchmark.leaderboard(entries)
+    for section in sections:
+        show(section)
+    report = out / "benchmark.md"
+    write_text(report, "\n".join(map(section_markdown, sections)))
+    echo(f"Report: {report}")

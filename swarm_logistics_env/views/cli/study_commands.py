@@ -42,8 +42,8 @@ StudyArgument = Annotated[
     Argument(
         metavar="FILE|PRESET",
         # Literal, as to import the presets would slow every command.
-        help="TOML file of a study, or a preset: benchmark, orders, paper-fit, paper, quick, "
-        "resilience, scorecard.",
+        help="TOML file of a study, or a preset: orders, paper-fit, paper, quick, resilience, "
+        "scorecard.",
     ),
 ]
 DirectoryArgument = Annotated[Path, Argument(help="Directory of a study.")]

@@ -100,6 +100,15 @@ def test_cases_and_runs_are_known_by_content() -> None:
             {"faults": [{"modes": ["FM1"]}], "reference": "papr"},
             "reference = 'papr': should be 'paper'",
         ),
+        ({"ablations": [{"policy": "homing", "mode": "FM9"}]}, "no failure mode 'FM9'"),
+        (
+            {"ablations": [{"policy": "homing", "mode": "FM1", "robots": 25}]},
+            "ablations.robots = 25: should be less than n_robots = 25",
+        ),
+        (
+            {"ablations": [{"policy": "homing", "mode": "FM1", "onset": 500}]},
+            "ablations.onset = 500 s: should be less than duration",
+        ),
         ({"parameters": [{"name": "n_robots", "values": [1, 2]}]}, "belong in `sizes`"),
         ({"policies": ["swarm-dt", "swarm-dt"]}, "given twice"),
         ({"policies": [{"nam": "swarm-dt"}]}, "PolicySpec has no field 'nam'; did you mean 'name'"),

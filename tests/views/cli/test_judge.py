@@ -11,14 +11,16 @@ from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
 
-import numpy as np
 import pytest
 
 from swarm_logistics_env import judge
+from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.spi.phases import two_phases
+from swarm_logistics_env.study.questions import benchmark_cells
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.report import benchmark
 from swarm_logistics_env.study.report.answer import answer
+from swarm_logistics_env.study.report.benchmark import Entry
 from swarm_logistics_env.study.runs.recorded import RecordedStudy
 from swarm_logistics_env.study.runs.store import Runs
 from swarm_logistics_env.study.studies import Study
@@ -64,11 +66,23 @@ def material(
         faults=[{"modes": ["FM4"], "robots": [1]}],
         parameters=[],
     )
-    held_out = {"title": "Held out: x", "modes": ["FM1+FM4"], "robots": [1]}
     monkeypatch.setitem(PRESETS, "scorecard", small)
-    monkeypatch.setitem(PRESETS, "benchmark", small.replace(seeds=3, faults=[held_out], sizes=[]))
+    space = {
+        "room": ({**size, "duration": 20.0},),
+        "n_robots": (4,),
+        "items_per_robot": (1, 2),
+        "handling_time": (0.5, 1.0, 2.0),
+        "mode": ("", "FM1+FM4"),
+        "share_failing": (0.25,),
+        "onset": (0.0, 5.0),
+    }
+    monkeypatch.setattr(benchmark_cells, "SPACE", space)
+    monkeypatch.setattr(benchmark_cells, "SEEDS", 2)
+    for half in benchmark_cells.N_CELLS:
+        monkeypatch.setitem(benchmark_cells.N_CELLS, half, 2)
     monkeypatch.setattr(benchmark, "ENTRIES", tmp_path_factory.mktemp("entries") / "entries")
-    benchmark.Entries({"Held out: x, no fault": 2.0}, {"swarm-dt": np.full(3, 0.5)}).write()
+    shares = ((0.5, 0.7),)
+    benchmark.write_entries({"swarm-dt": Entry(digest="f", held_out=shares, development=shares)})
 
 
 TRIALS = "judge lab.csv --column performance=boxes"
@@ -183,6 +197,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
         ("lab.csv --first-seed 0", "--first-seed is not for a file of trials, and"),
         ("homing --seeds 2", "--seeds"),
         ("homing --benchmark --seeds 5", "same conditions for everybody"),
+        ("homing-stock --benchmark", "is the benchmark's reference: its score is 1"),
         ("homing --benchmark --first-seed 0", "--first-seed: the benchmark has the same"),
     ],
 )
@@ -343,9 +358,12 @@ def test_a_policy_is_judged_in_a_world_of_a_preset_and_a_file(command: Command) 
 
 def test_the_benchmark_gives_a_table_and_a_place_and_goes_on(command: Command) -> None:
     printed = command("judge homing --benchmark --processes 1")
-    assert "Worst cell: Held out: x, FM1+FM4, m = 1" in printed
+    assert "Worst cell, share " in printed
     assert "entries by score" in printed
-    assert Path("results/benchmark/homing/report.html").exists()
+    digest = benchmark_cells.entry_digest(PolicySpec.of("homing"))[:8]
+    assert f"drawn from the policy's digest {digest}" in " ".join(printed.split())
+    report = Path(f"results/benchmark/homing-{digest}/benchmark.md")
+    assert "| swarm-dt | 0.59 [" in report.read_text()
     again = command("judge homing --benchmark --processes 1")
     assert "0 runs played" in again
     first, second = (text.split("entries")[1].split("Report:")[0] for text in (printed, again))
