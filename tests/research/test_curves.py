@@ -17,7 +17,7 @@ def test_each_point_changes_one_thing_alone_and_items_go_with_robots() -> None:
     assert play_curves.conditions("robots", 100)["n_items"] == 240
     assert play_curves.conditions("seconds", 125.0)["n_items"] == 60
     broken = {
-        arm.case.scenario.n_robots: fault.robots
+        arm.case.scenario.n_robots: fault.model_dump()["robots"]
         for _, _, arm in play_curves.study().plan().cells
         for fault in arm.case.faults
     }
