@@ -63,7 +63,8 @@ class SiteFidelityParameters(HomingParameters):
         0.001, description="probability to give the search up, a step; source"
     )
     turn: NonNegativeFloat = Field(
-        math.radians(7.0), description="standard deviation of a turn in search, a step [rad]; source"
+        math.radians(7.0),
+        description="standard deviation of a turn in a search, a step [rad]; source",
     )
     turn_decay: NonNegativeFloat = Field(
         0.28, description="at which turns at a site narrow to `turn` [1/step]; source"
@@ -217,7 +218,7 @@ def go_on(
             trip[TRIP.site_y] = trip[TRIP.y]
             trip[TRIP.n_around] = 1.0 + items_around(observation, parameters.site_range)
             trip[TRIP.mode] = BRINGS
-    elif mode == GIVES_UP or mode == BRINGS:
+    elif mode in (GIVES_UP, BRINGS):
         if observation[row.IN_DELIVERY_AREA] > 0.5:
             again = poisson_at_most(trip[TRIP.n_around], parameters.site_rate)
             returns = mode == BRINGS and number < again
@@ -252,7 +253,7 @@ def way_of_search(
     mode = trip[TRIP.mode]
     x = memory[MEMORY.heading_x]
     y = memory[MEMORY.heading_y]
-    if mode == GIVES_UP or mode == BRINGS:  # it lost what it brought
+    if mode in (GIVES_UP, BRINGS):  # it lost what it brought
         return home_direction(observation, memory, x, y, parameters)
     if mode == GOES_TO_SITE:
         wall = memory[MEMORY.wall]
