@@ -3,7 +3,7 @@
 Judges the results that others published, each a file or folder that is read unedited, and writes
 the tables of docs/published.md. NAME is one of `SETS`; sets that are not given keep their rows.
 `controllers=PATH`, with a clone of `SOURCES["simulator"]`, plays published controllers: in the
-world of that simulator, beside the times in the clone, and in this package's (ten minutes).
+world of that simulator, beside the times in the clone, and in this package's (five minutes).
 """
 
 from __future__ import annotations

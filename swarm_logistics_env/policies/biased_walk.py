@@ -126,10 +126,8 @@ class BiasedWalk(Scripted):
         self._heading = np.array([math.tau * uniform(key, 0) for key in keys])
         self._compass = np.empty((0, 2))
 
-    def act(
-        self, observations: NDArray[np.float32], state: WarehouseState | None = None
-    ) -> NDArray[np.float64]:
-        """Return commands (N, 4) for observation rows (N, D); the state is not read.
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return commands (N, 4) for observation rows (N, D).
 
         Raises:
             PolicyError: there are more or fewer rows than robots at `reset`.
@@ -200,7 +198,8 @@ def act_biased_walk(
         carries = observation[row.CARRYING] > 0.5
         delivers = observation[row.CARRYING_REQUESTED] > 0.5
         share = 2.0 * uniform(keys[robot], 2 * counts[robot]) - 1.0
-        heading[robot] += constants.largest_turn * share - period * observation[row.TURN_RATE]
+        body_turn = period * float(observation[row.TURN_RATE])
+        heading[robot] += constants.largest_turn * share - body_turn
         x = math.cos(heading[robot])
         y = math.sin(heading[robot])
         if delivers:
@@ -240,8 +239,8 @@ def push_away(
     for number in range(count):
         # A neighbour is as wide, and begins with the same columns; absent ones are zeros.
         column = first + row.ITEM_WIDTH * number
-        x = observation[column + row.ITEM.x]
-        y = observation[column + row.ITEM.y]
+        x = float(observation[column + row.ITEM.x])
+        y = float(observation[column + row.ITEM.y])
         strength = push * math.exp(-length_of(x, y) / reach)
         push_x -= strength * x
         push_y -= strength * y
@@ -257,7 +256,7 @@ def push_off_walls(
     push_y = 0.0
     walls = observation[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
     for beam in range(row.N_BEAMS):
-        distance = walls[beam]
+        distance = float(walls[beam])
         if distance <= walls[beam - 1] and distance < walls[(beam + 1) % row.N_BEAMS]:
             nearness = (parameters.wall_distance - distance) / parameters.wall_range
             push = parameters.wall_push * distance * math.exp(nearness)

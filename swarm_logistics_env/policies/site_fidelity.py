@@ -205,8 +205,8 @@ def go_on(
 ) -> None:
     """Reckon a robot's place, and change the mode of its trip where that is over."""
     wall = memory[MEMORY.wall]
-    velocity_x = observation[row.VELOCITY_X]
-    velocity_y = observation[row.VELOCITY_Y]
+    velocity_x = float(observation[row.VELOCITY_X])
+    velocity_y = float(observation[row.VELOCITY_Y])
     along, aside = to_frame((math.cos(wall), math.sin(wall)), velocity_x, velocity_y)
     trip[TRIP.x] += period * along
     trip[TRIP.y] += period * aside

@@ -29,7 +29,7 @@ def rows_of(n_robots: int, *things: tuple[int, list[float]]) -> NDArray[np.float
     return rows
 
 
-def walkers(n_robots: int, **parameters: float) -> Any:
+def walkers(n_robots: int, **parameters: Any) -> Any:
     policy = load("biased-walk", **parameters)
     start(policy, STEP.replace(n_items=1, n_robots=11), seed=0)
     policy.reset(n_robots, 0)
@@ -104,7 +104,7 @@ def test_a_compass_shows_the_delivery_area_whatever_the_robot_faces() -> None:
 
 @pytest.mark.compiled
 def test_with_a_compass_it_delivers_more_than_without_a_bias() -> None:
-    def delivered(name: str, **parameters: float) -> int:
+    def delivered(name: str, **parameters: Any) -> int:
         episodes = (run_episode(SMALL, load(name, **parameters), seed) for seed in range(3))
         return sum(episode.delivered for episode in episodes)
 

@@ -30,7 +30,7 @@ INSIDE = row.IN_DELIVERY_AREA, [1.0]
 EASTWARDS = row.VELOCITY, [1.0, 0.0]
 
 
-def foragers(**parameters: float) -> Any:
+def foragers(**parameters: Any) -> Any:
     policy = load("site-fidelity", **parameters)
     start(policy, Scenario(max_speed=0.8), seed=0)  # a period is a step
     policy.reset(N, 0)
