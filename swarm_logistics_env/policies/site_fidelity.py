@@ -1,9 +1,9 @@
 """Site fidelity: the central-place forager of Hecker and Moses, without its pheromones.
 
 Source: J. P. Hecker and M. E. Moses, Beyond pheromones: evolving error-tolerant, flexible, and
-scalable robot swarms, Swarm Intelligence 9, 43-70 (2015), doi 10.1007/s11721-015-0104-z; constants
-are those that their laboratory's repository BCLab-UNM/CPFA-ARGoS plays where targets lie evenly
-spread. Its authors ask what this package asks: does it bear errors, other worlds, larger swarms?
+scalable ant-inspired robot swarms, Swarm Intelligence 9, 43-70 (2015), equations 1 to 4. The paper
+prints no evolved constants; these are the ones that their laboratory's later repository
+BCLab-UNM/CPFA-ARGoS plays where targets lie evenly spread (experiments/CPFAU60min*.xml).
 
 A robot leaves the delivery area in a random direction, and at some moment begins to search: its
 heading turns by normal noise. It may give up, and returns. Where it lifts an item it counts those
