@@ -2,25 +2,38 @@
 
 Judges the results that others published, each a file or folder that is read unedited, and writes
 the tables of docs/published.md. NAME is one of `SETS`; sets that are not given keep their rows.
+`controllers=PATH`, with a clone of `SOURCES["simulator"]`, plays published controllers: in the
+world of that simulator, beside the times in the clone, and in this package's (five minutes).
 """
 
 from __future__ import annotations
 
+import ast
 import json
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import numpy as np
 from more_itertools import map_reduce
 
-from research.tables import ROOT, rewrite, table
-from swarm_logistics_env import judge
+from research.tables import ROOT, example, play, rewrite, table
+from swarm_logistics_env import Scenario, judge, run_episode, spi
 from swarm_logistics_env.core.errors import StudyError
-from swarm_logistics_env.study.report.section import NOTHING, bracketed, fixed, share_in_words
-from swarm_logistics_env.study.report.tables import critical_size_in_words
+from swarm_logistics_env.policies import PolicySpec
+from swarm_logistics_env.study.report.section import (
+    NOTHING,
+    bracketed,
+    fixed,
+    mean_p,
+    ratio,
+    share_in_words,
+)
+from swarm_logistics_env.study.report.tables import contacts_text, critical_size_in_words
 from swarm_logistics_env.study.verdicts.collapses import collapses, edges
 from swarm_logistics_env.study.verdicts.results import StudyResults
 
@@ -59,6 +72,107 @@ SETS = {
     "foraging-faults": PublishedSet("MARSLab-UTRGV/RL-FL-Foraging, results/exp4b", "none seen"),
     "foraging-sizes": PublishedSet("MARSLab-UTRGV/RL-FL-Foraging, 4 to 16 robots", "none seen"),
 }
+
+# The simulator's world: a step of 0.02 m is 0.01 s at 2 m/s, and robots have no inertia. A box is
+# delivered once its centre is a radius before the area, which is a fifth of the width.
+SIMULATOR = Scenario(
+    warehouse_width=5.0,
+    warehouse_height=5.0,
+    delivery_width=1.125,
+    duration=1000.0,
+    max_acceleration=1e4,
+    heading_drift=0.0,
+    control_period=0.01,
+    physics_period=0.01,
+)
+CONTROLLERS = "controllers"
+FIRST_SEED = 640_000  # nothing else uses these
+N_RUNS = 10  # as many as the published means are over
+
+
+class Walk(NamedTuple):
+    """A task of the simulator, and who plays it here.
+
+    Attributes:
+        task: its name in the other tables.
+        file: of the published times: text of a dict {robots: {boxes: steps}}.
+        policy: a name, and parameters if it has any.
+        in_sequence: whether one box is asked for at a time; else all are at once.
+    """
+
+    task: str
+    file: str
+    policy: PolicySpec
+    in_sequence: bool = False
+
+
+_WITHOUT_BIAS = PolicySpec(name="biased-walk", parameters={"bias": 0.0})
+_COMPASS = PolicySpec(name="biased-walk-compass")
+WALKS = (
+    Walk("task1", "task_1_new.txt", _WITHOUT_BIAS),
+    Walk("task1-bias", "task_1_w_bias_new.txt", _COMPASS),
+    Walk("task1-bias", "task_1_w_bias_new.txt", PolicySpec(name="biased-walk")),
+    Walk("task2-bias", "task_2_w_bias_new.txt", _COMPASS, in_sequence=True),
+)
+BOXES = (10, 30)
+
+
+def time_rows(
+    clone: Path, sizes: Sequence[int] = (10, 30, 50), n_runs: int = N_RUNS
+) -> Iterator[list[str]]:
+    """Yield a row for each walk and size: published and measured steps until all is delivered."""
+    for walk in WALKS:
+        published = ast.literal_eval((clone / walk.file).read_text(encoding="utf-8"))
+        for n_robots in sizes:
+            cells = []
+            shares = []
+            for n_boxes in BOXES:
+                scenario = SIMULATOR.replace(
+                    n_robots=n_robots,
+                    n_items=n_boxes,
+                    n_requests=1 if walk.in_sequence else n_boxes,
+                )
+                steps = played_steps(scenario, walk.policy, n_runs)
+                cells += [f"{published[n_robots][n_boxes]:,.0f}", in_thousands(steps)]
+                shares.append(steps.value / published[n_robots][n_boxes])
+            yield [
+                walk.task,
+                f"`{walk.policy.title}`",
+                str(n_robots),
+                *cells,
+                fixed(float(np.sqrt(np.prod(shares))), 2),
+            ]
+
+
+def played_steps(scenario: Scenario, policy: PolicySpec, n_runs: int) -> spi.Interval:
+    """Return the mean number of control steps until all items are delivered."""
+    ends = [
+        run_episode(scenario, policy.load(), seed).ended_at
+        for seed in range(FIRST_SEED, FIRST_SEED + n_runs)
+    ]
+    return spi.mean_interval(np.array(ends) / scenario.control_period)
+
+
+def in_thousands(steps: spi.Interval) -> str:
+    """Return a mean with its limits, with commas: "1,234 [1,001, 1,467]"."""
+    if steps.low is None or steps.high is None:
+        return f"{steps.value:,.0f}"
+    return f"{steps.value:,.0f} [{steps.low:,.0f}, {steps.high:,.0f}]"
+
+
+def realistic_rows(results: StudyResults) -> Iterator[list[str]]:
+    """Yield a row for each policy of examples/published_controllers.toml."""
+    r_of = {verdict.compared.policy: ratio(verdict) for verdict in results.verdicts}
+    for policy, cells in map_reduce(results.cells, lambda cell: cell.policy).items():
+        p_texts = [mean_p(cell) for cell in cells]
+        yield [f"`{policy}`", *p_texts, r_of[policy], contacts_text(cells[0])]
+
+
+def controller_rows(clone: Path) -> dict[str, Any]:
+    """Play the published controllers in both worlds; return the rows of both tables."""
+    times = [*time_rows(clone)]
+    (results,) = play([example(ROOT / "results" / "published", "published_controllers")])
+    return {"times": times, "realistic": [*realistic_rows(results)]}
 
 
 def scalability_rows(results: StudyResults) -> Iterator[list[str]]:
@@ -113,10 +227,16 @@ def blocks(rows: Mapping[str, Any]) -> dict[str, str]:
     scaling = [[name, *row] for name in sets for row in sets[name].get("scalability", [])]
     questions = [[name, *row] for name in sets for row in sets[name].get("others", [])]
     head = ("set", "policy", "N", "S from each to the next", "S > 0", "runs that collapse")
+    controllers = rows[CONTROLLERS]
+    steps = [f"{n_boxes} boxes, {whose}" for n_boxes in BOXES for whose in ("published", "here")]
+    times_head = ("task", "policy", "N", *steps, "here / published")
+    realistic_head = ("policy", "P", "P, two in FM4", "R", "contacts a robot-minute")
     return {
         "published sources": table(("set", "source", "licence", "command", "read"), sources),
         "published s": table(head, scaling),
         "published others": table(("set", "policy", "question", "value", "> 0"), questions),
+        "published times": table(times_head, controllers["times"]),
+        "published realistic": table(realistic_head, controllers["realistic"]),
     }
 
 
@@ -128,7 +248,7 @@ def main() -> None:
     """Judge the sets that are given, and write the page's tables."""
     rows: dict[str, Any] = json.loads(ROWS.read_text(encoding="utf-8"))
     for name, _, path in (argument.partition("=") for argument in sys.argv[1:]):
-        rows[name] = judged(name, path)
+        rows[name] = controller_rows(Path(path)) if name == CONTROLLERS else judged(name, path)
     ROWS.write_text(json.dumps(rows, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     rewrite(PAGE, blocks(rows))
 

@@ -23,6 +23,7 @@ from swarm_logistics_env.core.errors import (
 )
 from swarm_logistics_env.core.fingerprint import UNSTABLE, changed_files, changes, deep_copy
 from swarm_logistics_env.core.records import Record, canonical_json
+from swarm_logistics_env.policies.biased_walk import BiasedWalk, BiasedWalkCompass
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
 from swarm_logistics_env.policies.files import (
@@ -40,6 +41,7 @@ from swarm_logistics_env.policies.sb3_files import (
     StableBaselinesModel,
     refuse_untrusted,
 )
+from swarm_logistics_env.policies.site_fidelity import SiteFidelity
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
 from swarm_logistics_env.policies.told import Told
 
@@ -54,6 +56,9 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
     "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
     # This is Swarm D-T without its taxis, for ablations.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
+    "biased-walk": BiasedWalk,
+    "biased-walk-compass": BiasedWalkCompass,
+    "site-fidelity": SiteFidelity,
     "homing": Homing,
     "homing-stock": HomingStock,
     "homing-told": Told,

@@ -59,7 +59,16 @@ def fresh(name: str, n_robots: int) -> Any:
 
 
 @pytest.mark.parametrize(
-    "name", ["swarm-dt", "swarm-dt-follow", "random-walk", "homing", "ppo-delivery"]
+    "name",
+    [
+        "swarm-dt",
+        "swarm-dt-follow",
+        "random-walk",
+        "biased-walk",
+        "site-fidelity",
+        "homing",
+        "ppo-delivery",
+    ],
 )
 def test_a_command_follows_from_its_own_row_alone_and_stays_within_bounds(name: str) -> None:
     rng, n = np.random.default_rng(0), 20

@@ -93,6 +93,28 @@ def test_the_page_of_published_sets_shows_what_was_judged(tmp_path: Path) -> Non
     assert refused["refused"].startswith("the number of robots and 'tags' change together")
 
 
+def test_published_controllers_stand_beside_published_times(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for walk in play_published.WALKS:
+        (tmp_path / walk.file).write_text("{'robot': {'box': 'time'}, 3: {10: 400.0, 30: 25.0}}")
+    briefly = play_published.SIMULATOR.replace(duration=1.0)  # too little to deliver 10 boxes
+    monkeypatch.setattr(play_published, "SIMULATOR", briefly)
+    rows = [*play_published.time_rows(tmp_path, sizes=(3,), n_runs=2)]
+    assert [row[0] for row in rows] == ["task1", "task1-bias", "task1-bias", "task2-bias"]
+    assert rows[0][1] == "`biased-walk (bias = 0.0)`"
+    measured = "100 [100, 100]"
+    assert rows[0][2:] == ["3", "400", measured, "25", measured, "1.00"]
+
+    def outcome(_: str, setting: Any, seed: int) -> Any:
+        return delivered(40 + seed % 3 - (20 if setting.name == "FM4" else 0))
+
+    study = tables.example(tmp_path, "published_controllers", seeds=3, policies=["site-fidelity"])
+    ((policy, p, p_in_fault, r, _),) = play_published.realistic_rows(judged(study, outcome))
+    assert policy == "`site-fidelity`"
+    assert (p[:4], p_in_fault[:4], r[:4]) == ("41.0", "21.0", "-0.4")
+
+
 def test_a_reading_is_as_far_from_the_paper_as_its_cells(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(play_readings, "delivered", lambda *_: 38)
     processes: Any = SimpleNamespace(map=map)

@@ -39,7 +39,7 @@ def paper_tables(results: StudyResults, answer: Answer, sections: Iterable[Secti
     """Return the tables of a study for a paper: the answer, then those of these sections."""
     about = f"P is {results.plan.what_p_is}. {_world(results.plan)}; {results.seeds_text}."
     if results.exploratory:
-        about += f" {templates.EXPLORATORY.capitalize()}."
+        about += f" {templates.EXPLORATORY[0].upper()}{templates.EXPLORATORY[1:]}."
     labels = {
         verdict.after.name: parameter_label(verdict)
         for verdict in results.verdicts
