@@ -16,8 +16,8 @@ STOCK = PolicySpec(
 )
 # Local scripts, with central control, then learned; the reference has score 1.
 POLICIES = (
-    "swarm-dt", "swarm-dt-follow", "biased-walk", "site-fidelity", "homing", STOCK, "central", "central-stock",
-    "ppo-delivery@all", "ppo-robust@all",
+    "swarm-dt", "swarm-dt-follow", "biased-walk", "site-fidelity", "homing", STOCK, "central",
+    "central-stock", "ppo-delivery@all", "ppo-robust@all",
 )  # fmt: skip
 # Other people's learners, where `make interop` has trained them; each in its largest world.
 LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "benchmarl-mappo-small")
