@@ -33,12 +33,13 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help first-look paper paper-fit tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
+.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
 	@echo "make paper SEEDS=20  run the study of the paper; tables and data in $(OUT)"
 	@echo "make paper-fit MINUTES=40  fit the constants of swarm-dt to the paper's tables, then confirm them for as long: results/paper_fit"
+	@echo "make tune MINUTES=60   search the parameters of every script by one declared rule, then confirm them: results/tune"
 	@echo "make tables          play the studies behind docs/results.md (26,000 runs, two to four hours of two cores; with the learners of make interop, if there), write its tables, the README's numbers and the scores of judge --benchmark"
 	@echo "make test            the gate: lint, types, tests with coverage"
 	@echo "make interpreted     once a day: kernels by the interpreter, which checks their indices"
@@ -75,6 +76,9 @@ paper: $(STUDY)/installed
 paper-fit: $(FIT)/installed
 	$(FIT)/bin/python -m research.fit_paper --minutes $(MINUTES)
 	$(FIT)/bin/python -m research.play_paper_fit --minutes $(MINUTES)
+
+tune: $(FIT)/installed
+	$(FIT)/bin/python -m research.tune --minutes $(MINUTES)
 
 tables: $(STUDY)/installed
 	$(STUDY)/bin/python -m research.play_tables
