@@ -28,12 +28,11 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, ValidationInfo, field_validator
 
 from swarm_logistics_env.compiler.kernels import kernel, uniform
-from swarm_logistics_env.policies.homing import (
+from swarm_logistics_env.policies.driving import (
     HOLD,
     LET_GO,
     LIFT,
     DrivingParameters,
-    Homing,
     avoid_neighbours,
     away_from_neighbours,
     fetch,
@@ -43,6 +42,7 @@ from swarm_logistics_env.policies.homing import (
     search,
     search_direction,
 )
+from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import command_own_frames
 from swarm_logistics_env.world.motion.memory import MEMORY, has_failed, kept_home, length_of
