@@ -32,7 +32,7 @@ from swarm_logistics_env.policies.files import (
     read_policy,
 )
 from swarm_logistics_env.policies.homing import Homing
-from swarm_logistics_env.policies.homing_stock import HomingStock
+from swarm_logistics_env.policies.homing_stock import CREW, HomingStock
 from swarm_logistics_env.policies.models import within
 from swarm_logistics_env.policies.policy import Policy, check_policy, identity_parts
 from swarm_logistics_env.policies.sb3_files import (
@@ -55,6 +55,7 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),
     "homing": Homing,
     "homing-stock": HomingStock,
+    "homing-crew": functools.partial(HomingStock, **CREW),
     "central": Central,
     "central-stock": CentralStock,
 }
