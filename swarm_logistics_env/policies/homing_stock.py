@@ -30,7 +30,7 @@ by who sees it, and of one that nobody sees nobody can tell.
 All constants are fitted, for the most deliveries in the paper's world with `restock` at N = 25.
 Only seeds from 400,000 to 400,045 were used. In `realistic` a stock pays with `near` 1.2 and `far`
 1.6, tried on seeds from 430,000 to 430,169, as was `LEAST_CERTAINTY`. Those of `homing-crew` were
-tried in `realistic` with `restock` on seeds from 430,200 to 430,705.
+tried in `realistic` with `restock` on seeds from 430,200 to 430,707.
 """
 
 from __future__ import annotations
