@@ -16,7 +16,7 @@ EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
 SMALL = Scenario(
     n_robots=10, n_items=24, warehouse_width=7.0, warehouse_height=5.0, duration=60.0, restock=True
 )
-WITHOUT_STOCK = {"homing-stock": "homing", "central-stock": "central"}
+WITHOUT_STOCK = {"homing-stock": "homing", "homing-crew": "homing", "central-stock": "central"}
 
 
 def fresh(n_robots: int, name: str = "homing") -> Any:
@@ -112,3 +112,38 @@ def test_who_holds_keeps_its_item_and_who_stocks_puts_it_down_before_the_area() 
     assert (gripper == 0.0).mean() == pytest.approx(0.6, abs=0.08)
     leaving[:, row.ITEMS : row.ITEMS + 3] = (1.0, 0.3, 0.3)  # no gap beside this item
     assert (policy.act(leaving)[:, 3] == 0.0).all()
+
+
+def test_a_robot_whose_patience_is_over_leaves_the_requested_item_to_others_for_as_long() -> None:
+    policy = load("homing-stock", patience=7.95)
+    policy.reset(20, 0)
+    carrying = loaded(rows_of(20))
+    carrying[:, row.VELOCITY] = 1.0  # it drives, so it is not stuck
+    seeing = rows_of(20)
+    seeing[:, row.ITEMS : row.ITEMS + 4] = (1.0, 0.1, 0.0, 1.0)
+    grippers = [policy.act(rows)[0, 3] for rows in [carrying] * 80 + [seeing] * 81]
+    assert grippers[:79] == [1.0] * 79
+    assert grippers[79:159] == [-1.0] * 80
+    assert grippers[160] == 1.0
+    policy.act(loaded(rows_of(20, inside=True)))  # inside it waits as long as it takes
+    inside = [policy.act(loaded(rows_of(20, inside=True)))[0, 3] for _ in range(8)]
+    assert inside == [1.0] * 8
+
+
+@pytest.mark.parametrize(
+    ("n_items", "handling_time", "is_stocked"), [(60, 1.0, False), (10, 1.0, True), (60, 0.0, True)]
+)
+def test_the_stock_of_a_crew_is_the_deeper_the_more_items_there_are_if_lifting_takes_time(
+    n_items: int, handling_time: float, is_stocked: bool
+) -> None:
+    policy: Any = load("homing-crew")
+    policy.configure(Scenario(n_items=n_items, handling_time=handling_time))
+    policy.reset(400, 0)
+    policy.act(rows_of(400, EAST))
+    policy.act(rows_of(400, EAST, inside=True))
+    leaving = rows_of(400, (-1.0, 0.0))
+    for _ in range(20):
+        policy.act(leaving)
+    leaving[:, row.ITEMS : row.ITEMS + 3] = (1.0, 0.1, 0.0)  # 2 m from the area
+    lifted = (policy.act(leaving)[:, 3] == 1.0).mean()
+    assert lifted == pytest.approx(1.0 if is_stocked else 0.5, abs=0.08)

@@ -41,6 +41,7 @@ def commands_of(policy: Any) -> Any:
     rows = rng.uniform(low, high, (12, 200, len(low))).astype(np.float32)
     flags = (low == 0.0) & (high == 1.0)
     rows[:, :, flags] = rows[:, :, flags].round()
+    policy.configure(Scenario(handling_time=1.0))  # where lifting takes time all parameters matter
     policy.reset(200, 0)
     return np.array([policy.act(step) for step in rows for _ in range(10)])
 

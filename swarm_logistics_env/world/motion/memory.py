@@ -88,6 +88,7 @@ class MemoryColumns(NamedTuple):
     cannot_lift: int  # 1: it takes its gripper for broken; falls to 0 in RETRY_TIME
     in_vain: int  # [s] that it held on to items in vain; fades in FADING_TIME, a lift clears it
     delivering: int  # [s] that it held the requested item inside the area; fades as `in_vain`
+    tried: int  # [s] that it carried the requested item outside; below 0: leaves it to others
     # What its maker knows of its body, see `body_of`; they stay for the whole episode.
     top_speed: int
     handling_time: int
