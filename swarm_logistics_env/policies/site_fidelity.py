@@ -27,16 +27,14 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat
 
 from swarm_logistics_env.compiler.kernels import gaussian, kernel, pair_key, uniform
-from swarm_logistics_env.policies.homing import (
+from swarm_logistics_env.policies.driving import (
     LET_GO,
-    Homing,
-    HomingParameters,
     avoid_neighbours,
-    decide_homing,
     home_direction,
     requested_item,
     search_direction,
 )
+from swarm_logistics_env.policies.homing import Homing, HomingParameters, decide_homing
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import command_own_frames
 from swarm_logistics_env.world.motion.memory import MEMORY, length_of, to_frame
