@@ -13,7 +13,8 @@ Declared before the first run:
 * A claim holds (fails) if the one-sided 95 % Clopper-Pearson limit of the share of the sets lies
   above UPPER (below LOWER), else it is open. Of 30 sets these are 27 and more (3 and fewer). Above
   1/2 a claim would hold that one set in three denies; above .9 one unlucky mean would decide.
-* A claim that no P >= 0 can contradict "cannot fail": it is not played and not counted.
+* A claim "cannot fail" if no P puts the indicator below the threshold that it is claimed to be
+  above; A > 0 is one where a parameter at least doubles. It is not played and not counted.
 * Order: three seeds in all cells, two more in those of up to 60 robots, then these two in those of
   100 and 150, which cost most. Where the time ends before, the table says so.
 """
@@ -21,21 +22,37 @@ Declared before the first run:
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from research.fit_paper import LARGE, Constants, Tried, append, cell_name, play, read_tried
-from research.play_paper_fit import sets_that_fit
-from research.tables import ROOT
+from research.play_paper_fit import (
+    ENDS,
+    PAGE,
+    Means,
+    by_set,
+    means,
+    published,
+    samples,
+    sets_that_fit,
+)
+from research.tables import ROOT, rewrite, table
 from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.study.questions.comparison import NO_FAULT, Question, Setting
 from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.world.scenario import Scenario
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FIRST_SEED = 5_400_000  # nothing else uses the seeds from here to 5,402,999
 SETS = 30
@@ -44,7 +61,8 @@ SEEDS_IN_ALL_CELLS = 3  # before any set has more
 LOWER = 0.25  # share of the sets
 UPPER = 0.75
 FOLDER = ROOT / "docs" / "results" / "paper_fit"
-Means = Mapping[str, float]  # P by the name of the cell
+PICTURE = ROOT / "docs" / "media" / "paper-fit-claims.png"
+COLOURS = {"holds": "#2a7f62", "fails": "#b3392f", "open": "#9aa3ad"}
 
 
 class Job(NamedTuple):
@@ -82,7 +100,7 @@ def estimate(question: Question, p: Callable[[Setting], float]) -> Estimate:
 
 
 def can_fail(question: Question) -> bool:
-    """Return whether any P >= 0 puts the indicator on the side that is not claimed."""
+    """Return whether any P >= 0 puts the indicator beyond the threshold, not claimed there."""
     is_never_below = "cannot_fail" in estimate(question, lambda _: 1.0).flags
     return not (PAPER.claims[question] and is_never_below)
 
@@ -125,11 +143,173 @@ def play_missing(path: Path, sets: Sequence[Constants], is_over: Callable[[], bo
         append(Tried("claims", 0, job.seed, job.constants, performance), path)
 
 
+def of_cells(cells: Means) -> Callable[[Setting], float]:
+    """Return P of each setting by the cells; what is no cell is the base scenario again."""
+
+    def p(setting: Setting) -> float:
+        name = cell_name(setting)
+        return cells[name if name in cells else cell_name(NO_FAULT)]
+
+    return p
+
+
+def claim_text(question: Question) -> str:
+    """Return a claim as the results print it."""
+    sign = ">" if PAPER.claims[question] else "≤"
+    before = question.original
+    after = question.changed
+    is_of_fault = question.indicator in ("FT", "R")
+    condition = str(after) if is_of_fault else f"{before} -> {after.value:g}"
+    return f"{condition}: {question.indicator} {sign} {question.threshold:g}"
+
+
+def limits(n_holding: int, n: int) -> tuple[float, float]:
+    """Return the lower and the upper 95 % limit of a share of which n draws gave n_holding."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(n_holding, n).proportion_ci(confidence_level=0.9)
+    return float(interval.low), float(interval.high)
+
+
+def word(n_holding: int, n: int) -> str:
+    """Return what it says of a claim that it holds under so many of n sets."""
+    low, high = limits(n_holding, n)
+    if low > UPPER:
+        return "holds"
+    return "fails" if high < LOWER else "open"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper, and its indicator under the sets.
+
+    Attributes:
+        of_sets: by means over the seeds of each set, shape (n_sets,); empty: it cannot fail.
+        of_runs: of each seed of each set that delivered something before, shape (n_runs,).
+    """
+
+    question: Question
+    of_sets: NDArray[np.float64]
+    of_runs: NDArray[np.float64]
+
+    def is_on_its_side(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return of each value whether it lies on the claimed side; the threshold is below."""
+        return (values > self.question.threshold) == PAPER.claims[self.question]
+
+    @property
+    def n_holding(self) -> int:
+        """Under how many of the sets it holds."""
+        return int(self.is_on_its_side(self.of_sets).sum())
+
+    @property
+    def word(self) -> str:
+        """What the sets say of it."""
+        if not can_fail(self.question):
+            return "cannot fail"
+        return word(self.n_holding, len(self.of_sets))
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """Its row in the page's table."""
+        before = f"{estimate(self.question, published).value:z.2f}"
+        if not can_fail(self.question):
+            return claim_text(self.question), before, "", "", "", "", self.word
+        n = len(self.of_sets)
+        low, high = np.quantile(self.of_sets, ENDS)
+        lower, upper = limits(self.n_holding, n)
+        return (
+            claim_text(self.question),
+            before,
+            f"{self.of_sets.mean():z.2f} ({low:z.2f} to {high:z.2f})",
+            f"{self.n_holding} of {n}",
+            f"{100 * lower:.0f} to {100 * upper:.0f} %",
+            f"{100 * self.is_on_its_side(self.of_runs).mean():.0f} %",
+            self.word,
+        )
+
+
+def judged_claims(rows: Sequence[Tried]) -> list[Claim]:
+    """Return the claims with what was played, in the order of the paper's text."""
+    means_of_sets = [means(of_set) for of_set in by_set(rows)]
+    by_seed: dict[int, dict[str, int]] = {}
+    for row in rows:  # a seed's small and large cells may be two rows
+        by_seed.setdefault(row.seed, {}).update(row.performance)
+
+    def values(question: Question, cells: Sequence[Means]) -> NDArray[np.float64]:
+        needed = {cell_name(s) for s in settings_of(question) if s in PAPER.cells}
+        functions = [of_cells(p) for p in cells if needed <= p.keys()]
+        return np.array([estimate(question, p).value for p in functions if p(question.original)])
+
+    return [
+        Claim(question, values(question, means_of_sets), values(question, list(by_seed.values())))
+        if can_fail(question)
+        else Claim(question, np.empty(0), np.empty(0))
+        for question in questions()
+    ]
+
+
+def runs_a_cell(rows: Sequence[Tried]) -> tuple[int, int]:
+    """Return the least and the largest number of runs of a cell that a set has."""
+    names = list(map(cell_name, needed_cells()))
+    numbers = [len(samples(of_set)[name]) for of_set in by_set(rows) for name in names]
+    return min(numbers), max(numbers)
+
+
+def block(rows: Sequence[Tried], claims: Sequence[Claim]) -> str:
+    """Return the table of the page."""
+    words = Counter(claim.word for claim in claims)
+    least, most = runs_a_cell(rows)
+    runs = f"{least}" if least == most else f"{least} to {most}"
+    summary = (
+        f"{len(by_set(rows))} sets, {runs} runs a cell. Of {len(claims)} claims "
+        f"{words['holds']} hold, {words['fails']} fail, {words['open']} are open and "
+        f"{words['cannot fail']} cannot fail."
+    )
+    head = (
+        "claim of the paper",
+        "paper",
+        "mean of the sets (5 to 95 % of them)",
+        "holds under",
+        "limits of the share",
+        "single runs",
+        "",
+    )
+    return f"{summary}\n\n{table(head, [claim.row for claim in claims])}"
+
+
+def draw(claims: Sequence[Claim], path: Path = PICTURE) -> None:
+    """Draw the share of the sets under which each claim holds by means, with its limits."""
+    from matplotlib.figure import Figure
+
+    shown = [claim for claim in claims if can_fail(claim.question)]
+    figure = Figure(figsize=(8.0, 0.24 * len(shown) + 1.0), layout="constrained")
+    axes: Axes = figure.add_subplot()
+    for height, claim in enumerate(shown):
+        n = len(claim.of_sets)
+        colour = COLOURS[claim.word]
+        axes.plot(limits(claim.n_holding, n), [height, height], color=colour, linewidth=2.2)
+        axes.plot([claim.n_holding / n], [height], "o", color=colour, markersize=5.5)
+    for limit in (LOWER, UPPER):
+        axes.axvline(limit, color="black", linewidth=0.8, linestyle=":")
+    axes.set(
+        xlim=(-0.01, 1.01),
+        xlabel="share of the sets under which it holds by means (green: holds, red: fails)",
+    )
+    axes.set_yticks(range(len(shown)), [claim_text(claim.question) for claim in shown])
+    axes.invert_yaxis()
+    axes.margins(y=0.01)
+    figure.savefig(path, dpi=110)
+
+
 def main(minutes: float = 60.0, folder: Path = FOLDER) -> None:
-    """Play what is left until the time is up."""
+    """Play what is left until the time is up, then write the page's table and its picture."""
     end = time.monotonic() + 60.0 * minutes
-    sets = drawn_sets(folder / "tried.csv")
-    play_missing(folder / "claims.csv", sets, lambda: time.monotonic() > end)
+    path = folder / "claims.csv"
+    play_missing(path, drawn_sets(folder / "tried.csv"), lambda: time.monotonic() > end)
+    rows = read_tried(path)
+    claims = judged_claims(rows)
+    draw(claims)
+    rewrite(PAGE, {"claims": block(rows, claims)})
 
 
 if __name__ == "__main__":
