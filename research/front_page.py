@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from research.fit_paper import read_tried
-from research.play_paper_fit import claim_rows, means, sets_that_fit, word
+from research.play_claims import judged_claims, runs_a_cell
+from research.play_paper_fit import by_set
 from research.tables import ROOT, read_rows, table, with_blocks
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.study.report import drawing, section
@@ -123,15 +124,13 @@ def intervals() -> dict[str, list[str]]:
 
 def counts() -> dict[str, list[str]]:
     """Return the counts below the findings of the README, by the words that each begins with."""
-    claims = read("claims")
-    n_untestable = sum(claim["verdict"] == "untestable" for claim in claims)
-    tried = read_tried(RESULTS / "paper_fit" / "tried.csv")
-    of_sets = claim_rows([means(rows) for rows in sets_that_fit(tried)])
-    words = Counter(word(n_holding, n_sets) for _, n_holding, n_sets in of_sets)
-    n_sets = of_sets[0][2]
+    played = read_tried(RESULTS / "paper_fit" / "claims.csv")
+    claims = judged_claims(played)
+    words = Counter(claim.word for claim in claims)
+    least_runs, _ = runs_a_cell(played)
     of_text = (
-        len(claims), words["supported"] - n_untestable, n_untestable, words["contradicted"],
-        words["open"], n_sets,
+        len(claims), words["cannot fail"], words["holds"], words["fails"], words["open"],
+        least_runs, len(by_set(played)),
     )  # fmt: skip
     seeds = {line["study"]: line["seeds"] for line in read("estimates")}
     coverage = section.percent(_coverage_over_trainings())

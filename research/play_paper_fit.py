@@ -1,15 +1,13 @@
-"""Confirm the fits of `fit_paper` on other seeds, and count the sets under which claims hold.
+"""Confirm the fits of `fit_paper` on other seeds; `play_claims` asks which claims hold under them.
 
     python -m research.play_paper_fit --minutes 20  # plays; a second call goes on
-    python -m research.play_paper_fit --minutes 0   # tables and picture of what was played alone
+    python -m research.play_paper_fit --minutes 0   # tables of what was played alone
 
 Declared before the first run: what ships as `swarm-dt` is the fit without any failed robot, if it
 predicts R and FT as well as the fit `all`, i.e. if the 95 % interval of its mean distance from the
 paper's R and FT, less that of `all`, over common seeds, does not lie above 0. The fit
 `shipped`, with the default radio, was added after `sound` was seen, which delivers a
-quarter too much with that radio; the rule is the same. A
-claim is contradicted (supported) only if it holds under at most (at least) one (nine) in ten of the
-sets that fit.
+quarter too much with that radio; the rule is the same.
 """
 
 from __future__ import annotations
@@ -17,7 +15,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import typer
@@ -27,7 +25,6 @@ from research.fit_paper import (
     CONSTANTS,
     FAULTY,
     FITS,
-    LARGE,
     SOUND,
     Tried,
     append,
@@ -43,25 +40,17 @@ from research.play_fm4 import Played, fm4_table, runs
 from research.tables import ROOT, rewrite, table, write_rows
 from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
-from swarm_logistics_env.spi.definitions import DEFINITIONS, Change
-from swarm_logistics_env.study.questions.comparison import NO_FAULT, Question, Setting
+from swarm_logistics_env.study.questions.comparison import NO_FAULT, Setting
 from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.world.scenario import Scenario
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 FIRST_SEED = 5_390_000  # of the confirmation; fit_paper.py uses those from 5,300,000 on
 SEEDS = 6  # a cell
 SEEDS_OF_FAULTS = 20  # as FT and R hang on few deliveries
 SEEDS_OF_FM4 = 30
-SEEDS_OF_SETS = 3
-SMALL = tuple(setting for setting in SOUND if setting not in LARGE)
 OF_FAULTS = (*(s for s in SOUND if s.kind == "fault"), *FAULTY)
 ENDS = (0.05, 0.95)
-DECIDED = 0.9  # share of the sets that fit
 PAGE = ROOT / "docs" / "research" / "paper_fit.md"
-PICTURE = ROOT / "docs" / "media" / "paper-fit-claims.png"
 Means = Mapping[str, float]  # P by the name of the cell
 Samples = Mapping[str, NDArray[np.float64]]  # P over seeds
 
@@ -93,12 +82,17 @@ def confirm(folder: Path, is_over: Callable[[], bool]) -> None:
             append(Tried(name, 0, seed, constants, play(cells, constants, seed)), path)
 
 
-def by_set(rows: Sequence[Tried]) -> dict[tuple[float, ...], list[Tried]]:
+def by_set(rows: Sequence[Tried]) -> list[list[Tried]]:
     """Return what was played of each set of constants."""
     sets: dict[tuple[float, ...], list[Tried]] = {}
     for row in rows:
         sets.setdefault(tuple(row.constants.values()), []).append(row)
-    return {key: trials for key, trials in sets.items() if any(map(is_full, trials))}
+    return list(sets.values())
+
+
+def sets_in_all_cells(rows: Sequence[Tried]) -> list[list[Tried]]:
+    """Return what was played of each set of constants that was played in all cells."""
+    return [of_set for of_set in by_set(rows) if any(map(is_full, of_set))]
 
 
 def samples(rows: Sequence[Tried]) -> dict[str, NDArray[np.float64]]:
@@ -123,109 +117,12 @@ def fits(rows: Sequence[Tried]) -> bool:
 
 def sets_that_fit(tried: Sequence[Tried]) -> list[list[Tried]]:
     """Return what was played of each set of constants that fits."""
-    return [rows for rows in by_set(tried).values() if fits(rows)]
-
-
-def play_sets(folder: Path, is_over: Callable[[], bool]) -> None:
-    """Play the sets that fit at further seeds, up to 60 robots, one seed of all of them a time."""
-    path = folder / "tried.csv"
-    for number in range(1, SEEDS_OF_SETS):
-        for rows in by_set(read_tried(path)).values():
-            if is_over() or len(rows) > number or not fits(rows):
-                continue
-            seed = FIRST_SEED + 1000 + number
-            performance = play((*SMALL, *FAULTY), rows[0].constants, seed)
-            append(Tried("further seeds", 0, seed, rows[0].constants, performance), path)
+    return [rows for rows in sets_in_all_cells(tried) if fits(rows)]
 
 
 def published(setting: Setting) -> float:
     """Return the paper's P."""
     return PAPER.performance[setting]
-
-
-def indicator(question: Question, p: Callable[[Setting], float]) -> float:
-    """Return an indicator's value by P of each setting."""
-    definition = DEFINITIONS[question.indicator]
-    before = question.original
-    after = question.changed
-    settings = [before, after, Setting("fault", "removed", after.value)]
-    performances = {name: [p(s)] for name, s in zip(definition.performances, settings)}
-    n = int(before.value) if before.kind == "size" else Scenario().n_robots
-    arguments = definition.arguments(Change(before.value, after.value, n))
-    return definition.function(**performances, **arguments, threshold=question.threshold).value
-
-
-def of_cells(cells: Means) -> Callable[[Setting], float]:
-    """Return P of each setting by the cells; what is no cell is the base scenario again."""
-
-    def p(setting: Setting) -> float:
-        name = cell_name(setting)
-        return cells[name if name in cells else cell_name(NO_FAULT)]
-
-    return p
-
-
-def questions() -> list[Question]:
-    """Return the claims of the paper's text but those on FM3_send, another reading of FM3."""
-    return [question for question in PAPER.claims if question.changed.name != "FM3_send"]
-
-
-def claim_text(question: Question) -> str:
-    """Return a claim as the results print it."""
-    sign = ">" if PAPER.claims[question] else "≤"
-    before = question.original
-    after = question.changed
-    is_of_fault = question.indicator in ("FT", "R")
-    condition = str(after) if is_of_fault else f"{before} -> {after.value:g}"
-    return f"{condition}: {question.indicator} {sign} {question.threshold:g}"
-
-
-def holds(question: Question, cells: Means) -> bool:
-    """Return whether a claim of the paper holds for these P."""
-    value = indicator(question, of_cells(cells))
-    return (value > question.threshold) == PAPER.claims[question]
-
-
-def word(n_holding: int, n: int) -> str:
-    """Return what it says of a claim that it holds under so many of n sets."""
-    if n_holding >= DECIDED * n:
-        return "supported"
-    return "contradicted" if n - n_holding >= DECIDED * n else "open"
-
-
-def claim_rows(cells: Sequence[Means]) -> list[tuple[str, int, int]]:
-    """Return each claim, under how many of the sets it holds, and of how many.
-
-    Args:
-        cells: P of each set that fits.
-    """
-    return [
-        (claim_text(question), sum(holds(question, p) for p in cells), len(cells))
-        for question in questions()
-    ]
-
-
-def draw_claims(rows: Sequence[tuple[str, int, int]]) -> None:
-    """Draw under which share of the sets that fit each claim holds."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.0, 0.24 * len(rows) + 1.0), layout="constrained")
-    axes: Axes = figure.add_subplot()
-    colours = {"supported": "#2a7f62", "contradicted": "#b3392f"}
-    shares = [held / n for _, held, n in rows]
-    axes.barh(
-        [text for text, _, _ in rows],
-        shares,
-        color=[colours.get(word(held, n), "#9aa3ad") for _, held, n in rows],
-    )
-    for limit in (1.0 - DECIDED, DECIDED):
-        axes.axvline(limit, color="black", linewidth=0.8, linestyle=":")
-    axes.set(
-        xlim=(0.0, 1.0), xlabel=f"share of the {rows[0][2]} sets that fit under which it holds"
-    )
-    axes.invert_yaxis()
-    axes.margins(y=0.01)
-    figure.savefig(PICTURE, dpi=110)
 
 
 def r_and_ft(setting: Setting, p: Callable[[Setting], Any]) -> NDArray[np.float64]:
@@ -281,9 +178,9 @@ def nearness(cells: Means) -> tuple[str, ...]:
 
 
 def blocks(folder: Path) -> dict[str, str]:
-    """Return the tables of the page, and draw its picture."""
+    """Return the tables of the page but that of the claims."""
     tried = read_tried(folder / "tried.csv")
-    n_sets = len(by_set(tried))
+    n_sets = len(sets_in_all_cells(tried))
     fitting_sets = sets_that_fit(tried)
     fitting_means = [means(rows) for rows in fitting_sets]
     confirmed: dict[str, list[Tried]] = {}
@@ -307,15 +204,11 @@ def blocks(folder: Path) -> dict[str, str]:
         ("cell", "paper", *confirmed, "sets that fit, 5 to 95 %"),
         [_cell_row(setting, confirmed, fitting_means) for setting in PAPER.cells],
     )
-    claims = claim_rows(fitting_means)
-    draw_claims(claims)
-    words = [(text, f"{held} of {n}", word(held, n)) for text, held, n in claims]
     return {
         "constants": f"{n_sets} sets were played in all cells, {len(fitting_sets)} of them "
         f"fit.\n\n{constants}",
         "near": near,
         "cells": cells,
-        "claims": table(("claim of the paper", "holds under", ""), words),
         "fm4": fm4_table(folder / "fm4.csv"),
     }
 
@@ -348,7 +241,7 @@ def _cell_row(
 
 
 def main(minutes: float = 20.0, out: Path = Path("results/paper_fit")) -> None:
-    """Play what is left until the time is up, then write the page's tables and its picture."""
+    """Play what is left until the time is up, then write the page's tables."""
     end = time.monotonic() + 60.0 * minutes
 
     def is_over() -> bool:
@@ -360,7 +253,6 @@ def main(minutes: float = 20.0, out: Path = Path("results/paper_fit")) -> None:
         if not (out / "fm4.csv").exists():
             shown = {name: sets[name] for name in ("2026", "sound")}
             write_rows(out / "fm4.csv", Played._fields, list(runs(shown, SEEDS_OF_FM4)))
-        play_sets(out, is_over)
     rewrite(PAGE, blocks(out))
 
 
