@@ -56,6 +56,7 @@ def test_a_loop_of_ones_own_learns_on_the_frame_of_motion() -> None:
     assert sum(learned) > 0  # an untrained one delivers nothing
 
 
+@pytest.mark.daily
 def test_each_robot_of_a_mixed_swarm_does_what_its_policy_does_upon_the_same_rows() -> None:
     scenario = Scenario(n_robots=10, n_items=20, duration=20.0)
     world = Warehouse(scenario)

@@ -151,6 +151,7 @@ def test_flat_is_the_same_in_vectors() -> None:
         flat.step(np.zeros((3, 4)))
 
 
+@pytest.mark.daily
 def test_stable_baselines3_learns_from_flat_without_a_warning() -> None:
     sb3 = pytest.importorskip("stable_baselines3")
     from stable_baselines3.common.env_checker import check_env as check_for_sb3

@@ -49,6 +49,7 @@ def value_of(value: object) -> str:
     return str(fingerprint(value)["value"])
 
 
+@pytest.mark.daily
 @given(CONTENTS, CONTENTS)
 def test_objects_of_one_class_differ_exactly_if_their_contents_do(left: Any, right: Any) -> None:
     assert value_of(Holder(left)) == value_of(Holder(left))

@@ -42,6 +42,7 @@ def test_it_delivers_around_racks(policy: str, floor: str, least: int) -> None:
         assert run_episode(scenario, load(policy), seed).delivered >= least
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("policy_name", POLICIES)
 def test_it_serves_every_dock_that_requests_name(policy_name: str) -> None:
     world, policy = begun(policy_name, floor="two_docks", request_docks="random")

@@ -41,6 +41,7 @@ def loaded(rows: NDArray[np.float32]) -> NDArray[np.float32]:
     return rows
 
 
+@pytest.mark.daily
 @pytest.mark.compiled
 @pytest.mark.parametrize(
     ("name", "weaker", "times", "duration"),

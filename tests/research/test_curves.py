@@ -24,6 +24,7 @@ def test_each_point_changes_one_thing_alone_and_items_go_with_robots() -> None:
     assert broken == {5: 1, 10: 1, 25: 2, 50: 4, 100: 8}
 
 
+@pytest.mark.daily
 def test_a_table_of_a_curve_has_p_standstills_and_r_at_each_point(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -208,6 +208,7 @@ def test_faults_that_meet_leave_pay_and_end_as_the_reference_says(case: Case) ->
         play(replace(case, planned=(*case.planned, gone)), STEPS)
 
 
+@pytest.mark.daily
 @given(case=cases())
 @settings(max_examples=EXAMPLES, report_multiple_bugs=False)
 def test_many_steps_in_one_call_pass_over_no_beginning_or_end_of_a_fault(case: Case) -> None:

@@ -108,6 +108,7 @@ def table(column: str, names: list[str]) -> str:
 COLUMNS = ["policy", "table", "fault", "header"]
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("column", COLUMNS)
 def test_cells_of_trials_are_refused_or_reported(
     column: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -218,6 +218,7 @@ MANNERS: list[dict[str, Any]] = [
 ]
 
 
+@pytest.mark.daily
 @pytest.mark.parametrize("manner", MANNERS)
 def test_command_of_a_run_plays_it_in_run_and_watch_whatever_its_faults(
     manner: dict[str, Any],

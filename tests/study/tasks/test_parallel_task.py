@@ -120,6 +120,7 @@ def test_a_policy_is_told_the_world_the_swarm_and_its_seed() -> None:
     assert policy.told == (3, 5)
 
 
+@pytest.mark.daily
 def test_equal_seeds_give_equal_bits_in_other_processes(study: Study) -> None:
     script = (
         "import sys; from swarm_logistics_env.study.studies import Study\n"

@@ -133,6 +133,7 @@ def make_theirs(request: pytest.FixtureRequest) -> Iterator[Any]:
         yield lambda n: module.parallel_env(**fields, **{size: n})
 
 
+@pytest.mark.daily
 def test_each_passes_pettingzoos_test_on_environments_that_are_not_ours(make_theirs: Any) -> None:
     test = importlib.import_module("pettingzoo.test").parallel_api_test
     idle = make_theirs(3).action_space(make_theirs(3).possible_agents[0]).sample()

@@ -80,6 +80,7 @@ def test_study_run_prints_and_writes_the_report(file: Path, command: Command) ->
     assert json.loads(rows[0]["scenario"])["duration"] == 0.5
 
 
+@pytest.mark.daily
 def test_figures_are_drawn_as_wide_and_in_the_letters_that_a_paper_needs(
     command: Command,
 ) -> None:
