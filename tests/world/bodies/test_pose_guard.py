@@ -122,3 +122,18 @@ def test_a_robot_that_answers_without_a_pose_is_stopped_and_tries(watched: Watch
     assert set(shares[WITHIN_A_SECOND:]) == {0.0, pose_guard.TRY_SHARE}
     assert not watched.guard.lost.any()
     assert watched.step() == 1.0
+
+
+@pytest.mark.parametrize("turn", [0.2, -0.2])
+def test_a_robot_that_turns_on_the_spot_to_either_side_is_not_taken_for_frozen(
+    watched: Watched, turn: float
+) -> None:
+    guard = watched.guard
+    position = guard.position.copy()
+    heading = np.zeros(2)
+    for _ in range(3 * WITHIN_A_SECOND):
+        heading[0] += turn  # past half a turn, too
+        position[1, 0] += PERIOD * SPEED
+        both = np.array([True, True])
+        guard.update(position.copy(), np.angle(np.exp(1j * heading)), both, both)
+        assert guard.speed_share[0] == 1.0

@@ -1,0 +1,46 @@
+"""The study that a command line means asks its questions in another world."""
+
+from __future__ import annotations
+
+import pytest
+
+from swarm_logistics_env import Scenario
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.views.cli.study_choice import ask_in_world
+
+
+@pytest.mark.parametrize(
+    ("n_robots", "robots", "sizes"),
+    [
+        (1, None, None),  # the only robot may not fail
+        (2, (1,), (1, 2, 4)),
+        (3, (1,), (1, 3, 6)),
+        (8, (1, 2), (3, 8, 16)),
+        (9, (1, 2, 3), (4, 9, 18)),
+        (25, (1, 2, 3), (10, 25, 50)),
+        (50, (2, 4, 6), (20, 50, 100)),
+    ],
+)
+def test_sizes_and_failures_follow_from_the_number_of_robots(
+    n_robots: int, robots: tuple[int, ...] | None, sizes: tuple[int, ...] | None
+) -> None:
+    study = Study.preset("scorecard")
+    ask_in_world(study, Scenario(n_robots=n_robots))
+    specification = study.specification
+    assert [factor.robots for factor in specification.faults] == (
+        [] if robots is None else [robots]
+    )
+    if sizes is not None:
+        assert [factor.values for factor in specification.sizes] == [sizes]
+    study.plan()  # no question of it is impossible
+
+
+def test_values_of_a_parameter_follow_from_its_value_there() -> None:
+    study = Study.preset("scorecard")
+    before = {factor.name: factor.values for factor in study.specification.parameters}
+    ask_in_world(study, Scenario(delivery_width=1.0))
+    after = {factor.name: factor.values for factor in study.specification.parameters}
+    assert before["delivery_width"] == (2.0, 1.0)
+    assert after["delivery_width"] == (1.0, 0.5)
+    ask_in_world(study, Scenario(floor="aisles"))
+    assert study.specification.parameters == ()
