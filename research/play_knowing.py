@@ -42,7 +42,9 @@ def share_of_way(p: Numbers, least: Numbers, most: Numbers) -> Interval:
 
 def rungs(results: StudyResults) -> str:
     """Return the table: P, items more than who is told nothing, and the share of the way."""
-    cells = {cell.arm.setting.name: cell for cell in results.cells}
+    by_label = {cell.arm.setting.name: cell for cell in results.cells}
+    labels = [policy.title for policy in results.plan.specification.policies]
+    cells = {label: by_label[label] for label in labels}
     least = cells[NOTHING_TOLD].by_seed
     most = cells[CENTRAL].by_seed
     rows = []
