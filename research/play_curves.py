@@ -82,7 +82,7 @@ def blocks(results: StudyResults) -> Iterator[tuple[str, str]]:
             f"{seeds_from(results)}; 95 % intervals; R with FM4 in {100 * BROKEN:g} % of the "
             "robots, at least one."
         )
-        yield f"curve {curve}", table(("policy", "", *titles), rows, line)
+        yield f"curve_{curve.split()[0]}", table(("policy", "", *titles), rows, line)
 
 
 def _measures(

@@ -37,8 +37,8 @@ def test_a_table_of_a_curve_has_p_standstills_and_r_at_each_point(
     study.run()
     results = study.findings()
     blocks = dict(play_curves.blocks(results))
-    assert list(blocks) == ["curve robots", "curve seconds"]
-    head, _, *rows = blocks["curve robots"].splitlines()
+    assert list(blocks) == ["curve_robots", "curve_seconds"]
+    head, _, *rows = blocks["curve_robots"].splitlines()
     assert head == "| policy |  | 3 robots | 6 robots |"
     labels = ["P", "runs that stand still", "R"]
     assert [row.split(" | ")[1] for row in rows[:3]] == labels
