@@ -125,8 +125,8 @@ def jobs(sets: Sequence[Constants]) -> Iterator[Job]:
     cells = needed_cells()
     small = tuple(setting for setting in cells if setting not in LARGE)
     first = range(SEEDS_IN_ALL_CELLS)
-    others = range(SEEDS_IN_ALL_CELLS, SEEDS)
-    for numbers, cells_to_play in ((first, cells), (others, small), (others, LARGE)):
+    remaining = range(SEEDS_IN_ALL_CELLS, SEEDS)
+    for numbers, cells_to_play in ((first, cells), (remaining, small), (remaining, LARGE)):
         for number in numbers:
             for position, constants in enumerate(sets):
                 yield Job(constants, FIRST_SEED + 100 * position + number, cells_to_play)

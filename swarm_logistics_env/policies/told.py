@@ -56,8 +56,8 @@ class Told(Scripted):
 
     def configure(self, scenario: Scenario) -> None:
         """Take what the script's maker knows, and how far radio and cameras reach."""
-        told = self.parameters.model_dump(exclude={"hears", "count"})
-        self._script = HomingStock(**told)
+        of_script = self.parameters.model_dump(exclude={"hears", "count"})
+        self._script = HomingStock(**of_script)
         self._script.configure(scenario)
         self._radio_range = scenario.radio_range
 

@@ -66,13 +66,13 @@ def test_those_are_told_who_are_near_enough_and_carry_nothing(
     who: dict[str, object], robots: list[int]
 ) -> None:
     world = world_of([1.0, 2.9, 4.8, 6.7, 8.6, 9.5])  # the first has it in view
-    _, told = told_rows(world, **who)
-    assert told == robots
+    _, listeners = told_rows(world, **who)
+    assert listeners == robots
     world.state.robot_item[1] = 2
     world.state.item_status[2] = 1
-    _, told = told_rows(world, **who)
-    assert 1 not in told
-    assert 0 in told
+    _, listeners = told_rows(world, **who)
+    assert 1 not in listeners
+    assert 0 in listeners
 
 
 def test_the_true_place_stands_in_the_robots_own_frame_behind_what_is_in_view() -> None:
@@ -91,13 +91,13 @@ def test_where_nothing_is_asked_for_it_is_the_script_itself() -> None:
     world = Warehouse(SCENARIO)
     rows = world.reset(seed=0)
     world.state.open_requests[:] = -1
-    told = policies.load("homing-told", near=2.0, far=2.5)
+    told_script = policies.load("homing-told", near=2.0, far=2.5)
     script = HomingStock(near=2.0, far=2.5)
-    for policy in (told, script):
+    for policy in (told_script, script):
         policy.configure(SCENARIO)  # type: ignore[attr-defined]
         policy.reset(6, 3)
-    np.testing.assert_equal(told.act(rows, world.state), script.act(rows))  # type: ignore[call-arg]
+    np.testing.assert_equal(told_script.act(rows, world.state), script.act(rows))  # type: ignore[call-arg]
     with pytest.raises(PolicyError, match="state = None"):
-        told.act(rows)
+        told_script.act(rows)
     with pytest.raises(PolicyError, match="hears"):
         policies.load("homing-told", hears="nobody")
