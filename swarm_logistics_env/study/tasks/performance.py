@@ -133,6 +133,11 @@ class Performance(Record):
         if not isinstance(scenario, Scenario):
             raise StudyError(f"performance = {str(self)!r}: should be of the warehouse's orders")
         is_there = scenario.has_due_times if needs == "order_due" else scenario.has_orders
+        if not is_there and scenario.order_file is not None:
+            raise StudyError(
+                f"performance = {str(self)!r}: no row of the file of orders has a due time: "
+                "should have a column due"
+            )
         if not is_there:
             raise StudyError(
                 f"performance = {str(self)!r}: {needs} = {getattr(scenario, needs)!r}: should be "

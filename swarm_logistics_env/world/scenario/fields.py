@@ -295,8 +295,8 @@ class ScenarioFields(Record):
     @property
     def has_due_times(self) -> bool:
         """Whether an order may be late."""
-        listed = self.order_file
-        return self.order_due is not None or (listed is not None and listed.has_due_times)
+        listed = self.order_file  # a file says itself what is due
+        return self.order_due is not None if listed is None else listed.has_due_times
 
     @property
     def tells_all(self) -> bool:

@@ -156,8 +156,14 @@ def _cells_of(names: list[str], row: list[str], line: int) -> dict[str, str]:
     if len(row) != len(names):
         raise ValueError(f"line {line}: {len(row)} cells: should be {len(names)}, as in line 1")
     cells = {name: cell.strip() for name, cell in zip(names, row, strict=True)}
-    if not cells["item"]:
+    item = cells["item"]
+    if not item:
         raise ValueError(f"line {line}: item is empty: should be an item's number or a class")
+    if not (item.isdecimal() or item[0].isalpha()):
+        raise ValueError(
+            f"line {line}: item = {item!r}: should be an item's number, 0 or more, or a class, "
+            "which begins with a letter"
+        )
     return cells
 
 

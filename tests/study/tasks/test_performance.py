@@ -82,6 +82,9 @@ def test_a_condition_without_the_measure_is_refused_before_it_is_played() -> Non
         Study(performance="on_time", **FAULTS).plan()
     with pytest.raises(StudyError, match="'longest_queue:9': orders = 'next': should be set"):
         Study(performance="longest_queue:9", **FAULTS).plan()
+    listed = {"orders": "time,item/0,4/5,2", "order_due": 30.0}  # a file says itself what is due
+    with pytest.raises(StudyError, match="no row of the file of orders has a due time"):
+        Study(performance="p95_tardiness:60", scenario=listed, **FAULTS).plan()
     with pytest.raises(StudyError, match="should be of the warehouse's orders"):
         Study(
             performance="on_time", task=LANE, policies=["walker"], sizes=[{"values": [2, 4]}]

@@ -289,6 +289,8 @@ BAD_ORDERS: dict[str, str] = {
     file_of("0", header="time"): "line 1: no column 'item'",
     file_of("0,1,2"): "line 2: 3 cells: should be 4",
     file_of("0,,,"): "line 2: item is empty",
+    file_of("0,A,,", "1,-1,,"): "line 3: item = '-1': should be an item's number, 0 or more, or a",
+    file_of("0,4.5,,"): "line 2: item = '4.5': should be an item's number, 0 or more, or a class",
     file_of("soon,1,,"): "line 2: time = 'soon': should be a number",
     file_of("-1,1,,"): "line 2: time = -1: should be at least 0",
     file_of("0,1,,", "8,2,7,"): "line 3: due = 7: should be at least the order's time, 8 s",
