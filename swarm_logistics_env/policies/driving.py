@@ -1,4 +1,4 @@
-"""Driving by what a robot senses and remembers: the kernels that `Homing` and `HomingStock` share.
+"""Driving by what a robot senses and remembers: the kernels that scripts which drive home share.
 
 Each returns a direction in a robot's own frame, or a motion: direction (x, y), speed and gripper.
 """

@@ -101,7 +101,7 @@ class Performance(Record):
         return self
 
     def __str__(self) -> str:
-        return self.measure if self.worst is None else f"{self.measure}:{self.worst:g}"
+        return self.measure if self.worst is None else f"{self.measure}:{self.worst:.15g}"
 
     @property
     def words(self) -> str:
@@ -162,7 +162,7 @@ class Performance(Record):
         if measure.is_gain:
             none_due = 0.0 if measure.largest is None else measure.largest
             return none_due if value is None else float(value)
-        worst = self.worst or measure.largest or 1.0
+        worst = self.worst or 1.0  # a share of runs
         return max(0.0, 1.0 - (value or 0.0) / worst)
 
     def is_capped(self, outcome: Outcome) -> bool:

@@ -96,9 +96,11 @@ def test_each_entry_has_held_out_cells_of_its_own_and_the_same_development_half(
 
 def test_the_digest_is_of_the_content_of_an_entry(tmp_path: Path) -> None:
     copied = shutil.copy(TRAINED["ppo-robust"], tmp_path / "copied.safetensors")
-    same = {entry_digest(PolicySpec.of(policy)) for policy in ("ppo-robust", str(copied))}
-    assert len(same) == 1
-    others = (
+    digests_of_copies = {
+        entry_digest(PolicySpec.of(policy)) for policy in ("ppo-robust", str(copied))
+    }
+    assert len(digests_of_copies) == 1
+    other_entries = (
         "ppo-robust@1",
         "ppo-robust@all",
         "homing",
@@ -106,8 +108,8 @@ def test_the_digest_is_of_the_content_of_an_entry(tmp_path: Path) -> None:
         Standing(1),
         Standing(2),
     )
-    digests = {entry_digest(PolicySpec.of(policy)) for policy in others}
-    assert len(digests | same) == 7
+    digests = {entry_digest(PolicySpec.of(policy)) for policy in other_entries}
+    assert len(digests | digests_of_copies) == 7
     assert entry_digest(PolicySpec.of(Standing(1))) in digests
 
 

@@ -41,6 +41,7 @@ SERVED = Outcome(
         ("longest_queue:10", 0.2),
         ("longest_standstill:100", 0.5),
         ("stands_still", 0.0),
+        ("p95_tardiness:1234567.5", 1.0 - 45.0 / 1234567.5),  # its text keeps every digit
     ],
 )
 def test_p_is_the_measure_or_how_far_it_is_from_its_worst_value(text: str, p: float) -> None:
