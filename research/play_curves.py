@@ -25,7 +25,7 @@ from swarm_logistics_env.study.verdicts.verdict import Verdict
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-POLICIES = ("swarm-dt", "homing", "homing-stock", "homing-crew", "ppo-delivery", "ppo-robust")
+POLICIES = ("swarm-dt", "homing", "homing-stock", "ppo-delivery", "ppo-robust")
 N_ROBOTS, ITEMS_A_ROBOT, DURATION = 25, 2.4, 500.0  # where the curves cross, as in `realistic`
 BROKEN = 0.08  # the share of robots in FM4
 ITEMS = (1, 2, 3, 4, 6, 8)  # a robot

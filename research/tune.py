@@ -49,8 +49,8 @@ SCRIPTS: Mapping[str, tuple[str, ...]] = {
         "spread_gain", "spread_range", "avoid_gain", "avoid_range", "wall_gain", "wall_range",
         "clearance", "obstacle_range", "sure",
     ),
-    "homing-crew": (
-        "density", "holders", "patience", "spread_gain", "spread_range", "avoid_gain",
+    "homing-stock": (
+        "near", "density", "holders", "patience", "spread_gain", "spread_range", "avoid_gain",
         "avoid_range", "clearance", "obstacle_range",
     ),
 }  # fmt: skip

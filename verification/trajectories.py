@@ -136,8 +136,8 @@ GOLDEN |= {
     "homing-stock with wheels": _small(
         policy="homing-stock", drive="differential", n_robots=8, restock=True, steps=300
     ),
-    "homing-crew": _small(
-        policy="homing-crew", handling_time=0.3, n_robots=8, restock=True, steps=300
+    "homing-stock that lifts slowly": _small(
+        policy="homing-stock", handling_time=0.3, n_robots=8, restock=True, steps=300
     ),
     "central-stock": _in_aisles("central-stock"),
     "ppo-robust": _small(policy="ppo-robust", restock=True, steps=300),

@@ -13,24 +13,22 @@ Robots sense and remember what those of `homing` do, and six simple mechanisms a
 * A laden robot that stands still goes in a random direction, not away from home, for a moment.
 * A robot that never entered the area goes to the lowest timer heard.
 
-Three parameters, off in `homing-stock`, make it `homing-crew`:
+Three parameters keep the swarm going where lifting takes time:
 
-* `density`: where lifting takes time, the more items there are, the deeper is the stock. A shallow
-  one of many items is a wall: laden robots do not get through, least in the corners beside the
-  area. Where lifting takes no time, robots make their way, and `near` and `far` stay.
+* `density`: the more items there are, the deeper is the stock. A shallow one of many items is a
+  wall: laden robots do not get through, least in the corners beside the area. Where lifting takes
+  no time, robots make their way, and the stock is `near`.
 * `patience`: a robot that carries the requested item for too long, because it is caged by the stock
   or takes a wrong way for the way home, puts it down, clears the way (`clear_the_way`), and leaves
   the item to others for as long.
-* `holders`: fewer robots hold, so that more search.
+* `holders`: where fewer robots hold, more search.
 
 Messages are not used. A voice was tried: robots told each other how far the way to the requested
 item is, and the nearest one or two free ones went. On 30 seeds from 431,000 on no gain was shown.
 The likely reason: who sees an item fetches it anyway, and nobody can tell of one that nobody sees.
 
-All constants are fitted, for the most deliveries in the paper's world with `restock` at N = 25.
-Only seeds from 400,000 to 400,045 were used. In `realistic` a stock pays with `near` 1.2 and `far`
-1.6, tried on seeds from 430,000 to 430,169, as was `LEAST_CERTAINTY`. Those of `homing-crew` were
-tried in `realistic` with `restock` on seeds from 430,200 to 430,707.
+All constants are fitted, for the most deliveries, on seeds from 400,000 to 400,045 in the paper's
+world and from 430,000 to 430,707 in `realistic`, both with `restock`.
 """
 
 from __future__ import annotations
@@ -40,7 +38,7 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationInfo, field_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.policies.driving import (
@@ -79,48 +77,34 @@ from swarm_logistics_env.world.scenario import Scenario
 # Lengths in m; distances from the delivery area are as a robot reckons them.
 CARRIED_OFF = 1.0  # where an item is put down for which there is no gap
 LEAST_CERTAINTY = 0.3  # of a direction home that was taken once, after 72 s
-BAND = 0.5  # between `near` and `far`, where a density decides how deep the stock is
+BAND = 0.5  # behind the stock, in which items stay where they are
 STUCK = 0.4  # a robot tries a random direction until the memory's 1 has fallen to this
 TRIES_AGAIN = 0.5  # of `cannot_deliver`: below it a robot holds items inside again
 PULL = 0.4  # home, beside a random direction of length 1
 
 
 class HomingStockParameters(DrivingParameters):
-    """Those that `HomingStock` shares with `Homing`, and its distances, both fitted, see above."""
+    """Those that `HomingStock` shares with `Homing`, and those of its stock, all fitted."""
 
     near: PositiveFloat = Field(
-        0.8, description="robots put items down nearer to the area than this [m]; fitted"
+        0.8,
+        description="robots put items down nearer to the area than this, and lift for the stock "
+        "those that lie 0.5 m farther still [m]",
     )
-    far: PositiveFloat = Field(
-        1.2, description="robots that stock lift items farther from it than this [m]; fitted"
-    )
-
     density: NonNegativeFloat = Field(
-        0.0,
-        description="if above 0, the stock lies so deep before the area, over the whole height of "
-        "the warehouse, that all items would lie as densely as this [1/m2], and `near` and `far` "
-        "follow",
+        1.0,
+        description="where lifting takes time, `near` is what makes all items, put down before the "
+        "area over the whole height of the warehouse, as dense as this [1/m2]; 0: it stays",
     )
     holders: PositiveFloat = Field(
-        0.6, description="share of the robots that hold; the others stock; fitted"
+        0.5, description="share of the robots that hold; the others stock"
     )
     patience: NonNegativeFloat = Field(
-        0.0,
+        15.0,
         description="for how long it carries the requested item outside, and then leaves it to "
         "others [s]; 0: for ever",
     )
 
-    @field_validator("far")
-    @classmethod
-    def _check_far(cls, far: float, about: ValidationInfo) -> float:
-        near = about.data.get("near", far)
-        if far < near:
-            raise ValueError(f"should be at least near = {near:g} [m]")
-        return far
-
-
-# `homing-crew`: robots that lift, put down and deliver in no time stock as `homing-stock` does.
-CREW = {"density": 1.0, "holders": 0.5, "patience": 15.0}
 
 Parameters = HomingStockParameters.for_kernels()
 Home: TypeAlias = tuple[float, float, float]  # the direction, and how often it was taken lately
@@ -188,7 +172,7 @@ def decide_homing_stock(
             )
         else:
             stocks = holds or role > parameters.holders
-            least = 0.0 if holds else parameters.far
+            least = 0.0 if holds else parameters.near + BAND
             item = -1 if gives_up else requested_item(observation, memory, False)
             motion = search_items(
                 observation, memory, home, push, item, is_inside, stocks, least, period, parameters
@@ -314,7 +298,7 @@ class HomingStock(Homing):
     Its keyword arguments are the fields of `HomingStockParameters`.
 
     Raises:
-        PolicyError: it is not 0 < near <= far.
+        PolicyError: a parameter is unknown or out of range.
 
     Example:
         >>> policy = HomingStock()
@@ -334,5 +318,5 @@ class HomingStock(Homing):
         density = self.parameters.density
         if density > 0.0 and scenario.handling_time > 0.0:
             depth = scenario.n_items / (density * scenario.warehouse_height)
-            deep = self.parameters.model_copy(update={"near": depth, "far": depth + BAND})
+            deep = self.parameters.model_copy(update={"near": depth})
             self._values = deep.values()

@@ -33,7 +33,7 @@ from swarm_logistics_env.policies.files import (
     read_policy,
 )
 from swarm_logistics_env.policies.homing import Homing
-from swarm_logistics_env.policies.homing_stock import CREW, HomingStock
+from swarm_logistics_env.policies.homing_stock import HomingStock
 from swarm_logistics_env.policies.models import within
 from swarm_logistics_env.policies.policy import Policy, check_policy, identity_parts
 from swarm_logistics_env.policies.sb3_files import (
@@ -61,7 +61,6 @@ SCRIPTED: dict[str, Callable[..., Policy]] = {
     "site-fidelity": SiteFidelity,
     "homing": Homing,
     "homing-stock": HomingStock,
-    "homing-crew": functools.partial(HomingStock, **CREW),
     "homing-told": Told,
     "central": Central,
     "central-stock": CentralStock,

@@ -16,7 +16,7 @@ EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
 SMALL = Scenario(
     n_robots=10, n_items=24, warehouse_width=7.0, warehouse_height=5.0, duration=60.0, restock=True
 )
-WITHOUT_STOCK = {"homing-stock": "homing", "homing-crew": "homing", "central-stock": "central"}
+WITHOUT_STOCK = {"homing-stock": "homing", "central-stock": "central"}
 
 
 def fresh(n_robots: int, name: str = "homing") -> Any:
@@ -110,7 +110,7 @@ def test_who_holds_keeps_its_item_and_who_stocks_puts_it_down_before_the_area() 
     leaving[:, row.CARRYING] = 1.0
     gripper = policy.act(leaving)[:, 3]
     assert set(gripper) == {-1.0, 0.0}
-    assert (gripper == 0.0).mean() == pytest.approx(0.6, abs=0.08)
+    assert (gripper == 0.0).mean() == pytest.approx(0.5, abs=0.08)
     leaving[:, row.ITEMS : row.ITEMS + 3] = (1.0, 0.3, 0.3)  # no gap beside this item
     assert (policy.act(leaving)[:, 3] == 0.0).all()
 
@@ -134,10 +134,10 @@ def test_a_robot_whose_patience_is_over_leaves_the_requested_item_to_others_for_
 @pytest.mark.parametrize(
     ("n_items", "handling_time", "is_stocked"), [(60, 1.0, False), (10, 1.0, True), (60, 0.0, True)]
 )
-def test_the_stock_of_a_crew_is_the_deeper_the_more_items_there_are_if_lifting_takes_time(
+def test_a_stock_is_the_deeper_the_more_items_there_are_if_lifting_takes_time(
     n_items: int, handling_time: float, is_stocked: bool
 ) -> None:
-    policy: Any = load("homing-crew")
+    policy: Any = load("homing-stock")
     policy.configure(Scenario(n_items=n_items, handling_time=handling_time))
     policy.reset(400, 0)
     policy.act(rows_of(400, EAST))

@@ -91,8 +91,8 @@ def test_where_nothing_is_asked_for_it_is_the_script_itself() -> None:
     world = Warehouse(SCENARIO)
     rows = world.reset(seed=0)
     world.state.open_requests[:] = -1
-    told_script = policies.load("homing-told", near=2.0, far=2.5)
-    script = HomingStock(near=2.0, far=2.5)
+    told_script = policies.load("homing-told", near=2.0)
+    script = HomingStock(near=2.0)
     for policy in (told_script, script):
         policy.configure(SCENARIO)  # type: ignore[attr-defined]
         policy.reset(6, 3)
