@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
-from research.play_benchmark import STOCK
 from research.play_tables import shares_of_script
 from research.tables import ROOT, percent_change, play, rewrite, side, signed_percent, table
 from swarm_logistics_env import spi
@@ -72,7 +71,7 @@ REALISTIC = World(
     "mujoco",
     n_seeds=5,
     faults=(),
-    policies=("homing", STOCK, "ppo-robust@all"),
+    policies=("homing", "homing-stock", "ppo-robust@all"),
 )
 OTHERS = (
     World("wheels", _WHEELS, "mujoco", 10),

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.core.errors import PolicyError
-from swarm_logistics_env.policies.crowd import at_most_1, commands_of, drift, share_items
+from swarm_logistics_env.policies.crowd import approach, commands_of, drift, share_items
 from swarm_logistics_env.policies.planned_ground import ground_of
 from swarm_logistics_env.policies.policy import Scripted
 from swarm_logistics_env.policies.routes import (
@@ -52,6 +52,7 @@ class Central(Scripted):
         """Take the sizes of the warehouse and of the robots, and the floor plan."""
         self._scenario = scenario
         self._stride = scenario.max_speed * scenario.control_period  # [m] in a control step
+        self._braking_distance = scenario.max_speed**2 / (2.0 * scenario.max_acceleration)
         self._ground = ground_of(scenario)
 
     def reset(self, n_robots: int, seed: int) -> None:
@@ -264,12 +265,12 @@ class Central(Scripted):
         """Return velocities (N, 2), in top speeds, of robots on their way to where they wait."""
         return drift(
             state.robot_position, state.robot_present, goals, self._waits_under, worker,
-            self._stride,
+            self._stride, self._braking_distance,
         )  # fmt: skip
 
     def _towards(self, x: float, y: float, goal: tuple[float, float]) -> tuple[float, float]:
-        """Return the velocity, in top speeds, to be at the goal in one control step if it can."""
-        return at_most_1((goal[0] - x) / self._stride, (goal[1] - y) / self._stride)
+        """Return the velocity, in top speeds, to come to a stand at the goal."""
+        return approach(goal[0] - x, goal[1] - y, self._stride, self._braking_distance)
 
     def _steer(
         self,

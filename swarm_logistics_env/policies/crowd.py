@@ -24,6 +24,7 @@ def drift(
     waits_under: NDArray[np.int64],
     worker: int,
     stride: float,
+    braking_distance: float,
 ) -> Numbers:
     """Return velocities (N, 2), in top speeds, of robots on their way to where they wait.
 
@@ -33,6 +34,7 @@ def drift(
         waits_under: the item of each robot (N,), or `NOBODY`.
         worker: to whom all give way; `NOBODY`: to none.
         stride: how far a robot drives in a control period [m].
+        braking_distance: in which it stops from top speed [m].
     """
     n_robots = len(position)
     velocity = np.empty((n_robots, 2))
@@ -58,7 +60,7 @@ def drift(
         if is_at_goal and waits_under[robot] != NOBODY:
             shove_x = 0.0
             shove_y = 0.0
-        velocity_x, velocity_y = at_most_1(to_x / stride, to_y / stride)
+        velocity_x, velocity_y = approach(to_x, to_y, stride, braking_distance)
         # Pass on the right, so that two who meet get past each other.
         velocity_x += shove_x + 0.5 * shove_y
         velocity_y += shove_y + 0.5 * -shove_x
@@ -91,6 +93,23 @@ def commands_of(velocity: Numbers, cosine: Numbers, sine: Numbers, gripper: Numb
         commands[robot, 1] = cosine[robot] * y - sine[robot] * x
         commands[robot, 2], commands[robot, 3] = 0.0, gripper[robot]
     return commands
+
+
+@kernel
+def approach(
+    to_x: float, to_y: float, stride: float, braking_distance: float
+) -> tuple[float, float]:
+    """Return the velocity, in top speeds, of a robot that comes to a stand `to_x`, `to_y` [m] away.
+
+    Args:
+        stride: how far it drives in a control period [m].
+        braking_distance: in which it stops from top speed [m].
+    """
+    distance = math.sqrt(to_x * to_x + to_y * to_y)
+    scale = 1.0 / max(stride, distance)
+    if distance < braking_distance:
+        scale = min(scale, 1.0 / math.sqrt(max(distance, 1e-6) * braking_distance))
+    return scale * to_x, scale * to_y
 
 
 @kernel

@@ -8,23 +8,32 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from swarm_logistics_env.policies.crowd import drift, share_items
+from swarm_logistics_env.policies.crowd import approach, drift, share_items
 from swarm_logistics_env.world.warehouse.state import CARRIED, NOBODY, STORED
 
 
 def velocities(position: Any, goals: Any, worker: int = NOBODY, **changed: Any) -> Any:
-    """Return what `drift` does, of robots that wait under no item and drive 0.2 m a period."""
+    """Return what `drift` does, of robots that wait under no item and drive 0.2 m a period.
+
+    They stop in 0.1 m.
+    """
     position, goals = np.array(position, float), np.array(goals, float)
     fields = {
         "present": np.ones(len(position), np.bool_),
         "waits_under": np.full(len(position), NOBODY),
     } | changed
-    return drift(position, fields["present"], goals, fields["waits_under"], worker, 0.2)
+    return drift(position, fields["present"], goals, fields["waits_under"], worker, 0.2, 0.1)
 
 
 def test_a_robot_alone_drives_to_its_goal_and_is_there_in_one_period_if_it_can() -> None:
     np.testing.assert_allclose(velocities([[1, 1]], [[1, 3]]), [[0, 1]])
     np.testing.assert_allclose(velocities([[1, 1]], [[1.05, 1]]), [[0.25, 0]])
+
+
+def test_a_robot_slows_down_as_its_brakes_need_it() -> None:
+    speeds = [approach(0.0, distance, 0.2, 4.0)[1] for distance in (9.0, 4.0, 1.0, 0.25)]
+    assert speeds == pytest.approx([1.0, 1.0, 0.5, 0.25])
+    assert approach(0.01, 0.0, 0.2, 4.0) == (0.05, 0.0)  # it is there in one period
 
 
 def test_near_robots_push_each_other_aside_and_pass_on_the_right() -> None:
