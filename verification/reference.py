@@ -9,8 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from swarm_logistics_env import Fault, Scenario, Warehouse
-from swarm_logistics_env.core.streams import generator
+from swarm_logistics_env.compiler.kernels import pair_key, uniform
+from swarm_logistics_env.core.streams import generator, row_keys
 from swarm_logistics_env.world.warehouse.failure_modes import failure_mode
 from swarm_logistics_env.world.warehouse.faults import GRACE, LOST_AS_A_WHOLE, failed_robots
 from swarm_logistics_env.world.warehouse.state import NOBODY
@@ -174,8 +177,9 @@ class Faults:
 class Radio:
     """What each robot broadcasts: its timer, late and untrue as its faults make it; messages."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, seed: int) -> None:
         self._scenario = scenario
+        self._keys = row_keys(seed, "sensors", scenario.n_robots)
         self._last_inside: dict[int, int] = {}
         self._own: list[list[float]] = []  # by step and robot, before delays and lies
         self._given = [[[0.0] * scenario.message_size] * scenario.n_robots]
@@ -202,19 +206,31 @@ class Radio:
 
     def messages(self, commands: Sequence[Sequence[float]], able: list[Able]) -> list[list[float]]:
         """Return the message of each robot after a step; what it could do as the step began."""
-        nothing = [0.0] * self._scenario.message_size
+        step = len(self._given)
         self._given.append(
             [
-                [min(max(word, -1.0), 1.0) for word in command[4:]]
-                if can["present"] and can["obeys"]
-                else nothing
-                for command, can in zip(commands, able)
+                self._message(robot, step, command, able[robot])
+                for robot, command in enumerate(commands)
             ]
         )
-        step = len(self._given) - 1
         return [
             self._given[max(step - can["radio_delay"], 0)][robot] for robot, can in enumerate(able)
         ]
+
+    def _message(self, robot: int, step: int, command: Sequence[float], can: Able) -> list[float]:
+        """Return what a robot hands its channel, which may have failed, before it comes late."""
+        size = self._scenario.message_size
+        if not (can["present"] and can["obeys"]):
+            return [0.0] * size
+        if not can["messages_refresh"]:
+            return self._given[-1][robot]
+        if not can["messages_mean"]:
+            key = self._keys[robot]
+            n = self._scenario.n_robots
+            streams = [np.uint64(pair_key(key, n + part)) for part in range(size)]
+            return [2.0 * uniform(stream, step) - 1.0 for stream in streams]
+        sign = 1.0 if can["messages_true"] else -1.0
+        return [sign * min(max(word, -1.0), 1.0) for word in command[4:]]
 
 
 def rewards(

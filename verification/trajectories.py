@@ -110,8 +110,9 @@ GOLDEN = {
 }
 for _mode in FAILURE_MODES:
     _passing = None if _mode == "removed" else 6.0
-    GOLDEN[f"{_mode} from the start"] = _small(Fault(_mode, 2))
-    GOLDEN[f"{_mode} for a while"] = _small(Fault(_mode, 3, 5.0, _passing))
+    _size = 2 if _mode.startswith("message_") else 0
+    GOLDEN[f"{_mode} from the start"] = _small(Fault(_mode, 2), message_size=_size)
+    GOLDEN[f"{_mode} for a while"] = _small(Fault(_mode, 3, 5.0, _passing), message_size=_size)
 GOLDEN |= {
     "several faults at once": _small(
         Fault("FM1", (0, 1)), Fault("motor_slow", (1, 2), 3.0, 5.0, 0.3), Fault("FM4", 2, 8.0)

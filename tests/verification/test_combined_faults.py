@@ -112,7 +112,7 @@ def play(case: Case, last: int) -> list[int]:
     env.reset_arrays(case.number)
     world, rng = env.warehouse, random.Random(source)
     watch, faults = Watch(world), Faults(scenario, case.number, case.planned)
-    radio, before = Radio(scenario), deepcopy(world.state)
+    radio, before = Radio(scenario, case.number), deepcopy(world.state)
     copy: Warehouse | None = None
     able = check_able(world, faults, before)
     deaf = deepcopy(before)

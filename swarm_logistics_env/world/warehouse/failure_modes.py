@@ -27,6 +27,9 @@ class Capabilities(NamedTuple):
     obeys: Annotated[NDArray[np.bool_], "N"]  # False: ignores its commands, the gripper's too
     releases_inside: Annotated[NDArray[np.bool_], "N"]  # False: lets nothing go inside the area
     rangers_refresh: Annotated[NDArray[np.bool_], "N"]  # False: its rangers repeat one reading
+    messages_refresh: Annotated[NDArray[np.bool_], "N"]  # False: it repeats its last message
+    messages_mean: Annotated[NDArray[np.bool_], "N"]  # False: its messages are random numbers
+    messages_true: Annotated[NDArray[np.bool_], "N"]  # False: it tells the opposite
     ranger_bias: Annotated[NDArray[np.float64], "N"]  # [m] that its rangers read too far
     radio_delay: Annotated[NDArray[np.int64], "N"]  # control steps that its broadcasts lag
 
@@ -48,7 +51,7 @@ class FailureMode:
         radio_delay: how late its broadcasts come [s].
         present: False: it is out of the arena.
         lifts, delivers, sends, hears, hears_requests, honest, obeys, releases_inside,
-            rangers_refresh: see `Capabilities`.
+            rangers_refresh, messages_refresh, messages_mean, messages_true: see `Capabilities`.
     """
 
     description: str
@@ -70,6 +73,9 @@ class FailureMode:
     obeys: bool = True
     releases_inside: bool = True
     rangers_refresh: bool = True
+    messages_refresh: bool = True
+    messages_mean: bool = True
+    messages_true: bool = True
 
 
 # Sending and hearing are the robots' own radio, i.e. timers and messages. What the warehouse tells
@@ -126,6 +132,15 @@ FAILURE_MODES: dict[str, FailureMode] = {
     ),
     "rangers_biased": FailureMode("its rangers read 0.2 m too far", mark="B", ranger_bias=0.2),
     "radio_delayed": FailureMode("what it broadcasts comes 2 s late", mark="D", radio_delay=2.0),
+    "message_frozen": FailureMode(
+        "repeats the message that it broadcast when it failed", mark="mf", messages_refresh=False
+    ),
+    "message_random": FailureMode(
+        "broadcasts random numbers as its message", mark="mr", messages_mean=False
+    ),
+    "message_lying": FailureMode(
+        "broadcasts its message with the opposite sign", mark="ml", messages_true=False
+    ),
     "dead": FailureMode(
         "stands still, senses, sends and lifts nothing, keeps what it carries",
         mark="X",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel
+from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel, pair_key, uniform
 
 from .commands import MESSAGE
 from .sensor_errors import RADIO, is_missed
@@ -13,7 +13,11 @@ from .structs import NOBODY, World
 
 @kernel
 def send_messages(world: World) -> None:
-    """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros."""
+    """Broadcast the rest of the commands of those who obey, cut to [-1, 1]; of others, zeros.
+
+    A channel that has failed repeats what it was handed last, or hands on random numbers from the
+    robot's own stream, or the opposite.
+    """
     robots = world.robots
     able = world.able
     step = world.progress.step[0]
@@ -26,6 +30,13 @@ def send_messages(world: World) -> None:
         for part in range(message.shape[1]):
             number = world.commands.now[robot, MESSAGE + part] if sends else 0.0
             number = min(max(number, -1.0), 1.0)
+            if sends and not able.messages_true[robot]:
+                number = -number
+            if sends and not able.messages_mean[robot]:
+                # Beside the streams of the losses between robots, which the numbers 0 to n - 1 key.
+                number = 2.0 * uniform(pair_key(robots.sensor_key[robot], n + part), step) - 1.0
+            if sends and not able.messages_refresh[robot]:
+                number = before[((step - 1) % n_kept) * n + robot, part]
             before[(step % n_kept) * n + robot, part] = number
             if able.radio_delay[robot] > 0:
                 sent_step = step - able.radio_delay[robot]

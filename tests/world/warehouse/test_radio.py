@@ -47,6 +47,27 @@ def test_a_late_message_is_that_of_two_seconds_ago(build: Build) -> None:
     assert heard_by[:, 1] == pytest.approx([*[0.0] * 20, *sent[:-20]])
 
 
+@pytest.mark.parametrize(
+    ("mode", "sign"), [("message_frozen", 0.0), ("message_lying", -1.0), ("message_random", None)]
+)
+def test_a_channel_that_failed_repeats_turns_round_or_makes_up_what_it_is_handed(
+    build: Build, mode: str, sign: float | None
+) -> None:
+    world = build([(8.1, 5.0), (7.0, 5.0)], [FAR], [Fault(mode, (0,), 1.0)], message_size=1)
+    sent = np.linspace(-0.9, 1.0, 200)
+    rows = [world.step([(0.0, 0.0, 0.0, 0.0, number)] * 2) for number in sent]
+    heard_by = np.array(rows)[:, :, row.MESSAGES]
+    assert heard_by[:, 0] == pytest.approx(sent)  # the other robot's channel works
+    before, after = heard_by[:10, 1], heard_by[10:, 1]
+    assert before == pytest.approx(sent[:10])
+    if sign is None:
+        assert np.abs(after).max() < 1.0
+        assert abs(after.mean()) < 0.15
+        assert after.std() == pytest.approx(3.0**-0.5, abs=0.1)  # evenly in [-1, 1]
+    else:
+        assert after == pytest.approx(sign * sent[10:] if sign else np.full(190, sent[9]))
+
+
 def test_who_is_seen_and_not_heard_tells_neither_its_timer_nor_a_message(build: Build) -> None:
     fields: dict[str, Any] = {"view_range": 2.0, "radio_range": 1.0, "message_size": 1}
     world = build([(8.5, 5.0), (7.0, 5.0), (7.8, 5.0)], [FAR], **fields)
