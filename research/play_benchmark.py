@@ -10,10 +10,10 @@ from swarm_logistics_env.study.questions.benchmark_cells import benchmark_study,
 from swarm_logistics_env.study.report import benchmark, section
 from swarm_logistics_env.study.verdicts.results import StudyResults
 
-# Local scripts, with central control, then learned; the reference has score 1.
+# Local scripts, with central control, then learned; the reference, `homing-stock`, has score 1.
 POLICIES = (
-    "swarm-dt", "swarm-dt-follow", "biased-walk", "site-fidelity", "homing", "homing-stock",
-    "central", "central-stock", "ppo-delivery@all", "ppo-robust@all",
+    "swarm-dt", "swarm-dt-follow", "biased-walk", "site-fidelity", "homing", "central",
+    "central-stock", "ppo-delivery@all", "ppo-robust@all",
 )  # fmt: skip
 # Other people's learners, where `make interop` has trained them; each in its largest world.
 LEARNERS = ("sb3-ppo-paper", "benchmarl-ippo-paper", "torchrl-ppo-small", "benchmarl-mappo-small")
