@@ -56,6 +56,7 @@ CONTENTS = {
         "research/questions_of_the_field",
         "research/readings_and_tries",
         "research/paper_fit",
+        "research/tuning",
     ),
     "Look up": (
         "Commands and files <reference>",

@@ -1,5 +1,7 @@
 """One declared search over the parameters of every script: `make tune MINUTES=60`.
 
+It writes docs/research/tuning.md, and every set that was played into docs/results/tune.
+
 `swarm-dt` keeps the constants of the fit to the paper; what is better for it has another name.
 
 Declared before the first run. Method: CMA-ES (Hansen 2016) on the logarithms of the parameters,
@@ -17,6 +19,7 @@ from __future__ import annotations
 import csv
 import importlib
 import math
+import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -28,7 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import typer
 
-from research.tables import read_rows, write_rows
+from research.tables import ROOT, read_rows, rewrite, table, write_rows
 from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.spi.summaries import t_interval
@@ -39,6 +42,7 @@ FIRST_SEED = 5_500_000  # nothing else uses the seeds from here to 5,599,999
 CONFIRMED = 24  # fresh seeds
 RANGE = 4.0  # times and parts of the shipped value
 SPREAD = 1.0 / 6.0
+ENDS = ("ln gain", "low", "high")
 # Of each script, the parameters that are searched.
 SCRIPTS: Mapping[str, tuple[str, ...]] = {
     "swarm-dt": (
@@ -67,6 +71,8 @@ WORLDS: Mapping[str, Scenario] = {
     "slow lifting": _BASE.replace(handling_time=3.0),
     "paper": Scenario(restock=True),
 }
+PAGE = ROOT / "docs" / "research" / "tuning.md"
+RESULTS = ROOT / "docs" / "results" / "tune"
 Values = Mapping[str, float]
 
 
@@ -187,16 +193,43 @@ def confirm(script: str, values: Values) -> dict[str, Interval]:
     return {**by_world, "all": t_interval(gains.mean(axis=1))}
 
 
+def publish(out: Path) -> None:
+    """Write the page from what lies in `out`, and copy it."""
+    value_rows = []
+    gains: dict[str, dict[str, str]] = {}
+    for script in SCRIPTS:
+        for name in (f"{script}.csv", f"{script}-values.csv", f"{script}-confirmed.csv"):
+            RESULTS.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(out / name, RESULTS / name)
+        before, after = read_rows(RESULTS / f"{script}-values.csv")
+        value_rows += [(f"`{script}`", name, before[name], after[name]) for name in SCRIPTS[script]]
+        for row in read_rows(RESULTS / f"{script}-confirmed.csv"):
+            gain = Interval(*(100.0 * math.expm1(float(row[end])) for end in ENDS))
+            gains.setdefault(row["world"], {})[script] = section.bracketed(gain, 0)
+    n_sets = {script: len(read_tried(RESULTS / f"{script}.csv", script)) for script in SCRIPTS}
+    gain_rows = [(world, *(row[script] for script in SCRIPTS)) for world, row in gains.items()]
+    heads = [f"`{script}`, {n_sets[script]} sets" for script in SCRIPTS]
+    line = f"{CONFIRMED} fresh seeds; geometric means of P over that of the shipped set, 95 %."
+    blocks = {
+        "tuned values": table(("script", "parameter", "shipped", "searched"), value_rows),
+        "tuned gains": table(("change of P [%]", *heads), gain_rows, line),
+    }
+    rewrite(PAGE, blocks)
+
+
 def main(minutes: float = 60.0, out: Path = Path("results/tune")) -> None:
     """Search every script for an equal part of the time, confirm what comes out, and print it."""
     for script in SCRIPTS:
         end = time.monotonic() + 60.0 * minutes / len(SCRIPTS)
         values = search(script, out / f"{script}.csv", partial(_is_after, end))
-        write_rows(out / f"{script}-values.csv", list(values), [list(values.values())])
+        sets = {"shipped": shipped(script), "searched": values}
+        rows = [(name, *chosen.values()) for name, chosen in sets.items()]
+        write_rows(out / f"{script}-values.csv", ("set", *values), rows)
         gains = confirm(script, values)
-        rows = [(world, *interval) for world, interval in gains.items()]
-        write_rows(out / f"{script}-confirmed.csv", ("world", "ln gain", "low", "high"), rows)
+        gain_rows = [(world, *interval) for world, interval in gains.items()]
+        write_rows(out / f"{script}-confirmed.csv", ("world", *ENDS), gain_rows)
         print(script, values, {world: section.bracketed(g, 2) for world, g in gains.items()})
+    publish(out)
 
 
 def _is_after(end: float) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from research import tune
+from research.tables import write_rows
 
 
 def test_a_search_begins_with_the_shipped_values_and_goes_to_four_times_and_a_quarter() -> None:
@@ -39,3 +40,28 @@ def test_what_was_tried_is_read_back_and_a_line_that_was_cut_short_is_not(tmp_pa
     assert tune.read_tried(path, "homing") == tried
     path.write_text(path.read_text().rstrip()[:-4])
     assert tune.read_tried(path, "homing") == tried[:1]
+
+
+def test_the_page_has_the_values_of_both_sets_and_the_gain_in_each_world(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "tuning.md"
+    blocks = (
+        f"<!-- tables: tuned {name} -->\n<!-- end of tables -->" for name in ("gains", "values")
+    )
+    page.write_text("\n".join(blocks))
+    monkeypatch.setattr(tune, "PAGE", page)
+    monkeypatch.setattr(tune, "RESULTS", tmp_path / "results" / "tune")
+    for script, names in tune.SCRIPTS.items():
+        p = dict.fromkeys(tune.WORLDS, 7)
+        tune.append(tune.Tried(0, 5, tune.shipped(script), p), tmp_path / f"{script}.csv")
+        rows = [("shipped", *[1.5] * len(names)), ("searched", *[2.5] * len(names))]
+        write_rows(tmp_path / f"{script}-values.csv", ("set", *names), rows)
+        gains = [("aisles", math.log(1.5), math.log(0.9), math.log(2.0))]
+        write_rows(tmp_path / f"{script}-confirmed.csv", ("world", *tune.ENDS), gains)
+    tune.publish(tmp_path)
+    text = page.read_text()
+    assert "| aisles | 50 [-10, 100] | 50 [-10, 100] | 50 [-10, 100] |" in text
+    assert "| `homing-stock` | density | 1.5 | 2.5 |" in text
+    assert "`homing`, 1 sets" in text
+    assert tune.read_tried(tune.RESULTS / "homing.csv", "homing")
