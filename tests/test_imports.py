@@ -29,6 +29,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "wrappers": {"core", "environment", "spi", "world"},
     "policies": {"compiler", "core", "environment", "spi", "world", "wrappers"},
     "adapters": {"core", "environment", "policies", "world", "wrappers"},
+    "robots": {"compiler", "core", "policies", "world"},
     "study": {"compiler", "core", "policies", "spi", "world"},
 }
 MAY_IMPORT["train"] = {*MAY_IMPORT} - {"swarm_logistics_v0"}

@@ -1,0 +1,1 @@
+"""What leaves the simulator for robots."""

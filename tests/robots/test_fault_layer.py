@@ -1,0 +1,126 @@
+"""A layer around a policy lets a robot fail as the simulator lets it fail."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env import Fault, Scenario, Warehouse, policies
+from swarm_logistics_env.core.errors import FaultError
+from swarm_logistics_env.robots.fault_layer import FaultLayer, append_trial
+from swarm_logistics_env.study import read_trials
+from swarm_logistics_env.world import observations as row
+
+# Nobody hears anybody, so that what a faulty robot broadcasts changes no run.
+SILENT = Scenario(
+    n_robots=8, n_items=14, warehouse_width=5.0, warehouse_height=4.0, duration=60.0, restock=True,
+    radio_range=0.01,
+)  # fmt: skip
+N_STEPS = 250
+
+
+def run(scenario: Scenario, faults: list[Any], layers: list[FaultLayer]) -> np.ndarray[Any, Any]:
+    """Return the places of all robots after each step, with the faults or with the layers."""
+    world = Warehouse(scenario)
+    policy = policies.load("homing")
+    policy.configure(scenario)
+    policy.reset(scenario.n_robots, 4)
+    rows = world.reset(4, faults)
+    places = []
+    for _ in range(N_STEPS):
+        time = world.state.time
+        for robot, layer in enumerate(layers):
+            rows[robot] = layer.sensed(rows[robot], time)
+        commands = policy.act(rows)
+        for robot, layer in enumerate(layers):
+            commands[robot] = layer.driven(commands[robot], rows[robot], time)
+        rows = world.step(commands).copy()
+        places.append(world.state.robot_position.copy())
+    return np.array(places)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "motor_slow:3@5", "motor_dead:3@5", "motor_wear:3", "view_reduced:3@5+10",
+        "rangers_blind:3", "rangers_frozen:3@5", "rangers_biased:3@5", "FM2:3@5", "FM3:3",
+        "FM3_isolated:3@5+10",
+    ],
+)  # fmt: skip
+def test_a_swarm_with_layers_runs_as_one_with_the_faults_in_the_simulator(fault: str) -> None:
+    layers = [FaultLayer([fault], SILENT, robot, seed=4) for robot in range(SILENT.n_robots)]
+    np.testing.assert_allclose(run(SILENT, [], layers), run(SILENT, [fault], []), atol=1e-5)
+    assert any(layer.modes(6.0) for layer in layers)
+
+
+def layer_of(*faults: Any, **fields: Any) -> FaultLayer:
+    return FaultLayer(faults, Scenario(n_robots=1, **fields), number=0, seed=0)
+
+
+def test_a_dead_robot_stands_and_sends_nothing() -> None:
+    layer = layer_of("dead:1@10")
+    sensed = np.zeros(row.N_COLUMNS)
+    assert layer.driven([1.0, 0.0, 2.0, 1.0], sensed, 9.9).tolist() == [1.0, 0.0, 1.0, 1.0]
+    assert not layer.driven([1.0, 0.0, 0.0, 1.0], sensed, 10.0).any()
+    assert layer.broadcast(3.0, [], 9.9) is not None
+    assert layer.broadcast(3.0, [], 10.0) is None
+
+
+def test_grippers_fail_by_what_they_hold_and_where() -> None:
+    outside = np.zeros(row.N_COLUMNS)
+    inside = outside.copy()
+    inside[[row.IN_DELIVERY_AREA, row.CARRYING]] = 1.0
+    jam = layer_of("FM4_jam")
+    assert jam.driven([0, 0, 0, -1], outside, 0.0)[3] == -1.0
+    assert jam.driven([0, 0, 0, -1], inside, 0.0)[3] == 0.0
+    assert not jam.counts(0.0)
+    lame = layer_of("FM2")
+    assert lame.driven([0, 0, 0, 1], outside, 0.0)[3] == 0.0
+    assert lame.driven([0, 0, 0, 1], inside, 0.0)[3] == 1.0
+    assert lame.counts(0.0)
+
+
+@pytest.mark.parametrize(
+    ("mode", "timers", "words"),
+    [
+        ("FM1", [0, 0, 0, 0], [1, 0.5, 0, -0.5]),
+        ("FM3_send", [], []),
+        ("message_frozen", [4, 5, 6, 7], [0.9] * 4),
+        ("message_lying", [4, 5, 6, 7], [-1, -0.5, 0, 0.5]),
+        ("radio_delayed", [math.nan, 3, 4, 5], [0, 0.9, 1, 0.5]),
+    ],
+)
+def test_the_radio_sends_what_the_mode_leaves_of_timer_and_message(
+    mode: str, timers: list[float], words: list[float]
+) -> None:
+    # A delay of 2 s is two periods.
+    layer = layer_of(Fault(mode, 1, onset=1.0), control_period=1.0, message_size=1)
+    own = [(4.0, 1.0), (5.0, 0.5), (6.0, 0.0), (7.0, -0.5)]
+    assert layer.broadcast(3.0, [0.9], 0.0) == (3.0, [0.9])
+    sent = [layer.broadcast(timer, [word], 1.0 + k) for k, (timer, word) in enumerate(own)]
+    assert [one.timer for one in sent if one] == pytest.approx(timers, nan_ok=True)
+    assert [one.message[0] for one in sent if one] == pytest.approx(words)
+
+
+def test_trials_of_robots_are_a_table_that_judge_reads(tmp_path: Path) -> None:
+    path = tmp_path / "trials.csv"
+    swarm = Scenario(n_robots=12)
+    for seed, (sound, broken) in enumerate([(20, 15), (22, 16), (19, 12)]):
+        append_trial(path, [], swarm, seed, sound)
+        append_trial(path, ["FM4:2@30"], swarm, seed, broken)
+    trials = read_trials(path)
+    assert trials.performance(fault="FM4", faulty=2).tolist() == [15, 16, 12]
+    assert trials.performance(faulty=0).tolist() == [20, 22, 19]
+    with pytest.raises(FaultError, match="2 faults: should be at most 1"):
+        append_trial(path, ["FM4", "FM1"], swarm, 0, 1)
+
+
+def test_a_fault_by_role_and_a_robot_that_is_not_there_are_refused() -> None:
+    with pytest.raises(FaultError, match="role = 'carrier': should be None"):
+        layer_of("FM4:1:carrier")
+    with pytest.raises(FaultError, match="number = 1: robots are 0 to 0"):
+        FaultLayer([], Scenario(n_robots=1), number=1, seed=0)
