@@ -38,12 +38,17 @@ def commands_of(policy: Any) -> Any:
     """What robots that sense anything, ten steps long, are commanded to do, (steps, N, 4)."""
     rng = np.random.default_rng(0)
     low, high = observations.bounds(Scenario())
-    rows = rng.uniform(low, high, (12, 200, len(low))).astype(np.float32)
+    rows = rng.uniform(low, high, (12, 80, len(low))).astype(np.float32)
     flags = (low == 0.0) & (high == 1.0)
     rows[:, :, flags] = rows[:, :, flags].round()
-    policy.configure(Scenario(handling_time=1.0))  # where lifting takes time all parameters matter
-    policy.reset(200, 0)
-    return np.array([policy.act(step) for step in rows for _ in range(10)])
+    rows[:, 0, [observations.CARRYING, observations.CARRYING_REQUESTED]] = 1.0
+    rows[:, 0, observations.IN_DELIVERY_AREA] = 0.0  # for 12 s: it may lose its patience
+    commands = []
+    for handling_time in (0.0, 1.0):  # a stock has a parameter for either
+        policy.configure(Scenario(handling_time=handling_time, n_items=12))
+        policy.reset(80, 0)
+        commands += [policy.act(step) for step in rows for _ in range(10)]
+    return np.array(commands)
 
 
 # One that is told of the world needs a world: tests/policies/test_told.py.

@@ -55,15 +55,23 @@ def mutated(mutant: Mutant, source: str) -> str:
         _check_once(mutant, source.count(mutant.node))
         return source.replace(mutant.node, mutant.becomes)
     tree = ast.parse(source)
+    return replaced(tree, *change(mutant, tree))
+
+
+def change(mutant: Mutant, tree: ast.Module) -> tuple[ast.AST, ast.AST]:
+    """Return the node of the file's tree that a mutant replaces, and what stands there then."""
     definition = _definition(tree, mutant)
-    wanted, new = ast.dump(_node(mutant.node)), _node(mutant.becomes)
-    matches = [node for node in ast.walk(definition) if ast.dump(node) == wanted]
+    old, new = _node(mutant.node), _node(mutant.becomes)
+    wanted = ast.dump(old)
+    # Of its kind alone, as the text of a node is as long as all that is in it.
+    alike = (node for node in ast.walk(definition) if type(node) is type(old))
+    matches = [node for node in alike if ast.dump(node) == wanted]
     _check_once(mutant, len(matches))
     if isinstance(matches[0], ast.expr) and isinstance(new, ast.Pass):
         new = ast.Constant(None)
     if isinstance(matches[0], ast.stmt) and isinstance(new, ast.expr):
         new = ast.Expr(new)
-    return replaced(tree, matches[0], new)
+    return matches[0], new
 
 
 def replaced(tree: ast.Module, old: ast.AST, new: ast.AST) -> str:
