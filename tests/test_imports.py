@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
 import importlib
 import inspect
@@ -46,8 +47,13 @@ MODULES = {
 }
 
 
-def all_imports() -> Iterator[tuple[str, int, str]]:
-    """Yield the module that each import stands in, its line, and the module that it loads."""
+@functools.cache
+def all_imports() -> list[tuple[str, int, str]]:
+    """Return the module that each import stands in, its line, and the module that it loads."""
+    return list(_imports())
+
+
+def _imports() -> Iterator[tuple[str, int, str]]:
     for importer, path in MODULES.items():
         folder = importer if path.name == "__init__.py" else importer.rpartition(".")[0]
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -57,9 +63,6 @@ def all_imports() -> Iterator[tuple[str, int, str]]:
                 base = resolve_name("." * node.level + (node.module or ""), folder)
                 for member in (f"{base}.{alias.name}" for alias in node.names):
                     yield importer, node.lineno, member if member in MODULES else base
-
-
-IMPORTS = list(all_imports())
 
 
 def room(module: str) -> str:
@@ -77,7 +80,7 @@ def test_imports_point_one_way_as_the_table_has_it() -> None:
     graphlib.TopologicalSorter(MAY_IMPORT).prepare()  # raises CycleError
     uphill = [
         f"{importer}:{line} imports {imported}"
-        for importer, line, imported in IMPORTS
+        for importer, line, imported in all_imports()
         if imported.split(".")[0] == PACKAGE
         and room(imported) not in MAY_IMPORT[room(importer)] | {room(importer)}
     ]
@@ -86,7 +89,7 @@ def test_imports_point_one_way_as_the_table_has_it() -> None:
 
 def test_rooms_within_a_room_do_not_import_in_circles() -> None:
     below: dict[str, set[str]] = {}
-    for importer, _, imported in IMPORTS:
+    for importer, _, imported in all_imports():
         rooms = (inner_room(importer), inner_room(imported))
         if rooms[0] != rooms[1] and imported.startswith(PACKAGE):
             below.setdefault(rooms[0], set()).add(rooms[1])
@@ -95,7 +98,9 @@ def test_rooms_within_a_room_do_not_import_in_circles() -> None:
 
 
 def test_only_physics_knows_pymunk() -> None:
-    users = {importer for importer, _, imported in IMPORTS if imported.split(".")[0] == "pymunk"}
+    users = {
+        importer for importer, _, imported in all_imports() if imported.split(".")[0] == "pymunk"
+    }
     assert users == {f"{PACKAGE}.world.warehouse.physics"}
 
 
