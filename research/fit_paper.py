@@ -81,7 +81,7 @@ def cell_name(setting: Setting) -> str:
 
 def conditions(setting: Setting, radio_range: float) -> tuple[Scenario, list[Fault]]:
     """Return the scenario and the faults of a cell of the paper."""
-    kind, name, value, _ = setting
+    kind, name, value, *_ = setting
     scenario = Scenario(radio_range=radio_range)
     if kind == "size":
         large = Scenario.preset("paper_scalability")

@@ -108,7 +108,7 @@ def _published_cells(parts: Iterable[StudyResults]) -> Cells:
     modes = list(FAULTS)
 
     def position(cell: Cell) -> tuple[int, int]:
-        kind, name, value, _ = cell.arm.setting
+        kind, name, value, *_ = cell.arm.setting
         return KINDS.index(kind), modes.index(name) if kind == "fault" and value else -1
 
     cells = [cell for part in parts for cell in part.cells]
@@ -156,7 +156,7 @@ def _rows(cells: Iterable[Cell], missed: Sequence[Cell]) -> Iterator[tuple[str, 
 
 
 def _label(row: Sequence[Cell]) -> str:
-    kind, name, level, _ = row[0].arm.setting
+    kind, name, level, *_ = row[0].arm.setting
     values = ", ".join(f"{cell.arm.setting.value:g}" for cell in row)
     if kind == "size":
         n_items = row[0].arm.case.scenario.model_dump()["n_items"]

@@ -26,7 +26,7 @@ N_STEPS = 250
 def run(scenario: Scenario, faults: list[Any], layers: list[FaultLayer]) -> np.ndarray[Any, Any]:
     """Return the places of all robots after each step, with the faults or with the layers."""
     world = Warehouse(scenario)
-    policy = policies.load("homing")
+    policy: Any = policies.load("homing")
     policy.configure(scenario)
     policy.reset(scenario.n_robots, 4)
     rows = world.reset(4, faults)
@@ -100,7 +100,9 @@ def test_the_radio_sends_what_the_mode_leaves_of_timer_and_message(
     # A delay of 2 s is two periods.
     layer = layer_of(Fault(mode, 1, onset=1.0), control_period=1.0, message_size=1)
     own = [(4.0, 1.0), (5.0, 0.5), (6.0, 0.0), (7.0, -0.5)]
-    assert layer.broadcast(3.0, [0.9], 0.0) == (3.0, [0.9])
+    before = layer.broadcast(3.0, [0.9], 0.0)
+    assert before is not None
+    assert tuple(before) == (3.0, [0.9])
     sent = [layer.broadcast(timer, [word], 1.0 + k) for k, (timer, word) in enumerate(own)]
     assert [one.timer for one in sent if one] == pytest.approx(timers, nan_ok=True)
     assert [one.message[0] for one in sent if one] == pytest.approx(words)

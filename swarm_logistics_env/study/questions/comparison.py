@@ -21,12 +21,16 @@ CONFIDENCE = 0.95  # of intervals and verdicts, unless a look of a study makes i
 
 
 class Setting(NamedTuple):
-    """One setting of a factor: a swarm size, a fault, a parameter's value, or another policy."""
+    """One setting of a factor: a swarm size, a fault, a parameter's value, or another policy.
+
+    Where policies are compared in several conditions, `condition` says in which.
+    """
 
     kind: FactorKind
     name: str
     value: float
     onset: float = 0.0
+    condition: str = ""
 
     def __str__(self) -> str:
         if self.kind == "size":
@@ -34,7 +38,7 @@ class Setting(NamedTuple):
         if self.kind == "parameter":
             return f"{self.name} = {self.value:g}"
         if self.kind == "policy":
-            return f"{self.name}, N = {self.value:g}"
+            return f"{self.name}, {self.condition or f'N = {self.value:g}'}"
         if self == NO_FAULT:
             return "no fault"
         if self == OTHER_BEHAVIOUR:
@@ -191,3 +195,40 @@ def compared(table: str, arms: Sequence[Arm]) -> Iterator[Comparison]:
             third = by_setting.get(reference) if definition.needs_removed else None
             if third or not definition.needs_removed:
                 yield Comparison(table, definition.symbol, before, after, third)
+
+
+def between_policies(comparisons: Sequence[Comparison]) -> Iterator[Comparison]:
+    """Yield the change of P from each policy to the first, in the conditions that both have.
+
+    Of a failure mode only that with the most robots, so that the questions are few.
+    """
+    arms: dict[str, dict[tuple[object, object], Arm]] = {}
+    for comparison in comparisons:
+        removed = comparison.original.case.task.removed
+        most = arms.setdefault(comparison.policy, {})
+        for arm in comparison.arms:
+            setting = arm.setting
+            if setting.name == removed or setting == OTHER_BEHAVIOUR:
+                continue
+            is_fault = setting.kind == "fault" and setting != NO_FAULT
+            case = arm.case
+            fault: object = (setting.name, setting.onset) if is_fault else case.faults
+            condition: tuple[object, object] = (case.scenario, fault)
+            known = most.setdefault(condition, arm)
+            if is_fault and setting.value > known.setting.value:
+                most[condition] = arm
+    first, *others = arms
+    for policy in others:
+        for condition, arm in arms[policy].items():
+            if condition in arms[first]:
+                pair = (_of_policy(arm), _of_policy(arms[first][condition]))
+                yield from compared("Policies", pair)
+
+
+def _of_policy(arm: Arm) -> Arm:
+    """Return the arm as it stands in a comparison of policies."""
+    case = arm.case
+    setting = Setting(
+        "policy", case.policy.title, case.scenario.n_robots, condition=str(arm.setting)
+    )
+    return Arm(setting, case)

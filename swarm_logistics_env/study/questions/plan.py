@@ -15,7 +15,15 @@ from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.study.tasks.task import Case, Fields, Run, TaskFault, TaskScenario
 from swarm_logistics_env.study.trials import Trial
 
-from .comparison import NO_FAULT, OTHER_BEHAVIOUR, Arm, Comparison, Setting, compared
+from .comparison import (
+    NO_FAULT,
+    OTHER_BEHAVIOUR,
+    Arm,
+    Comparison,
+    Setting,
+    between_policies,
+    compared,
+)
 from .specification import BOTH, Ablation, Factor, Faults, Parameter, Sizes, Specification
 
 SUPERLINEAR = 1.0  # threshold of S for the steps in `Sizes.superlinear`
@@ -185,14 +193,15 @@ def make_plan(
         )
         for part, policy in parts.items()
     ]
+    wanted = [
+        comparison
+        for comparison in _comparisons(specification, cases)
+        if comparison.indicator in specification.indicators
+    ]
+    if specification.compares_policies:
+        wanted += between_policies(wanted)
     # What two factors compare alike is compared once, or Holm's family would count it twice.
-    comparisons = tuple(
-        dict.fromkeys(
-            comparison
-            for comparison in _comparisons(specification, cases)
-            if comparison.indicator in specification.indicators
-        )
-    )
+    comparisons = tuple(dict.fromkeys(wanted))
     if not comparisons:
         raise StudyError(
             "the study compares nothing: give sizes, faults, parameters or ablations, and the "

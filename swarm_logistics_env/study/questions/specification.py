@@ -207,6 +207,8 @@ class Specification(Record):
         scenario: the base scenario, as a table of the fields in which it differs from the task's
             default; "preset" is a field of the warehouse.
         sizes, faults, parameters, ablations: the factors that the study varies.
+        compares_policies: whether P of each policy is compared with that of the first one, in all
+            conditions that indicators need; of a failure mode in that with the most robots.
         indicators: the indicators to test; conditions that only others need are not run.
         until_clear: whether the study is looked at after 10, 20, .. up to `seeds` seeds, and each
             comparison stops where its verdict is clear under Holm; only the conditions that open
@@ -236,6 +238,7 @@ class Specification(Record):
     faults: Annotated[tuple[Faults, ...], BeforeValidator(each_of(Faults))] = ()
     parameters: Annotated[tuple[Parameter, ...], BeforeValidator(each_of(Parameter))] = ()
     ablations: Annotated[tuple[Ablation, ...], BeforeValidator(each_of(Ablation))] = ()
+    compares_policies: bool = False
     indicators: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(DEFINITIONS)
     until_clear: bool = False
     performance: Annotated[

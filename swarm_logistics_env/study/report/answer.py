@@ -28,6 +28,7 @@ from swarm_logistics_env.study.verdicts.verdict import (
 
 from . import section, templates
 from .answer_notes import notes, reasons_in_words
+from .policies_compared import comparison_in_words
 from .section import Section
 from .templates import Slots, fill
 
@@ -159,6 +160,7 @@ class Answer(NamedTuple):
     """What a study found.
 
     Attributes:
+        comparison: by which factor P of policies differs; empty: they are not compared.
         scope: how much was asked, of which policies, and over which seeds.
         performance: P of every policy where the swarm is as it should be.
         lines: the questions.
@@ -166,6 +168,7 @@ class Answer(NamedTuple):
         notes: how to read the verdicts, and what is still open.
     """
 
+    comparison: str
     scope: str
     performance: str
     lines: tuple[Line, ...]
@@ -198,7 +201,8 @@ class Answer(NamedTuple):
             (question, line.value, line.interval(level), line.verdict_text)
             for question, line in zip(self.questions, self.lines)
         )
-        return Section("Answer", columns, rows, (self.performance, self.notes))
+        above = [self.comparison] if self.comparison else []
+        return Section("Answer", columns, rows, (*above, self.performance, self.notes))
 
 
 def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
@@ -227,7 +231,8 @@ def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
     needs_runs = any(line.needs_runs for line in lines)
     reasons = reasons_in_words({line.reason for line in lines})
     notes_text = notes(results, needs_runs, reasons)
-    return Answer(scope, performance, tuple(lines), reasons, notes_text)
+    comparison = comparison_in_words(results)
+    return Answer(comparison, scope, performance, tuple(lines), reasons, notes_text)
 
 
 def _part_of_title(table: str) -> str:
@@ -286,7 +291,8 @@ def _question(verdicts: Sequence[Verdict]) -> tuple[str, Slots]:
     if after.kind == "fault":
         return "fault", {**slots, "start": start, "n_robots": comparison.n_robots}
     if after.kind == "policy":
-        return "policy", slots
+        condition = f", {after.condition}" if after.condition else ""
+        return "policy", {**slots, "condition": condition}
     return "parameter", {**slots, "before": before.value}
 
 

@@ -9,7 +9,7 @@ from typing import Self
 
 from swarm_logistics_env.study.verdicts.results import StudyResults
 
-from .answer import answer
+from .answer import Answer, answer
 from .section import Section
 
 
@@ -23,15 +23,16 @@ class Findings(StudyResults):
         return cls(**{field.name: getattr(results, field.name) for field in fields(results)})
 
     @cached_property
-    def _answer(self) -> Section:
-        return answer(self).section
+    def _answer(self) -> Answer:
+        return answer(self)
 
     def __repr__(self) -> str:
-        lines = ["  ".join(row) for row in self._answer.rows]
+        lines = [self._answer.comparison] if self._answer.comparison else []
+        lines += ["  ".join(row) for row in self._answer.section.rows]
         return "\n".join([f"Results of the study {self.plan.specification.name!r}", *lines])
 
     def _repr_html_(self) -> str:
-        return html_table(self._answer)
+        return html_table(self._answer.section)
 
 
 def html_table(section: Section) -> str:

@@ -103,6 +103,8 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
             "seeds": results.seeds_text,
         }
     }
+    if answer.comparison:
+        slots["comparison"] = {"comparison": answer.comparison[:-1]}
     method = templates.METHOD.format(error=section.percent(1.0 - CONFIDENCE))
     verdict_slots = {"words": words, "method": method}
     if len(verdicts) == 1:

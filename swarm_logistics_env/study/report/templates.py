@@ -30,6 +30,16 @@ SCOPE = {
     "incomplete": "{study}: {questions}, {policies}, up to {seeds}.",
 }
 
+# The line before all others where policies are compared.
+POLICIES = {
+    "decided": "P of {first} is {times} times that of {second} ({condition})",
+    "open": "Whether P of {first} or of {second} is larger is open: {times} times ({condition})",
+    "undefined": "P of {first} and of {second} cannot be compared: {problem} ({condition})",
+    "same": "; so in {n_same} of {n_others} other conditions",
+    "turned": "; the other way round: {conditions}",
+    "undecided": "; open: {conditions}",
+}
+
 # The second line of the answer: P where the swarm is as it should be.
 PERFORMANCE = {
     "nothing": "P: no run has succeeded.",
@@ -55,7 +65,7 @@ QUESTION = {
     "failure_modes": "{count} failure modes{start}",
     "parameters": "{count} parameters{start}",
     "fault": "{name}{start}, {values} of {n_robots}{property}",
-    "policy": "with {name}{property}",
+    "policy": "with {name}{condition}{property}",
     "parameter": "{name} {before:g}→{values}{property}",
 }
 
@@ -109,6 +119,7 @@ EXPLORATORY = "exploratory: over other seeds or P than were declared before the 
 # The sentence that a paper can quote: the cases that apply, one after the other.
 FOR_A_PAPER = {
     "performance": "{policies}{world}: {performance} over {seeds}",
+    "comparison": ". {comparison}",
     "one_question": "; {lowest}; {property}: {words} ({method})",
     "several_questions": "; of {n_questions} questions {words} ({method})",
     "not_decided": "; not decided: {questions}",

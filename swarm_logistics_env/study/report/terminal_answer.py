@@ -21,7 +21,8 @@ def terminal_answer(answer: Answer, width: int, most: int | None = MOST_LINES) -
         width: of the terminal [characters]; no line is longer.
         most: lines at most; None: as many as it takes.
     """
-    head = [*_fold(answer.scope, width), *_fold(answer.performance, width)]
+    above = (answer.comparison, answer.scope, answer.performance)
+    head = [line for text in above for line in _fold(text, width)]
     tail = _fold(answer.notes, width)
     rows = _rows(answer, width)
     n_rows = len(rows) if most is None else most - len(head) - len(tail)

@@ -16,7 +16,13 @@ from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.progress_bar import ProgressBar
 from swarm_logistics_env.core.records import file_name
 from swarm_logistics_env.policies.spec import PolicySpec
-from swarm_logistics_env.study.questions.comparison import OTHER_BEHAVIOUR, Arm, Setting, compared
+from swarm_logistics_env.study.questions.comparison import (
+    OTHER_BEHAVIOUR,
+    Arm,
+    Setting,
+    between_policies,
+    compared,
+)
 from swarm_logistics_env.study.questions.declaration import Declaration
 from swarm_logistics_env.study.questions.plan import Origin, Plan
 from swarm_logistics_env.study.questions.specification import Specification
@@ -171,9 +177,12 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
         (title, [Arm(setting, _case(origin, row)) for setting, row in rows])
         for title, rows in _tables(origin)
     ]
+    comparisons = [comparison for title, arms in tables for comparison in compared(title, arms)]
+    if len(specification.policies) == 2:  # of more, nobody says which one is the reference
+        comparisons += between_policies(comparisons)
     return Plan(
         specification,
-        tuple(comparison for title, arms in tables for comparison in compared(title, arms)),
+        tuple(comparisons),
         RECORDED.code(),
         {},
         nulls={

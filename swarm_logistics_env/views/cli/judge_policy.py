@@ -56,11 +56,12 @@ FIXED_BY_BENCHMARK = (
     "seeds", "first_seed", "clearing", "performance", "preset", "scenario_file", "changes", "bodies"
 )  # fmt: skip
 
-PolicyArgument = Annotated[
-    str,
+PoliciesArgument = Annotated[
+    list[str],
     Argument(
-        metavar="POLICY",
-        help="Name (`list policies`), path of a policy file, module:Class or my.py:Class.",
+        metavar="POLICIES",
+        help="Name (`list policies`), path of a policy file, module:Class or my.py:Class. Each "
+        "other one is compared with the first.",
     ),
 ]
 MostSeedsOption = Annotated[
@@ -72,7 +73,7 @@ MostSeedsOption = Annotated[
 
 def judge_policy_command(
     context: typer.Context,
-    policy: PolicyArgument,
+    policies: PoliciesArgument,
     out: JudgedOption = None,
     seeds: MostSeedsOption = None,
     first_seed: FirstSeedOption = None,
@@ -105,7 +106,7 @@ def judge_policy_command(
     normalize: NormalizeOption = None,
     env: EnvOption = None,
 ) -> None:
-    """Judge a policy until its verdicts are clear.
+    """Judge a policy until its verdicts are clear, or compare several.
 
     It is played in a warehouse in which delivered items come back, so that P has no cap: that in
     which a policy file was trained, or the paper's. Sizes and failures follow from it.
@@ -113,29 +114,29 @@ def judge_policy_command(
     if as_benchmark:
         _refuse_conditions(context)
     engine = engine_named("local" if processes == 1 else "process", processes, run_limit=run_limit)
-    (spec,) = policies_of([policy], trust_code, frame, normalize, env)
+    specs = policies_of(policies, trust_code, frame, normalize, env)
     most_seeds = seeds or JUDGE_SEEDS
     world = None
     if not as_benchmark:
-        scenario = _scenario_without_cap(preset, scenario_file, changes, bodies, spec)
+        scenario = _scenario_without_cap(preset, scenario_file, changes, bodies, specs)
         options = options_of_world(preset, scenario_file, changes, bodies)
         world = JudgedWorld(scenario, clearing, options, first_seed, performance)
-    for training in spec.trainings or (spec,):
-        training.load()  # what is wrong with it is said before anything is written
+    for spec in specs:
+        for training in spec.trainings or (spec,):
+            training.load()  # what is wrong with it is said before anything is written
     if world is None:
-        name = f"{slug(spec.title)}-{entry_digest(spec)[:8]}"
-        directory = out or Path("results", "benchmark", name)
-        study = Study(out=directory, **dict(benchmark_study(spec)))
+        study = _benchmark_of(specs, out)
     else:
-        directory = out or Path("results", "judged", "-".join([slug(spec.title), *world.words]))
-        study = _study_in(world, directory, spec, most_seeds, until_clear=until_clear)
+        study = _study_in(world, out, specs, most_seeds, until_clear=until_clear)
+    directory = study.out
+    assert directory is not None
     say(f"{study.plan()}, kept in {directory}")
     echo()
     say_what_a_pilot_shows(study)
     tally = run_study(study, engine, minutes=minutes)
     results = study.findings()
     if world is None and not (tally.left or tally.failed):
-        _show_benchmark(results, entry_digest(spec), directory)
+        _show_benchmark(results, entry_digest(specs[0]), directory)
     else:
         show_report(results, directory, full=full, is_finished=not tally.left)
     is_open = any(verdict.on_property.adjusted == "open" for verdict in results.verdicts)
@@ -143,11 +144,26 @@ def judge_policy_command(
         reason = f"Stopped after {minutes:g} min, {tally.left} runs are left"
         say(f"{reason}; the same command goes on:", str(context.obj))
     # Several trainings and untrusted code need options that the suggested command does not have.
-    elif world and is_open and not (tally.left or spec.trainings or spec.trusted):
-        words = [spec.name, *world.options_again, "--first-seed", str(study.plan().seeds[-1] + 1)]
+    elif world and is_open and not tally.left and not any(map(_needs_options, specs)):
+        names = [spec.name for spec in specs]
+        unseen = str(study.plan().seeds[-1] + 1)
+        words = [*names, *world.options_again, "--first-seed", unseen]
         _suggest_more_seeds(words, directory, max(JUDGE_SEEDS, 2 * most_seeds))
     say_what_was_played(tally)
     raise Exit(1 if tally.failed else 0)
+
+
+def _benchmark_of(policies: Sequence[PolicySpec], out: Path | None) -> Study:
+    """Return the benchmark's study of a policy, kept in a directory."""
+    if len(policies) > 1:
+        raise StudyError(f"--benchmark: should be of one policy, not of {len(policies)}")
+    (policy,) = policies
+    name = f"{slug(policy.title)}-{entry_digest(policy)[:8]}"
+    return Study(out=out or Path("results", "benchmark", name), **dict(benchmark_study(policy)))
+
+
+def _needs_options(policy: PolicySpec) -> bool:
+    return bool(policy.trainings) or policy.trusted
 
 
 def _refuse_conditions(context: typer.Context) -> None:
@@ -166,11 +182,11 @@ def _scenario_without_cap(
     scenario_file: Path | None,
     changes: Repeated,
     bodies: str | None,
-    policy: PolicySpec,
+    policies: Sequence[PolicySpec],
 ) -> Scenario:
     """Return the scenario that the options name, in which items come back if not said otherwise."""
     usual = Scenario.model_validate(load_preset(STUDY).scenario)
-    scenario = scenario_of(preset, scenario_file, changes, bodies, policies=[policy], usual=usual)
+    scenario = scenario_of(preset, scenario_file, changes, bodies, policies=policies, usual=usual)
     if "restock" in changed_fields(changes, bodies):
         return scenario
     return scenario.replace(restock=True)
@@ -216,18 +232,25 @@ class JudgedWorld(NamedTuple):
 
 
 def _study_in(
-    world: JudgedWorld, directory: Path, policy: PolicySpec, most_seeds: int, *, until_clear: bool
+    world: JudgedWorld,
+    out: Path | None,
+    policies: Sequence[PolicySpec],
+    most_seeds: int,
+    *,
+    until_clear: bool,
 ) -> Study:
-    """Return the study of a policy in a world, kept in a directory."""
+    """Return the study of policies in a world, kept in a directory."""
+    titles = "-and-".join(slug(policy.title) for policy in policies)
     study = study_of(
         STUDY,
-        directory,
+        out or Path("results", "judged", "-".join([titles, *world.words])),
         most_seeds,
-        [policy],
-        policy.trusted,
+        policies,
+        policies[0].trusted,
         until_clear=until_clear and most_seeds > FIRST_LOOK,
         first_seed=world.first_seed,
         performance=world.performance,
+        compares_policies=len(policies) > 1,
     )
     ask_in_world(study, world.scenario)
     if world.clearing:

@@ -51,10 +51,16 @@ class JudgeCommand(TyperCommand):
         context = self.context_class(self, info_name=info_name, parent=parent)
         typed, _, _ = self.make_parser(context).parse_args(list(args))
         argument, *options = self.params
-        target = typed[argument.name]
-        if target is None:
+        targets = typed[argument.name]
+        if not targets:
             return super().make_context(info_name, args, parent, **extra)
+        target, *others = targets
         kind = POLICY if names_policy(target) else TRIALS
+        for other in others:
+            if kind == TRIALS or not names_policy(other):
+                raise StudyError(
+                    f"{' '.join(targets)}: should be policies alone, or one file of trials"
+                )
         half = self.halves[kind]
         for option in options:
             if option.name in typed and option.name not in _names(half):
@@ -92,16 +98,16 @@ def _names(command: TyperCommand) -> set[str]:
 # Nobody calls it: `judge --help` shows its argument and its text.
 def judge_command(
     policy_or_trials: Annotated[
-        str,
+        list[str],
         Argument(
-            metavar="TRIALS|POLICY",
+            metavar="TRIALS|POLICIES",
             help="File of trials, one trial or delivery a row (CSV, .xlsx, .parquet, JSON of "
             "POGEMA or marl-eval, a Monitor's CSV), or a folder of them; or a policy: name, path "
-            "of a policy file, module:Class or my.py:Class.",
+            "of a policy file, module:Class or my.py:Class; several policies are compared.",
         ),
     ],
 ) -> None:
-    """Judge a policy until its verdicts are clear, or recorded trials.
+    """Judge policies until verdicts are clear, or recorded trials.
 
     A file or folder of trials is read, a policy is played. `judge TRIALS --help` and `judge POLICY
     --help` show the options of one alone.

@@ -217,7 +217,7 @@ def test_the_order_of_rows_decides_nothing(columns: list[str]) -> None:
     )
     assert first.plan.paired == bool(columns)
     assert first.policies == ("Base", "ours")
-    assert len(first.verdicts) == 2 * (1 + 1 + 2 + 1)
+    assert len(first.verdicts) == 2 * (1 + 1 + 2 + 1) + 4  # and the two side by side
     for results in shuffled:
         assert results.verdict_table.equals(first.verdict_table)
         assert results.cell_table.equals(first.cell_table)
