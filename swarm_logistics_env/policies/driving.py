@@ -6,6 +6,7 @@ Each returns a direction in a robot's own frame, or a motion: direction (x, y), 
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,24 +24,48 @@ HOLD = 0.0
 LET_GO = -1.0
 
 
+# Of these each script has values of its own.
+SpreadGain = Annotated[
+    NonNegativeFloat,
+    Field(description="away from each neighbour while it searches, in top speeds at distance 0"),
+]
+SpreadRange = Annotated[PositiveFloat, Field(description="where that push has fallen to 0 [m]")]
+AvoidGain = Annotated[
+    NonNegativeFloat,
+    Field(description="away from each near neighbour, always, in top speeds at distance 0"),
+]
+AvoidRange = Annotated[PositiveFloat, Field(description="where that push has fallen to 0 [m]")]
+WallGain = Annotated[
+    NonNegativeFloat,
+    Field(description="away from the nearest wall while it searches, in top speeds at distance 0"),
+]
+WallRange = Annotated[PositiveFloat, Field(description="where that push has fallen to 0 [m]")]
+Sure = Annotated[
+    NonNegativeFloat,
+    Field(description="entries lately, from which on it listens to no timer"),
+]
+Clearance = Annotated[
+    PositiveFloat, Field(description="a laden robot's centre from an item that it passes [m]")
+]
+ObstacleRange = Annotated[
+    PositiveFloat,
+    Field(description="how far it looks ahead for items when laden, beyond where they touch [m]"),
+]
+
+
 class DrivingParameters(ScriptParameters):
     """The gains and ranges of the kernels that `Homing` and `HomingStock` share.
 
-    All are fitted: they were tried for the most deliveries.
+    All are fitted: they were tried for the most deliveries, those without a value here in the
+    search of `research/tune.py`.
     """
 
-    spread_gain: NonNegativeFloat = Field(
-        0.8, description="away from each neighbour while it searches, in top speeds at distance 0"
-    )
-    spread_range: PositiveFloat = Field(2.0, description="where that push has fallen to 0 [m]")
-    avoid_gain: NonNegativeFloat = Field(
-        2.0, description="away from each near neighbour, always, in top speeds at distance 0"
-    )
-    avoid_range: PositiveFloat = Field(0.5, description="where that push has fallen to 0 [m]")
-    wall_gain: NonNegativeFloat = Field(
-        1.5, description="away from the nearest wall while it searches, in top speeds at distance 0"
-    )
-    wall_range: PositiveFloat = Field(0.6, description="where that push has fallen to 0 [m]")
+    spread_gain: SpreadGain
+    spread_range: SpreadRange
+    avoid_gain: AvoidGain
+    avoid_range: AvoidRange
+    wall_gain: WallGain
+    wall_range: WallRange
     mirror_range: NonNegativeFloat = Field(
         0.2, description="reflects its direction at a wall nearer than this while it searches [m]"
     )
@@ -50,15 +75,9 @@ class DrivingParameters(ScriptParameters):
     home_share: NonNegativeFloat = Field(
         0.8, description="of the direction home in a laden robot's, the rest is its heading"
     )
-    sure: NonNegativeFloat = Field(
-        3.0, description="entries lately, from which on it listens to no timer"
-    )
-    clearance: PositiveFloat = Field(
-        0.28, description="a laden robot's centre from an item that it passes [m]"
-    )
-    obstacle_range: PositiveFloat = Field(
-        0.5, description="how far it looks ahead for items when laden, beyond where they touch [m]"
-    )
+    sure: Sure
+    clearance: Clearance
+    obstacle_range: ObstacleRange
 
 
 @kernel

@@ -26,7 +26,16 @@ from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.driving import (
     LET_GO,
     LIFT,
+    AvoidGain,
+    AvoidRange,
+    Clearance,
     DrivingParameters,
+    ObstacleRange,
+    SpreadGain,
+    SpreadRange,
+    Sure,
+    WallGain,
+    WallRange,
     avoid_neighbours,
     fetch,
     freest_direction,
@@ -45,6 +54,16 @@ from swarm_logistics_env.world.scenario import Scenario
 
 class HomingParameters(DrivingParameters):
     """The parameters of `Homing`."""
+
+    spread_gain: SpreadGain = 0.2863
+    spread_range: SpreadRange = 3.767
+    avoid_gain: AvoidGain = 2.149
+    avoid_range: AvoidRange = 0.2247
+    wall_gain: WallGain = 4.609
+    wall_range: WallRange = 0.3258
+    sure: Sure = 4.061
+    clearance: Clearance = 0.2135
+    obstacle_range: ObstacleRange = 0.6606
 
 
 Parameters = HomingParameters.for_kernels()

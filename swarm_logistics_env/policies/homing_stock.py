@@ -45,7 +45,16 @@ from swarm_logistics_env.policies.driving import (
     HOLD,
     LET_GO,
     LIFT,
+    AvoidGain,
+    AvoidRange,
+    Clearance,
     DrivingParameters,
+    ObstacleRange,
+    SpreadGain,
+    SpreadRange,
+    Sure,
+    WallGain,
+    WallRange,
     avoid_neighbours,
     fetch,
     freest_direction,
@@ -85,6 +94,16 @@ PULL = 0.4  # home, beside a random direction of length 1
 
 class HomingStockParameters(DrivingParameters):
     """Those that `HomingStock` shares with `Homing`, and those of its stock, all fitted."""
+
+    spread_gain: SpreadGain = 0.8
+    spread_range: SpreadRange = 2.0
+    avoid_gain: AvoidGain = 2.0
+    avoid_range: AvoidRange = 0.5
+    wall_gain: WallGain = 1.5
+    wall_range: WallRange = 0.6
+    sure: Sure = 3.0
+    clearance: Clearance = 0.28
+    obstacle_range: ObstacleRange = 0.5
 
     near: PositiveFloat = Field(
         0.8,

@@ -42,7 +42,7 @@ from swarm_logistics_env.policies.sb3_files import (
     refuse_untrusted,
 )
 from swarm_logistics_env.policies.site_fidelity import SiteFidelity
-from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, SwarmDT
+from swarm_logistics_env.policies.swarm_dt import CONSTANTS_2026, CONSTANTS_TUNED, SwarmDT
 from swarm_logistics_env.policies.told import Told
 
 ENTRY_POINTS = "swarm_logistics_env.policies"
@@ -53,6 +53,7 @@ WEIGHTS = Path(__file__).parent / "weights"
 SCRIPTED: dict[str, Callable[..., Policy]] = {
     "swarm-dt": SwarmDT,
     "swarm-dt-2026": functools.partial(SwarmDT, **CONSTANTS_2026),
+    "swarm-dt-tuned": functools.partial(SwarmDT, **CONSTANTS_TUNED),
     "swarm-dt-follow": functools.partial(SwarmDT, heading_follows=True),
     # This is Swarm D-T without its taxis, for ablations.
     "random-walk": functools.partial(SwarmDT, taxis_gain=0.0),

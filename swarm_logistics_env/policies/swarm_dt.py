@@ -82,6 +82,18 @@ CONSTANTS_2026 = {
     "full_speed": False,
 }
 
+# The most deliveries in the ten worlds of the search in `research/tune.py`, not the paper's tables.
+CONSTANTS_TUNED = {
+    "diffusion": 0.06493,
+    "avoidance_gain": 0.42,
+    "avoidance_range": 0.3993,
+    "item_avoidance_gain": 1.198,
+    "item_avoidance_range": 0.2428,
+    "wall_distance": 0.3223,
+    "taxis_gain": 0.8622,
+    "drop_rate": 0.9005,
+}
+
 
 Parameters = SwarmDTParameters.for_kernels()
 
