@@ -7,23 +7,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, NoReturn, ParamSpec, TypeVar, cast
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.compiler.numba_fence import IS_PLAIN
+from swarm_logistics_env.compiler.numba_fence import IS_MISSING, IS_PLAIN, numba
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
+
+def _refuse_worlds(*_: object) -> NoReturn:
+    raise ModuleNotFoundError("a world needs the package numba, without which robots decide alone")
+
+
 # The array at a pointer (`addresses.pointer_at`), of a shape and a type.
-carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
+carray: Callable[..., NDArray[Any]]
+carray = _refuse_worlds if IS_MISSING else numba.carray  # type: ignore[attr-defined]  # not declared
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function` with numba.
+    """Compile `function` with numba; where that is missing it stays what it is.
 
     Without the interpreter's lock, so that several worlds step in threads; cached on disk, so
     that a second process starts at once; without fast-math, so that results are the same bits
@@ -49,6 +54,8 @@ def engine_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _compile(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
+    if IS_MISSING:
+        return function
     if IS_PLAIN:
         # Not kept on disk: numba looks at the kernel's own file alone, not at what it takes from
         # others, so that code of older sources would run.

@@ -11,10 +11,6 @@ from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
-from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
-from numba.core import types
-from numba.extending import intrinsic
-from numba.np import arrayobj
 from numpy.typing import NDArray
 
 from swarm_logistics_env.compiler.kernels import kernel
@@ -28,9 +24,6 @@ WIDE = 32  # outputs of a block
 NARROW = 8
 _LANES = 8  # floats in a register
 _ARRAYS = (0, 4, 6, 8)  # which of the arguments are arrays
-make_array: Any = arrayobj.make_array  # without types
-_COUNT = ir.IntType(64)
-_VECTOR = ir.VectorType(ir.FloatType(), _LANES)
 
 
 def _by_loops(width: int) -> SumBlock:
@@ -57,22 +50,28 @@ def _by_loops(width: int) -> SumBlock:
             biases, first_bias: a bias of each output.
             sums, first_sum, next_sum: where the sums begin, as `values`.
         """
-        for row in range(ROWS):
+        for row in range(ROWS if next_sum > 0 else 1):
             start = first_sum + row * next_sum
             total = sums[start : start + width]
             total[:] = biases[first_bias : first_bias + width]
             for index in range(n_in):
                 value = values[first_value + row * next_value + index]
                 weight = first_weight + index * width
-                of_input = weights[weight : weight + width]
-                for output in range(width):
-                    total[output] += value * of_input[output]
+                total += value * weights[weight : weight + width]
 
     return kernel(sum_block)
 
 
 def _in_registers(width: int) -> SumBlock:
     """Return the same as `_by_loops`, made of vector instructions."""
+    from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
+    from numba.core import types
+    from numba.extending import intrinsic
+    from numba.np import arrayobj
+
+    make_array: Any = arrayobj.make_array  # without types
+    count = ir.IntType(64)
+    vector_type = ir.VectorType(ir.FloatType(), _LANES)
     n_vectors = width // _LANES
 
     def typed(
@@ -95,12 +94,12 @@ def _in_registers(width: int) -> SumBlock:
         )
 
         def number(value: int) -> Any:
-            return ir.Constant(_COUNT, value)
+            return ir.Constant(count, value)
 
         def vectors_at(pointer: Any, first: Any) -> list[Any]:
             indices = (builder.add(first, number(_LANES * vector)) for vector in range(n_vectors))
             return [
-                builder.bitcast(builder.gep(pointer, [index]), _VECTOR.as_pointer())
+                builder.bitcast(builder.gep(pointer, [index]), vector_type.as_pointer())
                 for index in indices
             ]
 
@@ -109,9 +108,9 @@ def _in_registers(width: int) -> SumBlock:
 
         def in_all_lanes(value: Any) -> Any:
             first_lane = ir.Constant(ir.IntType(32), 0)
-            lane = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), value, first_lane)
+            lane = builder.insert_element(ir.Constant(vector_type, ir.Undefined), value, first_lane)
             zeros = ir.Constant(ir.VectorType(ir.IntType(32), _LANES), [0] * _LANES)
-            return builder.shuffle_vector(lane, ir.Constant(_VECTOR, ir.Undefined), zeros)
+            return builder.shuffle_vector(lane, ir.Constant(vector_type, ir.Undefined), zeros)
 
         initial = [load(pointer) for pointer in vectors_at(biases, first_bias)]
         before = builder.block
@@ -119,8 +118,8 @@ def _in_registers(width: int) -> SumBlock:
         builder.branch(head)
 
         builder.position_at_end(head)
-        index = builder.phi(_COUNT)
-        totals = [[builder.phi(_VECTOR) for _ in initial] for _ in range(ROWS)]
+        index = builder.phi(count)
+        totals = [[builder.phi(vector_type) for _ in initial] for _ in range(ROWS)]
         index.add_incoming(number(0), before)
         for row_totals in totals:
             for total, bias in zip(row_totals, initial):

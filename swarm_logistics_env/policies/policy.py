@@ -8,7 +8,7 @@ import sys
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self, cast, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from swarm_logistics_env.core.records import Record, canonical_json
 from swarm_logistics_env.policies.evaluation_mode import in_evaluation
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.state import WarehouseState
+
+if TYPE_CHECKING:
+    from swarm_logistics_env.policies.row_policy import Robot
 
 
 @runtime_checkable
@@ -67,6 +70,16 @@ def check_policy(policy: object) -> None:
 
 class Described:
     """A policy that says in a line what it is: in a session, and with a sentence in a notebook."""
+
+    def robot(self, body: Scenario, period: float, seed: int, number: int = 0) -> Robot:
+        """Return one robot that it steers, of the `number` in its swarm; see `Robot`.
+
+        Raises:
+            PolicyError: it does not decide from rows alone.
+        """
+        from swarm_logistics_env.policies.row_policy import Robot
+
+        return Robot(self, body, period, seed, number)
 
     def _repr_html_(self) -> str:
         about = (type(self).__doc__ or "").partition("\n\n")[0]
