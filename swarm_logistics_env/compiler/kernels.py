@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NoReturn, ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +17,15 @@ from swarm_logistics_env.compiler.numba_fence import IS_MISSING, IS_PLAIN, numba
 P = ParamSpec("P")
 R = TypeVar("R")
 
-
-def _refuse_worlds(*_: object) -> NoReturn:
-    raise ModuleNotFoundError("a world needs the package numba, without which robots decide alone")
-
-
-# The array at a pointer (`addresses.pointer_at`), of a shape and a type.
-carray: Callable[..., NDArray[Any]]
-carray = _refuse_worlds if IS_MISSING else numba.carray  # type: ignore[attr-defined]  # not declared
+# The array at a pointer (`addresses.pointer_at`), of a shape and a type; worlds alone need it.
+carray: Callable[..., NDArray[Any]] = getattr(numba, "carray", None)  # type: ignore[assignment]
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function` with numba; where that is missing it stays what it is.
+    """Compile `function` with numba; where that is missing it stays as it is.
+
+    To have the same bits there, a float32 that meets a plain float is made np.float64 in the code:
+    numba does so by itself, numpy does not.
 
     Without the interpreter's lock, so that several worlds step in threads; cached on disk, so
     that a second process starts at once; without fast-math, so that results are the same bits

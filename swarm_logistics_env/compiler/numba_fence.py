@@ -7,7 +7,7 @@ kernels are compiled in the plain way, by what numba documents alone, those that
 engine are interpreted, and worlds step one after the other. Both ways give the same bits.
 
 Without numba kernels are the Python functions that they are written as. That is for one robot's
-computer (`policies.row_policy.Robot`): the last bits are others, and worlds are refused.
+computer (`policies.row_policy.Robot`), which decides the same; worlds are refused.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from swarm_logistics_env.compiler.kernels import kernel, uniform
 from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
-from swarm_logistics_env.policies.row_policy import RowPolicy
+from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import MotionView
 from swarm_logistics_env.world.motion.memory import fading, length_of, note_command, remember_row
@@ -106,6 +106,11 @@ class BiasedWalk(RowPolicy, Scripted):
     parameters_type = BiasedWalkParameters
     parameters: BiasedWalkParameters
     stream = "biased walk"
+    ignores = UNREAD | {
+        "item_present", "item_requested", "item_recently_held", "neighbour_present",
+        "lowest_timer_present", "lowest_timer_x", "lowest_timer_y", "lowest_timer", "timer_runs",
+        "timer", "contact",
+    }  # fmt: skip
 
     def configure(self, scenario: Scenario) -> None:
         """Take what the maker of a robot knows: its speed and control period, and the swarm."""

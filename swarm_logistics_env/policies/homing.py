@@ -34,7 +34,7 @@ from swarm_logistics_env.policies.driving import (
     search,
 )
 from swarm_logistics_env.policies.policy import Scripted
-from swarm_logistics_env.policies.row_policy import RowPolicy
+from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import MotionView, command_own_frames
 from swarm_logistics_env.world.motion.memory import MEMORY, has_failed
@@ -138,6 +138,7 @@ class Homing(RowPolicy, Scripted):
     parameters_type: ClassVar[type[DrivingParameters]] = HomingParameters
     parameters: DrivingParameters
     stream = "homing"
+    ignores = UNREAD | {"neighbour_present", "lowest_timer", "timer", "timer_runs", "contact"}
     _fill_commands: ClassVar[Callable[..., None]] = staticmethod(act_homing)
 
     def configure(self, scenario: Scenario) -> None:

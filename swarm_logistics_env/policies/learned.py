@@ -26,7 +26,7 @@ from pydantic import (
 from swarm_logistics_env.compiler.packing import packed
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.records import Record
-from swarm_logistics_env.policies.row_policy import RowPolicy
+from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.world.motion.network_inputs import INPUTS
 from swarm_logistics_env.world.scenario import Scenario
@@ -168,6 +168,7 @@ class LearnedPolicy(RowPolicy):
     """
 
     stream = STREAM
+    ignores = UNREAD | {"neighbour_present"}
 
     def __init__(self, card: PolicyCard, tensors: Mapping[str, NDArray[np.float32]]) -> None:
         check_tensors(card.network, tensors)

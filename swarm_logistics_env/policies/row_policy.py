@@ -20,6 +20,18 @@ from swarm_logistics_env.world.scenario import Scenario
 _as_compiled = np.errstate(over="ignore", divide="ignore")
 
 
+# Columns that no policy of this package reads.
+UNREAD = frozenset(
+    {
+        "range_robots",
+        "range_items",
+        "neighbour_timer_heard",
+        "neighbour_timer",
+        "neighbour_message",
+    }
+)
+
+
 class RowPolicy(Described):
     """A policy whose robots share nothing: each decides from its own row, memory and stream.
 

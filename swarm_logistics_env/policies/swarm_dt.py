@@ -21,7 +21,7 @@ from pydantic import Field, NonNegativeFloat
 from swarm_logistics_env.compiler.kernels import kernel, uniform
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
-from swarm_logistics_env.policies.row_policy import RowPolicy
+from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import length_of
 from swarm_logistics_env.world.scenario import Scenario
@@ -119,6 +119,10 @@ class SwarmDT(RowPolicy, Scripted):
     parameters_type = SwarmDTParameters
     parameters: SwarmDTParameters
     stream = "swarm D-T"
+    ignores = UNREAD | {
+        "item_requested", "item_recently_held", "lowest_timer", "in_delivery_area", "timer_runs",
+        "timer", "velocity", "contact", "turn_rate",
+    }  # fmt: skip
 
     def configure(self, scenario: Scenario) -> None:
         """Take what the maker of a robot knows: its control period and its drive."""
