@@ -19,7 +19,7 @@ import warnings
 from typing import Any, cast
 
 try:
-    import numba
+    import numba as numba  # kernels.py takes it from here
 except ImportError:
     numba = None  # type: ignore[assignment]  # a module elsewhere
 

@@ -212,7 +212,8 @@ def remember_row(
 @inlined_kernel
 def length_of(x: float, y: float) -> float:
     """Return the length of a vector, in the precision of `x` and `y`."""
-    return np.sqrt(x * x + y * y)
+    length: float = np.sqrt(x * x + y * y)
+    return length
 
 
 @inlined_kernel
