@@ -8,7 +8,7 @@ each step, as `_by_loops` says in Python: both have the same bits.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,24 @@ from numpy.typing import NDArray
 from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.compiler.numba_fence import IS_INTERPRETED
 
+_LANES = 8  # floats in a register
+
+if TYPE_CHECKING or not IS_INTERPRETED:
+    from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
+    from numba.core import types
+    from numba.extending import intrinsic
+    from numba.np import arrayobj
+
+    make_array: Any = arrayobj.make_array  # without types
+    _COUNT = ir.IntType(64)
+    _VECTOR = ir.VectorType(ir.FloatType(), _LANES)
+
 Floats = NDArray[np.float32]
 SumBlock = Callable[[Floats, int, int, int, Floats, int, Floats, int, Floats, int, int], None]
 
 ROWS = 2
 WIDE = 32  # outputs of a block
 NARROW = 8
-_LANES = 8  # floats in a register
 _ARRAYS = (0, 4, 6, 8)  # which of the arguments are arrays
 
 
@@ -64,14 +75,6 @@ def _by_loops(width: int) -> SumBlock:
 
 def _in_registers(width: int) -> SumBlock:
     """Return the same as `_by_loops`, made of vector instructions."""
-    from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
-    from numba.core import types
-    from numba.extending import intrinsic
-    from numba.np import arrayobj
-
-    make_array: Any = arrayobj.make_array  # without types
-    count = ir.IntType(64)
-    vector_type = ir.VectorType(ir.FloatType(), _LANES)
     n_vectors = width // _LANES
 
     def typed(
@@ -94,12 +97,12 @@ def _in_registers(width: int) -> SumBlock:
         )
 
         def number(value: int) -> Any:
-            return ir.Constant(count, value)
+            return ir.Constant(_COUNT, value)
 
         def vectors_at(pointer: Any, first: Any) -> list[Any]:
             indices = (builder.add(first, number(_LANES * vector)) for vector in range(n_vectors))
             return [
-                builder.bitcast(builder.gep(pointer, [index]), vector_type.as_pointer())
+                builder.bitcast(builder.gep(pointer, [index]), _VECTOR.as_pointer())
                 for index in indices
             ]
 
@@ -108,9 +111,9 @@ def _in_registers(width: int) -> SumBlock:
 
         def in_all_lanes(value: Any) -> Any:
             first_lane = ir.Constant(ir.IntType(32), 0)
-            lane = builder.insert_element(ir.Constant(vector_type, ir.Undefined), value, first_lane)
+            lane = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), value, first_lane)
             zeros = ir.Constant(ir.VectorType(ir.IntType(32), _LANES), [0] * _LANES)
-            return builder.shuffle_vector(lane, ir.Constant(vector_type, ir.Undefined), zeros)
+            return builder.shuffle_vector(lane, ir.Constant(_VECTOR, ir.Undefined), zeros)
 
         initial = [load(pointer) for pointer in vectors_at(biases, first_bias)]
         before = builder.block
@@ -118,8 +121,8 @@ def _in_registers(width: int) -> SumBlock:
         builder.branch(head)
 
         builder.position_at_end(head)
-        index = builder.phi(count)
-        totals = [[builder.phi(vector_type) for _ in initial] for _ in range(ROWS)]
+        index = builder.phi(_COUNT)
+        totals = [[builder.phi(_VECTOR) for _ in initial] for _ in range(ROWS)]
         index.add_incoming(number(0), before)
         for row_totals in totals:
             for total, bias in zip(row_totals, initial):

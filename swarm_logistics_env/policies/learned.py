@@ -26,6 +26,7 @@ from pydantic import (
 from swarm_logistics_env.compiler.packing import packed
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.records import Record
+from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.world.motion.network_inputs import INPUTS
@@ -152,7 +153,7 @@ STREAM = "trained policy"
 PlaySteps: TypeAlias = Callable[[int, NDArray[np.float32], NDArray[np.float64]], tuple[int, bool]]
 
 
-class LearnedPolicy(RowPolicy):
+class LearnedPolicy(RowPolicy, Described):
     """A network that decides for each robot alone, from its own row: for swarms of any size.
 
     Args:

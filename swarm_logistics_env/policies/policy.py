@@ -8,7 +8,7 @@ import sys
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self, cast, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,9 @@ from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.fingerprint import fingerprint, joined
 from swarm_logistics_env.core.records import Record, canonical_json
 from swarm_logistics_env.policies.evaluation_mode import in_evaluation
+from swarm_logistics_env.policies.row_policy import Robot
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.state import WarehouseState
-
-if TYPE_CHECKING:
-    from swarm_logistics_env.policies.row_policy import Robot
 
 
 @runtime_checkable
@@ -77,8 +75,6 @@ class Described:
         Raises:
             PolicyError: it does not decide from rows alone.
         """
-        from swarm_logistics_env.policies.row_policy import Robot
-
         return Robot(self, body, period, seed, number)
 
     def _repr_html_(self) -> str:

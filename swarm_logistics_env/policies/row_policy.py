@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.streams import row_keys
-from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.world.observations import n_columns
 from swarm_logistics_env.world.scenario import Scenario
 
@@ -32,7 +31,7 @@ UNREAD = frozenset(
 )
 
 
-class RowPolicy(Described):
+class RowPolicy:
     """A policy whose robots share nothing: each decides from its own row, memory and stream.
 
     So `robot` gives the same commands as its row in a swarm.

@@ -179,7 +179,8 @@ except SetupError as error:
 def test_without_numba_a_robot_does_the_same(tmp_path: Path) -> None:
     rows = {name: rows_of_run(load(name), WHEELS, 500)[:, 2] for name in ROW_POLICIES}
     np.savez(tmp_path / "rows.npz", allow_pickle=False, **rows)
-    command = [sys.executable, "-c", WITHOUT_NUMBA, tmp_path / "rows.npz", tmp_path / "out.npz"]
+    paths = [str(tmp_path / name) for name in ("rows.npz", "out.npz")]
+    command = [sys.executable, "-c", WITHOUT_NUMBA, *paths]
     root = Path(files.__file__).parents[2]
     environment = {**os.environ, "PYTHONPATH": str(root)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
