@@ -49,6 +49,7 @@ CONTENTS = {
         "training",
         "faults",
         "own",
+        "robots",
     ),
     "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
     "Research": (

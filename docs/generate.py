@@ -41,7 +41,7 @@ FACTORS = ("sizes", "faults", "parameters", "ablations")
 # From the ground up: each imports those before it alone, as `tests/test_imports.py` has it.
 ROOMS = (
     "core", "compiler", "spi", "world", "environment", "wrappers", "policies", "adapters", "study",
-    "train", "views",
+    "train", "robots", "views",
 )  # fmt: skip
 PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")
 

@@ -61,6 +61,12 @@ STABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "policies.policy.start": (),
         "policies.policy.decide": (),
     },
+    "Robots": {
+        "policies.row_policy.Robot": ("step", "memory"),
+        "robots.contract_of": (),
+        "robots.Contract": ("to_yaml",),
+        "robots.check_rows": (),
+    },
     "Indicators": {
         "spi.scalability": (),
         "spi.robustness": (),

@@ -100,8 +100,8 @@ from tests.study.tasks.lane import LANE
 @ world/observations.py @MESSAGES =
 SPEED = TURN_RATE + 1
 N_COLUMNS = SPEED + 1
-@ world/observations.py @        *(messages if
-        Column("speed", "m/s", _run(SPEED, 1), 0, speed, "without direction"),
+@ world/observations.py @        *_messages(scenario)
+        Column("speed", "m/s", _run(SPEED, 1), 0, speed, "without direction", "odometry"),
 @ world/warehouse/sensing.py @    out[row.CONTACT] =
     out[row.SPEED] = math.hypot(out[row.VELOCITY], out[row.VELOCITY + 1])
 """

@@ -9,21 +9,23 @@ import math
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar, cast
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.compiler.numba_fence import IS_PLAIN
+from swarm_logistics_env.compiler.numba_fence import IS_MISSING, IS_PLAIN, numba
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# The array at a pointer (`addresses.pointer_at`), of a shape and a type.
-carray: Callable[..., NDArray[Any]] = numba.carray  # type: ignore[attr-defined]  # not declared
+# The array at a pointer (`addresses.pointer_at`), of a shape and a type; worlds alone need it.
+carray: Callable[..., NDArray[Any]] = getattr(numba, "carray", None)  # type: ignore[assignment]
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function` with numba.
+    """Compile `function` with numba; where that is missing it stays as it is.
+
+    To have the same bits there, a float32 that meets a plain float is made np.float64 in the code:
+    numba does so by itself, numpy does not.
 
     Without the interpreter's lock, so that several worlds step in threads; cached on disk, so
     that a second process starts at once; without fast-math, so that results are the same bits
@@ -49,6 +51,8 @@ def engine_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _compile(function: Callable[P, R], *, is_inlined: bool) -> Callable[P, R]:
+    if IS_MISSING:
+        return function
     if IS_PLAIN:
         # Not kept on disk: numba looks at the kernel's own file alone, not at what it takes from
         # others, so that code of older sources would run.

@@ -5,6 +5,9 @@ The fast way replaces parts of numba's compiler (`fast_kernels`), generates LLVM
 (`world.warehouse.thread_pool`). It was tested with some versions of numba. With any other one,
 kernels are compiled in the plain way, by what numba documents alone, those that reach the physics
 engine are interpreted, and worlds step one after the other. Both ways give the same bits.
+
+Without numba kernels are the Python functions that they are written as. That is for one robot's
+computer (`policies.row_policy.Robot`), which decides the same; worlds are refused.
 """
 
 from __future__ import annotations
@@ -15,7 +18,10 @@ import re
 import warnings
 from typing import Any, cast
 
-import numba
+try:
+    import numba as numba  # kernels.py takes it from here
+except ImportError:
+    numba = None  # type: ignore[assignment]  # a module elsewhere
 
 FIRST_TESTED = (0, 61)  # versions of numba; pyproject.toml has them, too
 LAST_TESTED = (0, 68)
@@ -50,6 +56,7 @@ def choose_way(version: str, wish: str | None) -> str:
     return "plain"
 
 
-IS_PLAIN = choose_way(numba.__version__, os.environ.get(WAY)) == "plain"
+IS_MISSING = numba is None
+IS_PLAIN = IS_MISSING or choose_way(numba.__version__, os.environ.get(WAY)) == "plain"
 # Nothing is compiled where numba was told so, as tests tell it to see the lines of kernels.
 IS_INTERPRETED = IS_PLAIN or bool(cast("Any", numba).config.DISABLE_JIT)

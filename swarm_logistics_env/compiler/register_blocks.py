@@ -8,17 +8,25 @@ each step, as `_by_loops` says in Python: both have the same bits.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
-from numba.core import types
-from numba.extending import intrinsic
-from numba.np import arrayobj
 from numpy.typing import NDArray
 
 from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.compiler.numba_fence import IS_INTERPRETED
+
+_LANES = 8  # floats in a register
+
+if TYPE_CHECKING or not IS_INTERPRETED:
+    from llvmlite import ir  # type: ignore[import-untyped]  # it ships none
+    from numba.core import types
+    from numba.extending import intrinsic
+    from numba.np import arrayobj
+
+    make_array: Any = arrayobj.make_array  # without types
+    _COUNT = ir.IntType(64)
+    _VECTOR = ir.VectorType(ir.FloatType(), _LANES)
 
 Floats = NDArray[np.float32]
 SumBlock = Callable[[Floats, int, int, int, Floats, int, Floats, int, Floats, int, int], None]
@@ -26,11 +34,7 @@ SumBlock = Callable[[Floats, int, int, int, Floats, int, Floats, int, Floats, in
 ROWS = 2
 WIDE = 32  # outputs of a block
 NARROW = 8
-_LANES = 8  # floats in a register
 _ARRAYS = (0, 4, 6, 8)  # which of the arguments are arrays
-make_array: Any = arrayobj.make_array  # without types
-_COUNT = ir.IntType(64)
-_VECTOR = ir.VectorType(ir.FloatType(), _LANES)
 
 
 def _by_loops(width: int) -> SumBlock:
@@ -57,16 +61,14 @@ def _by_loops(width: int) -> SumBlock:
             biases, first_bias: a bias of each output.
             sums, first_sum, next_sum: where the sums begin, as `values`.
         """
-        for row in range(ROWS):
+        for row in range(ROWS if next_sum > 0 else 1):
             start = first_sum + row * next_sum
             total = sums[start : start + width]
             total[:] = biases[first_bias : first_bias + width]
             for index in range(n_in):
                 value = values[first_value + row * next_value + index]
                 weight = first_weight + index * width
-                of_input = weights[weight : weight + width]
-                for output in range(width):
-                    total[output] += value * of_input[output]
+                total += value * weights[weight : weight + width]
 
     return kernel(sum_block)
 

@@ -49,6 +49,10 @@ class TrainingError(SwarmLogisticsError):
     """A training whose specification, directory or request cannot be."""
 
 
+class RobotError(SwarmLogisticsError):
+    """A robot's log, or an export for robots, that cannot be."""
+
+
 class StudyError(SwarmLogisticsError):
     """A study whose specification, store or request cannot be."""
 

@@ -17,15 +17,15 @@ of the robots within reach nobody sees which carry an item: published ones push 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from swarm_logistics_env.compiler.kernels import kernel, uniform
-from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
+from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import MotionView
 from swarm_logistics_env.world.motion.memory import fading, length_of, note_command, remember_row
@@ -88,7 +88,7 @@ class WalkConstants(NamedTuple):
     period: float
 
 
-class BiasedWalk(Scripted):
+class BiasedWalk(RowPolicy, Scripted):
     """A random walk with a bias home, which a robot takes from where it remembers to have entered.
 
     Its keyword arguments are the fields of `BiasedWalkParameters`.
@@ -105,6 +105,12 @@ class BiasedWalk(Scripted):
 
     parameters_type = BiasedWalkParameters
     parameters: BiasedWalkParameters
+    stream = "biased walk"
+    ignores = UNREAD | {
+        "item_present", "item_requested", "item_recently_held", "neighbour_present",
+        "lowest_timer_present", "lowest_timer_x", "lowest_timer_y", "lowest_timer", "timer_runs",
+        "timer", "contact",
+    }  # fmt: skip
 
     def configure(self, scenario: Scenario) -> None:
         """Take what the maker of a robot knows: its speed and control period, and the swarm."""
@@ -119,12 +125,15 @@ class BiasedWalk(Scripted):
         self._values = parameters.values()
         self._frame = MotionView(scenario)
 
-    def reset(self, n_robots: int, seed: int) -> None:
+    def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode with random stored headings."""
-        keys = row_keys(seed, "biased walk", n_robots)
         self._frame.begin(keys)
         self._heading = np.array([math.tau * uniform(key, 0) for key in keys])
         self._compass = np.empty((0, 2))
+
+    def memories(self) -> dict[str, NDArray[Any]]:
+        """Return all that robots remember, their stored headings [rad] last."""
+        return self._frame.memories() | {"stored_heading": self._heading}
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D).
@@ -198,7 +207,7 @@ def act_biased_walk(
         carries = observation[row.CARRYING] > 0.5
         delivers = observation[row.CARRYING_REQUESTED] > 0.5
         share = 2.0 * uniform(keys[robot], 2 * counts[robot]) - 1.0
-        body_turn = period * float(observation[row.TURN_RATE])
+        body_turn = period * np.float64(observation[row.TURN_RATE])
         heading[robot] += constants.largest_turn * share - body_turn
         x = math.cos(heading[robot])
         y = math.sin(heading[robot])
@@ -239,9 +248,9 @@ def push_away(
     for number in range(count):
         # A neighbour is as wide, and begins with the same columns; absent ones are zeros.
         column = first + row.ITEM_WIDTH * number
-        x = float(observation[column + row.ITEM.x])
-        y = float(observation[column + row.ITEM.y])
-        strength = push * math.exp(-length_of(x, y) / reach)
+        x = observation[column + row.ITEM.x]
+        y = observation[column + row.ITEM.y]
+        strength = np.float64(push * math.exp(-np.float64(length_of(x, y)) / reach))
         push_x -= strength * x
         push_y -= strength * y
     return push_x, push_y
@@ -256,7 +265,7 @@ def push_off_walls(
     push_y = 0.0
     walls = observation[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
     for beam in range(row.N_BEAMS):
-        distance = float(walls[beam])
+        distance = np.float64(walls[beam])
         if distance <= walls[beam - 1] and distance < walls[(beam + 1) % row.N_BEAMS]:
             nearness = (parameters.wall_distance - distance) / parameters.wall_range
             push = parameters.wall_push * distance * math.exp(nearness)

@@ -101,8 +101,9 @@ def away_from_neighbours(
         y = observation[start + row.NEIGHBOUR.y]
         distance = length_of(x, y)
         if 0.0 < distance < reach:
-            push_x -= (1.0 - distance / reach) * x / distance
-            push_y -= (1.0 - distance / reach) * y / distance
+            share = 1.0 - np.float64(distance) / reach
+            push_x -= share * x / distance
+            push_y -= share * y / distance
     return gain * push_x, gain * push_y
 
 
@@ -138,7 +139,7 @@ def fetch(
     """Return the direction, speed and gripper of a robot on its way to the item in a column."""
     x = observation[item + row.ITEM.x]
     y = observation[item + row.ITEM.y]
-    distance = max(length_of(x, y), 1e-6)
+    distance = np.float64(max(length_of(x, y), 1e-6))
     speed = min(1.0, distance / (2.0 * period))
     gripper = LIFT if distance < parameters.grip_range else LET_GO
     return x / distance + 0.5 * push_x, y / distance + 0.5 * push_y, speed, gripper
@@ -185,7 +186,7 @@ def search_direction(
         if walls[nearest] < parameters.mirror_range and approach > 0.0:
             x -= 2.0 * approach * towards_x
             y -= 2.0 * approach * towards_y
-        push = parameters.wall_gain * (1.0 - walls[nearest] / parameters.wall_range)
+        push = parameters.wall_gain * (1.0 - np.float64(walls[nearest]) / parameters.wall_range)
         wall_x = -push * towards_x
         wall_y = -push * towards_y
     reach = parameters.spread_range
@@ -221,8 +222,8 @@ def home_direction(
         lead_y = observation[row.LOWEST_TIMER_Y]
         distance = length_of(lead_x, lead_y)
         if distance > 0.0:
-            x += trust * lead_x / distance
-            y += trust * lead_y / distance
+            x += trust * np.float64(lead_x) / distance
+            y += trust * np.float64(lead_y) / distance
     return x, y
 
 
@@ -251,17 +252,17 @@ def freest_direction(
             start = row.ITEMS + row.ITEM_WIDTH * item
             if observation[start + row.ITEM.present] < 0.5:
                 break
-            item_x = observation[start + row.ITEM.x]
-            item_y = observation[start + row.ITEM.y]
+            item_x = np.float64(observation[start + row.ITEM.x])
+            item_y = np.float64(observation[start + row.ITEM.y])
             along = item_x * go_x + item_y * go_y
             aside = abs(item_x * go_y - item_y * go_x)
             if aside < parameters.clearance and 0.0 < along < parameters.obstacle_range + 0.25:
                 near = 1.0 - max(0.0, along - 0.25) / parameters.obstacle_range
                 worth -= 2.0 * near * min(1.0, (parameters.clearance - aside) / 0.05)
         beam = direction // 2
-        wall = observation[row.RANGE_WALLS + beam]
+        wall = np.float64(observation[row.RANGE_WALLS + beam])
         if direction % 2:  # between two beams
-            wall = min(wall, observation[row.RANGE_WALLS + (beam + 1) % row.N_BEAMS])
+            wall = min(wall, np.float64(observation[row.RANGE_WALLS + (beam + 1) % row.N_BEAMS]))
         if wall < 0.35:
             worth -= 2.0 * (1.0 - max(0.0, wall - 0.13) / 0.22)
         if worth > best_worth:

@@ -16,13 +16,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.compiler.kernels import kernel
-from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.driving import (
     LET_GO,
     LIFT,
@@ -44,6 +43,7 @@ from swarm_logistics_env.policies.driving import (
     search,
 )
 from swarm_logistics_env.policies.policy import Scripted
+from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import MotionView, command_own_frames
 from swarm_logistics_env.world.motion.memory import MEMORY, has_failed
@@ -139,7 +139,7 @@ def decide_homing(
         set_velocity(x, y, speed, gripper, commands[robot])
 
 
-class Homing(Scripted):
+class Homing(RowPolicy, Scripted):
     """Every robot remembers for some ten seconds where it last entered the delivery area.
 
     Its keyword arguments are the fields of `HomingParameters`.
@@ -156,6 +156,8 @@ class Homing(Scripted):
 
     parameters_type: ClassVar[type[DrivingParameters]] = HomingParameters
     parameters: DrivingParameters
+    stream = "homing"
+    ignores = UNREAD | {"neighbour_present", "lowest_timer", "timer", "timer_runs", "contact"}
     _fill_commands: ClassVar[Callable[..., None]] = staticmethod(act_homing)
 
     def configure(self, scenario: Scenario) -> None:
@@ -164,9 +166,13 @@ class Homing(Scripted):
         self._period = scenario.control_period
         self._frame = MotionView(scenario)
 
-    def reset(self, n_robots: int, seed: int) -> None:
+    def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode with random headings and empty memories."""
-        self._frame.begin(row_keys(seed, "homing", n_robots))
+        self._frame.begin(keys)
+
+    def memories(self) -> dict[str, NDArray[Any]]:
+        """Return all that robots remember, see `MotionView.memories`."""
+        return self._frame.memories()
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D).

@@ -262,7 +262,9 @@ def carry_stock(
     x = memory[MEMORY.heading_x]
     y = memory[MEMORY.heading_y]
     if item >= 0:  # it lets go outside, and lifts that one
-        return observation[item + row.ITEM.x], observation[item + row.ITEM.y], 1.0, LET_GO
+        x = np.float64(observation[item + row.ITEM.x])
+        y = np.float64(observation[item + row.ITEM.y])
+        return x, y, 1.0, LET_GO
     if certainty == 0.0:
         x, y = search_direction(observation, memory, x, y, is_inside, parameters)
         return x, y, 1.0, LET_GO

@@ -26,8 +26,8 @@ from pydantic import (
 from swarm_logistics_env.compiler.packing import packed
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.records import Record
-from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.policy import Described
+from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.world.motion.network_inputs import INPUTS
 from swarm_logistics_env.world.scenario import Scenario
@@ -153,7 +153,7 @@ STREAM = "trained policy"
 PlaySteps: TypeAlias = Callable[[int, NDArray[np.float32], NDArray[np.float64]], tuple[int, bool]]
 
 
-class LearnedPolicy(Described):
+class LearnedPolicy(RowPolicy, Described):
     """A network that decides for each robot alone, from its own row: for swarms of any size.
 
     Args:
@@ -167,6 +167,9 @@ class LearnedPolicy(Described):
     Raises:
         PolicyError: a tensor is missing, unknown, of the wrong shape or type, or not finite.
     """
+
+    stream = STREAM
+    ignores = UNREAD | {"neighbour_present"}
 
     def __init__(self, card: PolicyCard, tensors: Mapping[str, NDArray[np.float32]]) -> None:
         check_tensors(card.network, tensors)
@@ -197,12 +200,17 @@ class LearnedPolicy(Described):
         self._frame = MotionView(scenario, self.card.network.listens)
         self.reset(0, 0)
 
-    def reset(self, n_robots: int, seed: int) -> None:
+    def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode."""
-        self._frame.begin(row_keys(seed, STREAM, n_robots))
-        self._outputs = np.empty((n_robots, len(OUTPUTS)), np.float32)
+        self._frame.begin(keys)
+        self._outputs = np.zeros((len(keys), len(OUTPUTS)), np.float32)
         self._n_steps = 0
         self._tell_compiled_code()
+
+    def memories(self) -> dict[str, NDArray[Any]]:
+        """Return all that robots remember, the network's last outputs at the end."""
+        outputs = zip(OUTPUTS, self._outputs.T, strict=True)
+        return self._frame.memories() | {f"output_{name}": values for name, values in outputs}
 
     def _tell_compiled_code(self) -> None:
         """Note where the arrays of a step are; they live as long as the address."""

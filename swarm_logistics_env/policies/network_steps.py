@@ -122,4 +122,4 @@ def explore(
     for robot in range(outputs.shape[0]):
         for output in range(outputs.shape[1]):
             noise = gaussian(pair_key(keys[robot], output), counts[robot] - 1)
-            outputs[robot, output] += np.float32(deviations[output] * noise)
+            outputs[robot, output] += np.float32(np.float64(deviations[output]) * noise)

@@ -18,6 +18,7 @@ from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.fingerprint import fingerprint, joined
 from swarm_logistics_env.core.records import Record, canonical_json
 from swarm_logistics_env.policies.evaluation_mode import in_evaluation
+from swarm_logistics_env.policies.row_policy import Robot
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.state import WarehouseState
 
@@ -67,6 +68,14 @@ def check_policy(policy: object) -> None:
 
 class Described:
     """A policy that says in a line what it is: in a session, and with a sentence in a notebook."""
+
+    def robot(self, body: Scenario, period: float, seed: int, number: int = 0) -> Robot:
+        """Return one robot that it steers, of the `number` in its swarm; see `Robot`.
+
+        Raises:
+            PolicyError: it does not decide from rows alone.
+        """
+        return Robot(self, body, period, seed, number)
 
     def _repr_html_(self) -> str:
         about = (type(self).__doc__ or "").partition("\n\n")[0]

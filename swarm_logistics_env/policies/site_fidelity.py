@@ -20,7 +20,7 @@ search alone. Any item may be asked for next, so each that lies around a site is
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,10 +127,15 @@ class SiteFidelity(Homing):
         super().configure(scenario)
         self._n_steps = scenario.max_speed * scenario.control_period / STEP
 
-    def reset(self, n_robots: int, seed: int) -> None:
+    def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode: all leave, in random directions, with empty memories."""
-        super().reset(n_robots, seed)
-        self._trips = np.zeros((n_robots, N_TRIP_COLUMNS))
+        super().begin(keys)
+        self._trips = np.zeros((len(keys), N_TRIP_COLUMNS))
+
+    def memories(self) -> dict[str, NDArray[Any]]:
+        """Return all that robots remember, their trips last."""
+        trips = zip(TripColumns._fields, self._trips.T, strict=True)
+        return super().memories() | {f"trip_{name}": values for name, values in trips}
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D).

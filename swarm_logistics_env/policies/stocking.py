@@ -120,8 +120,8 @@ def item_to_stock(
         start = row.ITEMS + row.ITEM_WIDTH * item
         if observation[start + row.ITEM.present] < 0.5:
             break
-        x = observation[start + row.ITEM.x]
-        y = observation[start + row.ITEM.y]
+        x = np.float64(observation[start + row.ITEM.x])
+        y = np.float64(observation[start + row.ITEM.y])
         distance = memory[MEMORY.away] - x * home_x - y * home_y
         if observation[start + row.ITEM.recently_held] < 0.5 and distance > least:
             return start

@@ -12,7 +12,7 @@ timer, moves towards the one that tells the lowest.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,10 @@ from pydantic import Field, NonNegativeFloat
 
 from swarm_logistics_env.compiler.kernels import kernel, uniform
 from swarm_logistics_env.core.errors import PolicyError
-from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
+from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.motion.memory import length_of
 from swarm_logistics_env.world.scenario import Scenario
 
 
@@ -112,7 +113,7 @@ class StepConstants(NamedTuple):
     turn_of_body: float
 
 
-class SwarmDT(Scripted):
+class SwarmDT(RowPolicy, Scripted):
     """Swarm Diffusion-Taxis: a robot with the requested item follows the lowest timer it hears.
 
     Its keyword arguments are the fields of `SwarmDTParameters`.
@@ -129,6 +130,11 @@ class SwarmDT(Scripted):
 
     parameters_type = SwarmDTParameters
     parameters: SwarmDTParameters
+    stream = "swarm D-T"
+    ignores = UNREAD | {
+        "item_requested", "item_recently_held", "lowest_timer", "in_delivery_area", "timer_runs",
+        "timer", "velocity", "contact", "turn_rate",
+    }  # fmt: skip
 
     def configure(self, scenario: Scenario) -> None:
         """Take what the maker of a robot knows: its control period and its drive."""
@@ -142,11 +148,15 @@ class SwarmDT(Scripted):
         )
         self._values = parameters.values()
 
-    def reset(self, n_robots: int, seed: int) -> None:
-        """Begin an episode with random stored headings."""
-        self._keys = row_keys(seed, "swarm D-T", n_robots)
-        self._heading = np.full(n_robots, np.nan)
+    def begin(self, keys: NDArray[np.uint64]) -> None:
+        """Begin an episode; the first step draws the stored headings."""
+        self._keys = keys
+        self._heading = np.full(len(keys), np.nan)
         self._step = 0
+
+    def memories(self) -> dict[str, NDArray[Any]]:
+        """Return the stored headings [rad], and the number of steps."""
+        return {"heading": self._heading, "steps": np.full(len(self._keys), self._step)}
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Return commands (N, 4) for observation rows (N, D)."""
@@ -222,10 +232,10 @@ def decide_swarm_dt(
         if delivers and observation[row.LOWEST_TIMER] > 0.5:
             lead_x = observation[row.LOWEST_TIMER_X]
             lead_y = observation[row.LOWEST_TIMER_Y]
-            distance = math.sqrt(lead_x * lead_x + lead_y * lead_y)
+            distance = length_of(lead_x, lead_y)
             if distance > 0.0:
-                x += parameters.taxis_gain * lead_x / distance
-                y += parameters.taxis_gain * lead_y / distance
+                x += parameters.taxis_gain * np.float64(lead_x) / distance
+                y += parameters.taxis_gain * np.float64(lead_y) / distance
         if parameters.heading_follows:
             heading[robot] = math.atan2(y, x)
 
@@ -266,11 +276,11 @@ def avoid(
             break
         x = observation[column + row.ITEM.x]
         y = observation[column + row.ITEM.y]
-        distance = math.sqrt(x * x + y * y)
+        distance = length_of(x, y)
         if distance >= reach:
             break
         if distance > 0.0:
-            push = gain * (1.0 - distance / reach) / distance
+            push = gain * (1.0 - np.float64(distance) / reach) / distance
             push_x -= push * x
             push_y -= push * y
     return push_x, push_y

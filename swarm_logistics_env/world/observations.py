@@ -7,7 +7,10 @@ and y left [m]; there is no place in the warehouse and no compass. Blocks of sev
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -76,9 +79,33 @@ def n_columns(scenario: Scenario) -> int:
     return N_COLUMNS + N_NEIGHBOURS * scenario.message_size
 
 
+# What a robot needs to fill a row: by the name of a sensor, what it has to tell.
+SENSORS: Mapping[str, str] = MappingProxyType(
+    {
+        "rangers": "16 beams around, which tell walls, robots and items apart",
+        "item camera": "range and bearing of free items, which of them are requested, and which it "
+        "put down itself since its last delivery",
+        "neighbour camera and radio": "range and bearing of robots that are in view or heard",
+        "radio": "the timers and messages that others broadcast, and from whom they come",
+        "gripper": "whether it holds an item, and whether that is a requested one",
+        "floor sensor": "a sense of being inside the delivery area",
+        "clock": "the time since it was last inside the delivery area",
+        "odometry": "its velocity",
+        "bumper": "whether it touches something",
+        "gyro": "how fast its body turns, without the drift that nobody tells it",
+    }
+)
+
+
 @dataclass(frozen=True)
 class Column:
-    """A named part of an observation row: its columns, its unit and the range of its values."""
+    """A named part of an observation row: its columns, its unit and the range of its values.
+
+    Attributes:
+        sensor: what tells it, of `SENSORS`.
+        absent: the value where there is nothing to tell; None: there always is.
+        flag: the column that is 0 where there is nothing to tell; empty: no column says so.
+    """
 
     name: str
     unit: str
@@ -86,64 +113,97 @@ class Column:
     low: float
     high: float
     meaning: str
+    sensor: str
+    absent: float | None = None
+    flag: str = ""
 
 
 def columns(scenario: Scenario) -> tuple[Column, ...]:
     """Return the named columns of a row in `scenario`; together they cover it without a gap."""
     reach = scenario.ranger_range
-    view = scenario.view_range
     limit = scenario.timer_limit
-    far = max(view, scenario.radio_range)
     speed = scenario.max_speed
     turn = scenario.max_turn_rate
     beam = "beam k looks k * 22.5 degrees left of forward; the full range where it meets nothing"
+    beams = partial(Column, sensor="rangers", absent=reach)
+    return (
+        beams("range_robots", "m", _run(RANGE_ROBOTS, N_BEAMS), 0, reach, f"to robots; {beam}"),
+        beams("range_walls", "m", _run(RANGE_WALLS, N_BEAMS), 0, reach, "to walls and obstacles"),
+        beams("range_items", "m", _run(RANGE_ITEMS, N_BEAMS), 0, reach, "to free items"),
+        *_columns_of_others(scenario),
+        Column("carrying", "flag", _run(CARRYING, 1), 0, 1, "it carries an item", "gripper"),
+        Column(
+            "carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "a requested one",
+            "gripper", 0, "carrying",
+        ),
+        Column(
+            "in_delivery_area", "flag", _run(IN_DELIVERY_AREA, 1), 0, 1, "its centre is there",
+            "floor sensor",
+        ),
+        Column(
+            "timer_runs", "flag", _run(TIMER_RUNS, 1), 0, 1, "its own timer is not silent", "clock"
+        ),
+        Column(
+            "timer", "s", _run(TIMER, 1), 0, limit, "its own timer; the limit when silent", "clock",
+            limit, "timer_runs",
+        ),
+        Column(
+            "velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; cut at top speed",
+            "odometry",
+        ),
+        Column(
+            "contact", "flag", _run(CONTACT, 1), 0, 1, "it touches a robot, wall or obstacle",
+            "bumper",
+        ),
+        Column(
+            "turn_rate", "rad/s", _run(TURN_RATE, 1), -turn, turn,
+            "to the left, as its gyro tells: without its drift", "gyro",
+        ),
+        *_messages(scenario),
+    )  # fmt: skip
+
+
+def _columns_of_others(scenario: Scenario) -> tuple[Column, ...]:
+    """Return the columns of items, neighbours, and of who tells the lowest timer."""
+    view = scenario.view_range
+    limit = scenario.timer_limit
+    far = max(view, scenario.radio_range)
     items = _block(ITEMS, N_ITEMS_IN_VIEW, ITEM_FEATURES)
     neighbours = _block(NEIGHBOURS, N_NEIGHBOURS, NEIGHBOUR_FEATURES)
-    message = _run(MESSAGES, n_columns(scenario) - MESSAGES)
-    messages = (
-        Column("neighbour_message", "1", message, -1, 1, "the numbers that each broadcasts"),
+    item = partial(Column, sensor="item camera", absent=0, flag="item_present")
+    neighbour = partial(
+        Column, sensor="neighbour camera and radio", absent=0, flag="neighbour_present"
     )
+    timer = partial(Column, sensor="radio", absent=0, flag="neighbour_present")
+    lowest = partial(Column, sensor="radio", absent=0, flag="lowest_timer_present")
     return (
-        Column("range_robots", "m", _run(RANGE_ROBOTS, N_BEAMS), 0, reach, f"to robots; {beam}"),
-        Column("range_walls", "m", _run(RANGE_WALLS, N_BEAMS), 0, reach, "to walls and obstacles"),
-        Column("range_items", "m", _run(RANGE_ITEMS, N_BEAMS), 0, reach, "to free items"),
-        Column("item_present", "flag", items["present"], 0, 1, "a free item is in view"),
-        Column("item_x", "m", items["x"], -view, view, "its centre, forward"),
-        Column("item_y", "m", items["y"], -view, view, "its centre, left"),
-        Column("item_requested", "flag", items["requested"], 0, 1, "it is a requested one"),
-        Column(
-            "item_recently_held", "flag", items["recently_held"], 0, 1, "it was put down lately"
+        item("item_present", "flag", items["present"], 0, 1, "a free item is in view"),
+        item("item_x", "m", items["x"], -view, view, "its centre, forward"),
+        item("item_y", "m", items["y"], -view, view, "its centre, left"),
+        item("item_requested", "flag", items["requested"], 0, 1, "it is a requested one"),
+        item("item_recently_held", "flag", items["recently_held"], 0, 1, "it was put down lately"),
+        neighbour(
+            "neighbour_present", "flag", neighbours["present"], 0, 1, "one is heard or in view"
         ),
-        Column("neighbour_present", "flag", neighbours["present"], 0, 1, "one is heard or in view"),
-        Column("neighbour_x", "m", neighbours["x"], -far, far, "its centre, forward"),
-        Column("neighbour_y", "m", neighbours["y"], -far, far, "its centre, left"),
-        Column(
+        neighbour("neighbour_x", "m", neighbours["x"], -far, far, "its centre, forward"),
+        neighbour("neighbour_y", "m", neighbours["y"], -far, far, "its centre, left"),
+        timer(
             "neighbour_timer_heard", "flag", neighbours["timer_heard"], 0, 1, "its timer is heard"
         ),
-        Column("neighbour_timer", "s", neighbours["timer"], 0, limit, "its timer"),
-        Column("lowest_timer_present", "flag", _run(LOWEST_TIMER, 1), 0, 1, "a timer is heard"),
-        Column("lowest_timer_x", "m", _run(LOWEST_TIMER_X, 1), -far, far, "its sender, forward"),
-        Column("lowest_timer_y", "m", _run(LOWEST_TIMER_Y, 1), -far, far, "its sender, left"),
-        Column("lowest_timer", "s", _run(LOWEST_TIMER_TIME, 1), 0, limit, "the lowest timer heard"),
-        Column("carrying", "flag", _run(CARRYING, 1), 0, 1, "it carries an item"),
-        Column("carrying_requested", "flag", _run(CARRYING_REQUESTED, 1), 0, 1, "a requested one"),
-        Column("in_delivery_area", "flag", _run(IN_DELIVERY_AREA, 1), 0, 1, "its centre is there"),
-        Column("timer_runs", "flag", _run(TIMER_RUNS, 1), 0, 1, "its own timer is not silent"),
-        Column("timer", "s", _run(TIMER, 1), 0, limit, "its own timer; the limit when silent"),
-        Column(
-            "velocity", "m/s", _run(VELOCITY, 2), -speed, speed, "forward, left; cut at top speed"
-        ),
-        Column("contact", "flag", _run(CONTACT, 1), 0, 1, "it touches a robot, wall or obstacle"),
-        Column(
-            "turn_rate",
-            "rad/s",
-            _run(TURN_RATE, 1),
-            -turn,
-            turn,
-            "to the left, as its gyro tells: without its drift",
-        ),
-        *(messages if scenario.message_size else ()),
+        timer("neighbour_timer", "s", neighbours["timer"], 0, limit, "its timer"),
+        lowest("lowest_timer_present", "flag", _run(LOWEST_TIMER, 1), 0, 1, "a timer is heard"),
+        lowest("lowest_timer_x", "m", _run(LOWEST_TIMER_X, 1), -far, far, "its sender, forward"),
+        lowest("lowest_timer_y", "m", _run(LOWEST_TIMER_Y, 1), -far, far, "its sender, left"),
+        lowest("lowest_timer", "s", _run(LOWEST_TIMER_TIME, 1), 0, limit, "the lowest timer heard"),
     )
+
+
+def _messages(scenario: Scenario) -> tuple[Column, ...]:
+    if scenario.message_size == 0:
+        return ()
+    numbers = _run(MESSAGES, n_columns(scenario) - MESSAGES)
+    meaning = "the numbers that each broadcasts"
+    return (Column("neighbour_message", "1", numbers, -1, 1, meaning, "radio", 0),)
 
 
 def bounds(scenario: Scenario) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -30,6 +30,7 @@ COMMANDS = {
     "judge": ("judging", "judge_command"),
     "attack": ("attacking", "attack_command"),
     "record": ("recording", "record_command"),
+    "export": ("exporting", "export_command"),
     "list": ("playing", "list_command"),
     "study": ("study_commands", "study_app"),
 }

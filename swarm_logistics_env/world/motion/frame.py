@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import (
     BODY,
     N_COLUMNS,
+    MemoryColumns,
     body_of,
     face_anywhere,
     length_of,
@@ -77,6 +79,11 @@ class MotionView:
         fresh[:, BODY] = self._body if bodies is None else bodies
         face_anywhere(keys, fresh)
         self.memory[rows] = fresh
+
+    def memories(self) -> dict[str, NDArray[Any]]:
+        """Return what is remembered, by the names of `MemoryColumns`, and counted: (N,) each."""
+        columns = zip(MemoryColumns._fields, self.memory.T, strict=True)
+        return {**dict(columns), "turned_by": self.turned, "decisions": self.counts}
 
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on.

@@ -167,13 +167,13 @@ def remember_row(
     memory: NDArray[np.float64],
 ) -> tuple[float, float, float]:
     """Take what one row (D,) tells into a memory, and return its `kept_home`."""
-    x = sensed[row.VELOCITY_X]
-    y = sensed[row.VELOCITY_Y]
-    speed = length_of(x, y)
+    x = np.float64(sensed[row.VELOCITY_X])
+    y = np.float64(sensed[row.VELOCITY_Y])
+    speed = np.float64(length_of(sensed[row.VELOCITY_X], sensed[row.VELOCITY_Y]))
     is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
     delivers = sensed[row.CARRYING_REQUESTED] > 0.5
 
-    turn_back(sensed[row.TURN_RATE] * period, memory)
+    turn_back(np.float64(sensed[row.TURN_RATE]) * period, memory)
     diagnose(sensed, period, memory)
 
     memory[MEMORY.stuck] = max(0.0, memory[MEMORY.stuck] - period / STUCK_TIME)
@@ -211,15 +211,18 @@ def remember_row(
 
 @inlined_kernel
 def length_of(x: float, y: float) -> float:
-    """Return the length of a vector."""
-    return math.sqrt(x * x + y * y)
+    """Return the length of a vector, in the precision of `x` and `y`."""
+    length: float = np.sqrt(x * x + y * y)
+    return length
 
 
 @inlined_kernel
 def to_frame(frame: tuple[float, float], x: float, y: float) -> tuple[float, float]:
     """Return a vector in a frame that is turned by an angle of that cosine and sine."""
     cos, sin = frame
-    return cos * x + sin * y, cos * y - sin * x
+    forward = np.float64(x)
+    left = np.float64(y)
+    return cos * forward + sin * left, cos * left - sin * forward
 
 
 @kernel

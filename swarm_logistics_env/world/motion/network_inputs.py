@@ -109,7 +109,7 @@ def read_observations(
         turned[robot] = TURNS[beams]
         frame = COSINES[beams], SINES[beams]
         for beam in range(row.N_BEAMS):
-            distance = sensed[row.RANGE_WALLS + (beam + beams) % row.N_BEAMS]
+            distance = np.float64(sensed[row.RANGE_WALLS + (beam + beams) % row.N_BEAMS])
             read[INPUT.wall_0 + beam] = max(0.0, 1.0 - distance / WALL_REACH)
         read_neighbours(sensed, frame, read)
         read_items(sensed, frame, read)
@@ -150,9 +150,9 @@ def read_neighbours(
         first = INPUT.neighbour_0_along if is_far else INPUT.near_neighbour_0_along
         rank = index if is_far else index - N_FAR
         neighbour = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * rank
-        x = float(sensed[neighbour + row.NEIGHBOUR.x])
-        y = float(sensed[neighbour + row.NEIGHBOUR.y])
-        distance = length_of(x, y)
+        x = sensed[neighbour + row.NEIGHBOUR.x]
+        y = sensed[neighbour + row.NEIGHBOUR.y]
+        distance = np.float64(length_of(x, y))
         nearness = max(0.0, 1.0 - distance / reach) / distance if distance > 0.0 else 0.0
         put(read, first + len(_VECTOR) * rank, nearness, frame, x, y)
 
@@ -175,9 +175,9 @@ def read_items(
     for index in range(row.N_ITEMS_IN_VIEW):
         item = row.ITEMS + row.ITEM_WIDTH * index
         if sensed[item + row.ITEM.present] > 0.5 and sensed[item + row.ITEM.requested] > 0.5:
-            x = float(sensed[item + row.ITEM.x])
-            y = float(sensed[item + row.ITEM.y])
-            distance = max(length_of(x, y), 1e-9)
+            x = sensed[item + row.ITEM.x]
+            y = sensed[item + row.ITEM.y]
+            distance = np.float64(max(length_of(x, y), 1e-9))
             along, aside = to_frame(frame, x, y)
             read[INPUT.requested_present] = 1.0
             read[INPUT.requested_along] = along / distance
@@ -198,9 +198,9 @@ def read_lead(
     sensed: NDArray[np.float32], frame: tuple[float, float], trust: float, read: NDArray[np.float32]
 ) -> None:
     """Fill the inputs of the lowest timer heard, times `trust`."""
-    heard = sensed[row.LOWEST_TIMER] * trust
-    x = float(sensed[row.LOWEST_TIMER_X])
-    y = float(sensed[row.LOWEST_TIMER_Y])
+    heard = np.float64(sensed[row.LOWEST_TIMER]) * trust
+    x = sensed[row.LOWEST_TIMER_X]
+    y = sensed[row.LOWEST_TIMER_Y]
     distance = length_of(x, y)
     unit = heard / distance if distance > 0.0 else 0.0
     read[INPUT.lead_present] = heard

@@ -65,14 +65,14 @@ def clear_the_way(
         x = memory[MEMORY.heading_x]
         y = memory[MEMORY.heading_y]
         if requested >= 0:
-            x = -sensed[requested + row.ITEM.x]
-            y = -sensed[requested + row.ITEM.y]
+            x = -np.float64(sensed[requested + row.ITEM.x])
+            y = -np.float64(sensed[requested + row.ITEM.y])
         speed = 1.0
         gripper = 1.0 if memory[MEMORY.clearing] > _PUT_DOWN_TIME else -1.0
     elif sensed[row.CARRYING] < 0.5 and other >= 0:
-        x = sensed[other + row.ITEM.x]
-        y = sensed[other + row.ITEM.y]
-        away = length_of(x, y)
+        x = np.float64(sensed[other + row.ITEM.x])
+        y = np.float64(sensed[other + row.ITEM.y])
+        away = np.float64(length_of(sensed[other + row.ITEM.x], sensed[other + row.ITEM.y]))
         speed = min(1.0, 2.0 * away)
         alone = requested < 0 or square_to(sensed, requested) > _OUT_OF_REACH**2
         gripper = 1.0 if alone and away < _IN_REACH else -1.0
@@ -117,5 +117,7 @@ def nearest_items(sensed: NDArray[np.float32]) -> tuple[int, int]:
 @inlined_kernel
 def square_to(sensed: NDArray[np.float32], item: int) -> float:
     """Return the square of the distance to an item whose columns begin at `item` [m2]."""
-    square: float = sensed[item + row.ITEM.x] ** 2 + sensed[item + row.ITEM.y] ** 2
+    x = sensed[item + row.ITEM.x]
+    y = sensed[item + row.ITEM.y]
+    square: float = x * x + y * y
     return square

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_logistics_env.compiler.numba_fence import IS_MISSING
 from swarm_logistics_env.compiler.packing import blank
+from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.world.scenario import Scenario
 
 from .contacts import ContactMeasures, contact_measures
@@ -75,6 +77,8 @@ class WarehouseState:
     requested_docks: Integers
 
     def __init__(self, scenario: Scenario) -> None:
+        if IS_MISSING:
+            raise SetupError("the package numba is missing: a world needs it, robots do not")
         lengths = lengths_of(scenario)
         self.robots = robots = blank(Robots, lengths)
         self.able = blank(Capabilities, lengths)

@@ -1,0 +1,131 @@
+"""The contract of a policy, and checks of robots' logs against it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Scenario, Warehouse
+from swarm_logistics_env.core.errors import PolicyError, RobotError
+from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies.policy import start
+from swarm_logistics_env.policies.spec import SCRIPTED
+from swarm_logistics_env.robots import Contract, check_rows, contract_of
+from swarm_logistics_env.world.observations import unflatten
+
+NAMES = [name for name in SCRIPTED if not getattr(load(name), "needs_state", False)]
+SMALL: dict[str, Any] = {
+    "n_robots": 8, "n_items": 10, "warehouse_width": 4.0, "warehouse_height": 3.0,
+    "delivery_width": 1.0, "restock": True,
+}  # fmt: skip
+NOISY = Scenario(
+    **SMALL, message_size=2, timer_limit=3.0, relay="gossip", sensor_dropout=0.2, radio_loss=0.3,
+    ranger_noise=0.05, position_noise=0.05, drive="differential",
+)  # fmt: skip
+
+
+def rows_of_run(scenario: Scenario, *faults: str) -> NDArray[np.float32]:
+    """Return the rows of all robots in a run of 15 s, one below the other."""
+    policy = load("homing")
+    world = Warehouse(scenario)
+    read = [world.reset(0, faults)]
+    start(policy, scenario, 0)
+    for _ in range(150):
+        read.append(world.step(policy.act(read[-1])).copy())
+    return np.concatenate(read)
+
+
+@pytest.mark.parametrize("name", [*NAMES, "ppo-robust"])
+def test_it_is_yaml_of_all_that_a_robot_has_to_know(name: str) -> None:
+    contract = contract_of(load(name), NOISY)
+    text = yaml.safe_load(contract.to_yaml())
+    assert Contract(**text) == contract
+    covered = [column for part in text["inputs"] for column in part["columns"]]
+    assert sorted(covered) == list(range(141 + 16))
+    assert [part["column"] for part in text["outputs"]] == [0, 1, 2, 3]
+    assert (text["period"], text["frequency"]) == (0.1, 10.0)
+    used = {part["sensor"] for part in text["inputs"] if part["used"]}
+    assert set(text["leans_on"]) == used
+    assert text["body"]["control_period"] == 0.1
+
+
+def test_it_says_what_the_policy_reads_of_body_and_senses() -> None:
+    scenario = Scenario.preset("realistic")
+    of_stock = contract_of(load("homing-stock"), scenario)
+    assert {"n_items", "warehouse_height", "top_speed"} & {*of_stock.body} == {
+        "n_items",
+        "warehouse_height",
+    }
+    assert "gyro" in of_stock.leans_on
+    assert "floor sensor" in of_stock.leans_on
+    assert of_stock.initial_values["heading_x"] is None
+    assert of_stock.initial_values["home_x"] == 0.0
+    assert of_stock.initial_values["top_speed"] == scenario.max_speed
+    of_taxis = contract_of(load("swarm-dt"), scenario)
+    assert not {"gyro", "floor sensor", "odometry"} & {*of_taxis.leans_on}
+    assert of_taxis.initial_values == {"heading": None, "steps": 0.0}
+    assert "to the side" in of_taxis.outputs[1].high_means
+
+
+def test_a_policy_that_sees_everything_has_none() -> None:
+    with pytest.raises(PolicyError, match="sees the state of the whole warehouse"):
+        contract_of(load("central"), Scenario())
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("scenario", "faults"),
+    [
+        (Scenario(**SMALL), ["FM1:2", "rangers_blind:1@3", "dead:1@5"]),
+        (NOISY, ["view_reduced:2@2", "rangers_biased:2@4", "FM3:1@3"]),
+        (Scenario.preset("realistic").replace(floor="aisles"), []),
+    ],
+)
+def test_what_the_simulator_senses_keeps_to_it(scenario: Scenario, faults: list[str]) -> None:
+    check_rows(contract_of(load("homing"), scenario), rows_of_run(scenario, *faults))
+
+
+def log() -> NDArray[np.float32]:
+    rows = np.zeros((9, 157), np.float32)
+    parts = unflatten(rows, NOISY)
+    for name in ("range_robots", "range_walls", "range_items"):
+        parts[name][:] = NOISY.ranger_range
+    parts["timer"][:] = NOISY.timer_limit
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "value", "words"),
+    [
+        ("range_walls", 3, np.nan, r"range_walls in column 19 = nan: should be within"),
+        ("range_walls", 3, 2.5, r"= 2.5: should be within \[0, 2\]"),
+        ("velocity", 1, -np.inf, r"velocity in column 138 = -inf: should be within \[-2, 2\]"),
+        ("carrying", 0, 0.4, r"carrying in column 132 = 0.4: should be 0 or 1"),
+        ("carrying_requested", 0, 1.0, "should be 0, as carrying is 0"),
+        ("item_x", 0, 0.3, r"item_x in column 49 = 0.3: should be 0, as item_present is 0"),
+        ("item_present", 1, 1.0, "should be 0, as the one before is: the nearest come first"),
+        ("lowest_timer", 0, 1.0, "should be 0, as lowest_timer_present is 0"),
+        ("timer", 0, 1.0, "timer in column 136 = 1: should be 3, as timer_runs is 0"),
+    ],
+)
+def test_the_row_of_a_log_that_cannot_be_is_named(
+    name: str, number: int, value: float, words: str
+) -> None:
+    contract = contract_of(load("swarm-dt"), NOISY)
+    rows = log()
+    check_rows(contract, rows)
+    unflatten(rows, NOISY)[name][[7, 4], number] = value
+    with pytest.raises(RobotError, match=f"row 4: .*{words}"):
+        check_rows(contract, rows)
+
+
+def test_a_log_of_another_width_is_refused() -> None:
+    contract = contract_of(load("swarm-dt"), Scenario())
+    with pytest.raises(RobotError, match=r"rows of shape \(9, 157\): should be \(T, 141\)"):
+        check_rows(contract, log())
+    with pytest.raises(RobotError, match="should be a table of numbers"):
+        check_rows(contract, [["x"]])
