@@ -21,7 +21,8 @@ Three parameters keep the swarm going where lifting takes time:
 * `patience`: a robot that carries the requested item for too long, because it is caged by the stock
   or takes a wrong way for the way home, puts it down, clears the way (`clear_the_way`), and leaves
   the item to others for as long.
-* `holders`: where fewer robots hold, more search.
+* `holders`: the fewer robots there are for the items, the fewer of them hold, so that enough of
+  them search.
 
 Messages are not used. A voice was tried: robots told each other how far the way to the requested
 item is, and the nearest one or two free ones went. On 30 seeds from 431,000 on no gain was shown.
@@ -95,15 +96,15 @@ PULL = 0.4  # home, beside a random direction of length 1
 class HomingStockParameters(DrivingParameters):
     """Those that `HomingStock` shares with `Homing`, and those of its stock, all fitted."""
 
-    spread_gain: SpreadGain = 0.8
-    spread_range: SpreadRange = 2.0
-    avoid_gain: AvoidGain = 2.0
-    avoid_range: AvoidRange = 0.5
+    spread_gain: SpreadGain = 1.072
+    spread_range: SpreadRange = 2.383
+    avoid_gain: AvoidGain = 0.9
+    avoid_range: AvoidRange = 0.4769
     wall_gain: WallGain = 1.5
     wall_range: WallRange = 0.6
     sure: Sure = 3.0
-    clearance: Clearance = 0.28
-    obstacle_range: ObstacleRange = 0.5
+    clearance: Clearance = 0.1867
+    obstacle_range: ObstacleRange = 1.04
 
     near: PositiveFloat = Field(
         0.8,
@@ -111,15 +112,17 @@ class HomingStockParameters(DrivingParameters):
         "those that lie 0.5 m farther still [m]",
     )
     density: NonNegativeFloat = Field(
-        1.0,
+        0.7,
         description="where lifting takes time, `near` is what makes all items, put down before the "
         "area over the whole height of the warehouse, as dense as this [1/m2]; 0: it stays",
     )
     holders: PositiveFloat = Field(
-        0.5, description="share of the robots that hold; the others stock"
+        0.6,
+        description="share of the robots that hold where there are as many robots as items; it "
+        "goes with the root of robots by items, and the others stock",
     )
     patience: NonNegativeFloat = Field(
-        15.0,
+        21.3,
         description="for how long it carries the requested item outside, and then leaves it to "
         "others [s]; 0: for ever",
     )
@@ -334,10 +337,11 @@ class HomingStock(Homing):
     _fill_commands = staticmethod(act_homing_stock)
 
     def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows, with a density the warehouse's height and items, too."""
+        """Take what a robot's maker knows, and how many robots and items there are."""
         super().configure(scenario)
-        density = self.parameters.density
-        if density > 0.0 and scenario.handling_time > 0.0:
-            depth = scenario.n_items / (density * scenario.warehouse_height)
-            deep = self.parameters.model_copy(update={"near": depth})
-            self._values = deep.values()
+        parameters = self.parameters
+        share = math.sqrt(scenario.n_robots / scenario.n_items)
+        changes = {"holders": min(1.0, parameters.holders * share)}
+        if parameters.density > 0.0 and scenario.handling_time > 0.0:
+            changes["near"] = scenario.n_items / (parameters.density * scenario.warehouse_height)
+        self._values = parameters.model_copy(update=changes).values()
