@@ -1,0 +1,1 @@
+"""Robots: policies as the programs of single robots."""

@@ -1,0 +1,382 @@
+"""Expressions of kernels in C: what Python computes, with `float` for its numbers."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import inspect
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .c_values import (
+    AND,
+    ATOM,
+    BITS,
+    BOOL,
+    CHOICE,
+    COMPARISON,
+    DOUBLE,
+    FLOAT,
+    INT,
+    OR,
+    PRODUCT,
+    SUM,
+    UNARY,
+    WORD,
+    ArrayOf,
+    Known,
+    NoCError,
+    Scalar,
+    TupleOf,
+    Value,
+    common_kind,
+    constant,
+    converted,
+    tuple_of,
+)
+
+if TYPE_CHECKING:
+    from .c_program import Program
+
+_OPERATORS: dict[type, tuple[str, int, Callable[..., Any]]] = {
+    ast.Add: ("+", SUM, operator.add),
+    ast.Sub: ("-", SUM, operator.sub),
+    ast.Mult: ("*", PRODUCT, operator.mul),
+    ast.Div: ("/", PRODUCT, operator.truediv),
+    ast.BitXor: ("^", BITS, operator.xor),
+    ast.BitOr: ("|", BITS, operator.or_),
+}
+_COMPARISONS = {
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+}
+# C's functions of floats, by those of Python.
+_MATH = {
+    getattr(math, name): f"{name}f"
+    for name in ("atan2", "copysign", "cos", "exp", "log", "sin", "sqrt", "tanh")
+}
+
+
+class Expressions:
+    """Writes the expressions of one kernel.
+
+    Args:
+        program: the file that is written, which collects what expressions need.
+        names: what the kernel's names stand for, beside those of its variables.
+        real: the kind of its numbers.
+    """
+
+    def __init__(self, program: Program, names: Mapping[str, Any], real: Scalar = FLOAT) -> None:
+        self._program = program
+        self._names = names
+        self._real = real
+        self._variables: dict[str, Value | Known] = {}
+        self._used: set[str] = set()  # variables and parameters
+        self._written: set[str] = set()  # arrays
+
+    def value_of(self, node: ast.expr) -> Value:
+        """Return an expression as a value of C."""
+        known = self.evaluate(node)
+        return known if isinstance(known, Value) else self._as_value(known)
+
+    def evaluate(self, node: ast.expr) -> Value | Known:
+        """Return an expression as a value of C, or what of Python it stands for."""
+        match node:
+            case ast.Constant(value=bool() | int() | float()):
+                return constant(node.value, self._kind_of_number(node.value))
+            case ast.Name(id=name):
+                return self._named(name)
+            case ast.Attribute(value=owner, attr=name):
+                return self._attribute(self.evaluate(owner), name)
+            case ast.Tuple(elts=parts):
+                return tuple_of(tuple(map(self.value_of, parts)))
+            case ast.Subscript(value=owner, slice=index):
+                return self._item(self.evaluate(owner), index)
+            case ast.BinOp():
+                return self.operation(node.op, self.value_of(node.left), self.value_of(node.right))
+            case ast.UnaryOp(op=ast.USub()):
+                return self._negative(self.value_of(node.operand))
+            case ast.UnaryOp(op=ast.Not()):
+                operand = converted(self.value_of(node.operand), BOOL)
+                if operand.constant is not None:
+                    return constant(not operand.constant)
+                return Value(f"!{operand.within(UNARY)}", BOOL, UNARY)
+            case ast.BoolOp():
+                return self._joined(node)
+            case ast.Compare():
+                return self._comparison(node)
+            case ast.IfExp():
+                return self._choice(node)
+            case ast.Call():
+                return self._call(node)
+        raise NoCError(type(node).__name__)
+
+    def _kind_of_number(self, number: object) -> Scalar | None:
+        return self._real if isinstance(number, float) else None
+
+    def _named(self, name: str) -> Value | Known:
+        if name in self._variables:
+            self._used.add(name)
+            return self._variables[name]
+        if name in self._names:
+            return Known(self._names[name], name)
+        return Known(getattr(builtins, name), name)
+
+    def _as_value(self, known: Known) -> Value:
+        """Return a number of Python by its name; the file defines it."""
+        number = known.value
+        if isinstance(number, tuple) and not hasattr(number, "_fields"):
+            return tuple_of(tuple(constant(part) for part in number))
+        if not isinstance(number, bool | int | float | np.generic):
+            raise NoCError(f"{known.name or number} as a number")
+        value = constant(number, self._kind_of_number(number))
+        if not known.name or self._real is DOUBLE or value.kind is BOOL:
+            return value
+        name = self._program.define(known.name, number, value.text)
+        return Value(name, value.kind, constant=number)
+
+    def _attribute(self, owner: Value | Known, name: str) -> Value | Known:
+        if isinstance(owner, Value):
+            if name == "shape" and isinstance(owner.kind, ArrayOf):
+                return Known(owner.kind.shape)
+            raise NoCError(f"{owner.text}.{name}")
+        part = getattr(owner.value, name)
+        if owner.is_fixed and isinstance(part, bool | int | float):
+            kind = FLOAT if isinstance(part, float) else constant(part).kind
+            return Value(f"{self._program.record(owner)}.{name}", kind)
+        if owner.is_fixed:
+            return Known(part, f"{owner.name}_{name}", is_fixed=True)
+        if owner.value is math:
+            return Known(part)
+        is_module = inspect.ismodule(owner.value)
+        return Known(part, name if is_module else f"{owner.name}_{name}")
+
+    def _item(self, owner: Value | Known, index: ast.expr) -> Value | Known:
+        if isinstance(owner, Known):
+            return self._known_item(owner, index)
+        kind = owner.kind
+        if isinstance(kind, TupleOf):
+            number = self.value_of(index).constant
+            if owner.parts is not None:
+                return owner.parts[number]
+            return Value(f"{owner.text}.at[{number}]", kind.element)
+        if not isinstance(kind, ArrayOf):
+            raise NoCError(f"{owner.text}[..]")
+        if isinstance(index, ast.Slice):
+            return self._slice(owner, kind, index)
+        indices = index.elts if isinstance(index, ast.Tuple) else [index]
+        first = self.value_of(indices[0])
+        if len(indices) == 1 and len(kind.shape) == 1:
+            text = self._index(first, indices[0], kind.shape[0])
+            return Value(f"{owner.text}[{text}]", kind.element, root=owner.root)
+        if first.constant != 0 or kind.shape[0] != 1:
+            raise NoCError(f"{owner.text}: more rows than one")
+        inner = Value(owner.text, ArrayOf(kind.element, kind.shape[1:]), root=owner.root)
+        return inner if len(indices) == 1 else self._item(inner, indices[1])
+
+    def _index(self, index: Value, node: ast.expr, length: int) -> str:
+        if index.kind is not INT:
+            raise NoCError(f"the index {index.text}")
+        # Python counts from the end below 0; only differences get there.
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub):
+            return f"{self._program.use('wrapped_index')}({index.text}, {length})"
+        return index.text
+
+    def _slice(self, owner: Value, kind: ArrayOf, index: ast.Slice) -> Value:
+        if index.lower is None or index.upper is None or index.step is not None:
+            raise NoCError(f"a slice of {owner.text} without its first and last column")
+        first = self.value_of(index.lower)
+        last = self.value_of(index.upper)
+        if first.constant is None or last.constant is None:
+            raise NoCError(f"{owner.text}[{first.text}:{last.text}]")
+        part = ArrayOf(kind.element, (last.constant - first.constant,))
+        return Value(f"&{owner.text}[{first.text}]", part, UNARY, root=owner.root)
+
+    def _known_item(self, owner: Known, index: ast.expr) -> Value | Known:
+        nodes = index.elts if isinstance(index, ast.Tuple) else [index]
+        indices = [self.value_of(node) for node in nodes]
+        numbers = tuple(value.constant for value in indices)
+        if None not in numbers:
+            return Known(owner.value[numbers[0] if len(numbers) == 1 else numbers])
+        table = self._program.table(owner.name, np.asarray(owner.value))
+        texts = [self._index(*pair, n) for *pair, n in zip(indices, nodes, owner.value.shape)]
+        return Value(table + "".join(f"[{text}]" for text in texts), FLOAT)
+
+    def operation(self, symbol: ast.operator, left: Value, right: Value) -> Value:
+        """Return what Python's operator makes of two values."""
+        is_whole = left.kind is INT and right.kind is INT
+        match symbol:
+            case ast.Mod():
+                name = "remainder_of" if is_whole else "modulo"
+                return self._helped(name, INT if is_whole else FLOAT, left, right)
+            case ast.FloorDiv() if is_whole:
+                return self._helped("quotient_of", INT, left, right)
+            case ast.Pow() if right.constant == 2:
+                if left.constant is not None:
+                    return constant(left.constant**2, self._kind_of_number(left.constant))
+                return self._helped("squared", FLOAT, left)
+        if type(symbol) not in _OPERATORS:
+            raise NoCError(type(symbol).__name__)
+        sign, strength, compute = _OPERATORS[type(symbol)]
+        kind = common_kind(left, right)
+        if isinstance(symbol, ast.Div) and is_whole:
+            kind = self._real
+        if not isinstance(kind, Scalar):
+            raise NoCError(f"{left.text} {sign} {right.text}")
+        number = None
+        if left.constant is not None and right.constant is not None:
+            number = compute(left.constant, right.constant)
+            if kind is not INT and not (_has_name(left) or _has_name(right)):
+                return constant(number, kind)
+        left = converted(left, kind)
+        right = converted(right, kind)
+        # What binds as strongly is computed from the left.
+        text = f"{left.within(strength)} {sign} {right.within(strength + 1)}"
+        return Value(text, kind, strength, constant=number)
+
+    def _helped(self, name: str, kind: Scalar, *operands: Value) -> Value:
+        """Return a call of a function that stands in every file that needs it."""
+        texts = ", ".join(converted(operand, kind).text for operand in operands)
+        return Value(f"{self._program.use(name)}({texts})", kind)
+
+    def _negative(self, operand: Value) -> Value:
+        if operand.constant is not None and operand.strength >= UNARY and isinstance(operand.kind, Scalar):
+            if not _has_name(operand):
+                return constant(-operand.constant, operand.kind)
+        number = None if operand.constant is None else -operand.constant
+        text = operand.within(ATOM)
+        return Value(f"-{text}", operand.kind, UNARY, constant=number)
+
+    def _joined(self, node: ast.BoolOp) -> Value:
+        sign, strength = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
+        operands = [converted(self.value_of(operand), BOOL) for operand in node.values]
+        # A compiler warns of && within || without parentheses.
+        texts = (
+            operand.text if operand.strength >= COMPARISON else f"({operand.text})"
+            for operand in operands
+        )
+        return Value(f" {sign} ".join(texts), BOOL, strength)
+
+    def _comparison(self, node: ast.Compare) -> Value:
+        values = [self.value_of(operand) for operand in (node.left, *node.comparators)]
+        texts = []
+        for symbol, left, right in zip(node.ops, values, values[1:]):
+            kind = common_kind(left, right)
+            sides = (converted(side, kind).within(COMPARISON + 1) for side in (left, right))
+            texts.append(f" {_COMPARISONS[type(symbol)]} ".join(sides))
+        return Value(" && ".join(texts), BOOL, COMPARISON if len(texts) == 1 else AND)
+
+    def _choice(self, node: ast.IfExp) -> Value:
+        condition = converted(self.value_of(node.test), BOOL)
+        branches = self.value_of(node.body), self.value_of(node.orelse)
+        if condition.constant is not None:
+            return branches[0 if condition.constant else 1]
+        kind = common_kind(*branches)
+        first, second = (converted(branch, kind).within(CHOICE + 1) for branch in branches)
+        return Value(f"{condition.within(CHOICE + 1)} ? {first} : {second}", kind, CHOICE)
+
+    def _call(self, node: ast.Call) -> Value | Known:
+        if node.keywords:
+            raise NoCError("a call with named arguments")
+        match node.func:
+            case ast.Attribute(value=owner, attr="max"):
+                return self._of_array("largest_of", FLOAT, self.value_of(owner))
+        called = self.evaluate(node.func)
+        if isinstance(called, Value):
+            raise NoCError(f"a call of {called.text}")
+        function = called.value
+        if len(node.args) == 1 and isinstance(node.args[0], ast.Starred):
+            values = self.evaluate(node.args[0].value)
+            if not isinstance(values, Known):
+                raise NoCError(f"{called.name}(*..) of what is not known")
+            return Known(function(*values.value), "parameters", is_fixed=True)
+        arguments = [self.evaluate(argument) for argument in node.args]
+        if not arguments and called.is_fixed:
+            return Known(function())
+        known_call = self._program.kernel(function)
+        if known_call is not None:
+            return self._kernel_call(function, arguments)
+        return self._call_of_library(function, arguments)
+
+    def _call_of_library(self, function: Any, arguments: list[Value | Known]) -> Value | Known:
+        if function is len:
+            (argument,) = arguments
+            return Known(len(argument.value) if isinstance(argument, Known) else self._length(argument))
+        values = [a if isinstance(a, Value) else self._as_value(a) for a in arguments]
+        if function in _MATH:
+            return Value(self._call_text(_MATH[function], values, FLOAT), FLOAT)
+        if function is math.isnan:
+            return Value(f"isnan({values[0].text})", BOOL)
+        if function is abs:
+            return Value(self._call_text("fabsf", values, FLOAT), FLOAT)
+        if function in (min, max):
+            kind = common_kind(*values)
+            name = "smaller" if function is min else "larger"
+            name += "_int" if kind is INT else "_of"
+            return self._helped(name, kind, *values)  # type: ignore[arg-type]
+        if function is np.argmin:
+            return self._of_array("place_of_smallest", INT, values[0])
+        return self._converted_by(function, values[0])
+
+    def _converted_by(self, function: Any, value: Value) -> Value:
+        """Return a number as the kind of Python or numpy that a call names."""
+        if function is round:
+            nearest = self._call_text("rintf", [value], FLOAT)
+            return Value(f"{self._program.use('whole_number')}({nearest})", INT)
+        if function is int:
+            if value.kind is DOUBLE:
+                return Value(f"(int32_t){value.within(UNARY)}", INT, UNARY)
+            return Value(f"{self._program.use('whole_number')}({converted(value, FLOAT).text})", INT)
+        if function is bool:
+            return converted(value, BOOL)
+        kinds = {float: self._real, np.float32: FLOAT, np.float64: self._real, np.uint64: WORD}
+        if function not in kinds:
+            raise NoCError(f"a call of {getattr(function, '__name__', function)}")
+        kind = kinds[function]
+        if value.constant is not None:
+            return constant(value.constant, kind)
+        return converted(value, kind)
+
+    def _call_text(self, name: str, values: list[Value], kind: Scalar) -> str:
+        return f"{name}({', '.join(converted(value, kind).text for value in values)})"
+
+    def _length(self, array: Value) -> int:
+        if not isinstance(array.kind, ArrayOf):
+            raise NoCError(f"the length of {array.text}")
+        return array.kind.shape[0]
+
+    def _of_array(self, name: str, kind: Scalar, array: Value) -> Value:
+        return Value(f"{self._program.use(name)}({array.text}, {self._length(array)})", kind)
+
+    def _kernel_call(self, function: Any, arguments: list[Value | Known]) -> Value:
+        """Return a call of another kernel, which is written before this one."""
+        plain = [
+            a if isinstance(a, Value) or self._stays_known(a) else self._as_value(a)
+            for a in arguments
+        ]
+        callee = self._program.function(function, plain)
+        texts = []
+        for number, kind in callee.parameters:
+            argument = plain[number]
+            assert isinstance(argument, Value)
+            texts.append(converted(argument, kind).text)
+            if number in callee.written:
+                self._written.add(argument.root)
+        return Value(f"{callee.name}({', '.join(texts)})", callee.kind or INT)
+
+    def _stays_known(self, known: Known) -> bool:
+        return known.is_fixed or isinstance(known.value, np.ndarray)
+
+
+def _has_name(value: Value) -> bool:
+    """Return whether a constant is called by a name, which tells a reader more than its number."""
+    return re.search("[A-Z]{2}", value.text) is not None

@@ -1,0 +1,480 @@
+"""Statements of kernels in C: a function of C for each kernel, with its names and comments."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import io
+import textwrap
+import tokenize
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from swarm_logistics_env.core.errors import PolicyError
+
+from .c_expressions import Expressions
+from .c_values import (
+    BOOL,
+    DOUBLE,
+    FLOAT,
+    INT,
+    ArrayOf,
+    Kind,
+    Known,
+    NoCError,
+    TupleOf,
+    Value,
+    constant,
+    converted,
+)
+
+if TYPE_CHECKING:
+    from .c_program import Program
+
+WIDTH = 100  # of a line
+_INDENT = "    "
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of C.
+
+    Attributes:
+        name: in C.
+        kind: of what it returns; None: nothing.
+        parameters: the kernel's arguments that it takes, by their numbers, with their kinds.
+        written: the numbers of the arrays among them that it writes.
+        text: its definition.
+    """
+
+    name: str
+    kind: Kind | None
+    parameters: tuple[tuple[int, Kind], ...]
+    written: frozenset[int]
+    text: str
+
+
+class KernelWriter(Expressions):
+    """Writes one kernel, for arguments of some kinds, as a function of C.
+
+    Args:
+        program: the file that is written.
+        function: the kernel in Python.
+        name: of the function in C.
+        is_exact: whether its numbers have to be of double precision.
+    """
+
+    def __init__(
+        self, program: Program, function: Callable[..., Any], name: str, is_exact: bool = False
+    ) -> None:
+        super().__init__(program, function.__globals__, DOUBLE if is_exact else FLOAT)
+        self._name = name
+        self._file = f"{function.__module__}.{function.__name__}"
+        source = textwrap.dedent(inspect.getsource(function))
+        definition = ast.parse(source).body[0]
+        assert isinstance(definition, ast.FunctionDef)
+        self._definition = definition
+        self._comments = comments_of(source)
+        self._lines: list[str] = []
+        self._depth = 1
+        self._returned: Kind | None = None
+        self._kinds: dict[str, Kind] = {}
+        self._homes = homes_of(definition)
+        self._reads = {
+            node.id
+            for node in ast.walk(definition)
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
+        }
+        self._n_results = 0
+
+    def write(self, arguments: Sequence[Value | Known]) -> Function:
+        """Return the function for such arguments.
+
+        Raises:
+            PolicyError: something in the kernel cannot be written in C.
+        """
+        names = [argument.arg for argument in self._definition.args.args]
+        for name, argument in zip(names, arguments, strict=True):
+            self._variables[name] = argument
+            if isinstance(argument, Value):
+                self._kinds[name] = argument.kind
+                self._variables[name] = Value(name, argument.kind, root=name)
+        body = self._definition.body
+        description = ast.get_docstring(self._definition) or ""
+        self._comments = {n: text for n, text in self._comments.items() if n >= body[0].lineno}
+        self._write_block(body[1:] if description else body)
+        parameters = tuple(
+            (number, self._kinds[name])
+            for number, name in enumerate(names)
+            if isinstance(arguments[number], Value) and name in self._used
+        )
+        written = frozenset(n for n, name in enumerate(names) if name in self._written)
+        texts = [
+            declared(names[n], kind, is_constant=n not in written) for n, kind in parameters
+        ]
+        kind = "void" if self._returned is None else self._returned.name  # type: ignore[union-attr]
+        head = f"static {kind} {self._name}({', '.join(texts) or 'void'})"
+        lines = [*wrapped_lines(f"{head} {{"), *self._finished_lines(), "}"]
+        comment = comment_lines(description.partition("\n\nArgs:")[0], "")
+        text = "\n".join([*comment, *lines])
+        return Function(self._name, self._returned, parameters, written, text)
+
+    def _finished_lines(self) -> Iterator[str]:
+        """Yield the lines, with what is known only at the end of the function."""
+        for line in self._lines:
+            if line.startswith("declare "):
+                _, depth, name = line.split()
+                kind = self._kinds.get(name)
+                if kind is not None:
+                    zero = " = {{0}}" if isinstance(kind, TupleOf) else " = 0"
+                    yield f"{_INDENT * int(depth)}{declared(name, kind)}{zero};"
+                continue
+            if line.lstrip().startswith(("/*", "*")):
+                yield line
+                continue
+            for root in self._kinds:
+                qualifier = "" if root in self._written else "const "
+                line = line.replace(f"<const {root}>", qualifier)
+            yield from wrapped_lines(line)
+
+    def _emit(self, text: str) -> None:
+        self._lines.append(_INDENT * self._depth + text)
+
+    def _write_block(self, statements: Sequence[ast.stmt]) -> None:
+        for statement in statements:
+            self._write_comments(statement.lineno)
+            for name, homes in self._homes.items():
+                for home in homes:
+                    if home.statement is statement and not home.is_declared_there:
+                        self._lines.append(f"declare {self._depth} {name}")
+            try:
+                self._write_statement(statement)
+            except NoCError as error:
+                line = ast.unparse(statement).partition("\n")[0]
+                raise PolicyError(f"{self._file}: no C for `{line}`: {error}") from None
+
+    def _write_comments(self, line: int) -> None:
+        """Write the comments of Python that stand before a statement or beside it."""
+        for number in sorted(n for n in self._comments if n <= line):
+            self._lines += comment_lines(self._comments.pop(number), _INDENT * self._depth)
+
+    def _write_statement(self, statement: ast.stmt) -> None:
+        self._statement = statement
+        match statement:
+            case ast.Assign(targets=[target], value=value):
+                self._assign(target, value)
+            case ast.AnnAssign(target=target, value=ast.expr() as value):
+                self._assign(target, value)
+            case ast.AugAssign():
+                self._change(statement)
+            case ast.Expr(value=ast.Call() as call):
+                self._emit(f"{self.value_of(call).text};")
+            case ast.If():
+                self._write_if(statement)
+            case ast.For():
+                self._write_for(statement)
+            case ast.While():
+                condition = converted(self.value_of(statement.test), BOOL)
+                self._write_braces(f"while ({condition.text}) {{", statement.body)
+                self._emit("}")
+            case ast.Return():
+                self._write_return(statement.value)
+            case ast.Break() | ast.Continue():
+                self._emit("break;" if isinstance(statement, ast.Break) else "continue;")
+            case ast.Pass():
+                pass
+            case _:
+                raise NoCError(type(statement).__name__)
+
+    def _write_braces(self, head: str, statements: Sequence[ast.stmt]) -> None:
+        self._emit(head)
+        self._depth += 1
+        self._write_block(statements)
+        self._depth -= 1
+
+    def _write_if(self, statement: ast.If) -> None:
+        condition = converted(self.value_of(statement.test), BOOL)
+        if condition.constant is not None:
+            self._write_block(statement.body if condition.constant else statement.orelse)
+            return
+        self._write_braces(f"if ({condition.text}) {{", statement.body)
+        rest: Sequence[ast.stmt] = statement.orelse
+        while len(rest) == 1 and isinstance(rest[0], ast.If) and not self._begins(rest[0]):
+            branch = rest[0]
+            condition = converted(self.value_of(branch.test), BOOL)
+            if condition.constant is not None:
+                break
+            self._write_braces(f"}} else if ({condition.text}) {{", branch.body)
+            rest = branch.orelse
+        if rest:
+            self._write_braces("} else {", rest)
+        self._emit("}")
+
+    def _begins(self, statement: ast.stmt) -> bool:
+        """Return whether a variable has to be declared before a statement."""
+        homes = chain.from_iterable(self._homes.values())
+        return any(home.statement is statement for home in homes)
+
+    def _write_for(self, statement: ast.For) -> None:
+        """Write a loop over a range, or each turn of one over a tuple or over a single row."""
+        target = statement.target
+        if not isinstance(target, ast.Name):
+            raise NoCError("a loop of several variables")
+        match statement.iter:
+            case ast.Call(func=ast.Name(id="range"), args=[*arguments]):
+                numbers = [self.value_of(argument) for argument in arguments]
+            case ast.Tuple(elts=parts):
+                for value in map(self.value_of, parts):
+                    self._variables[target.id] = value
+                    self._write_block(statement.body)
+                return
+            case _:
+                raise NoCError(f"a loop over {ast.unparse(statement.iter)}")
+        first, last, *steps = numbers if len(numbers) > 1 else [constant(0), *numbers]
+        if (first.constant, last.constant) == (0, 1):
+            self._variables[target.id] = constant(0)
+            self._write_block(statement.body)
+            return
+        name = target.id
+        step = f"{name} += {steps[0].text}" if steps else f"{name}++"
+        self._variables[name] = Value(name, INT)
+        self._kinds[name] = INT
+        head = f"for (int32_t {name} = {first.text}; {name} < {last.text}; {step}) {{"
+        self._write_braces(head, statement.body)
+        self._emit("}")
+
+    def _write_return(self, node: ast.expr | None) -> None:
+        if node is None:
+            self._emit("return;")
+            return
+        value = self.value_of(node)
+        if self._returned is None:
+            self._returned = FLOAT if value.kind is DOUBLE else value.kind
+        self._emit(f"return {converted(value, self._returned).text};")
+
+    def _assign(self, target: ast.expr, node: ast.expr) -> None:
+        match node:
+            case ast.Call(func=ast.Attribute(attr="empty"), args=[shape, _]):
+                self._assign_array(target, shape)
+                return
+        value = self.evaluate(node)
+        if isinstance(value, Known) and isinstance(target, ast.Name):
+            if value.is_fixed:
+                self._variables[target.id] = value
+                return
+        value = value if isinstance(value, Value) else self._as_value(value)
+        if isinstance(target, ast.Tuple):
+            self._unpack(target.elts, value)
+        else:
+            self._assign_value(target, value)
+
+    def _assign_array(self, target: ast.expr, shape: ast.expr) -> None:
+        """Declare an array of a constant number of floats."""
+        lengths = self.value_of(shape)
+        numbers = tuple(part.constant for part in lengths.parts or (lengths,))
+        if not isinstance(target, ast.Name) or None in numbers:
+            raise NoCError("an array whose length is not constant")
+        kind = ArrayOf(FLOAT, numbers)
+        self._kinds[target.id] = kind
+        self._variables[target.id] = Value(target.id, kind, root=target.id)
+        self._emit(f"float {target.id}[{int(np.prod(numbers))}];")
+
+    def _unpack(self, targets: Sequence[ast.expr], value: Value) -> None:
+        if isinstance(value.kind, ArrayOf):
+            length = value.kind.shape[0]
+            parts = [Value(f"{value.text}[{n}]", value.kind.element) for n in range(length)]
+        elif value.parts is not None:
+            parts = list(value.parts)
+            for number, target in enumerate(targets):
+                later = " ".join(part.text for part in parts[number + 1 :])
+                if ast.unparse(target) in later:
+                    raise NoCError("an exchange of values")
+        else:
+            assert isinstance(value.kind, TupleOf)
+            if not value.text.isidentifier():
+                self._n_results += 1
+                name = f"result_{self._n_results}"
+                self._emit(f"const {value.kind.name} {name} = {value.text};")
+                value = Value(name, value.kind)
+            length = value.kind.length  # type: ignore[union-attr]
+            parts = [Value(f"{value.text}.at[{n}]", value.kind.element) for n in range(length)]  # type: ignore[union-attr]
+        for target, part in zip(targets, parts, strict=True):
+            self._assign_value(target, part)
+
+    def _assign_value(self, target: ast.expr, value: Value) -> None:
+        if isinstance(target, ast.Subscript):
+            self._assign_item(target, value)
+            return
+        if not isinstance(target, ast.Name):
+            raise NoCError(f"an assignment to {ast.unparse(target)}")
+        name = target.id
+        if name not in self._reads:
+            return
+        if isinstance(value.kind, ArrayOf):
+            self._variables[name] = Value(name, value.kind, root=value.root)
+            element = value.kind.element.name
+            self._emit(f"<const {value.root}>{element} *{name} = {value.text};")
+            return
+        is_declared = any(
+            home.statement is self._statement and home.is_declared_there
+            for home in self._homes.get(name, ())
+        )
+        if is_declared or name not in self._kinds:
+            self._kinds[name] = FLOAT if value.kind is DOUBLE else value.kind
+            self._variables[name] = Value(name, self._kinds[name])
+        text = converted(value, self._kinds[name]).text
+        self._used.add(name)
+        self._emit(f"{declared(name, self._kinds[name]) if is_declared else name} = {text};")
+
+    def _assign_item(self, target: ast.Subscript, value: Value) -> None:
+        """Write to an element, or to all elements of a slice."""
+        item = self.value_of(target)
+        self._written.add(item.root)
+        if isinstance(item.kind, ArrayOf):
+            length = item.kind.shape[0]
+            text = converted(value, item.kind.element).text
+            array = item.text.removeprefix("&").removesuffix("]").replace("[", "[column + ", 1)
+            self._emit(f"for (int32_t column = 0; column < {length}; column++) {{")
+            self._emit(f"{_INDENT}{array}] = {text};")
+            self._emit("}")
+            return
+        self._emit(f"{item.text} = {converted(value, item.kind).text};")
+
+    def _change(self, statement: ast.AugAssign) -> None:
+        """Write `a = a + b` for `a += b`: C would convert by other rules."""
+        value = self.value_of(statement.value)
+        target = self.value_of(statement.target)
+        if isinstance(target.kind, ArrayOf):
+            if target.kind.shape != (1,):
+                raise NoCError(f"a change of all of {target.text}")
+            self._written.add(target.root)
+            target = Value(f"{target.text}[0]", target.kind.element, root=target.root)
+        if isinstance(statement.target, ast.Subscript):
+            self._written.add(target.root)
+        changed = converted(self.operation(statement.op, target, value), target.kind)
+        sign = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*="}.get(type(statement.op))
+        if sign is not None:
+            self._emit(f"{target.text} {sign} {converted(value, target.kind).text};")
+        else:
+            self._emit(f"{target.text} = {changed.text};")
+
+
+@dataclass
+class _Home:
+    """Where a variable lives: the first statement of the smallest block that has all of its uses.
+
+    Attributes:
+        statement: that one; the variable is declared in or before it.
+        is_declared_there: whether it gives the variable its first value.
+    """
+
+    statement: ast.stmt
+    is_declared_there: bool
+
+
+# Of a use of a variable, from the outermost block in: which block, and the statement in it.
+_Path: TypeAlias = tuple[tuple[int, ast.stmt], ...]
+
+
+def homes_of(definition: ast.FunctionDef) -> dict[str, list[_Home]]:
+    """Return where the variables of a function live, without its parameters and loops' ones.
+
+    A name that is given a first value in several blocks is a variable of its own in each.
+    """
+    paths: dict[str, list[_Path]] = {}
+    names: set[str] = set()
+    loops: set[str] = set()
+
+    def visit(statements: Sequence[ast.stmt], path: _Path) -> None:
+        for statement in statements:
+            inner = (*path, (id(statements), statement))
+            if isinstance(statement, ast.For) and isinstance(statement.target, ast.Name):
+                loops.add(statement.target.id)
+            parts = [c for c in ast.iter_child_nodes(statement) if not isinstance(c, ast.stmt)]
+            for node in chain.from_iterable(map(ast.walk, parts)):
+                if isinstance(node, ast.Name):
+                    paths.setdefault(node.id, []).append(inner)
+                    if isinstance(node.ctx, ast.Store):
+                        names.add(node.id)
+            visit(getattr(statement, "body", []), inner)
+            visit(getattr(statement, "orelse", []), inner)
+
+    visit(definition.body, ())
+    names -= loops.union(argument.arg for argument in definition.args.args)
+    return {name: _homes(name, paths[name], 0) for name in names}
+
+
+def _homes(name: str, uses: list[_Path], depth: int) -> list[_Home]:
+    """Return where a variable lives whose uses share a block at a depth."""
+    while all(len(use) > depth + 1 for use in uses) and len({use[depth + 1][0] for use in uses}) == 1:
+        depth += 1
+    statement = uses[0][depth][1]
+    if _is_target(name, statement):
+        return [_Home(statement, is_declared_there=True)]
+    groups: dict[object, list[_Path]] = {}
+    for use in uses:
+        block = use[depth + 1][0] if len(use) > depth + 1 else None
+        groups.setdefault((use[depth][1], block), []).append(use)
+    if len(groups) > 1:
+        homes = [home for group in groups.values() for home in _homes(name, group, depth)]
+        if all(home.is_declared_there for home in homes):
+            return homes
+    return [_Home(statement, is_declared_there=False)]
+
+
+def _is_target(name: str, statement: ast.stmt) -> bool:
+    """Return whether a statement assigns to a variable, alone or among others."""
+    match statement:
+        case ast.Assign(targets=[ast.Tuple(elts=targets)]):
+            return any(isinstance(node, ast.Name) and node.id == name for node in targets)
+        case ast.Assign(targets=[ast.Name(id=target)]) | ast.AnnAssign(target=ast.Name(id=target)):
+            return target == name
+    return False
+
+
+def comments_of(source: str) -> dict[int, str]:
+    """Return the comments of Python source by their lines; those of several lines as one."""
+    comments: dict[int, str] = {}
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT and not token.string.startswith(("# fmt", "# type")):
+            comments[token.start[0]] = token.string.removeprefix("#").strip()
+    for line in sorted(comments, reverse=True):
+        if line + 1 in comments:
+            comments[line] += " " + comments.pop(line + 1)
+    return comments
+
+
+def comment_lines(text: str, indent: str) -> list[str]:
+    """Return the lines of a comment of C."""
+    text = text.replace("`", "").replace("*/", "* /")
+    width = WIDTH - len(indent) - len("/*  */")
+    lines = [line for part in text.splitlines() for line in textwrap.wrap(part, width) or [""]]
+    if not lines:
+        return []
+    lines = [f"{indent} * {line}".rstrip() for line in lines]
+    lines[0] = lines[0].replace(" *", "/*", 1)
+    lines[-1] += " */"
+    return lines
+
+
+def wrapped_lines(line: str) -> Iterator[str]:
+    """Yield a line of C as lines of at most `WIDTH` characters, broken at commas or else spaces."""
+    indent = line[: len(line) - len(line.lstrip())] + 2 * _INDENT
+    while len(line) > WIDTH:
+        end = line.rfind(", ", len(indent), WIDTH) + 1 or line.rfind(" ", len(indent), WIDTH)
+        if end <= 0:
+            break
+        yield line[:end]
+        line = indent + line[end:].lstrip()
+    yield line
+
+
+def declared(name: str, kind: Kind, *, is_constant: bool = False) -> str:
+    """Return the declaration of a variable, or of a parameter that is an array."""
+    if isinstance(kind, ArrayOf):
+        return f"{'const ' if is_constant else ''}{kind.element.name} *{name}"
+    return f"{kind.name} {name}"
