@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import re
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -35,6 +36,7 @@ from swarm_logistics_env.world.motion.network_inputs import random_heading_numbe
 from swarm_logistics_env.world.scenario import Scenario
 
 from .c_program import Program, table_text
+from .c_sizes import description_of
 from .c_statements import Function
 from .c_values import FLOAT, INT, WORD, ArrayOf, Known, Value, number_text
 
@@ -216,15 +218,22 @@ _UNIFORM = Function("uniform", FLOAT, ((0, WORD), (1, INT)), frozenset(), _UNIFO
 
 @dataclass(frozen=True)
 class CFiles:
-    """The files that were written.
+    """The files that were written; as text, what they take of a processor.
 
     Attributes:
         source: the .c file.
         header: the .h file, which says what there is to call.
+        scenario: whose body and control period they hold.
     """
 
     source: Path
     header: Path
+    scenario: Scenario
+
+    def __str__(self) -> str:
+        n_lines = len(self.source.read_text(encoding="utf-8").splitlines())
+        written = f"{self.source} ({n_lines:,} lines) and {self.header.name}"
+        return f"{written}\n{description_of(self.source, self.scenario)}"
 
 
 def write_c(policy: Policy, scenario: Scenario, folder: Path | str) -> CFiles:
@@ -263,11 +272,11 @@ def write_c(policy: Policy, scenario: Scenario, folder: Path | str) -> CFiles:
     name = _file_name(policy)
     about = f"{policy!r}, for robots of this body and control period"
     header = _HEADER.format(
-        about=about, n_columns=row.N_COLUMNS, n_commands=N_COMMANDS, stream=step.stream,
+        about=about, columns=_columns_text(scenario), n_columns=row.N_COLUMNS, n_commands=N_COMMANDS, stream=step.stream,
         period=number_text(scenario.control_period, FLOAT), state=_fields(step.state),
     )  # fmt: skip
     source = _SOURCE.format(name=name, about=about, program=program.text(), begin=begin, call=call)
-    files = CFiles(Path(folder) / f"{name}.c", Path(folder) / f"{name}.h")
+    files = CFiles(Path(folder) / f"{name}.c", Path(folder) / f"{name}.h", scenario)
     for path, text in ((files.header, header), (files.source, source)):
         with atomic_write(path, PolicyError) as part:
             part.write_text(text, encoding="utf-8")
@@ -281,6 +290,20 @@ def _fields(state: Mapping[str, int]) -> str:
         for name, length in state.items()
     ]
     return "\n".join(lines)
+
+
+def _columns_text(scenario: Scenario) -> str:
+    """Return the lines of a comment that say what stands in which columns of a row."""
+    lines = []
+    for column in row.columns(scenario.replace(message_size=0)):
+        numbers = range(row.N_COLUMNS)[column.columns]
+        place = f"{numbers[0]}"
+        if len(numbers) > 1:
+            step = f", every {numbers.step}th" if numbers.step > 1 else ""
+            place = f"{numbers[0]} to {numbers[-1]}{step}"
+        text = f"{place}: {column.name} [{column.unit}], {column.meaning}"
+        lines += textwrap.wrap(text, 94, initial_indent="  ", subsequent_indent="      ")
+    return "\n".join(f" * {line}" for line in lines)
 
 
 def _file_name(policy: Policy) -> str:
@@ -299,8 +322,11 @@ _BEGIN_MEMORY = """\
 _HEADER = """\
 /* {about}.
  *
- * A robot is a struct swarm_robot, which its program sets up once by swarm_reset. Then it calls
- * swarm_step once a control period, with what the robot senses, and does what the command says.
+ * A robot is a swarm_robot, which its program sets up once by swarm_reset. Then it calls swarm_step
+ * once a control period, with what the robot senses, and does what the command says.
+ *
+ * The columns of a row, of each thing in view the nearest first:
+{columns}
  */
 #ifndef SWARM_ROBOT_H
 #define SWARM_ROBOT_H
