@@ -82,9 +82,11 @@ def compiled_controller(path: Path) -> Path:
     program = _cache() / f"{digest.hexdigest()[:32]}.exe"
     if not program.is_file():
         with tempfile.TemporaryDirectory(dir=program.parent) as folder:
-            part = Path(folder, "part.exe")
-            _compile(compiler, path, part)
-            part.replace(program)  # whole or not at all, whoever compiles it at the same time
+            new_program = Path(folder, "part.exe")
+            _compile(compiler, path, new_program)
+            new_program.replace(
+                program
+            )  # whole or not at all, whoever compiles it at the same time
     return program
 
 
@@ -92,7 +94,10 @@ def _compile(compiler: list[str], path: Path, program: Path) -> None:
     language = "c" if path.suffix == ".c" else "c++"
     parts = [program.with_suffix(".controller.o"), program.with_suffix(".host.o")]
     including = ["-x", language, "-include", str(path.resolve())]
-    run_compiler([*compiler, *FLAGS, *including, "-c", str(_HOST / "controller.c"), "-o", str(parts[0])], path)
+    run_compiler(
+        [*compiler, *FLAGS, *including, "-c", str(_HOST / "controller.c"), "-o", str(parts[0])],
+        path,
+    )
     host = [*compiler_of(Path("host.c")), *FLAGS, "-c", str(_HOST / "host.c"), "-o", str(parts[1])]
     run_compiler(host, path)
     run_compiler([*compiler, *map(str, parts), "-lm", "-o", str(program)], path)
@@ -105,9 +110,14 @@ def run_compiler(command: Sequence[str], path: Path) -> None:
         PolicyError: it fails; with the beginning of what it says of the file at `path`.
     """
     try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace")
+        environment = os.environ | {"LC_ALL": "C"}
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", env=environment
+        )
     except OSError as error:
-        raise PolicyError(f"cannot run the compiler {command[0]}: {error.strerror or error}") from error
+        raise PolicyError(
+            f"cannot run the compiler {command[0]}: {error.strerror or error}"
+        ) from error
     if done.returncode:
         lines = (done.stderr or done.stdout).strip().splitlines()
         message = "\n".join(lines[:_TOLD]) or f"exit status {done.returncode}"

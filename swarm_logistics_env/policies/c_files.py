@@ -84,8 +84,9 @@ class _Server:
         self._requests = process.stdin
         self._answers = process.stdout
         self._finalizer = weakref.finalize(self, _end, process)
-        *numbers, stream = _FACTS.unpack(self._read(_FACTS.size))
-        self.facts = _Facts(*numbers, stream.rstrip(b"\0").decode(errors="replace"))
+        size, width, n_commands, period, stream = _FACTS.unpack(self._read(_FACTS.size))
+        purpose = stream.rstrip(b"\0").decode(errors="replace")
+        self.facts = _Facts(size, width, n_commands, period, purpose)
 
     def ask(self, request: bytes, length: int) -> bytes:
         """Return the answer to a request, of so many bytes.

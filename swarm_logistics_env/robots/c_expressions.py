@@ -8,7 +8,7 @@ import inspect
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,7 +49,6 @@ _OPERATORS: dict[type, tuple[str, int, Callable[..., Any]]] = {
     ast.Mult: ("*", PRODUCT, operator.mul),
     ast.Div: ("/", PRODUCT, operator.truediv),
     ast.BitXor: ("^", BITS, operator.xor),
-    ast.BitOr: ("|", BITS, operator.or_),
 }
 _COMPARISONS = {
     ast.Eq: "==",
@@ -167,7 +166,8 @@ class Expressions:
         if isinstance(kind, TupleOf):
             number = self.value_of(index).constant
             if owner.parts is not None:
-                return owner.parts[number]
+                part: Value = owner.parts[number]
+                return part
             return Value(f"{owner.text}.at[{number}]", kind.element)
         if not isinstance(kind, ArrayOf):
             raise NoCError(f"{owner.text}[..]")
@@ -177,7 +177,7 @@ class Expressions:
         first = self.value_of(indices[0])
         if len(indices) == 1 and len(kind.shape) == 1:
             text = self._index(first, indices[0], kind.shape[0])
-            return Value(f"{owner.text}[{text}]", kind.element, root=owner.root)
+            return Value(f"{owner.within(ATOM)}[{text}]", kind.element, root=owner.root)
         if first.constant != 0 or kind.shape[0] != 1:
             raise NoCError(f"{owner.text}: more rows than one")
         inner = Value(owner.text, ArrayOf(kind.element, kind.shape[1:]), root=owner.root)
@@ -208,7 +208,8 @@ class Expressions:
         if None not in numbers:
             return Known(owner.value[numbers[0] if len(numbers) == 1 else numbers])
         table = self._program.table(owner.name, np.asarray(owner.value))
-        texts = [self._index(*pair, n) for *pair, n in zip(indices, nodes, owner.value.shape)]
+        lengths = owner.value.shape
+        texts = [self._index(*which) for which in zip(indices, nodes, lengths, strict=True)]
         return Value(table + "".join(f"[{text}]" for text in texts), FLOAT)
 
     def operation(self, symbol: ast.operator, left: Value, right: Value) -> Value:
@@ -218,6 +219,8 @@ class Expressions:
             case ast.Mod():
                 name = "remainder_of" if is_whole else "modulo"
                 return self._helped(name, INT if is_whole else FLOAT, left, right)
+            case ast.BitOr() if left.kind is right.kind is BOOL:
+                return _connected("||", [left, right])
             case ast.FloorDiv() if is_whole:
                 return self._helped("quotient_of", INT, left, right)
             case ast.Pow() if right.constant == 2:
@@ -249,22 +252,14 @@ class Expressions:
         return Value(f"{self._program.use(name)}({texts})", kind)
 
     def _negative(self, operand: Value) -> Value:
-        if operand.constant is not None and operand.strength >= UNARY and isinstance(operand.kind, Scalar):
-            if not _has_name(operand):
-                return constant(-operand.constant, operand.kind)
         number = None if operand.constant is None else -operand.constant
-        text = operand.within(ATOM)
-        return Value(f"-{text}", operand.kind, UNARY, constant=number)
+        if number is not None and isinstance(operand.kind, Scalar) and not _has_name(operand):
+            return constant(number, operand.kind)
+        return Value(f"-{operand.within(ATOM)}", operand.kind, UNARY, constant=number)
 
     def _joined(self, node: ast.BoolOp) -> Value:
-        sign, strength = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
         operands = [converted(self.value_of(operand), BOOL) for operand in node.values]
-        # A compiler warns of && within || without parentheses.
-        texts = (
-            operand.text if operand.strength >= COMPARISON else f"({operand.text})"
-            for operand in operands
-        )
-        return Value(f" {sign} ".join(texts), BOOL, strength)
+        return _connected("&&" if isinstance(node.op, ast.And) else "||", operands)
 
     def _comparison(self, node: ast.Compare) -> Value:
         values = [self.value_of(operand) for operand in (node.left, *node.comparators)]
@@ -310,7 +305,9 @@ class Expressions:
     def _call_of_library(self, function: Any, arguments: list[Value | Known]) -> Value | Known:
         if function is len:
             (argument,) = arguments
-            return Known(len(argument.value) if isinstance(argument, Known) else self._length(argument))
+            return Known(
+                len(argument.value) if isinstance(argument, Known) else self._length(argument)
+            )
         values = [a if isinstance(a, Value) else self._as_value(a) for a in arguments]
         if function in _MATH:
             return Value(self._call_text(_MATH[function], values, FLOAT), FLOAT)
@@ -320,9 +317,9 @@ class Expressions:
             return Value(self._call_text("fabsf", values, FLOAT), FLOAT)
         if function in (min, max):
             kind = common_kind(*values)
-            name = "smaller" if function is min else "larger"
-            name += "_int" if kind is INT else "_of"
-            return self._helped(name, kind, *values)  # type: ignore[arg-type]
+            if kind is not FLOAT:
+                raise NoCError(f"{function.__name__} of integers")
+            return self._helped("smaller_of" if function is min else "larger_of", FLOAT, *values)
         if function is np.argmin:
             return self._of_array("place_of_smallest", INT, values[0])
         return self._converted_by(function, values[0])
@@ -335,7 +332,9 @@ class Expressions:
         if function is int:
             if value.kind is DOUBLE:
                 return Value(f"(int32_t){value.within(UNARY)}", INT, UNARY)
-            return Value(f"{self._program.use('whole_number')}({converted(value, FLOAT).text})", INT)
+            return Value(
+                f"{self._program.use('whole_number')}({converted(value, FLOAT).text})", INT
+            )
         if function is bool:
             return converted(value, BOOL)
         kinds = {float: self._real, np.float32: FLOAT, np.float64: self._real, np.uint64: WORD}
@@ -375,6 +374,15 @@ class Expressions:
 
     def _stays_known(self, known: Known) -> bool:
         return known.is_fixed or isinstance(known.value, np.ndarray)
+
+
+def _connected(sign: str, operands: Sequence[Value]) -> Value:
+    """Return truth values joined by && or ||; a compiler warns of one within the other."""
+    texts = (
+        operand.text if operand.strength >= COMPARISON else f"({operand.text})"
+        for operand in operands
+    )
+    return Value(f" {sign} ".join(texts), BOOL, AND if sign == "&&" else OR)
 
 
 def _has_name(value: Value) -> bool:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.core.code_files import PACKAGE
 from swarm_logistics_env.core.errors import PolicyError
 
 from .c_statements import Function, KernelWriter
@@ -33,14 +32,6 @@ static inline float smaller_of(float a, float b) {
 }""",
     "larger_of": """\
 static inline float larger_of(float a, float b) {
-    return b > a ? b : a;
-}""",
-    "smaller_int": """\
-static inline int32_t smaller_int(int32_t a, int32_t b) {
-    return b < a ? b : a;
-}""",
-    "larger_int": """\
-static inline int32_t larger_int(int32_t a, int32_t b) {
     return b > a ? b : a;
 }""",
     "squared": """\
@@ -143,16 +134,19 @@ class Program:
         return helper
 
     def kernel(self, function: Any) -> Callable[..., Any] | None:
-        """Return the Python function of a kernel of this package; None: it is none."""
-        python_function = getattr(function, "py_func", function)
-        module = getattr(python_function, "__module__", None) or ""
-        is_ours = inspect.isfunction(python_function) and module.startswith(PACKAGE.name)
-        return python_function if is_ours else None
+        """Return the Python function of a kernel; None: it is no function of Python's."""
+        function = getattr(function, "py_func", function)
+        return function if inspect.isfunction(function) else None
 
     def function(self, function: Any, arguments: Sequence[Value | Known]) -> Function:
-        """Return the function of C for a kernel and such arguments; it is written once."""
+        """Return the function of C for a kernel and such arguments; it is written once.
+
+        Raises:
+            PolicyError: it is no function of Python's, or something in it cannot be written in C.
+        """
         python_function = self.kernel(function)
-        assert python_function is not None
+        if python_function is None:
+            raise PolicyError(f"{function.__name__} is no function of Python's, so it has no C")
         if python_function in self._by_hand:
             written = self._by_hand[python_function]
             self._functions[python_function, "by hand"] = written

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import ast
 import inspect
-import io
 import textwrap
-import tokenize
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swarm_logistics_env.core.errors import PolicyError
 
 from .c_expressions import Expressions
+from .c_layout import INDENT, comment_lines, comments_of, declared, wrapped_lines
 from .c_values import (
+    ATOM,
     BOOL,
     DOUBLE,
     FLOAT,
@@ -31,12 +31,10 @@ from .c_values import (
     constant,
     converted,
 )
+from .c_variables import homes_of
 
 if TYPE_CHECKING:
     from .c_program import Program
-
-WIDTH = 100  # of a line
-_INDENT = "    "
 
 
 @dataclass(frozen=True)
@@ -113,9 +111,7 @@ class KernelWriter(Expressions):
             if isinstance(arguments[number], Value) and name in self._used
         )
         written = frozenset(n for n, name in enumerate(names) if name in self._written)
-        texts = [
-            declared(names[n], kind, is_constant=n not in written) for n, kind in parameters
-        ]
+        texts = [declared(names[n], kind, is_constant=n not in written) for n, kind in parameters]
         kind = "void" if self._returned is None else self._returned.name  # type: ignore[union-attr]
         head = f"static {kind} {self._name}({', '.join(texts) or 'void'})"
         lines = [*wrapped_lines(f"{head} {{"), *self._finished_lines(), "}"]
@@ -131,7 +127,7 @@ class KernelWriter(Expressions):
                 kind = self._kinds.get(name)
                 if kind is not None:
                     zero = " = {{0}}" if isinstance(kind, TupleOf) else " = 0"
-                    yield f"{_INDENT * int(depth)}{declared(name, kind)}{zero};"
+                    yield f"{INDENT * int(depth)}{declared(name, kind)}{zero};"
                 continue
             if line.lstrip().startswith(("/*", "*")):
                 yield line
@@ -142,7 +138,7 @@ class KernelWriter(Expressions):
             yield from wrapped_lines(line)
 
     def _emit(self, text: str) -> None:
-        self._lines.append(_INDENT * self._depth + text)
+        self._lines.append(INDENT * self._depth + text)
 
     def _write_block(self, statements: Sequence[ast.stmt]) -> None:
         for statement in statements:
@@ -160,7 +156,7 @@ class KernelWriter(Expressions):
     def _write_comments(self, line: int) -> None:
         """Write the comments of Python that stand before a statement or beside it."""
         for number in sorted(n for n in self._comments if n <= line):
-            self._lines += comment_lines(self._comments.pop(number), _INDENT * self._depth)
+            self._lines += comment_lines(self._comments.pop(number), INDENT * self._depth)
 
     def _write_statement(self, statement: ast.stmt) -> None:
         self._statement = statement
@@ -177,16 +173,10 @@ class KernelWriter(Expressions):
                 self._write_if(statement)
             case ast.For():
                 self._write_for(statement)
-            case ast.While():
-                condition = converted(self.value_of(statement.test), BOOL)
-                self._write_braces(f"while ({condition.text}) {{", statement.body)
-                self._emit("}")
             case ast.Return():
                 self._write_return(statement.value)
             case ast.Break() | ast.Continue():
                 self._emit("break;" if isinstance(statement, ast.Break) else "continue;")
-            case ast.Pass():
-                pass
             case _:
                 raise NoCError(type(statement).__name__)
 
@@ -234,16 +224,15 @@ class KernelWriter(Expressions):
                 return
             case _:
                 raise NoCError(f"a loop over {ast.unparse(statement.iter)}")
-        first, last, *steps = numbers if len(numbers) > 1 else [constant(0), *numbers]
+        first, last = numbers if len(numbers) > 1 else [constant(0), *numbers]
         if (first.constant, last.constant) == (0, 1):
             self._variables[target.id] = constant(0)
             self._write_block(statement.body)
             return
         name = target.id
-        step = f"{name} += {steps[0].text}" if steps else f"{name}++"
         self._variables[name] = Value(name, INT)
         self._kinds[name] = INT
-        head = f"for (int32_t {name} = {first.text}; {name} < {last.text}; {step}) {{"
+        head = f"for (int32_t {name} = {first.text}; {name} < {last.text}; {name}++) {{"
         self._write_braces(head, statement.body)
         self._emit("}")
 
@@ -262,10 +251,9 @@ class KernelWriter(Expressions):
                 self._assign_array(target, shape)
                 return
         value = self.evaluate(node)
-        if isinstance(value, Known) and isinstance(target, ast.Name):
-            if value.is_fixed:
-                self._variables[target.id] = value
-                return
+        if isinstance(value, Known) and value.is_fixed and isinstance(target, ast.Name):
+            self._variables[target.id] = value
+            return
         value = value if isinstance(value, Value) else self._as_value(value)
         if isinstance(target, ast.Tuple):
             self._unpack(target.elts, value)
@@ -335,11 +323,9 @@ class KernelWriter(Expressions):
         item = self.value_of(target)
         self._written.add(item.root)
         if isinstance(item.kind, ArrayOf):
-            length = item.kind.shape[0]
             text = converted(value, item.kind.element).text
-            array = item.text.removeprefix("&").removesuffix("]").replace("[", "[column + ", 1)
-            self._emit(f"for (int32_t column = 0; column < {length}; column++) {{")
-            self._emit(f"{_INDENT}{array}] = {text};")
+            self._emit(f"for (int32_t n = 0; n < {item.kind.shape[0]}; n++) {{")
+            self._emit(f"{INDENT}{item.within(ATOM)}[n] = {text};")
             self._emit("}")
             return
         self._emit(f"{item.text} = {converted(value, item.kind).text};")
@@ -361,120 +347,3 @@ class KernelWriter(Expressions):
             self._emit(f"{target.text} {sign} {converted(value, target.kind).text};")
         else:
             self._emit(f"{target.text} = {changed.text};")
-
-
-@dataclass
-class _Home:
-    """Where a variable lives: the first statement of the smallest block that has all of its uses.
-
-    Attributes:
-        statement: that one; the variable is declared in or before it.
-        is_declared_there: whether it gives the variable its first value.
-    """
-
-    statement: ast.stmt
-    is_declared_there: bool
-
-
-# Of a use of a variable, from the outermost block in: which block, and the statement in it.
-_Path: TypeAlias = tuple[tuple[int, ast.stmt], ...]
-
-
-def homes_of(definition: ast.FunctionDef) -> dict[str, list[_Home]]:
-    """Return where the variables of a function live, without its parameters and loops' ones.
-
-    A name that is given a first value in several blocks is a variable of its own in each.
-    """
-    paths: dict[str, list[_Path]] = {}
-    names: set[str] = set()
-    loops: set[str] = set()
-
-    def visit(statements: Sequence[ast.stmt], path: _Path) -> None:
-        for statement in statements:
-            inner = (*path, (id(statements), statement))
-            if isinstance(statement, ast.For) and isinstance(statement.target, ast.Name):
-                loops.add(statement.target.id)
-            parts = [c for c in ast.iter_child_nodes(statement) if not isinstance(c, ast.stmt)]
-            for node in chain.from_iterable(map(ast.walk, parts)):
-                if isinstance(node, ast.Name):
-                    paths.setdefault(node.id, []).append(inner)
-                    if isinstance(node.ctx, ast.Store):
-                        names.add(node.id)
-            visit(getattr(statement, "body", []), inner)
-            visit(getattr(statement, "orelse", []), inner)
-
-    visit(definition.body, ())
-    names -= loops.union(argument.arg for argument in definition.args.args)
-    return {name: _homes(name, paths[name], 0) for name in names}
-
-
-def _homes(name: str, uses: list[_Path], depth: int) -> list[_Home]:
-    """Return where a variable lives whose uses share a block at a depth."""
-    while all(len(use) > depth + 1 for use in uses) and len({use[depth + 1][0] for use in uses}) == 1:
-        depth += 1
-    statement = uses[0][depth][1]
-    if _is_target(name, statement):
-        return [_Home(statement, is_declared_there=True)]
-    groups: dict[object, list[_Path]] = {}
-    for use in uses:
-        block = use[depth + 1][0] if len(use) > depth + 1 else None
-        groups.setdefault((use[depth][1], block), []).append(use)
-    if len(groups) > 1:
-        homes = [home for group in groups.values() for home in _homes(name, group, depth)]
-        if all(home.is_declared_there for home in homes):
-            return homes
-    return [_Home(statement, is_declared_there=False)]
-
-
-def _is_target(name: str, statement: ast.stmt) -> bool:
-    """Return whether a statement assigns to a variable, alone or among others."""
-    match statement:
-        case ast.Assign(targets=[ast.Tuple(elts=targets)]):
-            return any(isinstance(node, ast.Name) and node.id == name for node in targets)
-        case ast.Assign(targets=[ast.Name(id=target)]) | ast.AnnAssign(target=ast.Name(id=target)):
-            return target == name
-    return False
-
-
-def comments_of(source: str) -> dict[int, str]:
-    """Return the comments of Python source by their lines; those of several lines as one."""
-    comments: dict[int, str] = {}
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type == tokenize.COMMENT and not token.string.startswith(("# fmt", "# type")):
-            comments[token.start[0]] = token.string.removeprefix("#").strip()
-    for line in sorted(comments, reverse=True):
-        if line + 1 in comments:
-            comments[line] += " " + comments.pop(line + 1)
-    return comments
-
-
-def comment_lines(text: str, indent: str) -> list[str]:
-    """Return the lines of a comment of C."""
-    text = text.replace("`", "").replace("*/", "* /")
-    width = WIDTH - len(indent) - len("/*  */")
-    lines = [line for part in text.splitlines() for line in textwrap.wrap(part, width) or [""]]
-    if not lines:
-        return []
-    lines = [f"{indent} * {line}".rstrip() for line in lines]
-    lines[0] = lines[0].replace(" *", "/*", 1)
-    lines[-1] += " */"
-    return lines
-
-
-def wrapped_lines(line: str) -> Iterator[str]:
-    """Yield a line of C as lines of at most `WIDTH` characters, broken at commas or else spaces."""
-    indent = line[: len(line) - len(line.lstrip())] + 2 * _INDENT
-    while len(line) > WIDTH:
-        end = line.rfind(", ", len(indent), WIDTH) + 1 or line.rfind(" ", len(indent), WIDTH)
-        if end <= 0:
-            break
-        yield line[:end]
-        line = indent + line[end:].lstrip()
-    yield line
-
-
-def declared(name: str, kind: Kind, *, is_constant: bool = False) -> str:
-    """Return the declaration of a variable, or of a parameter that is an array."""
-    if isinstance(kind, ArrayOf):
-        return f"{'const ' if is_constant else ''}{kind.element.name} *{name}"
-    return f"{kind.name} {name}"
