@@ -1,7 +1,8 @@
 """Policies as C: one file and a header, of one robot, for small processors.
 
 The file is made of the kernels that decide in Python, so it does what they do, with `float` for
-their `double`. It takes no memory but a structure of fixed size, and needs math.h alone.
+their `double`: only what a robot remembers for minutes stays of double precision. It takes no
+memory but a structure of fixed size, and needs math.h alone.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import copy
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,14 +22,14 @@ from swarm_logistics_env.policies.layers import hyperbolic_tangent
 from swarm_logistics_env.policies.learned import LearnedPolicy
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.world import observations as row
-from swarm_logistics_env.world.motion.memory import BODY, N_COLUMNS, body_of, face_anywhere
+from swarm_logistics_env.world.motion.memory import BODY, N_COLUMNS, body_of, face_anywhere, fading
 from swarm_logistics_env.world.motion.network_inputs import random_heading_number
 from swarm_logistics_env.world.scenario import Scenario
 
 from .c_program import Program
 from .c_sizes import description_of
 from .c_steps import KEY, MEMORY, N_COMMANDS, UNIFORM, python_function, step_of
-from .c_values import FLOAT, Value, number_text
+from .c_values import DOUBLE, FLOAT, ArrayOf, Value, number_text
 
 
 @dataclass(frozen=True)
@@ -67,22 +68,22 @@ def write_c(policy: Policy, scenario: Scenario, folder: Path | str) -> CFiles:
         configured.configure(scenario)
     step = step_of(configured, scenario)
     program = Program(
-        exact=[python_function(random_heading_number)],
+        exact=[python_function(random_heading_number), python_function(fading)],
         functions={python_function(uniform): UNIFORM, **step.by_hand},
     )
     if step.by_hand:
         program.function(hyperbolic_tangent, [Value("x", FLOAT)])
     begin = step.begin
-    if "memory" in step.state:
+    if MEMORY in step.state:
         face = program.function(face_anywhere, [KEY, MEMORY])
-        body = ", ".join(number_text(number, FLOAT) for number in body_of(scenario))
+        body = ", ".join(number_text(number, DOUBLE) for number in body_of(scenario))
         begin = _BEGIN_MEMORY.format(
             n_columns=N_COLUMNS, first=BODY.start, body=body, face=face.name
         )
     function = program.function(step.kernel, step.arguments)
     texts = ", ".join(step.arguments[number].text for number, _ in function.parameters)  # type: ignore[union-attr]
     call = f"{function.name}({texts});"
-    if "heading" in step.state:
+    if MEMORY not in step.state:
         call += "\n    robot->count++;"
     name = _file_name(policy)
     about = f"{policy!r}, for robots of this body and control period"
@@ -99,12 +100,13 @@ def write_c(policy: Policy, scenario: Scenario, folder: Path | str) -> CFiles:
     return files
 
 
-def _fields(state: Mapping[str, int]) -> str:
+def _fields(state: Sequence[Value]) -> str:
     """Return the declarations of what a robot keeps."""
-    lines = [
-        f"    float {name}[{length}];" if length else f"    float {name};"
-        for name, length in state.items()
-    ]
+    lines = []
+    for value in state:
+        assert isinstance(value.kind, ArrayOf)
+        length = f"[{value.kind.shape[1]}]" if len(value.kind.shape) > 1 else ""
+        lines.append(f"    {value.kind.element.name} {value.root}{length};")
     return "\n".join(lines)
 
 
@@ -129,9 +131,9 @@ def _file_name(policy: Policy) -> str:
 
 
 _BEGIN_MEMORY = """\
-    static const float body[] = {{{body}}};
+    static const double body[] = {{{body}}};
     for (int32_t column = 0; column < {n_columns}; column++) {{
-        robot->memory[column] = column < {first} ? 0.0f : body[column - {first}];
+        robot->memory[column] = column < {first} ? 0.0 : body[column - {first}];
     }}
     {face}(&robot->key, robot->memory);"""
 

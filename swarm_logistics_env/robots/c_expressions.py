@@ -58,9 +58,9 @@ _COMPARISONS = {
     ast.Gt: ">",
     ast.GtE: ">=",
 }
-# C's functions of floats, by those of Python.
+# Functions of math.h, which have an f at the end for floats.
 _MATH = {
-    getattr(math, name): f"{name}f"
+    getattr(math, name): name
     for name in ("atan2", "copysign", "cos", "exp", "log", "sin", "sqrt", "tanh")
 }
 
@@ -98,8 +98,11 @@ class Expressions:
                 return self._attribute(self.evaluate(owner), name)
             case ast.Tuple(elts=parts):
                 return tuple_of(tuple(map(self.value_of, parts)))
-            case ast.Subscript(value=owner, slice=index):
-                return self._item(self.evaluate(owner), index)
+            case ast.Subscript():
+                item = self.item_of(node)
+                if isinstance(item, Value) and item.kind is DOUBLE:
+                    return Value(f"(float){item.text}", FLOAT, UNARY)
+                return item
             case ast.BinOp():
                 return self.operation(node.op, self.value_of(node.left), self.value_of(node.right))
             case ast.UnaryOp(op=ast.USub()):
@@ -118,6 +121,10 @@ class Expressions:
             case ast.Call():
                 return self._call(node)
         raise NoCError(type(node).__name__)
+
+    def item_of(self, node: ast.Subscript) -> Value | Known:
+        """Return an element or a part of an array or a tuple, as it is stored."""
+        return self._item(self.evaluate(node.value), node.slice)
 
     def _kind_of_number(self, number: object) -> Scalar | None:
         return self._real if isinstance(number, float) else None
@@ -310,7 +317,8 @@ class Expressions:
             )
         values = [a if isinstance(a, Value) else self._as_value(a) for a in arguments]
         if function in _MATH:
-            return Value(self._call_text(_MATH[function], values, FLOAT), FLOAT)
+            name = _MATH[function] + ("" if self._real is DOUBLE else "f")
+            return Value(self._call_text(name, values, self._real), self._real)
         if function is math.isnan:
             return Value(f"isnan({values[0].text})", BOOL)
         if function is abs:

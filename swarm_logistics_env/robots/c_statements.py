@@ -312,7 +312,7 @@ class KernelWriter(Expressions):
             for home in self._homes.get(name, ())
         )
         if is_declared or name not in self._kinds:
-            self._kinds[name] = FLOAT if value.kind is DOUBLE else value.kind
+            self._kinds[name] = value.kind
             self._variables[name] = Value(name, self._kinds[name])
         text = converted(value, self._kinds[name]).text
         self._used.add(name)
@@ -320,7 +320,8 @@ class KernelWriter(Expressions):
 
     def _assign_item(self, target: ast.Subscript, value: Value) -> None:
         """Write to an element, or to all elements of a slice."""
-        item = self.value_of(target)
+        item = self.item_of(target)
+        assert isinstance(item, Value)
         self._written.add(item.root)
         if isinstance(item.kind, ArrayOf):
             text = converted(value, item.kind.element).text
@@ -333,7 +334,10 @@ class KernelWriter(Expressions):
     def _change(self, statement: ast.AugAssign) -> None:
         """Write `a = a + b` for `a += b`: C would convert by other rules."""
         value = self.value_of(statement.value)
-        target = self.value_of(statement.target)
+        target: Value | Known = self.value_of(statement.target)
+        if isinstance(statement.target, ast.Subscript):
+            target = self.item_of(statement.target)
+        assert isinstance(target, Value)
         if isinstance(target.kind, ArrayOf):
             if target.kind.shape != (1,):
                 raise NoCError(f"a change of all of {target.text}")

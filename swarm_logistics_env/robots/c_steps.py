@@ -26,7 +26,7 @@ from swarm_logistics_env.world.scenario import Scenario
 
 from .c_program import table_text
 from .c_statements import Function
-from .c_values import FLOAT, INT, WORD, ArrayOf, Known, Value
+from .c_values import DOUBLE, FLOAT, INT, WORD, ArrayOf, Known, Value
 
 N_COMMANDS = 4  # forward, left, turn, gripper
 
@@ -74,8 +74,7 @@ class Step:
     Attributes:
         kernel: what fills the command of one row.
         arguments: its arguments, in the order of its parameters.
-        state: what a robot keeps beside its key and its count, by name: how many floats; 0: one
-            that is no array.
+        state: what a robot keeps beside its key and its count: the arguments of such names.
         stream: the purpose of its random numbers.
         begin: statements of `swarm_reset` for the state.
         by_hand: functions that are not made of kernels.
@@ -83,7 +82,7 @@ class Step:
 
     kernel: Callable[..., Any]
     arguments: Sequence[Value | Known]
-    state: Mapping[str, int]
+    state: Sequence[Value]
     stream: str
     begin: str = ""
     by_hand: Mapping[Callable[..., Any], Function] = field(default_factory=dict)
@@ -91,7 +90,9 @@ class Step:
 
 _ROW = Value("row", ArrayOf(FLOAT, (1, row.N_COLUMNS)), root="row")
 _COMMAND = Value("command", ArrayOf(FLOAT, (1, N_COMMANDS)), root="command")
-MEMORY = Value("robot->memory", ArrayOf(FLOAT, (1, N_COLUMNS)), root="memory")
+# Of double precision: the time since it first saw a wall, in steps of 0.1 s, is else a thousandth
+# off after 100 s, and with it the direction that it remembers.
+MEMORY = Value("robot->memory", ArrayOf(DOUBLE, (1, N_COLUMNS)), root="memory")
 _OUTPUTS = Value("robot->outputs", ArrayOf(FLOAT, (1, len(OUTPUTS))), root="outputs")
 KEY = Value("&robot->key", ArrayOf(WORD, (1,)), root="key")
 _COUNT = Value("&robot->count", ArrayOf(INT, (1,)), root="count")
@@ -106,37 +107,35 @@ def step_of(policy: Policy, scenario: Scenario) -> Step:
         PolicyError: none is known of this policy.
     """
     period = Known(scenario.control_period, "PERIOD", is_fixed=True)
-    motion = {"turned": 0, "memory": N_COLUMNS}
     match policy:
         case LearnedPolicy():
-            return _network_step(policy, period, motion)
+            return _network_step(policy, period)
         case Homing() if type(policy) in (Homing, HomingStock):
             values = Known(policy._values, "values", is_fixed=True)
             of_homing = (_ROW, MEMORY, KEY, _COUNT, _TURNED, period, values, _COMMAND)
-            return Step(policy._fill_commands, of_homing, motion, "homing")
+            return Step(policy._fill_commands, of_homing, (_TURNED, MEMORY), "homing")
         case SwarmDT():
             values = Known(policy._values, "values", is_fixed=True)
             constants = Known(policy._constants, "constants", is_fixed=True)
             count = Value("robot->count", INT)
             of_taxis = (_ROW, KEY, count, values, constants, _HEADING, _COMMAND)
             begin = "    robot->heading = NAN; /* until the first step */"
-            return Step(decide_swarm_dt, of_taxis, {"heading": 0}, "swarm D-T", begin)
+            return Step(decide_swarm_dt, of_taxis, (_HEADING,), "swarm D-T", begin)
     raise PolicyError(
         f"policy = {type(policy).__name__}: should be homing, homing-stock, a Swarm D-T or a "
         "trained policy, as no other one is written in C"
     )
 
 
-def _network_step(policy: LearnedPolicy, period: Known, motion: Mapping[str, int]) -> Step:
+def _network_step(policy: LearnedPolicy, period: Known) -> Step:
     network = policy.card.network
     arguments = (
         _ROW, period, MEMORY, _COUNT, _TURNED, KEY, Known(network.listens, "LISTENS", True),
         Known(policy._layers, "layers", True), Known(policy._deviations, "deviations", True),
         Known(network.decides_every, "DECIDES_EVERY", True), _OUTPUTS, _COMMAND,
     )  # fmt: skip
-    state = {**motion, "outputs": len(OUTPUTS)}
     by_hand = {python_function(run_network): _network_function(policy)}
-    return Step(act_network, arguments, state, STREAM, "", by_hand)
+    return Step(act_network, arguments, (_TURNED, MEMORY, _OUTPUTS), STREAM, "", by_hand)
 
 
 def act_network(

@@ -45,7 +45,7 @@ class TupleOf:
 
     @property
     def name(self) -> str:
-        words = {BOOL: "bools", INT: "ints", FLOAT: "floats"}
+        words = {BOOL: "bools", INT: "ints", FLOAT: "floats", DOUBLE: "doubles"}
         return f"{words[self.element]}{self.length}"
 
 
@@ -142,7 +142,7 @@ def converted(value: Value, kind: Kind) -> Value:
         return Value(f"{value.within(COMPARISON + 1)} != 0", BOOL, COMPARISON)
     if value.constant is not None and kind.rank > value.kind.rank:
         is_name = re.fullmatch("[A-Z][A-Z0-9_]*", value.text)
-        text = f"(float){value.text}" if is_name else number_text(value.constant, kind)
+        text = f"({kind.name}){value.text}" if is_name else number_text(value.constant, kind)
         return Value(text, kind, UNARY, constant=value.constant)
     if kind.rank < value.kind.rank:
         raise NoCError(f"{value.text}, of kind {value.kind.name}, as {kind.name}")
