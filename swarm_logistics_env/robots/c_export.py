@@ -26,9 +26,10 @@ from swarm_logistics_env.world.motion.memory import BODY, N_COLUMNS, body_of, fa
 from swarm_logistics_env.world.motion.network_inputs import random_heading_number
 from swarm_logistics_env.world.scenario import Scenario
 
+from .c_expressions import python_function
 from .c_program import Program
 from .c_sizes import description_of
-from .c_steps import KEY, MEMORY, N_COMMANDS, UNIFORM, python_function, step_of
+from .c_steps import KEY, MEMORY, N_COMMANDS, UNIFORM, step_of
 from .c_values import DOUBLE, FLOAT, ArrayOf, Value, number_text
 
 

@@ -6,29 +6,26 @@ import ast
 import builtins
 import inspect
 import math
-import operator
-import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from .c_operators import Operators, connected
+from .c_parts import Parts
 from .c_values import (
     AND,
     ATOM,
-    BITS,
     BOOL,
     CHOICE,
     COMPARISON,
     DOUBLE,
     FLOAT,
     INT,
-    OR,
-    PRODUCT,
-    SUM,
     UNARY,
     WORD,
     ArrayOf,
+    Function,
     Known,
     NoCError,
     Scalar,
@@ -40,16 +37,8 @@ from .c_values import (
     tuple_of,
 )
 
-if TYPE_CHECKING:
-    from .c_program import Program
+FunctionOf: TypeAlias = Callable[[Any, Sequence[Value | Known]], Function]
 
-_OPERATORS: dict[type, tuple[str, int, Callable[..., Any]]] = {
-    ast.Add: ("+", SUM, operator.add),
-    ast.Sub: ("-", SUM, operator.sub),
-    ast.Mult: ("*", PRODUCT, operator.mul),
-    ast.Div: ("/", PRODUCT, operator.truediv),
-    ast.BitXor: ("^", BITS, operator.xor),
-}
 _COMPARISONS = {
     ast.Eq: "==",
     ast.NotEq: "!=",
@@ -65,19 +54,26 @@ _MATH = {
 }
 
 
-class Expressions:
+class Expressions(Operators):
     """Writes the expressions of one kernel.
 
     Args:
-        program: the file that is written, which collects what expressions need.
+        parts: where what expressions need is collected.
+        function_of: returns the function of C for a kernel and its arguments.
         names: what the kernel's names stand for, beside those of its variables.
         real: the kind of its numbers.
     """
 
-    def __init__(self, program: Program, names: Mapping[str, Any], real: Scalar = FLOAT) -> None:
-        self._program = program
+    def __init__(
+        self,
+        parts: Parts,
+        function_of: FunctionOf,
+        names: Mapping[str, Any],
+        real: Scalar = FLOAT,
+    ) -> None:
+        super().__init__(parts, real)
+        self._function_of = function_of
         self._names = names
-        self._real = real
         self._variables: dict[str, Value | Known] = {}
         self._used: set[str] = set()  # variables and parameters
         self._written: set[str] = set()  # arrays
@@ -91,7 +87,7 @@ class Expressions:
         """Return an expression as a value of C, or what of Python it stands for."""
         match node:
             case ast.Constant(value=bool() | int() | float()):
-                return constant(node.value, self._kind_of_number(node.value))
+                return constant(node.value, self.kind_of_number(node.value))
             case ast.Name(id=name):
                 return self._named(name)
             case ast.Attribute(value=owner, attr=name):
@@ -106,7 +102,7 @@ class Expressions:
             case ast.BinOp():
                 return self.operation(node.op, self.value_of(node.left), self.value_of(node.right))
             case ast.UnaryOp(op=ast.USub()):
-                return self._negative(self.value_of(node.operand))
+                return self.negative(self.value_of(node.operand))
             case ast.UnaryOp(op=ast.Not()):
                 operand = converted(self.value_of(node.operand), BOOL)
                 if operand.constant is not None:
@@ -126,9 +122,6 @@ class Expressions:
         """Return an element or a part of an array or a tuple, as it is stored."""
         return self._item(self.evaluate(node.value), node.slice)
 
-    def _kind_of_number(self, number: object) -> Scalar | None:
-        return self._real if isinstance(number, float) else None
-
     def _named(self, name: str) -> Value | Known:
         if name in self._variables:
             self._used.add(name)
@@ -144,10 +137,10 @@ class Expressions:
             return tuple_of(tuple(constant(part) for part in number))
         if not isinstance(number, bool | int | float | np.generic):
             raise NoCError(f"{known.name or number} as a number")
-        value = constant(number, self._kind_of_number(number))
+        value = constant(number, self.kind_of_number(number))
         if not known.name or self._real is DOUBLE or value.kind is BOOL:
             return value
-        name = self._program.define(known.name, number, value.text)
+        name = self._parts.define(known.name, number, value.text)
         return Value(name, value.kind, constant=number)
 
     def _attribute(self, owner: Value | Known, name: str) -> Value | Known:
@@ -158,7 +151,7 @@ class Expressions:
         part = getattr(owner.value, name)
         if owner.is_fixed and isinstance(part, bool | int | float):
             kind = FLOAT if isinstance(part, float) else constant(part).kind
-            return Value(f"{self._program.record(owner)}.{name}", kind)
+            return Value(f"{self._parts.record(owner)}.{name}", kind)
         if owner.is_fixed:
             return Known(part, f"{owner.name}_{name}", is_fixed=True)
         if owner.value is math:
@@ -195,7 +188,7 @@ class Expressions:
             raise NoCError(f"the index {index.text}")
         # Python counts from the end below 0; only differences get there.
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Sub):
-            return f"{self._program.use('wrapped_index')}({index.text}, {length})"
+            return f"{self._parts.use('wrapped_index')}({index.text}, {length})"
         return index.text
 
     def _slice(self, owner: Value, kind: ArrayOf, index: ast.Slice) -> Value:
@@ -214,59 +207,14 @@ class Expressions:
         numbers = tuple(value.constant for value in indices)
         if None not in numbers:
             return Known(owner.value[numbers[0] if len(numbers) == 1 else numbers])
-        table = self._program.table(owner.name, np.asarray(owner.value))
+        table = self._parts.table(owner.name, np.asarray(owner.value))
         lengths = owner.value.shape
         texts = [self._index(*which) for which in zip(indices, nodes, lengths, strict=True)]
         return Value(table + "".join(f"[{text}]" for text in texts), FLOAT)
 
-    def operation(self, symbol: ast.operator, left: Value, right: Value) -> Value:
-        """Return what Python's operator makes of two values."""
-        is_whole = left.kind is INT and right.kind is INT
-        match symbol:
-            case ast.Mod():
-                name = "remainder_of" if is_whole else "modulo"
-                return self._helped(name, INT if is_whole else FLOAT, left, right)
-            case ast.BitOr() if left.kind is right.kind is BOOL:
-                return _connected("||", [left, right])
-            case ast.FloorDiv() if is_whole:
-                return self._helped("quotient_of", INT, left, right)
-            case ast.Pow() if right.constant == 2:
-                if left.constant is not None:
-                    return constant(left.constant**2, self._kind_of_number(left.constant))
-                return self._helped("squared", FLOAT, left)
-        if type(symbol) not in _OPERATORS:
-            raise NoCError(type(symbol).__name__)
-        sign, strength, compute = _OPERATORS[type(symbol)]
-        kind = common_kind(left, right)
-        if isinstance(symbol, ast.Div) and is_whole:
-            kind = self._real
-        if not isinstance(kind, Scalar):
-            raise NoCError(f"{left.text} {sign} {right.text}")
-        number = None
-        if left.constant is not None and right.constant is not None:
-            number = compute(left.constant, right.constant)
-            if kind is not INT and not (_has_name(left) or _has_name(right)):
-                return constant(number, kind)
-        left = converted(left, kind)
-        right = converted(right, kind)
-        # What binds as strongly is computed from the left.
-        text = f"{left.within(strength)} {sign} {right.within(strength + 1)}"
-        return Value(text, kind, strength, constant=number)
-
-    def _helped(self, name: str, kind: Scalar, *operands: Value) -> Value:
-        """Return a call of a function that stands in every file that needs it."""
-        texts = ", ".join(converted(operand, kind).text for operand in operands)
-        return Value(f"{self._program.use(name)}({texts})", kind)
-
-    def _negative(self, operand: Value) -> Value:
-        number = None if operand.constant is None else -operand.constant
-        if number is not None and isinstance(operand.kind, Scalar) and not _has_name(operand):
-            return constant(number, operand.kind)
-        return Value(f"-{operand.within(ATOM)}", operand.kind, UNARY, constant=number)
-
     def _joined(self, node: ast.BoolOp) -> Value:
         operands = [converted(self.value_of(operand), BOOL) for operand in node.values]
-        return _connected("&&" if isinstance(node.op, ast.And) else "||", operands)
+        return connected("&&" if isinstance(node.op, ast.And) else "||", operands)
 
     def _comparison(self, node: ast.Compare) -> Value:
         values = [self.value_of(operand) for operand in (node.left, *node.comparators)]
@@ -304,8 +252,7 @@ class Expressions:
         arguments = [self.evaluate(argument) for argument in node.args]
         if not arguments and called.is_fixed:
             return Known(function())
-        known_call = self._program.kernel(function)
-        if known_call is not None:
+        if inspect.isfunction(python_function(function)):
             return self._kernel_call(function, arguments)
         return self._call_of_library(function, arguments)
 
@@ -327,7 +274,7 @@ class Expressions:
             kind = common_kind(*values)
             if kind is not FLOAT:
                 raise NoCError(f"{function.__name__} of integers")
-            return self._helped("smaller_of" if function is min else "larger_of", FLOAT, *values)
+            return self.helped("smaller_of" if function is min else "larger_of", FLOAT, *values)
         if function is np.argmin:
             return self._of_array("place_of_smallest", INT, values[0])
         return self._converted_by(function, values[0])
@@ -336,13 +283,11 @@ class Expressions:
         """Return a number as the kind of Python or numpy that a call names."""
         if function is round:
             nearest = self._call_text("rintf", [value], FLOAT)
-            return Value(f"{self._program.use('whole_number')}({nearest})", INT)
+            return Value(f"{self._parts.use('whole_number')}({nearest})", INT)
         if function is int:
             if value.kind is DOUBLE:
                 return Value(f"(int32_t){value.within(UNARY)}", INT, UNARY)
-            return Value(
-                f"{self._program.use('whole_number')}({converted(value, FLOAT).text})", INT
-            )
+            return Value(f"{self._parts.use('whole_number')}({converted(value, FLOAT).text})", INT)
         if function is bool:
             return converted(value, BOOL)
         kinds = {float: self._real, np.float32: FLOAT, np.float64: self._real, np.uint64: WORD}
@@ -362,7 +307,7 @@ class Expressions:
         return array.kind.shape[0]
 
     def _of_array(self, name: str, kind: Scalar, array: Value) -> Value:
-        return Value(f"{self._program.use(name)}({array.text}, {self._length(array)})", kind)
+        return Value(f"{self._parts.use(name)}({array.text}, {self._length(array)})", kind)
 
     def _kernel_call(self, function: Any, arguments: list[Value | Known]) -> Value:
         """Return a call of another kernel, which is written before this one."""
@@ -370,7 +315,7 @@ class Expressions:
             a if isinstance(a, Value) or self._stays_known(a) else self._as_value(a)
             for a in arguments
         ]
-        callee = self._program.function(function, plain)
+        callee = self._function_of(function, plain)
         texts = []
         for number, kind in callee.parameters:
             argument = plain[number]
@@ -384,15 +329,7 @@ class Expressions:
         return known.is_fixed or isinstance(known.value, np.ndarray)
 
 
-def _connected(sign: str, operands: Sequence[Value]) -> Value:
-    """Return truth values joined by && or ||; a compiler warns of one within the other."""
-    texts = (
-        operand.text if operand.strength >= COMPARISON else f"({operand.text})"
-        for operand in operands
-    )
-    return Value(f" {sign} ".join(texts), BOOL, AND if sign == "&&" else OR)
-
-
-def _has_name(value: Value) -> bool:
-    """Return whether a constant is called by a name, which tells a reader more than its number."""
-    return re.search("[A-Z]{2}", value.text) is not None
+def python_function(kernel: Any) -> Callable[..., Any]:
+    """Return the Python function of a kernel, compiled or not."""
+    function: Callable[..., Any] = getattr(kernel, "py_func", kernel)
+    return function

@@ -6,16 +6,16 @@ import ast
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from swarm_logistics_env.core.errors import PolicyError
 
-from .c_expressions import Expressions
+from .c_expressions import Expressions, FunctionOf
 from .c_layout import INDENT, comment_lines, comments_of, declared, wrapped_lines
+from .c_parts import Parts
 from .c_values import (
     ATOM,
     BOOL,
@@ -23,6 +23,7 @@ from .c_values import (
     FLOAT,
     INT,
     ArrayOf,
+    Function,
     Kind,
     Known,
     NoCError,
@@ -33,43 +34,28 @@ from .c_values import (
 )
 from .c_variables import homes_of
 
-if TYPE_CHECKING:
-    from .c_program import Program
-
-
-@dataclass(frozen=True)
-class Function:
-    """A function of C.
-
-    Attributes:
-        name: in C.
-        kind: of what it returns; None: nothing.
-        parameters: the kernel's arguments that it takes, by their numbers, with their kinds.
-        written: the numbers of the arrays among them that it writes.
-        text: its definition.
-    """
-
-    name: str
-    kind: Kind | None
-    parameters: tuple[tuple[int, Kind], ...]
-    written: frozenset[int]
-    text: str
-
 
 class KernelWriter(Expressions):
     """Writes one kernel, for arguments of some kinds, as a function of C.
 
     Args:
-        program: the file that is written.
+        parts: where what it needs is collected.
+        function_of: returns the function of C for a kernel that this one calls.
         function: the kernel in Python.
         name: of the function in C.
         is_exact: whether its numbers have to be of double precision.
     """
 
     def __init__(
-        self, program: Program, function: Callable[..., Any], name: str, is_exact: bool = False
+        self,
+        parts: Parts,
+        function_of: FunctionOf,
+        function: Callable[..., Any],
+        name: str,
+        is_exact: bool = False,
     ) -> None:
-        super().__init__(program, function.__globals__, DOUBLE if is_exact else FLOAT)
+        real = DOUBLE if is_exact else FLOAT
+        super().__init__(parts, function_of, function.__globals__, real)
         self._name = name
         self._file = f"{function.__module__}.{function.__name__}"
         source = textwrap.dedent(inspect.getsource(function))

@@ -24,9 +24,9 @@ from swarm_logistics_env.world.motion.frame import OUTPUTS, command_rows, hold_r
 from swarm_logistics_env.world.motion.memory import N_COLUMNS
 from swarm_logistics_env.world.scenario import Scenario
 
-from .c_program import table_text
-from .c_statements import Function
-from .c_values import DOUBLE, FLOAT, INT, WORD, ArrayOf, Known, Value
+from .c_expressions import python_function
+from .c_parts import table_text
+from .c_values import DOUBLE, FLOAT, INT, WORD, ArrayOf, Function, Known, Value
 
 N_COMMANDS = 4  # forward, left, turn, gripper
 
@@ -192,12 +192,6 @@ def _network_function(policy: LearnedPolicy) -> Function:
     parameters = (0, ArrayOf(FLOAT, (1, widths[0]))), (2, ArrayOf(FLOAT, (1, widths[-1])))
     text = "\n\n".join([*tables, definition])
     return Function("run_network", None, parameters, frozenset({2}), text)
-
-
-def python_function(kernel: Any) -> Callable[..., Any]:
-    """Return the Python function of a kernel, compiled or not."""
-    function: Callable[..., Any] = getattr(kernel, "py_func", kernel)
-    return function
 
 
 UNIFORM = Function("uniform", FLOAT, ((0, WORD), (1, INT)), frozenset(), _UNIFORM_TEXT)

@@ -167,3 +167,22 @@ def tuple_of(parts: tuple[Value, ...]) -> Value:
     if not isinstance(element, Scalar):
         raise NoCError("a tuple of tuples")
     return Value("", TupleOf(element, len(parts)), parts=parts)
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function of C.
+
+    Attributes:
+        name: in C.
+        kind: of what it returns; None: nothing.
+        parameters: the kernel's arguments that it takes, by their numbers, with their kinds.
+        written: the numbers of the arrays among them that it writes.
+        text: its definition.
+    """
+
+    name: str
+    kind: Kind | None
+    parameters: tuple[tuple[int, Kind], ...]
+    written: frozenset[int]
+    text: str

@@ -14,7 +14,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, policies, run_episode
 from swarm_logistics_env.core.errors import PolicyError, StudyError
-from swarm_logistics_env.policies import PolicySpec, c_compiler
+from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.world import observations as row
 
@@ -152,7 +152,7 @@ def test_a_system_without_a_compiler_is_told_what_to_install(
 ) -> None:
     for variable in ("CC", "CXX"):
         monkeypatch.delenv(variable, raising=False)
-    monkeypatch.setattr(c_compiler.shutil, "which", lambda _: None)
+    monkeypatch.setattr(shutil, "which", lambda _: None)
     with pytest.raises(PolicyError, match=r"there is no compiler .* apt install gcc"):
         policies.load(f"c:{EXAMPLE}")
     with pytest.raises(PolicyError, match=r"cannot read missing\.c: No such file"):

@@ -42,10 +42,10 @@ def rest(x: float, n: int) -> float:
 def choices(x: float, n: int) -> float:
     # The same name in two branches is two variables.
     if (x > 0.5 and not (n == 2 or n > 7)) or x < -2.0:
-        part = 3
+        part = 3  # an integer
         y = x * part
     elif 0.0 < x <= 0.5:
-        part = 2.5
+        part = 2.5  # type: ignore[assignment]  # the other one
         y = x - part
     else:
         y = 7.0 if n % 2 else max(x, -1.0)
@@ -79,7 +79,8 @@ def arrays(x: float, n: int) -> float:
     part[1] -= 4.0
     is_odd = False
     is_odd |= n % 2 == 1
-    return numbers[2] * 10.0 + part.max() + np.argmin(part) + (1.0 if is_odd else 0.0)
+    rest = part.max() + np.argmin(part) + (1.0 if is_odd else 0.0)
+    return float(numbers[2] * 10.0 + rest)
 
 
 def exchanging(x: float, n: int) -> float:
@@ -142,7 +143,7 @@ def test_what_is_fixed_is_no_argument_and_what_is_only_read_is_constant() -> Non
         numbers[0] = others[1] / period
 
     four = ArrayOf(FLOAT, (4,))
-    arguments = [
+    arguments: list[Value | Known] = [
         Value("a", four), Value("b", four), Known(0.1, "PERIOD", is_fixed=True), Value("c", FLOAT),
     ]  # fmt: skip
     program = Program()
