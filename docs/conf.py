@@ -49,6 +49,7 @@ CONTENTS = {
         "training",
         "faults",
         "own",
+        "Controllers in C <c>",
     ),
     "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
     "Research": (

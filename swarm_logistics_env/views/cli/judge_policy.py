@@ -60,7 +60,7 @@ PolicyArgument = Annotated[
     str,
     Argument(
         metavar="POLICY",
-        help="Name (`list policies`), path of a policy file, module:Class or my.py:Class.",
+        help="Name (`list policies`), path of a policy file, module:Class, my.py:Class or c:my.c.",
     ),
 ]
 MostSeedsOption = Annotated[

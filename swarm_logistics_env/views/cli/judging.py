@@ -97,7 +97,7 @@ def judge_command(
             metavar="TRIALS|POLICY",
             help="File of trials, one trial or delivery a row (CSV, .xlsx, .parquet, JSON of "
             "POGEMA or marl-eval, a Monitor's CSV), or a folder of them; or a policy: name, path "
-            "of a policy file, module:Class or my.py:Class.",
+            "of a policy file, module:Class, my.py:Class or c:my.c.",
         ),
     ],
 ) -> None:
