@@ -19,6 +19,7 @@
 #define dup _dup
 #define dup2 _dup2
 #define fdopen _fdopen
+#define alarm(seconds) ((void)0)
 #else
 #include <unistd.h>
 #endif
@@ -30,6 +31,8 @@ double host_period(void);
 const char *host_stream(void);
 void host_reset(void *robot, uint64_t seed, uint32_t number);
 void host_step(void *robot, const float *row, float *command);
+
+#define LONGEST 60 /* [s] that an answer may take: a controller that never ends is ended */
 
 enum { RESET, STEP, TIME };
 
@@ -117,7 +120,9 @@ int main(void) {
     fflush(answers);
     request_of_host request;
     while (fread(&request, sizeof request, 1, stdin) == 1) {
+        alarm(LONGEST);
         answer(answers, &request);
+        alarm(0);
     }
     return 0;
 }
