@@ -106,7 +106,8 @@ def load(
     if make is None:
         names = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         hint = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, names)
-        kinds = "a name, 'my.py:Class', 'module:Class', 'c:my.c', or a .safetensors or .zip file"
+        kinds = "a name, 'my.py:Class', 'package.module:Class'"
+        kinds += ", 'c:my.c', or a .safetensors or .zip file"
         raise PolicyError(f"no policy {name!r} ({kinds}){hint}")
     if env is not None and ":" not in env:
         raise PolicyError(f"env {env!r}: should be 'my.py:NAME' or 'package.module:NAME'")
