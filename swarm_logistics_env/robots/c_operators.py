@@ -94,6 +94,7 @@ class Operators:
         return Value(f"{self._parts.use(name)}({texts})", kind)
 
     def negative(self, operand: Value) -> Value:
+        """Return what Python's minus makes of a value."""
         number = None if operand.constant is None else -operand.constant
         if number is not None and isinstance(operand.kind, Scalar) and not _has_name(operand):
             return constant(number, operand.kind)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
@@ -265,19 +266,26 @@ class KernelWriter(Expressions):
             parts = list(value.parts)
             for number, target in enumerate(targets):
                 later = " ".join(part.text for part in parts[number + 1 :])
-                if ast.unparse(target) in later:
+                if re.search(rf"\b{re.escape(self._target_text(target))}(?!\w)", later):
                     raise NoCError("an exchange of values")
         else:
-            assert isinstance(value.kind, TupleOf)
-            if not value.text.isidentifier():
+            kind = value.kind
+            assert isinstance(kind, TupleOf)
+            name = value.text
+            if not name.isidentifier():
                 self._n_results += 1
                 name = f"result_{self._n_results}"
-                self._emit(f"const {value.kind.name} {name} = {value.text};")
-                value = Value(name, value.kind)
-            length = value.kind.length  # type: ignore[union-attr]
-            parts = [Value(f"{value.text}.at[{n}]", value.kind.element) for n in range(length)]  # type: ignore[union-attr]
+                self._emit(f"const {kind.name} {name} = {value.text};")
+            parts = [Value(f"{name}.at[{n}]", kind.element) for n in range(kind.length)]
         for target, part in zip(targets, parts, strict=True):
             self._assign_value(target, part)
+
+    def _target_text(self, target: ast.expr) -> str:
+        if isinstance(target, ast.Subscript):
+            item = self.item_of(target)
+            assert isinstance(item, Value)
+            return item.text
+        return ast.unparse(target)
 
     def _assign_value(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Subscript):

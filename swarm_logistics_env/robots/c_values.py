@@ -151,10 +151,10 @@ def converted(value: Value, kind: Kind) -> Value:
 
 def common_kind(*values: Value) -> Kind:
     """Return the kind that Python makes of values of several kinds."""
-    tuples = [value for value in values if isinstance(value.kind, TupleOf)]
+    tuples = [value.kind for value in values if isinstance(value.kind, TupleOf)]
     if tuples:
-        element = max((value.kind.element for value in tuples), key=lambda kind: kind.rank)  # type: ignore[union-attr]
-        return TupleOf(element, tuples[0].kind.length)  # type: ignore[union-attr]
+        element = max((kind.element for kind in tuples), key=lambda kind: kind.rank)
+        return TupleOf(element, tuples[0].length)
     scalars = [value.kind for value in values if isinstance(value.kind, Scalar)]
     if len(scalars) < len(values):
         raise NoCError(f"{values[0].text} and {values[-1].text} as numbers")
