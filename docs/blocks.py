@@ -164,8 +164,9 @@ def run_in_small(texts: Mapping[str, str]) -> None:
     Python is run where it names what a command of its page reads.
     """
     with _working_folder() as folder:
-        for path in (ROOT / "examples").glob("*.py"):
-            shutil.copy(path, folder)
+        for path in (ROOT / "examples").iterdir():
+            if path.suffix in (".py", ".c"):
+                shutil.copy(path, folder)
         for block in (block for text in texts.values() for block in blocks(text)):
             if file := _FILE.match(block.code):
                 (folder / file[1]).write_text(block.code, encoding="utf-8")

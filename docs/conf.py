@@ -50,6 +50,7 @@ CONTENTS = {
         "faults",
         "own",
         "robots",
+        "Controllers in C <c>",
     ),
     "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
     "Research": (

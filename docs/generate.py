@@ -40,8 +40,8 @@ from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN, SCENARIO_PRES
 FACTORS = ("sizes", "faults", "parameters", "ablations")
 # From the ground up: each imports those before it alone, as `tests/test_imports.py` has it.
 ROOMS = (
-    "core", "compiler", "spi", "world", "environment", "wrappers", "policies", "adapters", "study",
-    "train", "robots", "views",
+    "core", "compiler", "spi", "world", "environment", "wrappers", "policies", "adapters", "robots",
+    "study", "train", "views",
 )  # fmt: skip
 PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")
 

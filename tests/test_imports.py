@@ -30,10 +30,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "wrappers": {"core", "environment", "spi", "world"},
     "policies": {"compiler", "core", "environment", "spi", "world", "wrappers"},
     "adapters": {"core", "environment", "policies", "world", "wrappers"},
+    "robots": {"compiler", "core", "policies", "world"},
     "study": {"compiler", "core", "policies", "spi", "world"},
 }
 MAY_IMPORT["train"] = {*MAY_IMPORT} - {"swarm_logistics_v0"}
-MAY_IMPORT["robots"] = {"compiler", "core", "policies", "world"}
 MAY_IMPORT["views"] = {"core", "policies", "robots", "spi", "study", "train", "world"}
 MAY_IMPORT["__main__"] = {"views"}
 MAY_IMPORT["__init__"] = {*MAY_IMPORT}  # offers names of all rooms

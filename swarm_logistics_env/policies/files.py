@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.core.errors import PolicyError, how_to_install
 from swarm_logistics_env.core.records import atomic_write, canonical_json
+from swarm_logistics_env.policies.c_files import CFile, is_c_name
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.sb3_files import SB3_SUFFIX, from_sb3
@@ -206,6 +207,8 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
 
 def maker_of_file(name: str, trust_code: bool) -> Callable[..., Policy] | None:
     """Return what reads the policy file of that path; None: it is not called as one."""
+    if is_c_name(name):
+        return functools.partial(CFile, name)
     path = Path(name)
     if path.suffix == SUFFIX:
         return functools.partial(read_policy, path)

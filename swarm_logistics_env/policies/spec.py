@@ -24,6 +24,7 @@ from swarm_logistics_env.core.errors import (
 from swarm_logistics_env.core.fingerprint import UNSTABLE, changed_files, changes, deep_copy
 from swarm_logistics_env.core.records import Record, canonical_json
 from swarm_logistics_env.policies.biased_walk import BiasedWalk, BiasedWalkCompass
+from swarm_logistics_env.policies.c_files import is_c_name
 from swarm_logistics_env.policies.central import Central
 from swarm_logistics_env.policies.central_stock import CentralStock
 from swarm_logistics_env.policies.files import (
@@ -82,10 +83,10 @@ def load(
 
     Args:
         name: one of `NAMES`, a name that an installed package declares in the entry-point group
-            `swarm_logistics_env.policies`, "package.module:Class", or the path of a policy file.
-            Naming a class imports, and so executes, its module. A file that `swarm-logistics
-            train` wrote (.safetensors) executes nothing; a model that stable-baselines3 saved
-            (.zip) does.
+            `swarm_logistics_env.policies`, "package.module:Class", "c:my.c" (see `c_files`), or the
+            path of a policy file. Naming a class or a file in C executes it. A file that
+            `swarm-logistics train` wrote (.safetensors) executes nothing; a model that
+            stable-baselines3 saved (.zip) does.
         trust_code: whether to read a file although that executes the code in it.
         env: what wraps the environment that it plays in, as "my.py:wrap" (see `within`).
         parameters: handed to the policy, e.g. `taxis_gain=0.5` for "swarm-dt".
@@ -106,7 +107,8 @@ def load(
     if make is None:
         names = [*NAMES, *entry_points(group=ENTRY_POINTS).names]
         hint = "; see examples/mixed_swarm.py" if "=" in name else suggest(name, names)
-        kinds = "a name, 'my.py:Class', 'package.module:Class', or a .safetensors or .zip file"
+        kinds = "a name, 'my.py:Class', 'package.module:Class'"
+        kinds += ", 'c:my.c', or a .safetensors or .zip file"
         raise PolicyError(f"no policy {name!r} ({kinds}){hint}")
     if env is not None and ":" not in env:
         raise PolicyError(f"env {env!r}: should be 'my.py:NAME' or 'package.module:NAME'")
@@ -308,10 +310,11 @@ class PolicySpec(Record):
 
     def _parts_of(self, policy: Policy) -> dict[str, Any]:
         """Return what identifies the policy that it stands for, by name."""
-        file = file_of_name(self.name) if self.made is None else None
+        is_python = self.made is None and not is_c_name(self.name)
+        file = file_of_name(self.name) if is_python else None
         parts = identity_parts(policy, [file] if file else ())
         # Two functions may make objects of one class; a class need not keep its parameters.
-        if self.made is None and ":" in self.name:
+        if is_python and ":" in self.name:
             parts["made by"] = self.name.rpartition(":")[2]
         if self.parameters and "parameters" not in parts:
             parts["given"] = self.parameters

@@ -38,7 +38,7 @@ EPISODE_CODE = (
     "world/floor/plans/*.txt", "policies/*.py", "!policies/__init__.py", "!policies/spec.py",
     "!policies/files.py", "!policies/models.py", "!policies/model_spaces.py",
     "!policies/networks.py", "!policies/normalizers.py", "!policies/sb3_files.py",
-    "!policies/demonstrations.py", "!policies/testing.py",
+    "!policies/demonstrations.py", "!policies/testing.py", "!policies/c_*.py",
 )  # fmt: skip
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def attack_command(
     policy: Annotated[
         str,
-        Argument(metavar="POLICY", help="Name, .safetensors file, module:Class or my.py:Class."),
+        Argument(metavar="POLICY", help="Name, a file, module:Class, my.py:Class or c:my.c."),
     ],
     robots: Annotated[int, Option(min=1, help="How many robots fail.")] = 2,
     modes: Annotated[Repeated, Option("--mode", help="Mode to search; may be repeated.")] = None,

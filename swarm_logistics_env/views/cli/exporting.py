@@ -11,6 +11,7 @@ from typer import Argument, Option, echo
 from swarm_logistics_env.core.errors import RobotError, suggest
 from swarm_logistics_env.core.records import atomic_write
 from swarm_logistics_env.policies import Policy, write_onnx
+from swarm_logistics_env.robots.c_export import write_c
 from swarm_logistics_env.robots.contract import contract_of
 from swarm_logistics_env.study.report.section import slug
 from swarm_logistics_env.world.scenario import Scenario
@@ -24,24 +25,27 @@ class Format(NamedTuple):
 
     Attributes:
         suffix: of the file's name.
-        write: writes the file at a path, for the robots of a scenario.
+        write: writes the file at a path, for the robots of a scenario; returns what to say of it.
     """
 
     suffix: str
-    write: Callable[[Policy, Scenario, Path], None]
+    write: Callable[[Policy, Scenario, Path], object]
 
 
-def _write_contract(policy: Policy, scenario: Scenario, path: Path) -> None:
+def _write_contract(policy: Policy, scenario: Scenario, path: Path) -> Path:
     text = contract_of(policy, scenario).to_yaml()
     with atomic_write(path, RobotError) as part:
         part.write_text(text, encoding="utf-8")
+    return path
 
 
-def _write_onnx(policy: Policy, _: Scenario, path: Path) -> None:
+def _write_onnx(policy: Policy, _: Scenario, path: Path) -> Path:
     write_onnx(policy, path)
+    return path
 
 
 FORMATS = {
+    "c": Format(".c", write_c),
     "contract": Format(".yaml", _write_contract),
     "onnx": Format(".onnx", _write_onnx),
 }
@@ -60,12 +64,12 @@ def export_command(
     changes: SetOption = None,
     trust_code: TrustOption = False,
 ) -> None:
-    """Write a policy for robots: its contract, or its network."""
+    """Write a policy for robots: as C, its contract, or its network."""
     if to not in FORMATS:
         raise RobotError(f"--to {to}: no such format{suggest(to, FORMATS)}")
     (spec,) = policies_of([policy], trust_code)
     scenario = scenario_of(preset, scenario_file, changes, policies=[spec])
     form = FORMATS[to]
     path = out or Path(f"{slug(spec.title)}{form.suffix}")
-    form.write(spec.load(), scenario, path)
-    echo(f"Written: {path}")
+    written = form.write(spec.load(), scenario, path)
+    echo(f"Written: {written}")

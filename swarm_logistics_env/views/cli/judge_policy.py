@@ -60,8 +60,8 @@ PoliciesArgument = Annotated[
     list[str],
     Argument(
         metavar="POLICIES",
-        help="Name (`list policies`), path of a policy file, module:Class or my.py:Class. Each "
-        "other one is compared with the first.",
+        help="Name (`list policies`), path of a policy file, module:Class, my.py:Class or c:my.c. "
+        "Each other one is compared with the first.",
     ),
 ]
 MostSeedsOption = Annotated[

@@ -103,7 +103,7 @@ def judge_command(
             metavar="TRIALS|POLICIES",
             help="File of trials, one trial or delivery a row (CSV, .xlsx, .parquet, JSON of "
             "POGEMA or marl-eval, a Monitor's CSV), or a folder of them; or a policy: name, path "
-            "of a policy file, module:Class or my.py:Class; several policies are compared.",
+            "of a policy file, module:Class, my.py:Class or c:my.c; several policies are compared.",
         ),
     ],
 ) -> None:

@@ -48,7 +48,7 @@ def run_command(
         Repeated,
         Option(
             "--policy",
-            help="Name (`list policies`), path of a policy file, module:Class or my.py:Class; "
+            help="Name (`list policies`), path of a file, module:Class, my.py:Class or c:my.c; "
             "swarm-dt if not given. With --film it may be repeated.",
         ),
     ] = None,

@@ -14,7 +14,7 @@ from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.sb3_files import SB3_SUFFIX
 
 PolicyOption = Annotated[
-    str, Option(help="Name (`list policies`), path of a file, module:Class or my.py:Class.")
+    str, Option(help="Name (`list policies`), path of a file, module:Class, my.py:Class or c:my.c.")
 ]
 TrustOption = Annotated[
     bool,

@@ -1,0 +1,207 @@
+"""Policies as C: the file commands what the policy commands, without a warning or a fault."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from swarm_logistics_env import Scenario, Warehouse, policies
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.policies.c_files import CFile
+from swarm_logistics_env.policies.policy import start
+from swarm_logistics_env.robots.c_export import write_c
+from swarm_logistics_env.robots.c_sizes import ARM, CORTEX_M4, sizes_of
+from swarm_logistics_env.world.motion.memory import N_COLUMNS
+
+NAMES = ("homing", "homing-stock", "swarm-dt", "ppo-robust")
+# Robots on wheels, and lifting takes time: all that the kernels do.
+SCENARIO = Scenario.preset("realistic").replace(restock=True)
+FUZZ = Path(__file__).parent / "fuzz.c"
+EXACT = 1e-5  # of a command
+ROUNDED = 1e-2  # more is a decision on the other side of a branch
+needs_gcc = pytest.mark.skipif(not shutil.which("gcc"), reason="needs gcc")
+
+
+@dataclass
+class Replay:
+    """Rows of episodes, decided in Python and in C.
+
+    Attributes:
+        n_decisions: of single robots.
+        n_rounded: commands that differ by more than `EXACT`: those of `float`, seen enlarged, as
+            in the turn of a robot that hardly drives.
+        n_elsewhere: those that differ by more than `ROUNDED`.
+    """
+
+    n_decisions: int = 0
+    n_rounded: int = 0
+    n_elsewhere: int = 0
+
+
+def replay(name: str, scenario: Scenario, seeds: range, folder: Path) -> Replay:
+    """Play episodes with the policy; upon each row, the C file decides as well.
+
+    A robot whose commands differ goes on from what the policy remembers: else a heading that is
+    off would be counted at every decision to come.
+    """
+    files = write_c(policies.load(name), scenario, folder / f"{name}.c")
+    policy: Any = policies.load(name)
+    controller: Any = policies.load(f"c:{files.source}")
+    counts = Replay()
+    for seed in seeds:
+        world = Warehouse(scenario)
+        rows = world.reset(seed)
+        start(policy, scenario, seed)
+        start(controller, scenario, seed)
+        while not world.is_over_time:
+            commands = policy.act(rows)
+            difference = np.abs(commands - controller.act(rows)).max(axis=1)
+            elsewhere = difference > ROUNDED
+            counts.n_decisions += len(rows)
+            counts.n_elsewhere += elsewhere.sum()
+            counts.n_rounded += ((difference > EXACT) & ~elsewhere).sum()
+            if (difference > EXACT).any():
+                take_over(policy, controller, np.flatnonzero(difference > EXACT))
+            rows = world.step(commands)
+    return counts
+
+
+def take_over(policy: Any, controller: CFile, robots: NDArray[np.int64]) -> None:
+    """Let robots of the C file remember what those of the policy do."""
+    state: dict[str, Any] = {}
+    if hasattr(policy, "_frame"):
+        state = {"turned": policy._frame.turned, "memory": policy._frame.memory}
+    if hasattr(policy, "_outputs"):
+        state["outputs"] = policy._outputs
+    if hasattr(policy, "_heading"):
+        state["heading"] = policy._heading
+    fields: Any = [("key", "u8"), ("count", "i4")]
+    fields += [
+        (name, "f8" if name == "memory" else "f4", numbers.shape[1:])
+        for name, numbers in state.items()
+    ]
+    structs = np.frombuffer(bytearray(controller._robots), np.dtype(fields, align=True))
+    for name, numbers in state.items():
+        structs[name][robots] = numbers[robots]
+    controller._robots = structs.tobytes()
+
+
+@needs_gcc
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", NAMES)
+def test_the_c_file_decides_as_the_policy_does(name: str, tmp_path: Path) -> None:
+    counts = replay(name, SCENARIO.replace(duration=40.0), range(2), tmp_path)
+    assert counts.n_decisions == 20_000
+    assert counts.n_elsewhere <= 20
+    assert counts.n_rounded <= (2_000 if name == "homing-stock" else 100)
+
+
+@needs_gcc
+@pytest.mark.daily
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("preset", ["paper", "realistic"])
+def test_the_c_file_decides_as_the_policy_does_in_a_quarter_of_a_million_decisions(
+    name: str, preset: str, tmp_path: Path
+) -> None:
+    scenario = Scenario.preset(preset).replace(restock=True, duration=200.0)
+    counts = replay(name, scenario, range(5), tmp_path)
+    assert counts.n_decisions == 250_000
+    assert counts.n_elsewhere <= 250
+    assert counts.n_rounded <= (25_000 if name == "homing-stock" else 1_250)
+
+
+@needs_gcc
+@pytest.mark.parametrize("name", NAMES)
+def test_it_compiles_without_a_warning_and_takes_little(name: str, tmp_path: Path) -> None:
+    files = write_c(policies.load(name), SCENARIO, tmp_path / "robot.c")
+    sizes = sizes_of(files.source, ["gcc"])
+    assert sizes.flash < 128 * 1024
+    assert sizes.stack is not None
+    assert sizes.stack < 4 * 1024
+    part = tmp_path / "part.o"
+    subprocess.run(["gcc", "-std=c99", "-c", str(files.source), "-o", str(part)], check=True)
+    names = subprocess.run(["nm", "-u", str(part)], capture_output=True, text=True, check=True)
+    # Of floats, and what compilers use of their own accord: no heap, no files.
+    assert re.fullmatch(
+        r"(\s*U (\w+f|mem\w+|__stack_chk_fail|_GLOBAL_OFFSET_TABLE_)\n)+", names.stdout
+    )
+
+
+@pytest.mark.skipif(not shutil.which(ARM), reason=f"needs {ARM}")
+@pytest.mark.parametrize("name", NAMES)
+def test_it_compiles_for_a_cortex_m4_and_fits(name: str, tmp_path: Path) -> None:
+    sizes = sizes_of(
+        write_c(policies.load(name), SCENARIO, tmp_path / "robot.c").source, [ARM, *CORTEX_M4]
+    )
+    assert sizes.flash < 128 * 1024
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("name", "n_steps"),
+    [
+        ("homing-stock", 100_000),
+        ("swarm-dt", 100_000),
+        *(pytest.param(name, 2_500_000, marks=pytest.mark.daily) for name in NAMES),
+    ],
+)
+def test_no_row_makes_it_read_or_compute_what_is_not_there(
+    name: str, n_steps: int, tmp_path: Path
+) -> None:
+    files = write_c(policies.load(name), SCENARIO, tmp_path / "robot.c")
+    program = tmp_path / "fuzz"
+    checks = "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"
+    optimization = "-O2" if n_steps > 100_000 else "-O0"  # to compile takes longer than to run
+    sources = "-include", str(files.source), str(FUZZ), "-lm"
+    build = ["gcc", "-std=c99", optimization, *checks, *sources, "-o", str(program)]
+    done = subprocess.run(build, capture_output=True, text=True)
+    if "cannot find" in done.stderr:
+        pytest.skip("needs the sanitizers of gcc")
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run([program, str(n_steps)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@needs_gcc
+def test_a_row_with_what_is_no_number_leaves_a_robot_as_it_is(tmp_path: Path) -> None:
+    files = write_c(policies.load("homing"), SCENARIO, tmp_path / "robot.c")
+    controller: Any = policies.load(f"c:{files.source}")
+    controller.reset(2, 0)
+    before = controller._robots
+    rows = np.ones((2, 141), np.float32)
+    rows[0, 100] = np.nan
+    assert controller.act(rows)[0].tolist() == [0.0, 0.0, 0.0, 0.0]
+    size = controller.robot_size
+    assert controller._robots[:size] == before[:size]
+    assert controller._robots[size:] != before[size:]
+
+
+def test_the_files_say_what_they_are_for(tmp_path: Path) -> None:
+    files = write_c(policies.load("homing-stock", patience=8.0), SCENARIO, tmp_path / "robot.c")
+    header = files.header.read_text()
+    assert "HomingStock(patience=8.0)" in header
+    assert "#define SWARM_PERIOD 0.1f" in header
+    assert f"double memory[{N_COLUMNS}];" in header
+    assert "132: carrying [flag], it carries an item" in header
+    assert ".patience = 8.0f," in files.source.read_text()
+    with pytest.raises(PolicyError, match="policy = Central: should be homing, homing-stock"):
+        write_c(policies.load("central"), SCENARIO, tmp_path / "robot.c")
+
+
+@needs_gcc
+def test_what_they_take_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = write_c(policies.load("swarm-dt"), SCENARIO, tmp_path / "robot.c")
+    text = str(files)
+    assert "a robot keeps 16 bytes" in text
+    assert re.search(r"cc: [\d,]+ bytes of flash, at most \d+ bytes of stack", text)
+    assert re.search(r"[\d.]+ us a step on this machine, the mean of 10,000", text)
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert "neither sizes nor times: cannot run the compiler no-such-compiler" in str(files)

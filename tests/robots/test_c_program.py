@@ -1,0 +1,165 @@
+"""Functions of Python as functions of C: they compute the same."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import shutil
+import subprocess
+from collections.abc import Callable
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.robots.c_program import Program
+from swarm_logistics_env.robots.c_sizes import WARNINGS
+from swarm_logistics_env.robots.c_values import FLOAT, INT, ArrayOf, Known, Value
+
+TABLE = np.array([0.5, -1.5, 2.5, 4.0])
+_STEP = 0.25
+
+
+class Columns(NamedTuple):
+    first: int
+    second: int
+
+
+COLUMN = Columns(1, 2)
+
+
+def whole_numbers(x: float, n: int) -> float:
+    return float(n // 3) + 10.0 * float(n % 3) + 100.0 * round(x) + 1000.0 * int(x)
+
+
+def rest(x: float, n: int) -> float:
+    return x % 0.75 - (x - (n - (2 - n)) * _STEP) / -2.0
+
+
+def choices(x: float, n: int) -> float:
+    # The same name in two branches is two variables.
+    if (x > 0.5 and not (n == 2 or n > 7)) or x < -2.0:
+        part = 3  # an integer
+        y = x * part
+    elif 0.0 < x <= 0.5:
+        part = 2.5  # type: ignore[assignment]  # the other one
+        y = x - part
+    else:
+        y = 7.0 if n % 2 else max(x, -1.0)
+    for index in range(4):
+        if TABLE[index] < x:
+            continue
+        y += TABLE[index - 1]
+        break
+    return min(y, 5.0)
+
+
+def swapped(x: float, y: float) -> tuple[float, float]:
+    return y - _STEP, x**2
+
+
+def tuples(x: float, n: int) -> float:
+    pair = swapped(x, 1.0)
+    first, second = pair
+    if n > 1:
+        pair = 2.0, 3.0
+    for column in (COLUMN.first, COLUMN.second):
+        first -= column * second
+    return first + pair[1] * math.copysign(abs(x), second - 1.0)
+
+
+def arrays(x: float, n: int) -> float:
+    numbers = np.empty(4, np.float32)
+    numbers[0:4] = x
+    numbers[n] += 1.0
+    part = numbers[COLUMN.first : COLUMN.second + 1]
+    part[1] -= 4.0
+    is_odd = False
+    is_odd |= n % 2 == 1
+    rest = part.max() + np.argmin(part) + (1.0 if is_odd else 0.0)
+    return float(numbers[2] * 10.0 + rest)
+
+
+def exchanging(x: float, n: int) -> float:
+    y = 1.0
+    x, y = y, x + 1.0
+    return x + n
+
+
+def exchanging_items(x: float, n: int) -> float:
+    pair = np.empty(2, np.float32)
+    pair[0], pair[1] = pair[1], pair[0]
+    return x + n
+
+
+def failing(x: float, n: int) -> float:
+    assert n > 0
+    return x
+
+
+def as_c(function: Callable[..., Any], folder: Path) -> Any:
+    """Return the function compiled, of a float and an integer."""
+    program = Program()
+    program.function(function, [Value("x", FLOAT), Value("n", INT)])
+    source = folder / "function.c"
+    name = function.__name__
+    source.write_text(
+        "#include <math.h>\n#include <stdbool.h>\n#include <stdint.h>\n\n"
+        f"{program.text()}\n\nfloat run(float x, int32_t n);\n\n"
+        f"float run(float x, int32_t n) {{\n    return {name}(x, n);\n}}\n"
+    )
+    library = folder / "function.so"
+    flags = (*WARNINGS, "-O2", "-shared", "-fPIC")
+    subprocess.run(["gcc", *flags, str(source), "-lm", "-o", str(library)], check=True)
+    run = ctypes.CDLL(str(library)).run
+    run.argtypes = ctypes.c_float, ctypes.c_int32
+    run.restype = ctypes.c_float
+    return run
+
+
+@pytest.mark.skipif(not shutil.which("gcc"), reason="needs gcc")
+@pytest.mark.parametrize(
+    "function", [whole_numbers, rest, choices, tuples, arrays], ids=lambda f: f.__name__
+)
+def test_c_computes_what_python_computes(function: Callable[..., Any], tmp_path: Path) -> None:
+    run = as_c(function, tmp_path)
+    places = range(4)
+    for x, n in product((-2.5, -1.75, -0.5, -0.25, 0.0, 0.5, 0.75, 1.5, 2.5, 3.25), places):
+        assert run(x, n) == pytest.approx(float(function(x, n)), abs=1e-5), (x, n)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (
+            exchanging,
+            r"test_c_program.exchanging: no C for `.*x, y.* = .*y, x \+ 1.0.*`: an exchange",
+        ),
+        (exchanging_items, r"no C for `pair\[0\], .*: an exchange"),
+        (failing, "no C for `assert n > 0`: Assert"),
+        (math.sqrt, "sqrt is no function of Python's"),
+    ],
+)
+def test_what_has_no_c_is_told_with_its_line(function: Callable[..., Any], message: str) -> None:
+    with pytest.raises(PolicyError, match=message):
+        Program().function(function, [Value("x", FLOAT), Value("n", INT)])
+
+
+def test_what_is_fixed_is_no_argument_and_what_is_only_read_is_constant() -> None:
+    def change(numbers: Any, others: Any, period: float, unused: float) -> None:
+        numbers[0] = others[1] / period
+
+    four = ArrayOf(FLOAT, (4,))
+    arguments: list[Value | Known] = [
+        Value("a", four), Value("b", four), Known(0.1, "PERIOD", is_fixed=True), Value("c", FLOAT),
+    ]  # fmt: skip
+    program = Program()
+    function = program.function(change, arguments)
+    assert [number for number, _ in function.parameters] == [0, 1]
+    assert function.written == {0}
+    assert "static void change(float *numbers, const float *others) {" in program.text()
+    assert "#define PERIOD 0.1f" in program.text()
+    assert program.function(change, arguments) is function
