@@ -11,9 +11,10 @@ import pytest
 from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.core.errors import SetupError, TrainingError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.rewards import REWARD_TERMS, STOCK_DISTANCE, RewardTerms
+from swarm_logistics_env.environment.reward_terms import REWARD_TERMS, STOCK_DISTANCE
+from swarm_logistics_env.environment.rewards import RewardTerms
 from swarm_logistics_env.train import load_training
-from swarm_logistics_env.world.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+from swarm_logistics_env.world.warehouse.structs import CARRIED, DELIVERED, DUE, NOBODY, STORED
 
 STORAGE = 8.0  # [m], its width
 
@@ -41,9 +42,11 @@ def put_down(world: Warehouse, robot: int) -> None:
 def deliver(world: Warehouse, robot: int, next_request: int, due: float = math.inf) -> None:
     put_down(world, robot)
     world.state.item_status[world.state.requested] = DELIVERED
-    world.state.delivery_times.append(1.0)
-    world.state.delivered_by.append(robot)
-    world.state.delivered_due.append(due)
+    claims = world._world.claims
+    (n_delivered,) = world._world.outcome.n_delivered
+    claims.delivered_by[n_delivered] = robot
+    claims.delivered[n_delivered, DUE] = due
+    world._world.outcome.n_delivered[0] += 1
     world.state.open_requests[0] = next_request
 
 
@@ -134,6 +137,7 @@ def test_it_pays(world: Warehouse, case: str) -> None:
     terms = RewardTerms(weights)
     terms.begin(world)
     for acts, paid in changes:
+        world._world.outcome.n_delivered[0] = 0
         for act, *arguments in acts:
             act(world, *arguments)
         assert terms.pay(world).tolist() == pytest.approx(paid)
@@ -192,6 +196,7 @@ def test_with_several_requests_it_pays(case: str) -> None:
     terms = RewardTerms(weights)
     terms.begin(world)
     for acts, paid in changes:
+        world._world.outcome.n_delivered[0] = 0
         for act, *arguments in acts:
             act(world, *arguments)
         assert terms.pay(world).tolist() == pytest.approx(paid)
