@@ -126,8 +126,15 @@ class PlannedFloor:
     def ways(self, names_docks: bool) -> Ways:
         """Return what `way_along` reads, with each dock's own cells where requests name docks."""
         n_docks = len(self._plan.dock_names) if names_docks else 0
-        fields = zip(*(self._far(dock) for dock in range(NO_DOCK, n_docks)), strict=True)
-        return Ways(self.edge, self._plan.cell_size, *map(np.concatenate, fields), self._is_open)
+        fields = [self._far(dock) for dock in range(NO_DOCK, n_docks)]
+        return Ways(
+            edge=self.edge,
+            cell=self._plan.cell_size,
+            to_dock=np.concatenate([to_dock for to_dock, _, _ in fields]),
+            to_outside=np.concatenate([to_outside for _, to_outside, _ in fields]),
+            is_dock=np.concatenate([is_dock for _, _, is_dock in fields]),
+            is_open=self._is_open,
+        )
 
     def _fill(self, along: Numbers, cells: Numbers, dock: int) -> None:
         """Fill how far along the way into a dock points are (n,) [m], given in cells (n, 2)."""
