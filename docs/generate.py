@@ -17,7 +17,8 @@ from research.tables import ROOT, table, with_blocks
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS, REWARD_TERMS
+from swarm_logistics_env.environment.reward_terms import REWARD_TERMS
+from swarm_logistics_env.environment.rewards import DEFAULT_WEIGHTS
 from swarm_logistics_env.environment.spaces import ITEM_COLUMNS, ROBOT_FEATURES
 from swarm_logistics_env.study.questions.benchmark_cells import (
     SPACE,

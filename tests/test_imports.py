@@ -25,7 +25,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "compiler": set(),
     "spi": {"core"},
     "world": {"compiler", "core"},
-    "environment": {"core", "world"},
+    "environment": {"compiler", "core", "world"},
     "swarm_logistics_v0": {"environment"},
     "wrappers": {"core", "environment", "spi", "world"},
     "policies": {"compiler", "core", "environment", "spi", "world", "wrappers"},

@@ -55,10 +55,16 @@ from .half_speed import HalfSpeed
 @ world/warehouse/failure_modes.py @    "dead":
     "weak": FailureMode("drives slowly and lifts nothing", speed=0.2, lifts=False),
 ### A reward term
-@ environment/rewards.py @REWARD_TERMS:
-def presence(world: Warehouse, before: Moment, after: Moment) -> Earned:
-    return np.ones(world.state.n_robots)
-@ environment/rewards.py @    "own_delivery": own
+@ environment/reward_terms.py @class Moment(
+PRESENCE = 9
+@ environment/reward_terms.py @    elif wanted == OWN_DELIVERY:
+    elif wanted == PRESENCE:
+        presence(world, payment, earned)
+@ environment/reward_terms.py @REWARD_TERMS:
+@engine_kernel
+def presence(world, payment, earned):
+    earned[:] = 1.0
+@ environment/reward_terms.py @}
     "presence": presence,
 ### An indicator
 @ spi/definitions.py @def scalability(

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from swarm_logistics_env.core.errors import CommandError, SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import numbers_of
+from swarm_logistics_env.environment.reward_terms import pay_worlds
 from swarm_logistics_env.environment.spaces import ArrayStep
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.thread_pool import WorldThreadPool
@@ -49,7 +50,7 @@ class Worlds:
         world_of: (R,) the world of each row.
         is_over: of each world, whether its episode is.
         present: (R,) which rows of the latest observations are a robot's.
-        reported: the worlds whose latest step had more to tell than observations; rewards and ends
+        reported: the worlds whose latest step had more to tell than observations and rewards; ends
             of all others are zeros.
         observation_space, command_space: of every row.
 
@@ -155,9 +156,11 @@ class Worlds:
 
     def _step_together(self, outcome: RowsStep) -> RowsStep:
         stacks = [self._layers[world] for world in self._shared_out]
-        self._pool.is_watched[:] = [len(stack) > 1 or stack[-1].is_watched for stack in stacks]
+        self._pool.is_watched[:] = [
+            core.is_watched or any(map(_reads_steps, wrappers)) for *wrappers, core in stacks
+        ]
         for world, (*wrappers, _) in zip(self._shared_out, stacks):
-            for wrapper in wrappers:
+            for wrapper in filter(_changes_commands, wrappers):
                 robots = self._robots(world)
                 self._commands[robots] = wrapper.before_step(self._commands[robots].copy())
         # The worlds keep what they sensed, whatever the wrappers make of it.
@@ -174,11 +177,23 @@ class Worlds:
             self._take(world, step, outcome)
 
         self._pool.step(self._commands, outcome.observations, take_over)
+        self._pay_others(outcome.rewards)
         if changed_rows:
             outcome = outcome._replace(observations=outcome.observations.copy())
             for world, rows in changed_rows.items():
                 outcome.observations[self._robots(world)] = rows
         return outcome
+
+    def _pay_others(self, rewards: NDArray[np.float32]) -> None:
+        """Fill the rewards of those worlds whose step `_take` was not told of."""
+        reported = set(self.reported)
+        paid = []
+        for world in self._shared_out:
+            core = self._layers[world][-1]
+            if world not in reported and core.steady_pay is not None:
+                paid.append((core.warehouse.address, core.steady_pay, self.rows[world].start))
+        if paid:
+            pay_worlds(np.array(paid, np.int64), rewards)
 
     def _take(self, world: int, step: ArrayStep, outcome: RowsStep) -> None:
         robots = self._robots(world)
@@ -199,6 +214,15 @@ class Worlds:
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self.__dict__.update(saved)
         self._begin_work()
+
+
+def _changes_commands(wrapper: Wrapper) -> bool:
+    return type(wrapper).before_step is not Wrapper.before_step
+
+
+def _reads_steps(wrapper: Wrapper) -> bool:
+    kind = type(wrapper)
+    return (kind.after_step, kind.episode_info) != (Wrapper.after_step, Wrapper.episode_info)
 
 
 def _can_be_shared_out(layers: list[Any]) -> bool:

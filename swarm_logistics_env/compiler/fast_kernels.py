@@ -39,7 +39,7 @@ _CHECKSUM_SIZE = 16  # bytes
 _SILENCE = 1.0  # [s] of compiling that nobody is told of
 _PACKAGE = Path(__file__).parents[1]
 # Where kernels stand, and what they take from.
-_SOURCES = ("compiler/*.py", "world/**/*.py", "policies/*.py", "train/*.py")
+_SOURCES = ("compiler/*.py", "world/**/*.py", "environment/*.py", "policies/*.py", "train/*.py")
 _all_kernels: list[Any] = []
 _parts: dict[Any, set[Any]] = {}  # by kernel, the signatures that Python cannot call
 _config, _types = cast("tuple[Any, Any]", (config, types))  # without types

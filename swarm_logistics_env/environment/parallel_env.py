@@ -220,8 +220,16 @@ class SwarmLogisticsEnv(DictView):
 
     @property
     def is_watched(self) -> bool:
-        """Whether a step in which no event happens may pay a reward or end the episode."""
-        return self._rewards.pays_steadily or self.max_cycles is not None
+        """Whether a step needs `outcome` in which no event happens: it may end the episode here.
+
+        Or a reward term of one's own may pay; `steady_pay` tells of all others.
+        """
+        return self.max_cycles is not None or not self._rewards.are_compiled
+
+    @property
+    def steady_pay(self) -> int | None:
+        """What `reward_terms.pay_worlds` reads, if a step without an event may pay; or None."""
+        return self._rewards.address if self._rewards.pays_steadily else None
 
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
         """Return the result of `step_arrays` for the step that the warehouse has just taken."""
@@ -230,7 +238,7 @@ class SwarmLogisticsEnv(DictView):
         n = len(was_present)
         terminations = np.zeros(n, np.bool_)
         truncations = np.zeros(n, np.bool_)
-        if not (world.is_eventful or self.is_watched):
+        if not (world.is_eventful or self.is_watched or self._rewards.pays_steadily):
             return observations, np.zeros(n), terminations, truncations
         rewards = self._rewards.pay(world)
         if len(self.agents) < n:

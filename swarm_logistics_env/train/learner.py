@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -184,11 +185,37 @@ class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the e
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch)
 
-    def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Any:
-        try:
-            return super()._get_action_dist_from_latent(latent_pi)
-        except ValueError as error:  # of torch, whose message has the whole batch
-            raise FloatingPointError("an output of the network is not finite") from error
+    # As the base class has them, to the bit, without what it builds and checks around every batch.
+
+    def forward(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Return outputs drawn for each row, values and the outputs' log probabilities."""
+        means, deviations, values = self._answers(columns)
+        outputs = means + torch.empty_like(means).normal_() * deviations
+        return outputs, values, _log_probability(outputs, means, deviations)
+
+    def evaluate_actions(
+        self, columns: torch.Tensor, outputs: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Return values, and log probabilities and entropies of outputs, of each row."""
+        means, deviations, values = self._answers(columns)
+        entropy = 0.5 + 0.5 * math.log(2.0 * math.pi) + torch.log(deviations)
+        return values, _log_probability(outputs, means, deviations), entropy.sum(dim=1)
+
+    def _answers(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        for_outputs, for_values = self.mlp_extractor(columns)
+        means = self.action_net(for_outputs)
+        check_finite("an output of the network", means.detach().cpu().numpy())
+        deviations = torch.ones_like(means) * self.log_std.exp()
+        return means, deviations, self.value_net(for_values)
+
+
+def _log_probability(
+    outputs: torch.Tensor, means: torch.Tensor, deviations: torch.Tensor
+) -> torch.Tensor:
+    """Return that of outputs (n, 3) that are distributed normally, (n,)."""
+    squares = -((outputs - means) ** 2) / (2 * deviations**2)
+    densities = squares - deviations.log() - math.log(math.sqrt(2.0 * math.pi))
+    return densities.sum(dim=1)
 
 
 class _TwoReaders(torch.nn.Module):  # type: ignore[misc]  # torch is Any to mypy

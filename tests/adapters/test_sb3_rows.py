@@ -37,7 +37,8 @@ def unlike(world: int) -> Any:
         return IndicatorReward(faulty, "R", references=20.0)
     if world == 1:
         return SwarmSize(brief(n_robots=5), [2, 5])
-    return brief(n_robots=3, faults=[Fault("removed", (1,), onset=0.5)])
+    steady = {"stocking": 1.0, "contact": -1.0, "collision": -0.5}
+    return Wrapper(brief(n_robots=3, faults=[Fault("removed", (1,), onset=0.5)], rewards=steady))
 
 
 def test_rows_are_the_worlds_own_over_several_episodes_and_padding_is_zeros() -> None:

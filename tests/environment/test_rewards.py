@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import math
 import pickle
 from pathlib import Path
@@ -11,9 +12,12 @@ import pytest
 from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.core.errors import SetupError, TrainingError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.rewards import REWARD_TERMS, STOCK_DISTANCE, RewardTerms
+from swarm_logistics_env.environment.reward_terms import REWARD_TERMS, STOCK_DISTANCE
+from swarm_logistics_env.environment.rewards import RewardTerms
+from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies.policy import decide, start
 from swarm_logistics_env.train import load_training
-from swarm_logistics_env.world.warehouse.state import CARRIED, DELIVERED, NOBODY, STORED
+from swarm_logistics_env.world.warehouse.structs import CARRIED, DELIVERED, DUE, NOBODY, STORED
 
 STORAGE = 8.0  # [m], its width
 
@@ -41,9 +45,11 @@ def put_down(world: Warehouse, robot: int) -> None:
 def deliver(world: Warehouse, robot: int, next_request: int, due: float = math.inf) -> None:
     put_down(world, robot)
     world.state.item_status[world.state.requested] = DELIVERED
-    world.state.delivery_times.append(1.0)
-    world.state.delivered_by.append(robot)
-    world.state.delivered_due.append(due)
+    claims = world._world.claims
+    (n_delivered,) = world._world.outcome.n_delivered
+    claims.delivered_by[n_delivered] = robot
+    claims.delivered[n_delivered, DUE] = due
+    world._world.outcome.n_delivered[0] += 1
     world.state.open_requests[0] = next_request
 
 
@@ -134,6 +140,7 @@ def test_it_pays(world: Warehouse, case: str) -> None:
     terms = RewardTerms(weights)
     terms.begin(world)
     for acts, paid in changes:
+        world._world.outcome.n_delivered[0] = 0
         for act, *arguments in acts:
             act(world, *arguments)
         assert terms.pay(world).tolist() == pytest.approx(paid)
@@ -192,6 +199,7 @@ def test_with_several_requests_it_pays(case: str) -> None:
     terms = RewardTerms(weights)
     terms.begin(world)
     for acts, paid in changes:
+        world._world.outcome.n_delivered[0] = 0
         for act, *arguments in acts:
             act(world, *arguments)
         assert terms.pay(world).tolist() == pytest.approx(paid)
@@ -216,3 +224,43 @@ def test_a_reward_of_ones_own_is_a_term_by_its_name(tmp_path: Path) -> None:
     with pytest.raises(TrainingError, match=r"is code, which runs .* allowed by --t"):
         load_training(str(training))
     assert load_training(str(training), trust_code=True).rewards == {f"{file}:moved": 1.0}
+
+
+# What each term paid in two played worlds when terms were written in numpy: digests of every bit.
+AS_IN_NUMPY = {
+    "delivery": "5a3788ecde94b3ee", "own_delivery": "78a65dcd6f31f5d4",
+    "on_time": "3e07b377de94b3ee", "lift_requested": "6917a09046765144",
+    "approach": "7c9a11b917969e3a", "stocking": "f6596a7128d8857c",
+    "contact": "f3f2492c746aab5d", "collision": "c1451041662cc8ae",
+    "blocked_request": "c2d56fa08699cfd7",
+}  # fmt: skip
+
+
+def test_the_compiled_terms_pay_to_the_bit_what_they_paid_in_numpy() -> None:
+    """With several requests, orders in time and late, docks that are named, and failures."""
+    small = Scenario(
+        n_robots=8, n_items=8, warehouse_width=6.0, warehouse_height=5.0, delivery_width=1.5,
+        n_requests=3, restock=True, orders="poisson", order_rate=0.2, order_due=8.0,
+    )  # fmt: skip
+    docks = Scenario(n_robots=16, floor="two_docks", request_docks="random", n_requests=3)
+    digests = dict.fromkeys(REWARD_TERMS, "")
+    for scenario in (small, docks):
+        world = Warehouse(scenario)
+        observations = world.reset(0, ["FM4:2", "removed:1@20"])
+        policy = load("swarm-dt-2026")
+        start(policy, scenario, 0)
+        rng = np.random.default_rng(0)
+        terms = {name: RewardTerms({name: 1.0}) for name in REWARD_TERMS}
+        paid = {name: hashlib.blake2b(digest_size=4) for name in REWARD_TERMS}
+        for term in terms.values():
+            term.begin(world)
+        for _ in range(500):
+            commands = decide(policy, observations, world.state)
+            is_random = rng.random((scenario.n_robots, 1)) < 0.2
+            drawn = rng.uniform(-1.0, 1.0, commands.shape)
+            observations = world.step(np.where(is_random, drawn, commands))
+            for name, term in terms.items():
+                paid[name].update((term.pay(world) + 0.0).tobytes())
+        for name in REWARD_TERMS:
+            digests[name] += paid[name].hexdigest()
+    assert digests == AS_IN_NUMPY

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
-from swarm_logistics_env.environment.rewards import REWARD_TERMS
+from swarm_logistics_env.environment.reward_terms import REWARD_TERMS
 from swarm_logistics_env.policies.episode import Play
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
 from swarm_logistics_env.world.warehouse.faults import ROLES

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Protocol
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,20 @@ from .floor_plan import NO_DOCK, RACK, FloorPlan, Mask, floor_plan
 
 Numbers = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+
+class Ways(NamedTuple):
+    """Ways into the docks of a floor, for compiled code: rows of cells for the nearest dock first.
+
+    Behind them stand those of dock 0, 1, ... where requests name docks. An empty room has no cells.
+    """
+
+    edge: float  # as `FloorMap.edge` [m]
+    cell: float  # side of a cell [m]
+    to_dock: Annotated[Numbers, "docks rows", "columns"]  # [m] of each cell's centre
+    to_outside: Annotated[Numbers, "docks rows", "columns"]  # [m] to what is no dock
+    is_dock: Annotated[Mask, "docks rows", "columns"]
+    is_open: Annotated[Mask, "rows", "columns"]  # no racks
 
 
 class FloorMap(Protocol):
@@ -37,6 +51,9 @@ class FloorMap(Protocol):
             docks: the numbers of the docks (n,), or one for all; `NO_DOCK`: the nearest one.
         """
 
+    def ways(self, names_docks: bool) -> Ways:
+        """Return what `way_along` reads, with each dock's own cells where requests name docks."""
+
 
 class OpenFloor:
     """An empty room whose delivery area is a strip at the highest x.
@@ -58,6 +75,11 @@ class OpenFloor:
     def along(self, points: ArrayLike, docks: ArrayLike = NO_DOCK) -> Numbers:
         """Return x (n,) [m], as there is one dock."""
         return _points(points)[:, 0]
+
+    def ways(self, names_docks: bool) -> Ways:
+        """Return what `way_along` reads: no cells."""
+        no_cells = np.zeros((0, 0), np.bool_)
+        return Ways(self.edge, 1.0, np.zeros((0, 0)), np.zeros((0, 0)), no_cells, no_cells)
 
 
 class PlannedFloor:
@@ -100,6 +122,19 @@ class PlannedFloor:
             self._fill(of_dock, cells[is_for_dock], dock)
             along[is_for_dock] = of_dock
         return along
+
+    def ways(self, names_docks: bool) -> Ways:
+        """Return what `way_along` reads, with each dock's own cells where requests name docks."""
+        n_docks = len(self._plan.dock_names) if names_docks else 0
+        fields = [self._far(dock) for dock in range(NO_DOCK, n_docks)]
+        return Ways(
+            edge=self.edge,
+            cell=self._plan.cell_size,
+            to_dock=np.concatenate([to_dock for to_dock, _, _ in fields]),
+            to_outside=np.concatenate([to_outside for _, to_outside, _ in fields]),
+            is_dock=np.concatenate([is_dock for _, _, is_dock in fields]),
+            is_open=self._is_open,
+        )
 
     def _fill(self, along: Numbers, cells: Numbers, dock: int) -> None:
         """Fill how far along the way into a dock points are (n,) [m], given in cells (n, 2)."""
@@ -193,18 +228,45 @@ def _fill_along(
         cell_size: [m].
         cells: x and y of the points (n, 2) in cells.
     """
-    # A dock begins half a cell before the centre of its first cell.
-    half = 0.5 * cell_size
-    n_rows, n_columns = is_open.shape
     for point in range(len(cells)):
         x = cells[point, 0]
         y = cells[point, 1]
-        column = min(max(int(x), 0), n_columns - 1)
-        row = min(max(int(y), 0), n_rows - 1)
-        if is_dock[row, column]:
-            along[point] = max(_at_point(to_outside, is_open, row, column, x, y) - half, 0.0)
-        else:
-            along[point] = -max(_at_point(to_dock, is_open, row, column, x, y) - half, 0.0)
+        along[point] = _along_cells(to_dock, to_outside, is_dock, is_open, cell_size, x, y)
+
+
+@kernel
+def way_along(ways: Ways, point: Numbers, dock: int) -> float:
+    """Return how far along the way into a dock a point (2,) is [m]; see `FloorMap.along`."""
+    n_rows = len(ways.is_open)
+    if n_rows == 0:
+        return float(point[0])
+    rows = slice((dock - NO_DOCK) * n_rows, (dock - NO_DOCK + 1) * n_rows)
+    x = point[0] / ways.cell
+    y = point[1] / ways.cell
+    return _along_cells(
+        ways.to_dock[rows], ways.to_outside[rows], ways.is_dock[rows], ways.is_open, ways.cell, x, y
+    )
+
+
+@kernel
+def _along_cells(
+    to_dock: Numbers,
+    to_outside: Numbers,
+    is_dock: Mask,
+    is_open: Mask,
+    cell_size: float,
+    x: float,
+    y: float,
+) -> float:
+    """Return how far along the way into a dock a point is [m], given in cells."""
+    # A dock begins half a cell before the centre of its first cell.
+    half = 0.5 * cell_size
+    n_rows, n_columns = is_open.shape
+    column = min(max(int(x), 0), n_columns - 1)
+    row = min(max(int(y), 0), n_rows - 1)
+    if is_dock[row, column]:
+        return max(_at_point(to_outside, is_open, row, column, x, y) - half, 0.0)
+    return -max(_at_point(to_dock, is_open, row, column, x, y) - half, 0.0)
 
 
 @inlined_kernel
