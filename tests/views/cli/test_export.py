@@ -31,7 +31,7 @@ def test_a_network_is_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["homing", "--to", "yaml"], "--to yaml: no such format; known: contract, onnx"),
+        (["homing", "--to", "yaml"], "--to yaml: no such format; known: c, contract, onnx"),
         (["central", "--to", "contract"], "sees the state of the whole warehouse"),
         (["homing", "--to", "onnx"], "should be a trained one"),
         (["homing", "--to", "contract", "--out", "no/such/folder.yaml"], "cannot write"),
