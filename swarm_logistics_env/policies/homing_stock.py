@@ -28,8 +28,9 @@ Messages are not used. A voice was tried: robots told each other how far the way
 item is, and the nearest one or two free ones went. On 30 seeds from 431,000 on no gain was shown.
 The likely reason: who sees an item fetches it anyway, and nobody can tell of one that nobody sees.
 
-All constants are fitted, for the most deliveries, on seeds from 400,000 to 400,045 in the paper's
-world and from 430,000 to 430,707 in `realistic`, both with `restock`.
+Constants of the code are fitted, for the most deliveries, on seeds from 400,000 to 400,045 in the
+paper's world and from 430,000 to 430,707 in `realistic`, both with `restock`; the parameters are
+those of the second search that docs/research/tuning.md tells of.
 """
 
 from __future__ import annotations
@@ -96,33 +97,33 @@ PULL = 0.4  # home, beside a random direction of length 1
 class HomingStockParameters(DrivingParameters):
     """Those that `HomingStock` shares with `Homing`, and those of its stock, all fitted."""
 
-    spread_gain: SpreadGain = 1.072
-    spread_range: SpreadRange = 2.383
-    avoid_gain: AvoidGain = 0.9
-    avoid_range: AvoidRange = 0.4769
+    spread_gain: SpreadGain = 0.6066
+    spread_range: SpreadRange = 2.875
+    avoid_gain: AvoidGain = 1.136
+    avoid_range: AvoidRange = 0.5739
     wall_gain: WallGain = 1.5
     wall_range: WallRange = 0.6
     sure: Sure = 3.0
-    clearance: Clearance = 0.1867
-    obstacle_range: ObstacleRange = 1.04
+    clearance: Clearance = 0.2094
+    obstacle_range: ObstacleRange = 1.809
 
     near: PositiveFloat = Field(
-        0.8,
+        0.6898,
         description="robots put items down nearer to the area than this, and lift for the stock "
         "those that lie 0.5 m farther still [m]",
     )
     density: NonNegativeFloat = Field(
-        0.7,
+        0.8709,
         description="where lifting takes time, `near` is what makes all items, put down before the "
         "area over the whole height of the warehouse, as dense as this [1/m2]; 0: it stays",
     )
     holders: PositiveFloat = Field(
-        0.6,
+        0.5341,
         description="share of the robots that hold where there are as many robots as items; it "
         "goes with the root of robots by items, and the others stock",
     )
     patience: NonNegativeFloat = Field(
-        21.3,
+        22.39,
         description="for how long it carries the requested item outside, and then leaves it to "
         "others [s]; 0: for ever",
     )
