@@ -38,11 +38,11 @@ def commands_of(policy: Any) -> Any:
     """What robots that sense anything, ten steps long, are commanded to do, (steps, N, 4)."""
     rng = np.random.default_rng(0)
     low, high = observations.bounds(Scenario())
-    rows = rng.uniform(low, high, (12, 80, len(low))).astype(np.float32)
+    rows = rng.uniform(low, high, (17, 80, len(low))).astype(np.float32)
     flags = (low == 0.0) & (high == 1.0)
     rows[:, :, flags] = rows[:, :, flags].round()
     rows[:, 0, [observations.CARRYING, observations.CARRYING_REQUESTED]] = 1.0
-    rows[:, 0, observations.IN_DELIVERY_AREA] = 0.0  # for 12 s: it may lose its patience
+    rows[:, 0, observations.IN_DELIVERY_AREA] = 0.0  # for 17 s: it may lose its patience
     commands = []
     for handling_time in (0.0, 1.0):  # a stock has a parameter for either
         policy.configure(Scenario(handling_time=handling_time, n_items=12))
@@ -152,8 +152,9 @@ def test_parameters_that_cannot_be_are_refused_by_name(make: Any, message: str) 
 
 def test_a_policy_with_other_parameters_is_played_in_the_same_directory(tmp_path: Path) -> None:
     scenario = {"n_robots": 2, "n_items": 4, "duration": 1.0}
+    default = HomingStock().parameters.near
     tallies = []
-    for policy in (HomingStock(), HomingStock(near=1.2), HomingStock(near=0.8)):
+    for policy in (HomingStock(), HomingStock(near=1.2), HomingStock(near=default)):
         study = Study(
             out=tmp_path, policies=[policy], seeds=1, scenario=scenario, sizes=[{"values": [2, 3]}]
         )
