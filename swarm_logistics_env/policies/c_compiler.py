@@ -84,9 +84,8 @@ def compiled_controller(path: Path) -> Path:
         with tempfile.TemporaryDirectory(dir=program.parent) as folder:
             new_program = Path(folder, "part.exe")
             _compile(compiler, path, new_program)
-            new_program.replace(
-                program
-            )  # whole or not at all, whoever compiles it at the same time
+            # Whole or not at all, whoever compiles it at the same time.
+            new_program.replace(program)
     return program
 
 
