@@ -198,9 +198,6 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     command(f"{RUN} --restock")
     assert Study.stored("results/mine-restock").specification.scenario.restock  # type: ignore[attr-defined]
     assert "did you mean 'mujoco'" in command(f"{RUN} --bodies mujoko", code=2)
-    command(f"{RUN} --bodies mujoco --seeds 1")
-    moved = Study.stored("results/mine-bodies-mujoco")
-    assert {case.scenario.bodies for case in moved.plan().cases} == {"mujoco"}  # type: ignore[attr-defined]
     file.write_text(FILE.replace("n_items = 8, duration = 2", "n_items = 1, duration = 60"))
     printed = command(f"{RUN} --policy homing --seeds 1")
     assert "homing delivers every item before the end" in printed
@@ -211,6 +208,13 @@ def test_options_of_run_change_the_study_and_failed_runs_its_exit_code(
     assert "3 failed, the first with RuntimeError: a wheel came off" in printed
     assert "Stopped, as nothing works" in printed
     assert "2 of 2 runs failed" in Path("broken", "report.md").read_text()
+
+
+@pytest.mark.daily
+def test_robots_of_another_engine_play_a_study(command: Command) -> None:
+    command(f"{RUN} --bodies mujoco --seeds 1")
+    moved = Study.stored("results/mine-bodies-mujoco")
+    assert {case.scenario.bodies for case in moved.plan().cases} == {"mujoco"}  # type: ignore[attr-defined]
 
 
 def test_a_study_and_its_shards_are_kept_under_its_name_and_merged(command: Command) -> None:
