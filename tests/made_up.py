@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.study.questions.comparison import NO_FAULT, Setting
 from swarm_logistics_env.study.runs.rows import row_digest
 from swarm_logistics_env.study.runs.store import Runs, export
@@ -20,13 +19,11 @@ from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.study.verdicts.verdict import Decision
 
-
-def careful_homing() -> Homing:
-    """Return homing with the constants before its search, with which robots seldom touch."""
-    return Homing(
-        spread_gain=0.8, spread_range=2.0, avoid_gain=2.0, avoid_range=0.5, wall_gain=1.5,
-        wall_range=0.6, sure=3.0, clearance=0.28, obstacle_range=0.5,
-    )  # fmt: skip
+# The constants of homing before its search, with which robots seldom touch.
+CAREFUL = {
+    "spread_gain": 0.8, "spread_range": 2.0, "avoid_gain": 2.0, "avoid_range": 0.5,
+    "wall_gain": 1.5, "wall_range": 0.6, "sure": 3.0, "clearance": 0.28, "obstacle_range": 0.5,
+}  # fmt: skip
 
 
 def digest(directory: Path, to: Path) -> str:

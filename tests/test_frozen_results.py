@@ -19,10 +19,13 @@ from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks import Outcome
 from swarm_logistics_env.study.verdicts.columns import VERDICT_COLUMNS, frame
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge
+from tests.made_up import CAREFUL
 
 FROZEN = Path(__file__).parent / "frozen"
 SHIPPED = Path(__file__).parents[1] / "examples" / "shipped_policies.toml"
-POLICIES = ["swarm-dt", "swarm-dt-follow", "homing", "ppo-delivery", "ppo-robust"]
+# As they were when their runs were frozen.
+HOMING = {"name": "homing", "parameters": CAREFUL, "label": "homing"}
+POLICIES = ["swarm-dt", "swarm-dt-follow", HOMING, "ppo-delivery", "ppo-robust"]
 NUMBERS = ("value", "low", "high", "p_value", "p_holm", "change", "change_low", "change_high")
 WORDS = (
     "policy", "indicator", "comparison", "verdict", "verdict_holm", "claim_verdict_holm",
@@ -118,7 +121,7 @@ def test_verdicts_follow_from_the_frozen_runs(name: str) -> None:
 def test_runs_played_anew_equal_the_frozen_ones() -> None:
     faults = [{"modes": ["FM4"], "robots": [2]}]
     few = shipped(
-        policies=["swarm-dt", "homing", "ppo-robust"], seeds=1, sizes=[{"values": [5, 25]}],
+        policies=["swarm-dt", HOMING, "ppo-robust"], seeds=1, sizes=[{"values": [5, 25]}],
         parameters=[], faults=faults,
     )  # fmt: skip
     for name, study in {"quick": Study.preset("quick", seeds=1), "shipped_policies": few}.items():

@@ -276,7 +276,7 @@ DEFINITIONS: dict[str, Definition] = {
             performances={"p_o": "P_o", "p_new": "P_new"},
             function=relative_change,
             arguments=lambda _: {},
-            adjectives={0.0: "P is larger"},
+            adjectives={},
         ),
     )
 }

@@ -14,19 +14,20 @@ from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.policies import demonstrations
 from swarm_logistics_env.policies.demonstrations import record
+from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.wrappers import MotionFrame
-from tests.made_up import careful_homing
+from tests.made_up import CAREFUL
 
 SMALL = Scenario(n_robots=4, n_items=8, warehouse_width=6.0, warehouse_height=5.0, duration=20.0)
 FAULTS = ["removed:1@5", "FM1:1@3"]
 # Where robots touch, the float32 of what is recorded makes another run of it.
-CAREFUL = careful_homing()
+HOMING = Homing(**CAREFUL)
 
 
 def test_they_hold_every_decision_of_every_robot_that_is_there() -> None:
-    recorded = record(CAREFUL, 2, scenario=SMALL, seed=3, faults=FAULTS)
-    episodes = [run_episode(SMALL, CAREFUL, 3 + k, FAULTS) for k in range(2)]
+    recorded = record(HOMING, 2, scenario=SMALL, seed=3, faults=FAULTS)
+    episodes = [run_episode(SMALL, HOMING, 3 + k, FAULTS) for k in range(2)]
     assert recorded.delivered == [episode.delivered for episode in episodes]
     lengths = sorted(len(robot.actions) for robot in recorded.episodes if robot.seed == 3)
     assert lengths == [50, 200, 200, 200]
@@ -45,7 +46,7 @@ def test_they_hold_every_decision_of_every_robot_that_is_there() -> None:
 @pytest.mark.parametrize("drive", ["holonomic", "differential"])
 def test_outputs_in_the_frame_ask_for_the_motion_of_the_policy(drive: Any) -> None:
     scenario = SMALL.replace(drive=drive)
-    recorded = record(CAREFUL, 1, scenario=scenario, frame=True)
+    recorded = record(HOMING, 1, scenario=scenario, frame=True)
     # Played again from the outputs, the world goes the same way.
     env = MotionFrame(SwarmLogisticsEnv(scenario))
     first = env.reset_arrays(0)
@@ -54,9 +55,9 @@ def test_outputs_in_the_frame_ask_for_the_motion_of_the_policy(drive: Any) -> No
     seen = np.stack([robot.observations for robot in recorded.episodes], axis=1)
     np.testing.assert_array_equal(rows, seen)
     # And as far as the policy itself would have gone.
-    episodes = [run_episode(scenario, CAREFUL, seed) for seed in range(3)]
+    episodes = [run_episode(scenario, HOMING, seed) for seed in range(3)]
     delivered = [episode.delivered for episode in episodes]
-    recorded = record(CAREFUL, 3, scenario=scenario, frame=True)
+    recorded = record(HOMING, 3, scenario=scenario, frame=True)
     assert recorded.delivered == delivered
 
 

@@ -291,6 +291,8 @@ def _question(verdicts: Sequence[Verdict]) -> tuple[str, Slots]:
     if after.kind == "fault":
         return "fault", {**slots, "start": start, "n_robots": comparison.n_robots}
     if after.kind == "policy":
+        if after.condition:  # nothing is claimed of it
+            slots["property"] = ""
         condition = f", {after.condition}" if after.condition else ""
         return "policy", {**slots, "condition": condition}
     return "parameter", {**slots, "before": before.value}

@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse, policies, run_episode
+from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
-from tests.made_up import careful_homing
+from tests.made_up import CAREFUL
 from tests.world.warehouse.conftest import EAST, FAR, STAY, WEST, Build, steps
 
 DIAMETER, PERIOD = 0.25, 0.1
@@ -112,6 +113,7 @@ def test_a_copy_and_a_world_that_begins_again_count_the_same() -> None:
 
 
 def test_homing_meets_as_often_as_was_measured_apart_from_this_code() -> None:
+    homing = Homing(**CAREFUL)
     # Another program counted .5 contacts a robot-minute on other seeds.
-    counted = run_episode(Scenario(n_robots=25, duration=100.0), careful_homing(), 0).contacts
+    counted = run_episode(Scenario(n_robots=25, duration=100.0), homing, 0).contacts
     assert counted.contacts_per_robot_minute == pytest.approx(0.5, abs=0.4)
