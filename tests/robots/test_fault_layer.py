@@ -104,8 +104,9 @@ def test_the_radio_sends_what_the_mode_leaves_of_timer_and_message(
     assert before is not None
     assert tuple(before) == (3.0, [0.9])
     sent = [layer.broadcast(timer, [word], 1.0 + k) for k, (timer, word) in enumerate(own)]
-    assert [one.timer for one in sent if one] == pytest.approx(timers, nan_ok=True)
-    assert [one.message[0] for one in sent if one] == pytest.approx(words)
+    heard = [broadcast for broadcast in sent if broadcast]
+    assert [broadcast.timer for broadcast in heard] == pytest.approx(timers, nan_ok=True)
+    assert [broadcast.message[0] for broadcast in heard] == pytest.approx(words)
 
 
 def test_trials_of_robots_are_a_table_that_judge_reads(tmp_path: Path) -> None:

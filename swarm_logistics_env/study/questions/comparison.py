@@ -214,11 +214,11 @@ def between_policies(comparisons: Sequence[Comparison]) -> Iterator[Comparison]:
             case = arm.case
             fault: object = (setting.name, setting.onset) if is_fault else case.faults
             condition: tuple[object, object] = (case.scenario, fault)
-            known = most.setdefault(condition, arm)
-            if is_fault and setting.value > known.setting.value:
+            before = most.setdefault(condition, arm)
+            if is_fault and setting.value > before.setting.value:
                 most[condition] = arm
-    first, *others = arms
-    for policy in others:
+    first, *further = arms
+    for policy in further:
         for condition, arm in arms[policy].items():
             if condition in arms[first]:
                 pair = (_of_policy(arm), _of_policy(arms[first][condition]))

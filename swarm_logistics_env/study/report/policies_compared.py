@@ -55,8 +55,8 @@ def _sentence(verdicts: Sequence[Verdict], base: TaskScenario) -> str:
     text = templates.POLICIES["decided" if is_decided else "open"].format(
         first=first, second=second, times=times, condition=condition
     )
-    others = [verdict for verdict in verdicts if verdict is not main]
-    return text + (_elsewhere(others, is_ahead) if others else ".")
+    further = [verdict for verdict in verdicts if verdict is not main]
+    return text + (_elsewhere(further, is_ahead) if further else ".")
 
 
 def _n_seeds(verdict: Verdict) -> int:
@@ -75,13 +75,13 @@ def _factor(change: Interval, *, inverted: bool) -> Interval:
 
 def _elsewhere(verdicts: Sequence[Verdict], is_ahead: bool) -> str:
     """Return in how many other conditions the order is the same, and where it is not."""
-    same = "supported" if is_ahead else "refuted"
+    alike = "supported" if is_ahead else "refuted"
     turned = "refuted" if is_ahead else "supported"
     by_word: dict[str, list[str]] = map_reduce(
         verdicts, lambda v: v.on_threshold.adjusted, lambda v: v.after.condition
     )
     clauses = []
-    if n_same := len(by_word.pop(same, ())):
+    if n_same := len(by_word.pop(alike, ())):
         clauses.append(templates.POLICIES["same"].format(n_same=n_same, n_others=len(verdicts)))
     if turned in by_word:
         conditions = ", ".join(by_word.pop(turned))

@@ -54,10 +54,10 @@ class JudgeCommand(TyperCommand):
         targets = typed[argument.name]
         if not targets:
             return super().make_context(info_name, args, parent, **extra)
-        target, *others = targets
+        target, *further = targets
         kind = POLICY if names_policy(target) else TRIALS
-        for other in others:
-            if kind == TRIALS or not names_policy(other):
+        for name in further:
+            if kind == TRIALS or not names_policy(name):
                 raise StudyError(
                     f"{' '.join(targets)}: should be policies alone, or one file of trials"
                 )
