@@ -166,6 +166,8 @@ def search(script: str, path: Path, is_over: Callable[[], bool]) -> dict[str, fl
         # A call that goes on asks for the same points, as the seed is the same.
         sets = before[: len(points)]
         before = before[len(points) :]
+        if [tried.values for tried in sets] != values[: len(sets)]:
+            raise SystemExit(f"{path} was searched from other constants: search in a new folder")
         untried = values[len(sets) :]
         if untried and is_over():
             break
@@ -237,7 +239,8 @@ def main(
         gain_rows = [(world, *interval) for world, interval in gains.items()]
         write_rows(out / f"{script}-confirmed.csv", ("world", *ENDS), gain_rows)
         print(script, values, {world: section.bracketed(g, 2) for world, g in gains.items()})
-    publish(out)
+    if all((out / f"{script}-confirmed.csv").exists() for script in SCRIPTS):
+        publish(out)
 
 
 def _is_after(end: float) -> bool:

@@ -161,9 +161,9 @@ def lift_requested(world: World, payment: Payment, earned: Numbers) -> None:
             continue
         # One that was delivered and is asked for again does not lie where its carrier stands.
         if carrier == NOBODY and world.outcome.n_delivered[0] > 0:
-            place = world.items.position[item]
+            position = world.items.position[item]
             stand = world.robots.position[previous]
-            if place[0] != stand[0] or place[1] != stand[1]:
+            if position[0] != stand[0] or position[1] != stand[1]:
                 continue
         if carrier != NOBODY and delivers[carrier]:
             earned[carrier] += 1.0

@@ -80,8 +80,8 @@ class Expressions(Operators):
 
     def value_of(self, node: ast.expr) -> Value:
         """Return an expression as a value of C."""
-        known = self.evaluate(node)
-        return known if isinstance(known, Value) else self._as_value(known)
+        result = self.evaluate(node)
+        return result if isinstance(result, Value) else self._as_value(result)
 
     def evaluate(self, node: ast.expr) -> Value | Known:
         """Return an expression as a value of C, or what of Python it stands for."""

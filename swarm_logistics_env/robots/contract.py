@@ -274,8 +274,8 @@ def _yaml_lines(value: dict[str, Any], indent: str) -> Iterator[str]:
         elif isinstance(part, list) and part and isinstance(part[0], dict):
             yield f"{indent}{name}:"
             for table in part:
-                first, *others = _yaml_lines(table, f"{indent}  ")
+                first, *further = _yaml_lines(table, f"{indent}  ")
                 yield f"{indent}- {first.strip()}"
-                yield from others
+                yield from further
         else:
             yield f"{indent}{name}: {json.dumps(part, ensure_ascii=False)}"

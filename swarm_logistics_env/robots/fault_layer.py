@@ -72,7 +72,9 @@ class FaultLayer:
         self._occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in checked]
         self._beams: Row | None = None  # what frozen rangers repeat
         self._message: Numbers | None = None  # what a frozen channel repeats
-        self._sent: deque[Broadcast] = deque()
+        latest = max((fault.mode.radio_delay for fault in self._occurrences), default=0.0)
+        # Also before the fault, which then sends what was said before it began.
+        self._sent: deque[Broadcast] = deque(maxlen=round(latest / scenario.control_period) + 1)
         self._rng = generator(seed, "spoilt messages", number)
 
     def modes(self, time: float) -> tuple[str, ...]:
@@ -134,13 +136,11 @@ class FaultLayer:
         self._sent.append(Broadcast(timer, words))
         delays = [occurrence.mode.radio_delay for occurrence in self._active(time)]
         n_periods = round(max(delays, default=0.0) / self._scenario.control_period)
-        while len(self._sent) > n_periods + 1:
-            self._sent.popleft()
         if not self._keeps("sends", time):
             return None
-        sent = self._sent[0]
-        if len(self._sent) <= n_periods:  # what it sends then was not yet said
-            sent = Broadcast(math.nan, np.zeros_like(words))
+        sent = Broadcast(math.nan, np.zeros_like(words))  # of a time before the trial
+        if len(self._sent) > n_periods:
+            sent = self._sent[-1 - n_periods]
         return sent if self._keeps("honest", time) else sent._replace(timer=0.0)
 
     def _active(self, time: float) -> list[Occurrence]:
@@ -158,25 +158,23 @@ class FaultLayer:
 
     def _forget_unseen(self, sensed: Row, view_range: float, hears: bool) -> None:
         """Take out of a row what lies beyond its view [m], but for robots that it hears."""
-        self._keep(sensed, row.ITEMS, row.ITEM_WIDTH, view_range)
+        self._keep(sensed[row.ITEMS : row.NEIGHBOURS], row.N_ITEMS_IN_VIEW, view_range)
         heard_range = self._scenario.radio_range if hears else 0.0
+        neighbours = sensed[row.NEIGHBOURS : row.LOWEST_TIMER]
         if not hears:
-            neighbours = sensed[row.NEIGHBOURS : row.LOWEST_TIMER]
             neighbours[row.NEIGHBOUR.timer_heard :: row.NEIGHBOUR_WIDTH] = 0.0
             neighbours[row.NEIGHBOUR.timer :: row.NEIGHBOUR_WIDTH] = self._scenario.timer_limit
             sensed[row.MESSAGES :] = 0.0
-        order = self._keep(
-            sensed, row.NEIGHBOURS, row.NEIGHBOUR_WIDTH, max(view_range, heard_range)
-        )
+        order = self._keep(neighbours, row.N_NEIGHBOURS, max(view_range, heard_range))
         messages = sensed[row.MESSAGES :].reshape(row.N_NEIGHBOURS, -1)
         n_left = len(order)
         messages[:n_left] = messages[order]
         messages[n_left:] = 0.0
 
     @staticmethod
-    def _keep(sensed: Row, first: int, width: int, reach: float) -> list[int]:
-        """Move up the entries of a block that lie within `reach` [m]; return which these are."""
-        block = sensed[first : first + 8 * width].reshape(8, width)
+    def _keep(columns: Row, count: int, reach: float) -> list[int]:
+        """Move up those of `count` entries that lie within `reach` [m]; return which these are."""
+        block = columns.reshape(count, -1)  # an item and a neighbour begin with present, x, y
         is_near = np.hypot(block[:, 1], block[:, 2]) <= reach
         order = np.flatnonzero((block[:, 0] > 0.5) & is_near).tolist()
         block[: len(order)] = block[order]

@@ -99,14 +99,21 @@ def test_the_radio_sends_what_the_mode_leaves_of_timer_and_message(
 ) -> None:
     # A delay of 2 s is two periods.
     layer = layer_of(Fault(mode, 1, onset=1.0), control_period=1.0, message_size=1)
-    own = [(4.0, 1.0), (5.0, 0.5), (6.0, 0.0), (7.0, -0.5)]
+    handed = [(4.0, 1.0), (5.0, 0.5), (6.0, 0.0), (7.0, -0.5)]
     before = layer.broadcast(3.0, [0.9], 0.0)
     assert before is not None
     assert tuple(before) == (3.0, [0.9])
-    sent = [layer.broadcast(timer, [word], 1.0 + k) for k, (timer, word) in enumerate(own)]
+    sent = [layer.broadcast(timer, [word], 1.0 + k) for k, (timer, word) in enumerate(handed)]
     heard = [broadcast for broadcast in sent if broadcast]
     assert [broadcast.timer for broadcast in heard] == pytest.approx(timers, nan_ok=True)
     assert [broadcast.message[0] for broadcast in heard] == pytest.approx(words)
+
+
+def test_a_late_radio_sends_what_was_said_before_it_failed() -> None:
+    layer = layer_of(Fault("radio_delayed", 1, onset=5.0), control_period=1.0)
+    sent = [layer.broadcast(float(second), [], float(second)) for second in range(8)]
+    timers = [broadcast.timer for broadcast in sent if broadcast]
+    assert timers == [0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 4.0, 5.0]
 
 
 def test_trials_of_robots_are_a_table_that_judge_reads(tmp_path: Path) -> None:
