@@ -63,6 +63,7 @@ SCRIPTS: Mapping[str, tuple[str, ...]] = {
         "avoid_range", "clearance", "obstacle_range",
     ),
 }  # fmt: skip
+PARAMETERS: Mapping[str, tuple[str, ...]] = {**SCRIPTS, "swarm-dt-tuned": SCRIPTS["swarm-dt"]}
 _BASE = Scenario.preset("realistic").replace(restock=True)
 WORLDS: Mapping[str, Scenario] = {
     "realistic": _BASE,
@@ -93,7 +94,7 @@ class Tried(NamedTuple):
 def shipped(script: str) -> dict[str, float]:
     """Return the shipped values of what is searched."""
     policy: Any = policies.load(script)
-    return {name: float(getattr(policy.parameters, name)) for name in SCRIPTS[script]}
+    return {name: float(getattr(policy.parameters, name)) for name in PARAMETERS[script]}
 
 
 def values_at(script: str, point: Sequence[float]) -> dict[str, float]:
