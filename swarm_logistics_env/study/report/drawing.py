@@ -298,6 +298,8 @@ def forest(
 def trade_off(canvas: Canvas, panels: Mapping[str, Sequence[tuple[Point, Interval]]]) -> None:
     """Draw values against contacts per robot-minute with their intervals, on one scale.
 
+    Points of a single panel are named by their categories where there is room for the name.
+
     Args:
         canvas: to draw on.
         panels: points, each with its contacts, by the title of their panel.
@@ -321,6 +323,32 @@ def trade_off(canvas: Canvas, panels: Mapping[str, Sequence[tuple[Point, Interva
     grid[0, 0].set_ylim(bottom=0.0)
     grid[0, 0].set_xlim(left=0.0)
     _legend(canvas, grid[0, 0])
+    if len(panels) == 1:  # a panel of several is of one condition, which is its title
+        canvas.draw_without_rendering()  # so that it is known where the points stand
+        _name_points(grid[0, 0], [(c.value, p) for points in panels.values() for p, c in points])
+
+
+def _name_points(axes: Axes, points: Sequence[tuple[float, Point]]) -> None:
+    """Write the category of each point beside it where there is room, of lonely ones first."""
+    from matplotlib.transforms import Bbox
+
+    spots = [(x, point.value or 0.0) for x, point in points]
+    pixels = axes.transData.transform(spots)
+    apart = np.linalg.norm(pixels[:, None] - pixels, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    taken = [Bbox.from_bounds(x - 4.0, y - 4.0, 8.0, 8.0) for x, y in pixels.tolist()]
+    style: Any = {"textcoords": "offset points", "fontsize": "x-small"}
+    style["bbox"] = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
+    for index in np.argsort(-apart.min(axis=1), kind="stable").tolist():
+        for side, beside in (("left", 5.0), ("right", -5.0)):
+            name = points[index][1].category
+            text = axes.annotate(name, spots[index], (beside, 4.0), ha=side, **style)
+            box = text.get_window_extent()
+            is_inside = axes.bbox.x0 < box.x0 and box.x1 < axes.bbox.x1
+            if is_inside and not any(box.overlaps(other) for other in taken):
+                taken.append(box)
+                break
+            text.remove()
 
 
 def rates(

@@ -78,6 +78,17 @@ def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
     assert [[tuple(end) for end in line] for line in lines] == bars
 
 
+def test_a_lonely_point_has_a_name_and_not_all_on_a_heap_have_one() -> None:
+    contacts = Interval(2.0, 1.0, 5.0)
+    lonely = POINT._replace(category="lonely", value=8.0)
+    on_a_heap = [(POINT._replace(category=name), contacts) for name in "abc"]
+    canvas = Figure()
+    drawing.trade_off(canvas, {"": [*on_a_heap, (lonely, Interval(20.0, 19.0, 21.0))]})
+    names = {text.get_text() for text in canvas.axes[0].texts}
+    assert "lonely" in names
+    assert 0 < len(names & set("abc")) < 3
+
+
 @pytest.mark.parametrize(
     ("points", "low", "high"),
     [
