@@ -211,13 +211,13 @@ def _case(origin: Origin, row: Trial) -> Case:
 
 
 @lru_cache(10_000)  # many trials have the same P
-def _untimed(performance: float, contacts: float | None) -> Outcome:
-    return Outcome(untimed=performance, contacts_per_robot_minute=contacts)
+def _untimed(performance: float, least: float | None, contacts: float | None) -> Outcome:
+    return Outcome(untimed=performance, least=least, contacts_per_robot_minute=contacts)
 
 
 def _outcome(row: Trial) -> Outcome:
     if row.times is None:
-        return _untimed(row.performance, row.contacts)
+        return _untimed(row.performance, row.least, row.contacts)
     return Outcome(
         delivery_times=np.array(row.times),
         ended_at=row.duration or 0.0,

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
+from .words import means_no_number
+
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _LIKE_A_NUMBER = re.compile(r"[+-]?\d*[.,]?\d*([eE][+-]?\d+)?")  # also a decimal comma, or nothing
 # With signs between thousands: "1,204", "1.204.000,5" or "1 204".
@@ -18,11 +20,26 @@ _GROUPED = re.compile(r"[+-]?\d{1,3}(([.,'’\s])\d{3})(\2\d{3})*([.,]\d+)?")
 # Signs that stand between thousands and nowhere else in a number.
 _SURELY_GROUPED = re.compile(r"[+-]?\d{1,3}(['’\s])\d{3}(\1\d{3})*([.,]\d+)?")
 _MEASURED = ("performance", "time", "time_to_finish", "contacts")  # in each trial anew
+WORKBOOK = "a workbook"  # as the kind of a table
 LARGEST_EXACT = 2**53  # from here on programs that hold numbers as floats round whole ones
 
 
 class NoTrialsError(IndicatorError):
     """A file that can be read and holds no trials, as an empty one."""
+
+
+class CellError(IndicatorError):
+    """A cell that cannot be.
+
+    Attributes:
+        column: the name of its column.
+        row: its number in the table.
+    """
+
+    def __init__(self, message: str, column: str, row: int) -> None:
+        super().__init__(message)
+        self.column = column
+        self.row = row
 
 
 class MergedCell(str):
@@ -106,18 +123,15 @@ class Cells:
     meaning: str = ""
     seconds: float = 1.0
 
-    def error(self, row: int, should: str) -> IndicatorError:
+    def error(self, row: int, should: str) -> CellError:
         """Return the error that the cell of a row cannot be."""
         shown = repr(self.texts[row]) if self.texts[row] else "nothing"
-        return IndicatorError(
-            f"{self.table.location(row)}, column {self.name!r}: {shown}: {should}"
-        )
+        message = f"{self.table.location(row)}, column {self.name!r}: {shown}: {should}"
+        return CellError(message, self.name, row)
 
     def are_like_numbers(self) -> bool:
         """Return whether each cell is meant as a number, or empty."""
-        return all(
-            _LIKE_A_NUMBER.fullmatch(text) or _GROUPED.fullmatch(text) for text in self.texts
-        )
+        return all(map(like_a_number, self.texts))
 
     def number(self, row: int, least: float = -math.inf, *, must_be_whole: bool = False) -> float:
         """Return the cell of a row as a finite number of at least `least`; a time in seconds."""
@@ -201,6 +215,17 @@ class Columns(NamedTuple):
     has_seeds: bool
     performance_name: str
     notes: Sequence[str]
+
+
+def like_a_number(text: str) -> bool:
+    """Return whether a text is meant as a number, or empty."""
+    return bool(_LIKE_A_NUMBER.fullmatch(text) or _GROUPED.fullmatch(text))
+
+
+def holds_numbers(texts: Sequence[str]) -> bool:
+    """Return whether most cells with a value are meant as numbers."""
+    known = [text for text in texts if not means_no_number(text)]
+    return 2 * sum(map(like_a_number, known)) > len(known)
 
 
 @lru_cache(100_000)  # most cells are some of a few numbers
