@@ -97,9 +97,8 @@ def _refuse_other_than_numbers(cells: Cells, columns: Columns) -> None:
         is_needed = not {"time", "time_to_finish"} & columns.by_meaning.keys()
     # Of equal cells the first one; a merged cell is equal to no other.
     first_rows = {(type(text), text): row for row, text in reversed([*enumerate(cells.texts)])}
-    for row in sorted(first_rows.values()):
-        if not (cells.texts[row] or is_needed):
-            continue
+    rows = [row for row in first_rows.values() if cells.texts[row] or is_needed]
+    for row in sorted(rows, key=lambda row: (not cells.texts[row], row)):
         if meaning in _WHOLE:
             cells.whole_number(row, least)
         else:

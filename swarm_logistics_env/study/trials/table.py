@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from shlex import quote
 from typing import NamedTuple
 
 from swarm_logistics_env.spi.inputs import IndicatorError
@@ -176,14 +177,15 @@ class Cells:
             return f" without a sign between thousands{point}, or --thousands ."
         if not self.meaning:
             return (
-                f", as every column that varies is a parameter; else --ignore {self.name!r}, or "
-                f"say what it is, as by --column table={self.name!r} where each of its values has "
-                "runs of its own"
+                f", as every column that varies is a parameter; else --ignore {quote(self.name)}, "
+                f"or say what it is, as by --column {quote(f'table={self.name}')} where each of "
+                "its values has runs of its own"
             )
         if self.meaning == "performance":
+            option = quote(f"performance:{text}=0")
             return (
-                f"; where the robots did nothing, --value performance:{text}=0 says so; a trial "
-                "that was not recorded has no row"
+                f"; where the robots did nothing, --value {option} says so; a trial that was not "
+                "recorded has no row"
             )
         return ""
 

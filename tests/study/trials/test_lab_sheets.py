@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,160 +10,250 @@ from typing import Any, NamedTuple
 import pytest
 
 from swarm_logistics_env import judge, spi
-from swarm_logistics_env.study.trials import Trials, read_trials
+from swarm_logistics_env.study.trials import read_trials
 
 openpyxl = pytest.importorskip("openpyxl")
 
-Row = tuple[object, ...]
-# P of trials of eight robots, by the fault of one of them.
-TRIALS = {
-    "none": [12.5, 11.25, 13.0, 12.0, 12.75, 11.5],
-    "wheel": [10.5, 9.75, 8.5, 9.0],
-    "removed": [10.5, 11.0, 10.0, 11.25],
+Conditions = dict[tuple[int, str], list[float]]
+# P of trials by robots and fault, one robot of eight, and by robots alone.
+FAULTS: Conditions = {
+    (8, "none"): [11.25, 11.5, 12.0, 12.5, 12.75, 13.0],
+    (8, "wheel"): [8.5, 9.0, 9.75, 10.5],
+    (8, "removed"): [10.0, 10.5, 11.0, 11.25],
 }
-SIZES = {4: [10.0, 11.0, 12.0, 10.5], 8: [19.0, 20.0, 18.0], 16: [35.0, 36.0, 34.0, 33.0]}
-TIMES = {"none": [100, 110, 105, 98, 102], "wheel": [250, 260, 300, 300, 300]}
-READING = {
-    "--column": lambda value: {"columns": dict([value.split("=", 1)])},
-    "--wide": lambda value: {"wide": value},
-    "--duration": lambda value: {"duration": float(value)},
+SIZES: Conditions = {
+    (4, "none"): [10.0, 10.5, 11.0, 12.0],
+    (8, "none"): [18.0, 19.0, 20.0],
+    (16, "none"): [33.0, 34.0, 35.0],
 }
-
-
-def reading(option: str) -> dict[str, Any]:
-    """Return the arguments of `read_trials` that an option of the command line stands for."""
-    if option == "--skip-missing":
-        return {"skip_missing": True}
-    name, value = shlex.split(option)
-    return READING[name](value)
-
-
-def csv(*rows: Row, sign: str = ",") -> Callable[[Path], None]:
-    text = "".join(sign.join(map(str, row)) + "\n" for row in rows)
-    return lambda path: path.with_suffix(".csv").write_text(text) and None
-
-
-def workbook(*rows: Row, merged: tuple[str, ...]) -> Callable[[Path], None]:
-    def write(path: Path) -> None:
-        book = openpyxl.Workbook()
-        for row in rows:
-            book.active.append(row)
-        for cells in merged:
-            book.active.merge_cells(cells)
-        book.save(path.with_suffix(".xlsx"))
-
-    return write
-
-
-def rows(
-    word_of: Callable[[float], object] = str, sound: str = "none", removed: str = "removed"
-) -> list[Row]:
-    """Return robots, fault, faulty and P of each trial."""
-    words = {"none": sound, "removed": removed}
-    return [
-        (8, words.get(fault, fault), int(fault != "none"), word_of(p))
-        for fault, values in TRIALS.items()
-        for p in values
-    ]
-
-
-def comma(p: float) -> str:
-    return str(p).replace(".", ",")
-
-
-def by_fault(trials: Trials) -> dict[str, list[float]]:
-    return {
-        fault: trials.performance(fault=fault, n_robots=8).tolist()
-        for fault in dict.fromkeys(row.fault for row in trials.rows)
-    }
-
-
-def by_size(trials: Trials) -> dict[int, list[float]]:
-    return {n: trials.performance(n_robots=n).tolist() for n in SIZES}
-
-
-def tenfold(trials: Trials) -> dict[str, list[float]]:
-    return {fault: [p / 10 for p in values] for fault, values in by_fault(trials).items()}
-
-
-def times(trials: Trials) -> dict[str, list[float]]:
-    return {fault: [round(1 / p) for p in values] for fault, values in by_fault(trials).items()}
+TIMES: Conditions = {
+    (8, "none"): [1 / 110, 1 / 105, 1 / 102, 1 / 100, 1 / 98],
+    (8, "wheel"): [1 / 300, 1 / 300, 1 / 300, 1 / 260, 1 / 250],
+}
 
 
 class Sheet(NamedTuple):
-    """A file, what its trials are, the option that its refusal names, and what is told of it."""
+    """A text, or rows of a workbook; its trials, the option that is named, and what is told."""
 
     name: str
-    write: Callable[[Path], None]
-    trials: Callable[[Trials], object]
-    expected: object
+    content: str | list[tuple[object, ...]]
+    expected: Conditions
     option: str = ""
     note: str = ""
+    merged: tuple[str, ...] = ()
 
 
-HEAD = ("robots", "fault", "faulty", "delivered")
-WIDE_FAULTS = [
-    tuple("" if p is None else p for p in row) for row in zip_longest(*TRIALS.values())
-]
-WIDE_SIZES = [tuple("" if p is None else p for p in row) for row in zip_longest(*SIZES.values())]
-TIMED = [
-    (8, fault, int(fault != "none"), time) for fault, values in TIMES.items() for time in values
-]
+def lines(line: str, conditions: Conditions = FAULTS, **words: str) -> str:
+    """Return a line for each trial: {n}, {fault}, {m}, {p} and {comma} are filled."""
+    return "".join(
+        line.format(
+            n=n,
+            fault=words.get(fault, fault),
+            m=int(fault != "none"),
+            p=p,
+            comma=f"{p:05.2f}".replace(".", ","),
+        )
+        + "\n"
+        for (n, fault), values in conditions.items()
+        for p in values
+    )
+
+
+def wide(heading: str, conditions: Conditions, sign: str = ",") -> str:
+    columns = zip_longest(*conditions.values(), fillvalue="")
+    return "\n".join([heading, *(sign.join(map(str, row)) for row in columns)]) + "\n"
+
+
+HEAD = "robots,fault,faulty,delivered\n"
+LIMITED = "".join(
+    f"8,{fault},{int(fault != 'none')},{round(1 / p)}\n"
+    for (_, fault), values in TIMES.items()
+    for p in values
+)
 SHEETS = [
     Sheet(
         "a column a size, of unequal length",
-        csv(("N=4", "N=8", "N=16"), *WIDE_SIZES),
-        by_size,
+        wide("N=4,N=8,N=16", SIZES),
         SIZES,
-        note="'N=4' (robots 4), 'N=8' (robots 8), 'N=16' (robots 16). Their cells are read as P",
+        note="each of these columns is a condition: 'N=4' (robots 4), 'N=8' (robots 8), 'N=16' (r",
     ),
-    Sheet(
-        "a column a number",
-        csv(("day", 4, 8, 16), *(("Mon", *row) for row in WIDE_SIZES)),
-        lambda trials: {n: sorted(values) for n, values in by_size(trials).items()},
-        {n: sorted(values) for n, values in SIZES.items()},
-        "--wide robots",
-    ),
+    Sheet("a column a number", wide("4;8;16", SIZES, ";"), SIZES, "--wide robots"),
     Sheet(
         "a column a fault, in French",
-        csv(("sans panne", "wheel 1 de 8", "retirés 1 de 8"), *WIDE_FAULTS, sign=";"),
-        by_fault,
-        TRIALS,
-        note="'retirés 1 de 8' (fault removed, faulty 1, robots 8)",
+        wide("sans panne;wheel 1 de 8;retirés 1 de 8", FAULTS, ";"),
+        FAULTS,
+        note="'sans panne' (fault none, robots 8), 'wheel 1 de 8' (fault wheel, faulty 1, robots 8",
     ),
     Sheet(
-        "German, with points between thousands",
-        csv(
-            ("Versuch", "Roboter", "Ausfall", "ausgefallen", "geliefert"),
-            *(
-                (k, *row[:3], f"1.{row[3]}")
-                for k, row in enumerate(
-                    rows(lambda p: f"{10 * p:07.3f}".replace(".", ","), "kein", "entfernt")
-                )
-            ),
-            sign=";",
-        ),
-        lambda trials: {k: [(p - 1000) / 10 for p in v] for k, v in by_fault(trials).items()},
-        TRIALS,
-        note="'Ausfall' for fault, 'ausgefallen' for faulty, 'geliefert' for performance, 'kein'",
+        "German, with a point between thousands",
+        "Versuchstag;Roboter;Ausfall;ausgefallen;geliefert\n"
+        + lines(";{n};{fault};{m};1.0{comma}", none="kein", removed="entfernt"),
+        {key: [1000 + p for p in values] for key, values in FAULTS.items()},
+        note="'Ausfall' for fault, 'ausgefallen' for faulty, 'geliefert' for performance, 'kein' f",
     ),
     Sheet(
         "with gaps",
-        csv(HEAD, *rows(), (8, "none", 0, "NA"), (8, "wheel", 1, ""), (8, "wheel", "-", 9)),
-        by_fault,
-        TRIALS,
+        HEAD + lines("{n},{fault},{m},{p}") + "8,none,0,NA\n8,wheel,1,\n8,wheel,-,9\n",
+        FAULTS,
         "--skip-missing",
         note="3 of 17 rows lack a value and are left out: 1 in 'faulty', 2 in 'delivered'.",
     ),
     Sheet(
         "names merged over repetitions",
-        workbook(
-            ("", "N=4", "", "", "N=8", "", ""),
-            ("", *(f"run {k}" for k in (1, 2, 3)) * 2),
-            ("hall", 10, 11, 12, 19, 20, 18),
-            merged=("B1:D1", "E1:G1"),
-        ),
-        lambda trials: by_size(trials) | {16: None},
-        {},
+        [
+            ("hall", "N=4", None, None, "N=8", None, None),
+            (None, *(f"Versuch {k}" for k in (1, 2, 3) * 2)),
+            ("A", 10, 11, 12, 19, 20, 18),
+            ("B", 10.5, None, None, None, None, None),
+        ],
+        {key: values for key, values in SIZES.items() if key[0] < 16},
+        "--ignore hall",
+        merged=("B1:D1", "E1:G1"),
     ),
+    Sheet(
+        "with a time limit",
+        "robots,fault,faulty,time to finish [s]\n" + LIMITED,
+        TIMES,
+        "--duration 300",
+    ),
+    Sheet(
+        "with trials that did not finish",
+        "robots,fault,faulty,completion_time,geschafft\n"
+        + LIMITED.replace("\n", ",ja\n").replace("300,ja", "300,nein"),
+        TIMES,
+        note="3 of 10 trials were stopped before they finished, and nobody counted what was done",
+    ),
+    Sheet(
+        "units, a sum and a note in rows of their own",
+        "robots;fault;faulty;delivered\n-;;;[boxes]\n"
+        + lines("{n};{fault};{m};{comma}")
+        + "Mittelwert;;;11,02\nBatterie schwach am 3.5.;;;\n",
+        FAULTS,
+        note="'Batterie schwach am 3.5.' (line 18) is left out: a note below the trials.",
+    ),
+    Sheet("percent", HEAD + lines("{n},{fault},{m},{p} %"), FAULTS),
 ]
+
+
+def reading(option: str) -> dict[str, Any]:
+    """Return the arguments of `read_trials` that an option of the command line stands for."""
+    name, _, value = option.partition(" ")
+    (value,) = shlex.split(value) or ("",)
+    return {
+        "--skip-missing": {"skip_missing": True},
+        "--column": {"columns": dict([value.partition("=")[::2]])},
+        "--ignore": {"ignore": [value]},
+        "--wide": {"wide": value},
+        "--duration": {"duration": float(value) if name == "--duration" else None},
+    }[name]
+
+
+def write(folder: Path, sheet: Sheet) -> Path:
+    if isinstance(sheet.content, str):
+        path = folder / "sheet.csv"
+        path.write_text(sheet.content)
+        return path
+    book = openpyxl.Workbook()
+    for row in sheet.content:
+        book.active.append(row)
+    for cells in sheet.merged:
+        book.active.merge_cells(cells)
+    book.save(folder / "sheet.xlsx")
+    return folder / "sheet.xlsx"
+
+
+@pytest.mark.parametrize("sheet", SHEETS, ids=lambda sheet: sheet.name)
+def test_a_sheet_is_judged_at_once_or_with_the_option_that_is_named(
+    sheet: Sheet, tmp_path: Path
+) -> None:
+    path = write(tmp_path, sheet)
+    options = {}
+    if sheet.option:
+        with pytest.raises(spi.IndicatorError) as refused:
+            read_trials(path)
+        assert sheet.option in str(refused.value)
+        options = reading(sheet.option)
+    trials = read_trials(path, **options)
+    read: Conditions = {}
+    for row in trials.rows:
+        read.setdefault((row.n_robots or 0, row.fault), []).append(row.performance)
+    assert {key: sorted(values) for key, values in read.items()} == {
+        key: pytest.approx(values) for key, values in sheet.expected.items()
+    }
+    assert sheet.note in " ".join(trials.notes)
+    assert judge(path, **options).verdicts
+
+
+def test_all_that_is_wrong_with_a_sheet_is_told_at_once_with_what_to_type(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text("robtos;boxes;fault;m;note\n8;1,204;none;0;\n8;998;wheel;1;battery low\n")
+    with pytest.raises(spi.IndicatorError) as refused:
+        read_trials(path)
+    name, sign, note, performance = str(refused.value).splitlines()
+    assert "has a column 'robtos'; did you mean 'robots'? Then say --column robots=robtos" in name
+    assert "line 2, column 'boxes': '1,204': should be a number without" in sign
+    assert "--decimal , where decimals have a comma, or --thousands , where" in sign
+    assert "column 'note': 'battery low': should be a number" in note
+    assert "else --ignore note," in note
+    assert "no column 'performance'" in performance
+    assert "say which it is by --column performance=boxes, or add it" in performance
+    # A wide table whose names say less than what is needed.
+    path.write_text(wide("ohne;wheel;entfernt", FAULTS, ";"))
+    with pytest.raises(spi.IndicatorError, match="is a condition, --wide policy or --wide fault"):
+        read_trials(path)
+    with pytest.raises(spi.IndicatorError) as refused:
+        read_trials(path, wide="fault")
+    faulty, robots = str(refused.value).splitlines()
+    assert "--column faulty=1 where one fails in each trial with a fault" in faulty
+    assert "--column robots=8 where there are 8 in each trial" in robots
+    trials = read_trials(path, wide="fault", columns={"faulty": "1", "robots": "8"})
+    assert [row.faulty for row in trials.rows] == [0] * 6 + [1] * 8
+
+
+def test_a_verdict_holds_whatever_trials_that_were_stopped_would_have_done(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    head = "robots,fault,faulty,completion_time,finished\n"
+    sound = "".join(f"8,none,0,{time},yes\n" for time in range(270, 300, 3))
+    for limit, words in ((300, {"open"}), (900, {"refuted"})):
+        # At the limit all could have finished at once, or never.
+        path.write_text(head + sound + f"8,wheel,1,{limit},no\n" * 10)
+        (verdict,) = judge(path).verdicts
+        assert verdict.on_property.adjusted in words
+        assert verdict.interval.low == pytest.approx(-1 + 1 / 8, abs=1e-6)
+        assert verdict.value == pytest.approx(284 / limit - 1 + 1 / 8, abs=0.01)
+    # Where the sound ones were stopped, P_o is at most what is shown.
+    late = "8,none,0,300,no\n" * 3
+    broken = "".join(f"8,wheel,1,{time},yes\n" for time in range(280, 300, 2))
+    path.write_text(head + sound + late + broken)
+    (verdict,) = judge(path).verdicts
+    assert verdict.on_property.adjusted == "supported"
+    path.write_text(head + sound + late + broken.replace(",2", ",3"))
+    (verdict,) = judge(path).verdicts
+    assert verdict.value < 0 < verdict.interval.high
+    assert verdict.on_property.adjusted == "open"
+
+
+def test_words_that_mean_a_missing_value_leave_out_no_more_than_said(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    # An empty time is a trial that did not finish; to leave it out would be to leave out failures.
+    path.write_text("robots,makespan\n4,90\n4,\n8,60\n8,50\n")
+    with pytest.raises(spi.IndicatorError, match="of a trial that did not finish, columns should"):
+        read_trials(path, skip_missing=True)
+    assert read_trials(path, duration=100.0).rows[1].least == 0.0
+    # The words of the file are said by --value.
+    path.write_text("robots,p,note\n4,kaputt,\n4,9,x\n8,20,\n")
+    trials = read_trials(path, ignore=["note"], values=["p:kaputt="], skip_missing=True)
+    assert [row.performance for row in trials.rows] == [9.0, 20.0]
+    path.write_text("robots,p\n4,NA\n,8\n")
+    with pytest.raises(spi.IndicatorError, match="--skip-missing: no row of"):
+        read_trials(path, skip_missing=True)
+
+
+def test_a_german_column_that_may_tell_robots_apart_is_asked_about(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    rows = "".join(f"{trial};{robot};{robot + trial}\n" for trial in (1, 2) for robot in (1, 2, 3))
+    path.write_text(f"Versuch;Roboter;geliefert\n{rows}")
+    with pytest.raises(spi.IndicatorError) as refused:
+        read_trials(path)
+    assert "by --sum-over Roboter" in str(refused.value)
+    assert "say --column robots=Roboter" in str(refused.value)

@@ -126,7 +126,10 @@ JAM = "trial,robots,fault,faulty,onset,time\n1,4,jam,1,20,30\n"
         (HEAD + GOOD + "2,8,jam,,7\n", "line 3, column 'faulty': nothing: should be how many"),
         (HEAD + GOOD + "2,8,none,2,7\n", "line 3, column 'faulty': '2': should be 0 without"),
         (HEAD + GOOD + "2,8,jam,8,7\n", "column 'faulty': '8': should be less than the 8 robots"),
-        ("fault,faulty,p\njam,1,7\n", "no column 'robots', for the swarm's size, without which R is"),
+        (
+            "fault,faulty,p\njam,1,7\n",
+            "no column 'robots', for the swarm's size, without which R is",
+        ),
         (HEAD + GOOD + "1,8,none,,7\n", "line 3, column 'trial': '1': is in line 2 too"),
         ("robots,onset,duration,p\n4,60,60,1\n", "'60': should be before the trial ends at 60 s"),
         ("robots,seed,p\n4,0,1\n8,,2\n", "line 3: has no seed"),

@@ -74,7 +74,7 @@ SHAPES = [
         "a note",
         "N,fault,m,P,note\n" + rows("8,{fault},{m},{p},ok").replace("ok", "battery", 1),
         "--ignore note",
-        "else --ignore 'note'",
+        "else --ignore note",
     ),
     Shape(
         "two performances",
