@@ -178,7 +178,8 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
         for title, rows in _tables(origin)
     ]
     comparisons = [comparison for title, arms in tables for comparison in compared(title, arms)]
-    if len(specification.policies) == 2:  # of more, nobody says which one is the reference
+    # Of more policies nobody says which one is the reference.
+    if comparisons and len(specification.policies) == 2:
         comparisons += between_policies(comparisons)
     return Plan(
         specification,

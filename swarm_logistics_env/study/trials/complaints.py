@@ -56,4 +56,6 @@ class Complaints:
             IndicatorError: with a line for each.
         """
         if self._lines:
-            raise IndicatorError("\n".join(self._lines))
+            error = IndicatorError("\n".join(self._lines))
+            error.lines = (*self._lines,)
+            raise error

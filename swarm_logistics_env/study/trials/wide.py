@@ -22,7 +22,8 @@ from .words import CELLS, COLUMN_NAMES, MEANING, REPETITIONS, plain
 
 MEASURED = ("performance", "time", "time_to_finish")
 _ROBOTS = "|".join(word.replace("_", " ") for word in COLUMN_NAMES["n_robots"])
-_SIZE = re.compile(rf"(?:{_ROBOTS}|robots) ?[=:]? ?(\d+)|(\d+) (?:{_ROBOTS}|robots?)")
+# "N=4" or "4 robots", but not "Roboter 4", which may be one of them.
+_SIZE = re.compile(rf"(?:{_ROBOTS}) ?[=:] ?(\d+)|(\d+) (?:{_ROBOTS}|robot)")
 _VALUE = re.compile(r"(.*\D)\s*=\s*([+-]?[\d.,]+)\s*(\S*)")
 _REPETITION = re.compile(rf"(?:{'|'.join(REPETITIONS)}|#) ?[.:#]? ?\d+")
 # "wheel, m = 1", "wheel 1 of 8", "wheel (2/8)"

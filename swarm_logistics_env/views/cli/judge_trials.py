@@ -42,8 +42,8 @@ def judge_trials_command(
         Option(
             "--column",
             metavar="WHAT=NAME",
-            help="What a column of another name is, e.g. performance=boxes; or a number that is the "
-            "same in all trials, e.g. robots=8; may be repeated.",
+            help="What a column of another name is, e.g. performance=boxes; or the number that all "
+            "trials have, e.g. robots=8; may be repeated.",
         ),
     ] = None,
     ignore: Annotated[
