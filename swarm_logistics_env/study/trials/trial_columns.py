@@ -248,7 +248,9 @@ def _with_signs(
     columns = [table.columns[name] for name in numbers if name in table.columns]
     decimal = decimal or table.decimal or ("," if thousands == "." else None)
     if decimal is None and thousands is None and (text := _both_signs(columns)):
-        thousands, decimal = re.sub(r"[\d+-]", "", text)[-2:]
+        signs = re.sub(r"[\d+-]", "", text)
+        thousands = signs[0]
+        decimal = signs[-1]
         notes.append(
             f"Numbers are taken to have {thousands} between thousands and {decimal} before "
             f"decimals, as in {text}."

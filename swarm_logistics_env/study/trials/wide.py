@@ -140,7 +140,7 @@ def _as_said(table: Table, number: int, wide: str) -> Condition:
 
 
 def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[str, str]) -> Table:
-    """Return a table with a row for each cell that is not empty of the columns of conditions."""
+    """Return a table with a row for each cell of the columns of conditions, but for their ends."""
     import pandas as pd
 
     sizes = {condition["robots"] for condition in conditions.values() if "robots" in condition}
@@ -159,9 +159,12 @@ def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[
     labels = [number for number in range(len(table.header)) if number not in conditions]
     frame = pd.DataFrame([*table.cells], dtype=object).assign(row=range(len(table.cells)))
     long = frame.melt([*labels, "row"], [*conditions], "condition", CELLS)
-    filled = long[long[CELLS] != ""]
+    ends = _empty_ends(table, conditions)
+    trials = [
+        trial for trial in long.to_dict("records") if (trial["row"], trial["condition"]) not in ends
+    ]
     cells = []
-    for trial in filled.to_dict("records"):
+    for trial in trials:
         condition = conditions[trial["condition"]]
         of_condition = [condition.get(name, "") for name in new]
         cells.append([*(trial[label] for label in labels), *of_condition, trial[CELLS]])
@@ -169,19 +172,40 @@ def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[
     if measured not in columns.values():
         note += " Their cells are read as P, of which more is better; where they are times until "
         note += f"all was done, say --column {quote(f'time_to_finish={measured}')}."
-    n_empty = len(long) - len(filled)
-    if n_empty:
-        note += f" Empty cells ({n_empty}) are no trials."
+    if ends:
+        note += f" Empty cells at an end ({len(ends)}) are no trials."
     meanings = {} if measured in columns.values() else {"performance": measured}
     return replace(
         table,
         meanings={**table.meanings, **meanings},
         header=[*(table.header[label] for label in labels), *new, measured],
         cells=cells,
-        lines=[table.lines[row] for row in filled["row"]],
-        origins=[table.origins[row] for row in filled["row"]] if table.origins else (),
+        lines=[table.lines[trial["row"]] for trial in trials],
+        origins=[table.origins[trial["row"]] for trial in trials] if table.origins else (),
         notes=(*table.notes, note),
     )
+
+
+def _empty_ends(table: Table, conditions: Mapping[int, Condition]) -> set[tuple[int, int]]:
+    """Return row and column of the cells that are empty, as a condition has less trials.
+
+    Those are at the end of a column, or of the repetitions in a row. An empty cell before others
+    is a value that is missing.
+    """
+    ends = set()
+    for number, condition in conditions.items():
+        for row in reversed(range(len(table.cells))):
+            if table.cells[row][number]:
+                break
+            ends.add((row, number))
+        same = [other for other in conditions if conditions[other] == condition]
+        if len(same) > 1:
+            ends |= {
+                (row, number)
+                for row, texts in enumerate(table.cells)
+                if not any(texts[other] for other in same if other >= number)
+            }
+    return ends
 
 
 def _note(names: Sequence[str], conditions: Sequence[Condition]) -> str:

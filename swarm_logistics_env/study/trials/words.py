@@ -44,12 +44,12 @@ _COLUMNS = {
     },
     "fault": {
         "en": "failure mode fault_mode failure_mode",
-        "de": "ausfall ausfallart fehler fehlerart defekt storung stoerung",
+        "de": "ausfall ausfallart fehler fehlerart storung stoerung",
         "fr": "panne type_de_panne defaillance defaut",
         "es": "fallo falla tipo_de_fallo averia",
         "it": "guasto tipo_di_guasto avaria",
         "pt": "falha tipo_de_falha avaria",
-        "nl": "storing uitval defect",
+        "nl": "storing uitval",
     },
     "faulty": {
         "en": "m failed n_faulty",

@@ -249,6 +249,25 @@ def test_words_that_mean_a_missing_value_leave_out_no_more_than_said(tmp_path: P
         read_trials(path, skip_missing=True)
 
 
+def test_an_empty_cell_of_a_wide_table_is_missing_unless_it_is_at_an_end(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.csv"
+    path.write_text("N=4,N=8\n10,19\n,20\n11,\n")
+    with pytest.raises(spi.IndicatorError, match="--skip-missing leaves out 1 row that lacks a"):
+        read_trials(path)
+    trials = read_trials(path, skip_missing=True)
+    assert [row.performance for row in trials.rows] == [10.0, 11.0, 19.0, 20.0]
+    assert "Empty cells at an end (1) are no trials." in trials.notes[0]
+    # Of a time it says that the trial did not finish.
+    with pytest.raises(spi.IndicatorError, match="of a trial that did not finish, columns should"):
+        read_trials(path, columns={"time_to_finish": "cells"}, skip_missing=True)
+    path.write_text("robots,run 1,run 2\n4,10,\n8,20,21\n")
+    assert [row.n_robots for row in read_trials(path).rows] == [4, 8, 8]
+    # Numbers of robots, or of one of them?
+    path.write_text("trial;Roboter 1;Roboter 2\n1;3;4\n2;5;6\n")
+    with pytest.raises(spi.IndicatorError, match="where each column is a condition, --wide robots"):
+        read_trials(path)
+
+
 def test_a_german_column_that_may_tell_robots_apart_is_asked_about(tmp_path: Path) -> None:
     path = tmp_path / "sheet.csv"
     rows = "".join(f"{trial};{robot};{robot + trial}\n" for trial in (1, 2) for robot in (1, 2, 3))
