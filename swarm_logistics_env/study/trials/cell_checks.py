@@ -54,6 +54,9 @@ def check_cells(columns: Columns, complaints: Complaints, *, is_summed: bool) ->
                 _refuse_unknown_number(cells)
             if name in checked and name not in complaints.columns:
                 _refuse_other_than_numbers(checked[name], columns)
+    if {"fault", "faulty"} <= meanings.keys():
+        with complaints.noted():
+            _refuse_uncounted(meanings["fault"], meanings["faulty"], complaints)
     labels = [meanings.get(label) for label in ("policy", "table", "n_robots")]
     if is_summed or "time" in meanings:  # several rows make a trial
         labels.append(trial)
@@ -125,6 +128,14 @@ def _refuse_unknown_number(cells: Cells) -> None:
     numbers = {*texts} - {texts[row] for row in unknown} - {""}
     if unknown and numbers and all(map(str.isdecimal, numbers)):
         raise cells.error(unknown[0], "should be a number, as in other rows")
+
+
+def _refuse_uncounted(fault: Cells, faulty: Cells, complaints: Complaints) -> None:
+    """Refuse a fault without the number of robots that fail by it."""
+    rows = complaints.missing.get(faulty.name, ())
+    if rows and faulty.name not in complaints.columns:
+        name = fault.texts[rows[0]]
+        raise faulty.error(rows[0], f"should be how many robots fail by {name!r}, 1 or more")
 
 
 def _refuse_gaps(cells: Cells, rows: Sequence[int]) -> None:

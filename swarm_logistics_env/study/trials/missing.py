@@ -42,7 +42,7 @@ def missing_rows(columns: Columns) -> dict[str, list[int]]:
             rows[cells.name] = _empty_among_others(cells)
     if "fault" in meanings:
         _add_of_faults(meanings["fault"], meanings.get("faulty"), rows)
-    return {name: found for name, found in rows.items() if found}
+    return {name: rows[name] for name in columns.table.header if rows.get(name)}
 
 
 def without_rows(table: Table, complaints: Complaints) -> Table:

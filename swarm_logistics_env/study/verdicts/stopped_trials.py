@@ -42,7 +42,13 @@ def estimate_over_ends(estimates: Sequence[Estimate]) -> Estimate:
     if len(estimates) == 1 or first.untestable:
         return first
     base = largest if largest.value < first.threshold else smallest
-    combined = replace(base, value=first.value, low=smallest.low, high=largest.high)
+    has_limits = smallest.low is not None and largest.high is not None
+    combined = replace(
+        base,
+        value=first.value,
+        low=smallest.low if has_limits else None,
+        high=largest.high if has_limits else None,
+    )
     if smallest.value <= first.threshold <= largest.value and base.p_value is not None:
         return replace(combined, p_value=1.0, p_seen=1.0, probability=0.5)
     return combined

@@ -139,13 +139,14 @@ def reading(option: str) -> dict[str, Any]:
     """Return the arguments of `read_trials` that an option of the command line stands for."""
     name, _, value = option.partition(" ")
     (value,) = shlex.split(value) or ("",)
-    return {
+    readings: dict[str, dict[str, Any]] = {
         "--skip-missing": {"skip_missing": True},
         "--column": {"columns": dict([value.partition("=")[::2]])},
         "--ignore": {"ignore": [value]},
         "--wide": {"wide": value},
         "--duration": {"duration": float(value) if name == "--duration" else None},
-    }[name]
+    }
+    return readings[name]
 
 
 def write(folder: Path, sheet: Sheet) -> Path:
@@ -210,27 +211,35 @@ def test_all_that_is_wrong_with_a_sheet_is_told_at_once_with_what_to_type(tmp_pa
     assert [row.faulty for row in trials.rows] == [0] * 6 + [1] * 8
 
 
+def judged(path: Path, text: str) -> tuple[str, float, float, float]:
+    """Return the word on the one question of a file, its value and its limits."""
+    path.write_text("robots,fault,faulty,completion_time,finished\n" + text)
+    (verdict,) = judge(path).verdicts
+    interval = verdict.interval
+    assert interval is not None
+    assert interval.low is not None
+    assert interval.high is not None
+    return verdict.on_property.adjusted, interval.value, interval.low, interval.high
+
+
 def test_a_verdict_holds_whatever_trials_that_were_stopped_would_have_done(tmp_path: Path) -> None:
     path = tmp_path / "sheet.csv"
-    head = "robots,fault,faulty,completion_time,finished\n"
     sound = "".join(f"8,none,0,{time},yes\n" for time in range(270, 300, 3))
-    for limit, words in ((300, {"open"}), (900, {"refuted"})):
-        # At the limit all could have finished at once, or never.
-        path.write_text(head + sound + f"8,wheel,1,{limit},no\n" * 10)
-        (verdict,) = judge(path).verdicts
-        assert verdict.on_property.adjusted in words
-        assert verdict.interval.low == pytest.approx(-1 + 1 / 8, abs=1e-6)
-        assert verdict.value == pytest.approx(284 / limit - 1 + 1 / 8, abs=0.01)
-    # Where the sound ones were stopped, P_o is at most what is shown.
-    late = "8,none,0,300,no\n" * 3
-    broken = "".join(f"8,wheel,1,{time},yes\n" for time in range(280, 300, 2))
-    path.write_text(head + sound + late + broken)
-    (verdict,) = judge(path).verdicts
-    assert verdict.on_property.adjusted == "supported"
-    path.write_text(head + sound + late + broken.replace(",2", ",3"))
-    (verdict,) = judge(path).verdicts
-    assert verdict.value < 0 < verdict.interval.high
-    assert verdict.on_property.adjusted == "open"
+    for limit, expected in ((300, "open"), (900, "refuted")):
+        # All could have finished at once after the limit, or never.
+        word, value, low, _ = judged(path, sound + f"8,wheel,1,{limit},no\n" * 10)
+        assert word == expected
+        assert low == pytest.approx(-1 + 1 / 8, abs=1e-6)
+        assert value == pytest.approx(284 / limit - 1 + 1 / 8, abs=0.01)
+    # Where sound ones were stopped, P_o is at most what is shown.
+    sound += "8,none,0,300,no\n" * 3
+    word, *_ = judged(path, sound + "".join(f"8,wheel,1,{280 + k},yes\n" for k in range(10)))
+    assert word == "supported"
+    word, value, _, high = judged(
+        path, sound + "".join(f"8,wheel,1,{380 + k},yes\n" for k in range(10))
+    )
+    assert word == "open"
+    assert value < 0.0 < high
 
 
 def test_words_that_mean_a_missing_value_leave_out_no_more_than_said(tmp_path: Path) -> None:
