@@ -10,6 +10,7 @@ from shlex import quote
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
+from .complaints import Complaints
 from .table import CellError, Columns
 from .trial_columns import bare
 from .words import NO_WORDS, YES_WORDS, plain
@@ -18,18 +19,19 @@ _FEWEST_AT_A_LIMIT = 3  # trials that last as long, and the longest, by no chanc
 _CROSS = "x"  # marks yes, unless another word of the column does
 
 
-def finished_words(columns: Columns) -> dict[str, bool]:
+def finished_words(columns: Columns, complaints: Complaints) -> dict[str, bool]:
     """Return what each cell of the column `finished` says; none where nothing does.
 
-    Raises:
-        IndicatorError: a cell is of neither list, or is empty beside others; names its line. Or a
-            column may say which trials finished, and would be a parameter.
+    Args:
+        complaints: take a cell that is of neither list, or is empty beside others; or a column that
+            may say which trials finished, and would be a parameter.
     """
     if "time_to_finish" not in columns.by_meaning:
         return {}
     cells = columns.by_meaning.get("finished")
     if cells is None:
-        _refuse_unnamed(columns)
+        with complaints.noted():
+            _refuse_unnamed(columns)
         return {}
     first_rows = {text: row for row, text in reversed([*enumerate(cells.texts)])}
     if not any(first_rows):
@@ -43,12 +45,14 @@ def finished_words(columns: Columns) -> dict[str, bool]:
             meaning = None if other_marks else True
         if meaning is None:
             option = quote(f"finished:{text}=no")
-            raise cells.error(
+            error = cells.error(
                 row,
                 f"should be a word for yes or no: --value {option} where it means that a trial did "
                 "not finish, else with =yes",
             )
-        meanings[text] = meaning
+            complaints.add(error)
+        else:
+            meanings[text] = meaning
     return meanings
 
 

@@ -69,8 +69,7 @@ def read_trials(
             is not named: its value in the condition without a fault that has most trials.
 
     Raises:
-        IndicatorError: the file cannot be read, or a line of it cannot be; names line, column and
-            value.
+        IndicatorError: the file cannot be read, or a line of it; names line, column and value.
     """
     mapped = dict(columns or {})
     table = _table_of(source, mapped, ignore, values, sum_over, wide)
@@ -78,9 +77,7 @@ def read_trials(
         table, mapped, ignore, decimal, thousands, skip_missing=skip_missing
     )
     table = table_columns.table
-    finished = dict[str, bool]()
-    with complaints.noted():
-        finished = finished_words(table_columns)
+    finished = finished_words(table_columns, complaints)
     check_cells(table_columns, complaints, is_summed=sum_over is not None)
     faults = FaultNames(table_columns, complaints)
     check_columns(table_columns, faults, mapped, duration, complaints)

@@ -33,19 +33,29 @@ TrialsArgument = Annotated[
     ),
 ]
 
+ColumnOption = Annotated[
+    Repeated,
+    Option(
+        "--column",
+        metavar="WHAT=NAME",
+        help="What a column of another name is, e.g. performance=boxes; or the number that all "
+        "trials have, e.g. robots=8; may be repeated.",
+    ),
+]
+WideOption = Annotated[
+    str | None,
+    Option(
+        metavar="WHAT",
+        help="What the columns of a wide table differ in: robots, fault, policy, trial "
+        "(repetitions), or a parameter's name.",
+    ),
+]
+
 
 def judge_trials_command(
     trials: TrialsArgument,
     out: JudgedOption = None,
-    columns: Annotated[
-        Repeated,
-        Option(
-            "--column",
-            metavar="WHAT=NAME",
-            help="What a column of another name is, e.g. performance=boxes; or the number that all "
-            "trials have, e.g. robots=8; may be repeated.",
-        ),
-    ] = None,
+    columns: ColumnOption = None,
     ignore: Annotated[
         Repeated, Option(metavar="NAME", help="Column to leave out; may be repeated.")
     ] = None,
@@ -87,14 +97,7 @@ def judge_trials_command(
     skip_missing: Annotated[
         bool, Option("--skip-missing", help="Leave out rows that lack a value, and count them.")
     ] = False,
-    wide: Annotated[
-        str | None,
-        Option(
-            metavar="WHAT",
-            help="What the columns of a wide table differ in: robots, fault, policy, trial "
-            "(repetitions), or a parameter's name.",
-        ),
-    ] = None,
+    wide: WideOption = None,
     check: Annotated[
         bool, Option("--check", help="Show how the trials are read, and judge nothing.")
     ] = False,
