@@ -14,7 +14,13 @@ from pathlib import Path
 
 
 class SwarmLogisticsError(ValueError):
-    """Anything this package refuses; catch this to catch all of them."""
+    """Anything this package refuses; catch this to catch all of them.
+
+    Attributes:
+        lines: of a message that says several things, each of them; else empty.
+    """
+
+    lines: tuple[str, ...] = ()
 
 
 class ScenarioError(SwarmLogisticsError):

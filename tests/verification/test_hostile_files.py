@@ -90,12 +90,14 @@ def mangled(source: random.Random, content: bytes) -> bytes:
 
 
 def refused_or_done(call: Callable[[], object]) -> None:
-    sentence = None
+    sentences: Sequence[str] = ()
     try:
         call()
     except SwarmLogisticsError as error:
-        sentence = str(error)
-    assert sentence is None or (len(sentence) > 15 and len(sentence.splitlines()) == 1), sentence
+        sentences = error.lines or [str(error)]
+    for sentence in sentences:
+        assert len(sentence) > 15, sentence
+        assert len(sentence.splitlines()) == 1, sentence
 
 
 def listing(directory: str | Path) -> set[str]:

@@ -178,7 +178,8 @@ def imported_plan(specification: Specification, origin: Origin) -> Plan:
         for title, rows in _tables(origin)
     ]
     comparisons = [comparison for title, arms in tables for comparison in compared(title, arms)]
-    if len(specification.policies) == 2:  # of more, nobody says which one is the reference
+    # Of more policies nobody says which one is the reference.
+    if comparisons and len(specification.policies) == 2:
         comparisons += between_policies(comparisons)
     return Plan(
         specification,
@@ -211,13 +212,13 @@ def _case(origin: Origin, row: Trial) -> Case:
 
 
 @lru_cache(10_000)  # many trials have the same P
-def _untimed(performance: float, contacts: float | None) -> Outcome:
-    return Outcome(untimed=performance, contacts_per_robot_minute=contacts)
+def _untimed(performance: float, least: float | None, contacts: float | None) -> Outcome:
+    return Outcome(untimed=performance, least=least, contacts_per_robot_minute=contacts)
 
 
 def _outcome(row: Trial) -> Outcome:
     if row.times is None:
-        return _untimed(row.performance, row.contacts)
+        return _untimed(row.performance, row.least, row.contacts)
     return Outcome(
         delivery_times=np.array(row.times),
         ended_at=row.duration or 0.0,

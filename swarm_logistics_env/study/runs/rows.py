@@ -20,6 +20,7 @@ _FIELDS = {field.name for field in fields(Outcome)} - {"wall_seconds"}
 # Left out where they are missing: older rows have none of them.
 OF_ORDERS = tuple(measure.name for measure in fields(OrderMeasures))
 COUNTED = (*(measure.name for measure in fields(ContactMeasures)), *OF_ORDERS)
+_OPTIONAL = (*COUNTED, "least")
 _FOLLOWING = ("delivered", "longest_standstill", "stands_still")  # from an outcome
 _DESCRIBED = {
     "policy", "policy_identity", "task", "scenario", "faults", "behaviour", "code", "seed"
@@ -68,7 +69,7 @@ def row_digest(*values: object) -> str:
 
 def content_of(run: Run, outcome: Outcome) -> Content:
     """Return what a store keeps of a run and its outcome besides the wall time."""
-    missing = {name for name in COUNTED if getattr(outcome, name) is None}
+    missing = {name for name in _OPTIONAL if getattr(outcome, name) is None}
     result = _OUTCOME.dump_json(outcome, exclude={"wall_seconds", *missing}).decode()
     before, after = _described(run.case, run.code)
     return run.key, f"{before}{run.seed}{after}", int(outcome.error is not None), result
@@ -100,7 +101,7 @@ def outcome_of(text: str) -> Outcome:
     """
     outcome = _OUTCOME.validate_json(text, strict=True)
     # Unknown fields were refused; quotes within a text are escaped.
-    if not all(f'"{name}":' in text for name in _FIELDS.difference(COUNTED)):
+    if not all(f'"{name}":' in text for name in _FIELDS.difference(_OPTIONAL)):
         raise ValueError(f"an outcome should have the fields {sorted(_FIELDS)}")
     return outcome
 

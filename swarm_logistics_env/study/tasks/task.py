@@ -75,6 +75,8 @@ class Deliveries:
         error: traceback, its middle left out where it is very long; None: the run succeeded.
         wall_seconds: time it took [s]; no part of the result.
         untimed: P, 0 or more, where it is not the number of times; None: it is.
+        least: P at least, of a recorded trial that was stopped and not counted, where `untimed` is
+            the most that it may be; None: P is known.
     """
 
     delivery_times: Times = field(default_factory=lambda: np.empty(0))
@@ -86,6 +88,7 @@ class Deliveries:
     error: Annotated[str | None, BeforeValidator(_make_storable)] = None
     wall_seconds: float = 0.0  # a clock may be set back
     untimed: NonNegativeFloat | None = None
+    least: NonNegativeFloat | None = None
 
     @property
     def delivered(self) -> float:

@@ -1,40 +1,62 @@
-"""Checks of cells: what a spreadsheet put in place of a value, and labels that some rows lack."""
+"""Checks of cells: values that a spreadsheet lost, labels that some rows lack, and numbers."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from shlex import quote
 
-from .fault_names import NOT_KNOWN, ZERO
+from .complaints import Complaints
+from .fault_names import ZERO
 from .table import Cells, Columns, Formula
+from .words import NOT_KNOWN
 
 # What a spreadsheet shows in place of a value, in any language: "#DIV/0!", "#NV", "Err:502".
 _ERROR = re.compile(r"#[¡¿]?[\w/ ]+[!?]|#N/[AD]|#NV|#{3,}|Err:\d{3}")
 _ROUNDED = re.compile(r"\d([.,]\d+)?[eE]\+\d\d")  # as a spreadsheet shows a long number
+# The least number that a column of numbers may hold; a parameter holds any.
+_LEAST = {
+    "performance": 0.0,
+    "n_robots": 1.0,
+    "faulty": 0.0,
+    "onset": 0.0,
+    "seed": 0.0,
+    "time": 0.0,
+    "time_to_finish": 0.0,
+    "work": 0.0,
+    "duration": 0.0,
+    "contacts": 0.0,
+}
+_WHOLE = ("n_robots", "faulty", "seed")
 _DIGITS = 15  # that a spreadsheet keeps of a number
 
 
-def check_cells(columns: Columns, *, is_summed: bool) -> None:
-    """Refuse what a spreadsheet put in place of a value, and labels that only some rows have.
+def check_cells(columns: Columns, complaints: Complaints, *, is_summed: bool) -> None:
+    """Check each column by itself: values, labels that only some rows have, and numbers.
 
     Args:
+        complaints: take the first cell of a column that cannot be.
         is_summed: whether rows of robots were summed.
-
-    Raises:
-        IndicatorError: there is such a cell, of which the first of its column is named.
     """
     meanings = columns.by_meaning
     blocks = {cells.name for cells in columns.blocks}
     used = {cells.name for cells in (*meanings.values(), *columns.parameters)} | blocks
     trial = meanings.get("trial")
+    checked = {cells.name: cells for cells in (*meanings.values(), *columns.parameters)}
     for name, cells in columns.table.columns.items():
-        if name in used:
-            _refuse_spoiled(cells)
-        if name in blocks or (trial and name == trial.name):
-            _refuse_rounded(cells)
-        if name in blocks:
-            _refuse_unknown_number(cells)
+        with complaints.noted():
+            if name in used:
+                _refuse_spoiled(cells)
+            if name in blocks or (trial and name == trial.name):
+                _refuse_rounded(cells)
+            if name in blocks:
+                _refuse_unknown_number(cells)
+            if name in checked and name not in complaints.columns:
+                _refuse_other_than_numbers(checked[name], columns)
+    if {"fault", "faulty"} <= meanings.keys():
+        with complaints.noted():
+            _refuse_uncounted(meanings["fault"], meanings["faulty"], complaints)
     labels = [meanings.get(label) for label in ("policy", "table", "n_robots")]
     if is_summed or "time" in meanings:  # several rows make a trial
         labels.append(trial)
@@ -42,11 +64,13 @@ def check_cells(columns: Columns, *, is_summed: bool) -> None:
         labels += columns.blocks
     every_row = range(len(columns.table.cells))
     for label in filter(None, labels):
-        _refuse_gaps(label, every_row)
+        with complaints.noted():
+            _refuse_gaps(label, every_row)
     if {"onset", "faulty"} <= meanings.keys():
         faulty = meanings["faulty"].texts
         with_fault = [row for row in every_row if faulty[row] not in ("", *ZERO)]
-        _refuse_gaps(meanings["onset"], with_fault)
+        with complaints.noted():
+            _refuse_gaps(meanings["onset"], with_fault)
 
 
 def _refuse_spoiled(cells: Cells) -> None:
@@ -62,6 +86,26 @@ def _refuse_spoiled(cells: Cells) -> None:
             raise cells.error(
                 row, "should be a value, where a spreadsheet shows the error of a formula"
             )
+
+
+def _refuse_other_than_numbers(cells: Cells, columns: Columns) -> None:
+    """Refuse what is no number in a column of numbers; an empty cell only where one is needed."""
+    meaning = cells.meaning
+    least = _LEAST.get(meaning, -math.inf)
+    is_named = meaning == "seed" and not (len(columns.blocks) == 1 and cells.are_like_numbers())
+    if (meaning and meaning not in _LEAST) or is_named:
+        return
+    is_needed = not meaning or (meaning == "work" and "time_to_finish" in columns.by_meaning)
+    if meaning == "performance":
+        is_needed = not {"time", "time_to_finish"} & columns.by_meaning.keys()
+    # Of equal cells the first one; a merged cell is equal to no other.
+    first_rows = {(type(text), text): row for row, text in reversed([*enumerate(cells.texts)])}
+    rows = [row for row in first_rows.values() if cells.texts[row] or is_needed]
+    for row in sorted(rows, key=lambda row: (not cells.texts[row], row)):
+        if meaning in _WHOLE:
+            cells.whole_number(row, least)
+        else:
+            cells.number(row, least)
 
 
 def _refuse_rounded(cells: Cells) -> None:
@@ -84,6 +128,14 @@ def _refuse_unknown_number(cells: Cells) -> None:
     numbers = {*texts} - {texts[row] for row in unknown} - {""}
     if unknown and numbers and all(map(str.isdecimal, numbers)):
         raise cells.error(unknown[0], "should be a number, as in other rows")
+
+
+def _refuse_uncounted(fault: Cells, faulty: Cells, complaints: Complaints) -> None:
+    """Refuse a fault without the number of robots that fail by it."""
+    rows = complaints.missing.get(faulty.name, ())
+    if rows and faulty.name not in complaints.columns:
+        name = fault.texts[rows[0]]
+        raise faulty.error(rows[0], f"should be how many robots fail by {name!r}, 1 or more")
 
 
 def _refuse_gaps(cells: Cells, rows: Sequence[int]) -> None:

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from shlex import quote
 
+from .complaints import Complaints
 from .table import Cells, Columns
 from .trial import NO_FAULT_WORD, REMOVED_WORD, REPEATED
+from .trial_columns import bare
+from .words import MEANING, NO_FAULT_WORDS, NOT_KNOWN, REMOVED_WORDS, is_translated, plain
 
-_NO_FAULT_WORDS = (NO_FAULT_WORD, "no fault", "no_fault", "baseline", "healthy", "0", "-")
-_FAULT_NAMES = {
-    **dict.fromkeys(_NO_FAULT_WORDS, NO_FAULT_WORD),
-    REMOVED_WORD: REMOVED_WORD,
-    REPEATED: REPEATED,
-    "none again": REPEATED,
-}
-NOT_KNOWN = ("", "na", "n/a", "nan", "null")  # what programs and people write for no value
 ZERO = ("0", "0.0")  # of robots that fail, by a row's word
 
 
@@ -28,7 +23,7 @@ class FaultNames:
         notes: sentences on what was taken for what.
     """
 
-    def __init__(self, columns: Columns) -> None:
+    def __init__(self, columns: Columns, complaints: Complaints) -> None:
         self.notes: list[str] = []
         self._names = {"": NO_FAULT_WORD}
         fault = columns.by_meaning.get("fault")
@@ -43,9 +38,10 @@ class FaultNames:
         harmful = {name.casefold() for name, n in zip(fault.texts, robots) if n not in ZERO}
         harmless = spelled.keys() - harmful if harmful else set[str]()
         for name in faults:
-            self._names[name] = _FAULT_NAMES.get(name.casefold(), spelled[name.casefold()])
+            self._names[name] = usual_fault(name) or spelled[name.casefold()]
             if name.casefold() in NOT_KNOWN:
-                _refuse_unnamed(fault, robots, name)
+                with complaints.noted():
+                    _refuse_unnamed(fault, robots, name)
                 self._names[name] = NO_FAULT_WORD
                 shown = repr(name) if name else "An empty cell"
                 self.notes.append(f"{shown} in {fault.name!r} is taken for no fault.")
@@ -69,6 +65,36 @@ class FaultNames:
     def any_fails(self) -> bool:
         """Whether robots fail in some trial."""
         return any(name not in (NO_FAULT_WORD, REPEATED) for name in self._names.values())
+
+
+def usual_fault(name: str) -> str | None:
+    """Return what a fault is called by a word that is known in any language; None: it is not."""
+    word = plain(name)
+    if word in NO_FAULT_WORDS or name == "-":
+        return NO_FAULT_WORD
+    if word in REMOVED_WORDS:
+        return REMOVED_WORD
+    return REPEATED if word in (REPEATED, "none again") else None
+
+
+def notes_on_words(columns: Columns, mapped: Mapping[str, str]) -> Iterator[str]:
+    """Yield which words of other languages were recognised.
+
+    Args:
+        mapped: what a column is to its name in the file, as somebody says.
+    """
+    words = {}
+    for meaning, cells in columns.by_meaning.items():
+        word = bare(cells.name)
+        if cells.name not in mapped.values() and word in MEANING and is_translated(word):
+            words[cells.name] = "robots" if meaning == "n_robots" else meaning
+    fault = columns.by_meaning.get("fault")
+    for name in dict.fromkeys(fault.texts if fault else ()):
+        if (usual := usual_fault(name)) and name != "-" and is_translated(plain(name)):
+            words[name] = usual
+    if words:
+        pairs = ", ".join(f"{word!r} for {usual}" for word, usual in words.items())
+        yield f"Words taken for ours: {pairs}."
 
 
 def _refuse_unnamed(fault: Cells, robots: Sequence[str], name: str) -> None:

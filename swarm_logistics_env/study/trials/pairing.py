@@ -68,6 +68,8 @@ def _mean_of(trials: Sequence[Trial]) -> Trial:
         return trials[0]
     contacts = [trial.contacts for trial in trials if trial.contacts is not None]
     durations = {trial.duration for trial in trials}
+    least = [trial.performance if trial.least is None else trial.least for trial in trials]
+    is_known = all(trial.least is None for trial in trials)
     # By exact sums, which are the same in any order.
     return replace(
         min(trials, key=lambda trial: trial.line),
@@ -76,6 +78,7 @@ def _mean_of(trials: Sequence[Trial]) -> Trial:
         duration=durations.pop() if len(durations) == 1 else None,
         contacts=fsum(contacts) / len(contacts) if contacts else None,
         n_trials=len(trials),
+        least=None if is_known else fsum(least) / len(trials),
     )
 
 

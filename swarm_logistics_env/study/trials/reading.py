@@ -7,20 +7,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm_logistics_env.spi.inputs import IndicatorError
-
 from .cell_checks import check_cells
-from .fault_names import FaultNames
+from .column_checks import check_columns
+from .complaints import Complaints
+from .fault_names import FaultNames, notes_on_words
 from .finished import finished_words
+from .missing import missing_rows, without_rows
 from .pairing import paired_by_blocks
 from .readers import read_table
 from .references import notes_on_references, references_of
-from .table import Cells, Columns
+from .table import Cells, Columns, Table
 from .trial import Column, Trial, Trials
-from .trial_columns import MORE_IS_BETTER, columns_of
+from .trial_columns import columns_of
 from .trial_rows import numbered_blocks, trials_of
-from .units import word_of_time
-from .values import summed_over, with_values
+from .values import summed_over, with_constants, with_values
+from .wide import long_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,13 +37,15 @@ def read_trials(
     duration: float | None = None,
     decimal: str | None = None,
     thousands: str | None = None,
+    skip_missing: bool = False,
+    wide: str | None = None,
     reference: Mapping[str, float] | None = None,
 ) -> Trials:
     """Read one run a row, or one delivery a row (an event log).
 
     Files are CSV of any delimiter, or of a kind that `trials.readers` know. The columns are
     `robots`, `fault`, `faulty`, `onset`, `policy`, `seed`, `trial`, `contacts` and `performance`,
-    or words of `trial_columns.COLUMN_NAMES` for them, as far as they apply; any other column of
+    or words of `words.COLUMN_NAMES` for them, as far as they apply; any other column of
     numbers that vary is a parameter of that name. Instead of `performance` may stand
     `time_to_finish` (P is `work` divided by it), or `time`, in an event log: a run without any
     delivery is a row with an empty time. A column `table` tells tables apart of which each has
@@ -50,7 +53,8 @@ def read_trials(
 
     Args:
         source: path of a file or a folder of files, or a data frame of pandas.
-        columns: what a column is to its name in the file, e.g. {"performance": "boxes"}.
+        columns: what a column is to its name in the file, e.g. {"performance": "boxes"}; or to a
+            number where the file has no such column, e.g. {"robots": "8"}.
         ignore: columns to leave out.
         values: cells to replace, each "COLUMN:CELL=NEW", e.g. "fault:kein=none".
         sum_over: the column that tells the robots of a trial apart, whose deliveries are summed.
@@ -58,31 +62,35 @@ def read_trials(
         decimal: the sign before decimals, "." or ","; None: ".", unless cells show a comma.
         thousands: the sign between thousands, "." or ","; None: none, and a file is refused in
             which either may stand there.
+        skip_missing: whether rows that lack a value are left out; else they are refused.
+        wide: what the columns of a wide table differ in, where their names leave it open: "robots",
+            "fault", "policy", "trial" (repetitions), or the name of a parameter.
         reference: parameters and the value that A is relative to, e.g. {"width": 2.0}; of one that
             is not named: its value in the condition without a fault that has most trials.
 
     Raises:
-        IndicatorError: the file cannot be read, or a line of it cannot be; names line, column and
-            value.
+        IndicatorError: the file cannot be read, or a line of it; names line, column and value.
     """
     mapped = dict(columns or {})
-    table = read_table(source, mapped, ignore)
-    table = with_values(table, mapped, values)
-    if sum_over is not None:
-        table = summed_over(table, sum_over, mapped)
-    table_columns = columns_of(table, mapped, ignore, decimal, thousands)
-    check_cells(table_columns, is_summed=sum_over is not None)
-    faults = FaultNames(table_columns)
-    _check_columns(table_columns, faults, mapped)
-    finished = finished_words(table_columns)
+    table = _table_of(source, mapped, ignore, values, sum_over, wide)
+    table_columns, complaints = _columns_of(
+        table, mapped, ignore, decimal, thousands, skip_missing=skip_missing
+    )
+    table = table_columns.table
+    finished = finished_words(table_columns, complaints)
+    check_cells(table_columns, complaints, is_summed=sum_over is not None)
+    faults = FaultNames(table_columns, complaints)
+    check_columns(table_columns, faults, mapped, duration, complaints)
+    complaints.raise_all()
     blocks = numbered_blocks(table_columns)
-    trials, conditions = trials_of(table_columns, faults, finished, blocks, duration)
+    trials, conditions = trials_of(table_columns, faults, finished, blocks, duration, complaints)
     means, notes_on_pairs = paired_by_blocks(table_columns, trials)
     names = [cells.name for cells in table_columns.parameters]
     references = tuple(references_of(table.source, means, names, reference or {}))
     notes = [
         *table.notes,
         *table_columns.notes,
+        *notes_on_words(table_columns, mapped),
         *faults.notes,
         *_notes_on_conditions(trials, table_columns),
         *_notes_on_left_out(table_columns.ignored, conditions),
@@ -101,10 +109,51 @@ def read_trials(
     )
 
 
+def _table_of(
+    source: str | Path | pd.DataFrame,
+    mapped: dict[str, str],
+    ignore: Sequence[str],
+    values: Sequence[str],
+    sum_over: str | None,
+    wide: str | None,
+) -> Table:
+    """Return a table with a row for each trial or delivery, and cells as somebody says."""
+    table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide)
+    table = with_values(with_constants(table, mapped), mapped, values)
+    return table if sum_over is None else summed_over(table, sum_over, mapped)
+
+
+def _columns_of(
+    table: Table,
+    mapped: Mapping[str, str],
+    ignore: Sequence[str],
+    decimal: str | None,
+    thousands: str | None,
+    *,
+    skip_missing: bool,
+) -> tuple[Columns, Complaints]:
+    """Return the columns of a table, if said so of the rows with all values, and complaints."""
+    complaints = Complaints()
+    columns = columns_of(table, mapped, ignore, decimal, thousands, complaints)
+    complaints.missing = missing_rows(columns)
+    if not (skip_missing and complaints.missing):
+        return columns, complaints
+    table = without_rows(table, complaints)
+    complaints = Complaints()
+    return columns_of(table, mapped, ignore, decimal, thousands, complaints), complaints
+
+
 def _notes_on_conditions(trials: Sequence[Trial], columns: Columns) -> Iterator[str]:
     """Yield what P is where it is a rate, and what tells the conditions apart, or does not."""
     if "time_to_finish" in columns.by_meaning:
         yield f"P is {columns.performance_name.replace('/', 'divided by', 1)}: more is better."
+    stopped = sum(trial.least is not None for trial in trials)
+    if stopped:
+        yield (
+            f"{stopped} of {len(trials)} trials were stopped before they finished, and nobody "
+            "counted what was done: P of such a trial is shown as the most that it may be, as if "
+            "it had finished then; verdicts and intervals hold for any P from 0 to that."
+        )
     for cells in columns.covariates:
         yield f"{cells.name!r} differs from trial to trial: it tells no conditions apart."
     counts = Counter(trial.condition for trial in trials)
@@ -146,37 +195,3 @@ def _uses_of(columns: Columns) -> tuple[Column, ...]:
 
 
 _FEW_VALUES = 6  # that show what a column holds
-
-
-def _check_columns(columns: Columns, faults: FaultNames, mapped: Mapping[str, str]) -> None:
-    """Refuse a file without the columns that no other can stand for, all of them at once.
-
-    Args:
-        mapped: what a column is to its name in the file, as somebody says.
-    """
-    names = columns.by_meaning
-    lacking = {}
-    if not {"performance", "time", "time_to_finish"} & names.keys():
-        lacking["performance"] = "column 'performance', or time, for one delivery a row"
-    if faults.any_fails and "faulty" not in names:
-        lacking["faulty"] = "column 'faulty', for how many robots fail"
-    if lacking:
-        options = " ".join(f"--column {name}=NAME" for name in lacking)
-        raise IndicatorError(
-            f"{columns.table.source} has no {' and no '.join(lacking.values())}: it has "
-            f"{', '.join(map(repr, columns.table.header))}; say which it is by {options}, or add it"
-        )
-    if MORE_IS_BETTER not in mapped:
-        _refuse_time_as_performance(columns)
-
-
-def _refuse_time_as_performance(columns: Columns) -> None:
-    """Ask of a performance that is a time by its name whether more of it is better."""
-    cells = columns.by_meaning.get("performance")
-    if cells and (word := word_of_time(cells.name)):
-        raise IndicatorError(
-            f"{cells.table.source}: {cells.name!r} is a time by its name ({word}): where less is "
-            "better, as of the time until all is done, say --column "
-            f"time_to_finish={cells.name!r}, and --column work=NAME if what was done in it varies; "
-            f"where more is better, --column {MORE_IS_BETTER}={cells.name!r}"
-        )

@@ -7,9 +7,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from shlex import quote
 from typing import NamedTuple
 
 from swarm_logistics_env.spi.inputs import IndicatorError
+
+from .words import means_no_number
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _LIKE_A_NUMBER = re.compile(r"[+-]?\d*[.,]?\d*([eE][+-]?\d+)?")  # also a decimal comma, or nothing
@@ -18,11 +21,26 @@ _GROUPED = re.compile(r"[+-]?\d{1,3}(([.,'’\s])\d{3})(\2\d{3})*([.,]\d+)?")
 # Signs that stand between thousands and nowhere else in a number.
 _SURELY_GROUPED = re.compile(r"[+-]?\d{1,3}(['’\s])\d{3}(\1\d{3})*([.,]\d+)?")
 _MEASURED = ("performance", "time", "time_to_finish", "contacts")  # in each trial anew
+WORKBOOK = "a workbook"  # as the kind of a table
 LARGEST_EXACT = 2**53  # from here on programs that hold numbers as floats round whole ones
 
 
 class NoTrialsError(IndicatorError):
     """A file that can be read and holds no trials, as an empty one."""
+
+
+class CellError(IndicatorError):
+    """A cell that cannot be.
+
+    Attributes:
+        column: the name of its column.
+        row: its number in the table.
+    """
+
+    def __init__(self, message: str, column: str, row: int) -> None:
+        super().__init__(message)
+        self.column = column
+        self.row = row
 
 
 class MergedCell(str):
@@ -106,18 +124,15 @@ class Cells:
     meaning: str = ""
     seconds: float = 1.0
 
-    def error(self, row: int, should: str) -> IndicatorError:
+    def error(self, row: int, should: str) -> CellError:
         """Return the error that the cell of a row cannot be."""
         shown = repr(self.texts[row]) if self.texts[row] else "nothing"
-        return IndicatorError(
-            f"{self.table.location(row)}, column {self.name!r}: {shown}: {should}"
-        )
+        message = f"{self.table.location(row)}, column {self.name!r}: {shown}: {should}"
+        return CellError(message, self.name, row)
 
     def are_like_numbers(self) -> bool:
         """Return whether each cell is meant as a number, or empty."""
-        return all(
-            _LIKE_A_NUMBER.fullmatch(text) or _GROUPED.fullmatch(text) for text in self.texts
-        )
+        return all(map(like_a_number, self.texts))
 
     def number(self, row: int, least: float = -math.inf, *, must_be_whole: bool = False) -> float:
         """Return the cell of a row as a finite number of at least `least`; a time in seconds."""
@@ -162,14 +177,15 @@ class Cells:
             return f" without a sign between thousands{point}, or --thousands ."
         if not self.meaning:
             return (
-                f", as every column that varies is a parameter; else --ignore {self.name!r}, or "
-                f"say what it is, as by --column table={self.name!r} where each of its values has "
-                "runs of its own"
+                f", as every column that varies is a parameter; else --ignore {quote(self.name)}, "
+                f"or say what it is, as by --column {quote(f'table={self.name}')} where each of "
+                "its values has runs of its own"
             )
         if self.meaning == "performance":
+            option = quote(f"performance:{text}=0")
             return (
-                f"; where the robots did nothing, --value performance:{text}=0 says so; a trial "
-                "that was not recorded has no row"
+                f"; where the robots did nothing, --value {option} says so; a trial that was not "
+                "recorded has no row"
             )
         return ""
 
@@ -201,6 +217,17 @@ class Columns(NamedTuple):
     has_seeds: bool
     performance_name: str
     notes: Sequence[str]
+
+
+def like_a_number(text: str) -> bool:
+    """Return whether a text is meant as a number, or empty."""
+    return bool(_LIKE_A_NUMBER.fullmatch(text) or _GROUPED.fullmatch(text))
+
+
+def holds_numbers(texts: Sequence[str]) -> bool:
+    """Return whether most cells with a value are meant as numbers."""
+    known = [text for text in texts if not means_no_number(text)]
+    return 2 * sum(map(like_a_number, known)) > len(known)
 
 
 @lru_cache(100_000)  # most cells are some of a few numbers

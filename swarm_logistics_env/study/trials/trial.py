@@ -34,6 +34,8 @@ class Trial:
         duration: of the trial [s]; None: not given.
         contacts: per robot-minute [1/min]; None: not recorded.
         n_trials: of the file, of which it is the mean: several of one block and condition.
+        least: P at least, of a trial that was stopped and in which nobody counted what was done:
+            `performance` is the most that P may be; None: P is known.
     """
 
     line: int
@@ -50,6 +52,7 @@ class Trial:
     duration: float | None = None
     contacts: float | None = None
     n_trials: int = 1
+    least: float | None = None
 
     @property
     def condition(self) -> tuple[object, ...]:

@@ -6,35 +6,15 @@ import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from shlex import quote
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
+from .complaints import Complaints
 from .table import Cells, Columns, Table
 from .units import SECONDS, NamedUnit, in_seconds, is_per_minute, unit_of_time, without_unit
+from .words import CELLS, COLUMN_NAMES, ENGLISH_NAMES, MEANING, means_no_number, plain
 
-MORE_IS_BETTER = "more_is_better"  # for --column, of a performance that is a time by its name
-# What a column is, and the words that name it in files; small letters, "_" for all that is none.
-COLUMN_NAMES: dict[str, tuple[str, ...]] = {
-    "performance": (
-        *("p", "delivered", "items", "score", "throughput", "avg_throughput"),
-        MORE_IS_BETTER,
-    ),
-    "n_robots": ("robots", "n", "swarm_size", "num_agents", "n_agents", "agents"),
-    "fault": ("failure", "mode", "fault_mode", "failure_mode"),
-    "faulty": ("m", "failed", "n_faulty"),
-    "onset": ("fault_time",),
-    "policy": ("controller", "algorithm", "planner", "method"),
-    "seed": ("pair", "block", "map", "map_name", "layout", "instance", "day", "date", "operator"),
-    "trial": ("run", "id"),
-    "time": (),
-    "time_to_finish": ("finish_time", "completion_time", "makespan"),
-    "finished": ("success", "succeeded", "solved"),
-    "work": (),
-    "duration": ("length",),
-    "table": (),
-    "contacts": ("contacts_per_robot_minute",),
-}
-MEANING = {word: column for column, words in COLUMN_NAMES.items() for word in (column, *words)}
 TEXTS = ("fault", "policy", "trial", "table", "finished")  # columns that hold no numbers
 TIMES = ("onset", "time", "time_to_finish", "duration")
 SEEDS = ("seed", "pair")  # blocks of one run each in every condition
@@ -43,6 +23,8 @@ SEEDS = ("seed", "pair")  # blocks of one run each in every condition
 FEWEST_OF_COVARIATE = 6
 MOST_LEVELS = 50
 _ROBOT = re.compile(r"(robot|agent|drone|bot)(_?(id|no|nr|num|number|name|index|label))?|id_robot")
+# With a sign between thousands and the other one before decimals.
+_BOTH_SIGNS = re.compile(r"[+-]?\d{1,3}((\.\d{3})+,\d+|(,\d{3})+\.\d+)")
 # How a decimal comma looks that can stand between no thousands.
 _DECIMAL_COMMA = re.compile(r"[+-]?(\d+,(\d{1,2}|\d{4,})|0,\d+|\d{4,},\d+)")
 ONE_TRIAL_A_ROW = (
@@ -56,6 +38,7 @@ def columns_of(
     ignore: Sequence[str],
     decimal: str | None,
     thousands: str | None,
+    complaints: Complaints,
 ) -> Columns:
     """Return what the columns of a table are, with their cells.
 
@@ -64,20 +47,23 @@ def columns_of(
         ignore: names of columns to leave out.
         decimal: the sign before decimals, "." or ","; None: ".", unless a column says otherwise.
         thousands: the sign between thousands; None: none, but where it can be nothing else.
+        complaints: take what is wrong: a column that is named twice, may be a misspelled one, or
+            has no unit that its times can have; rows of robots, not of trials.
 
     Raises:
-        IndicatorError: a column is not there, is named twice, may be a misspelled one, or has no
-            unit that its times can have; there are no rows, or they are of robots, not of trials.
+        IndicatorError: a column that somebody names is not there, or there are no rows.
     """
     for option, sign in (("--decimal", decimal), ("--thousands", thousands)):
         if sign not in (None, ".", ","):
             raise IndicatorError(f"{option} {sign}: should be . or ,")
     if decimal is not None and decimal == thousands:
         raise IndicatorError(f"--thousands {thousands}: should be another sign than --decimal")
-    names, parameters, blocks = _names(table, columns, ignore)
+    names, parameters, blocks = _names(table, columns, ignore, complaints)
     numbers = [*(name for column, name in names.items() if column not in TEXTS), *parameters]
-    table, notes = _with_signs(table, numbers, decimal, thousands)
-    units = _units_of_times(table, names)
+    table, notes = _with_signs(table, numbers, decimal, thousands, complaints)
+    units = dict[str, NamedUnit]()
+    with complaints.noted():
+        units = _units_of_times(table, names)
     seconds = {column: SECONDS[unit.unit] for column, unit in units.items() if unit.unit in SECONDS}
     notes += [
         f"{names[column]!r} is converted to seconds."
@@ -112,19 +98,20 @@ def columns_of(
         raise IndicatorError(
             f"{table.source} holds no trial: should have a row for each below the names"
         )
-    _refuse_rows_of_robots(table_columns)
+    with complaints.noted():
+        _refuse_rows_of_robots(table_columns)
     return table_columns
 
 
 def _names(
-    table: Table, columns: Mapping[str, str], ignore: Sequence[str]
+    table: Table, columns: Mapping[str, str], ignore: Sequence[str], complaints: Complaints
 ) -> tuple[dict[str, str], list[str], list[str]]:
     """Return the name of each known column, columns left as parameters, and those of the block."""
     path = table.source
     header = _with_content(table, columns)
     for column in columns:
         if column not in MEANING:
-            raise IndicatorError(f"--column {column}: {_one_of(column, MEANING)}")
+            raise IndicatorError(f"--column {column}: {_one_of(column, ENGLISH_NAMES)}")
     for name in (*columns.values(), *ignore):
         if name not in table.index:
             raise IndicatorError(f"{path} has no column {name!r}: {_one_of(name, table.header)}")
@@ -137,41 +124,65 @@ def _names(
     parameters = list[str]()
     of_robots = list[str]()
     blocks = [names["seed"]] if "seed" in names else []
-    for name in header:
+    for name in dict.fromkeys(header):
         if not name or name in settled:
             continue
         if header.count(name) > 1:
-            raise IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
-        word = bare(name)
-        if is_robot(name):
+            complaints.add(
+                IndicatorError(f"{path} has two columns {name!r}: should have one of that name")
+            )
+            continue
+        if is_robot(name) or _may_be_robots(table.columns[name]):
             of_robots.append(name)
             continue
         meaning = meaning_of(name)
         if meaning is None or (meaning in chosen and name not in COLUMN_NAMES):
-            close = difflib.get_close_matches(word, MEANING, n=1, cutoff=0.75)
-            if close and meaning is None and len(word) > 3 and not table.kind:
-                raise IndicatorError(
-                    f"{path} has a column {name!r}; did you mean {close[0]!r}? Else rename it, or "
-                    f"leave it out by --ignore {name!r}"
-                )
+            close = difflib.get_close_matches(bare(name), ENGLISH_NAMES, n=1, cutoff=0.75)
+            if close and meaning is None and len(bare(name)) > 3 and not table.kind:
+                complaints.suspected[name] = MEANING[close[0]]
+                complaints.add(_misspelled(path, name, close[0]))
+                continue
             parameters.append(name)
         elif meaning == "seed":
             blocks.append(name)
             names[meaning] = " and ".join(blocks)
         elif meaning in names:
-            raise IndicatorError(
-                f"{path} has columns {names[meaning]!r} and {name!r}, both {meaning}: say "
-                f"which it is by --column {meaning}=NAME, and leave the other out by --ignore NAME"
-            )
+            complaints.add(_both(path, meaning, names[meaning], name))
         else:
             names[meaning] = name
     if of_robots and "time" not in names:
-        raise IndicatorError(
-            f"{path} has a column {of_robots[0]!r}, so its rows may be robots instead of trials: "
-            f"{ONE_TRIAL_A_ROW} by --sum-over {of_robots[0]!r}, or leave the column out; where it "
-            f"is the swarm's size, say --column robots={of_robots[0]!r}"
+        name = quote(of_robots[0])
+        complaints.add(
+            IndicatorError(
+                f"{path} has a column {of_robots[0]!r}, so its rows may be robots instead of "
+                f"trials: {ONE_TRIAL_A_ROW} by --sum-over {name}, or leave the column out; where "
+                f"it is the swarm's size, say --column robots={name}"
+            )
         )
     return names, parameters, blocks
+
+
+def _misspelled(path: str, name: str, word: str) -> IndicatorError:
+    return IndicatorError(
+        f"{path} has a column {name!r}; did you mean {word!r}? Then say --column "
+        f"{quote(f'{word}={name}')}; else rename it, or leave it out by --ignore {quote(name)}"
+    )
+
+
+def _both(path: str, meaning: str, first: str, second: str) -> IndicatorError:
+    word = "robots" if meaning == "n_robots" else meaning
+    return IndicatorError(
+        f"{path} has columns {first!r} and {second!r}, both {word}: leave one of them out by "
+        f"--ignore {quote(second)} or --ignore {quote(first)}"
+    )
+
+
+def _may_be_robots(cells: Cells) -> bool:
+    """Return whether the German "Roboter" may tell robots apart: it is their number or a robot."""
+    if bare(cells.name) != "roboter":
+        return False
+    numbers = sorted({int(text) for text in cells.texts if text.isdecimal() and len(text) < 9})
+    return len(numbers) > 2 and numbers == [*range(numbers[0], numbers[0] + len(numbers))]
 
 
 def _with_content(table: Table, columns: Mapping[str, str]) -> list[str]:
@@ -221,28 +232,48 @@ def _units_of_times(table: Table, names: Mapping[str, str]) -> dict[str, NamedUn
 
 
 def _with_signs(
-    table: Table, numbers: Sequence[str], decimal: str | None, thousands: str | None
+    table: Table,
+    numbers: Sequence[str],
+    decimal: str | None,
+    thousands: str | None,
+    complaints: Complaints,
 ) -> tuple[Table, list[str]]:
     """Return a table with the signs in its numbers, and notes on what was guessed.
 
     Args:
         numbers: the names of columns that hold numbers.
+        complaints: take a column in which a sign may stand before decimals or between thousands.
     """
     notes = []
     columns = [table.columns[name] for name in numbers if name in table.columns]
     decimal = decimal or table.decimal or ("," if thousands == "." else None)
+    if decimal is None and thousands is None and (text := _both_signs(columns)):
+        signs = re.sub(r"[\d+-]", "", text)
+        thousands = signs[0]
+        decimal = signs[-1]
+        notes.append(
+            f"Numbers are taken to have {thousands} between thousands and {decimal} before "
+            f"decimals, as in {text}."
+        )
     if decimal is None and (text := _decimal_comma(columns)):
         decimal = ","
         notes.append(f"Decimals are taken to have a comma, as in {text}.")
     if decimal is None and thousands is None:
         for cells in columns:
-            _refuse_thousands(cells)
+            with complaints.noted():
+                _refuse_thousands(cells)
     return replace(table, decimal=decimal or ".", thousands=thousands), notes
+
+
+def _both_signs(columns: Sequence[Cells]) -> str | None:
+    """Return a cell with a sign between thousands and one before decimals; None: none has both."""
+    texts = {text for cells in columns for text in cells.texts}
+    return min((text for text in texts if _BOTH_SIGNS.fullmatch(text)), default=None)
 
 
 def _decimal_comma(columns: Sequence[Cells]) -> str | None:
     """Return a cell whose comma stands before decimals, if no cell has a point; None: none."""
-    texts = {text for cells in columns for text in cells.texts}
+    texts = {text for cells in columns for text in cells.texts if not means_no_number(text)}
     if any("." in text for text in texts):
         return None
     return min((text for text in texts if _DECIMAL_COMMA.fullmatch(text)), default=None)
@@ -299,7 +330,7 @@ def _name_of_performance(names: Mapping[str, str], unit: NamedUnit | None) -> st
     if "time" in names:
         return "deliveries"
     name = names.get("performance", "P")
-    return "P" if bare(name) in ("p", "performance") else name
+    return "P" if bare(name) in ("p", "performance", CELLS) else name
 
 
 def _refuse_rows_of_robots(columns: Columns) -> None:
@@ -340,9 +371,9 @@ def meaning_of(name: str) -> str | None:
 
 
 def bare(name: str) -> str:
-    """Return a column's name in small letters, without unit: "Time [s]" is "time"."""
+    """Return a column's name in small letters, without accents and unit: "Time [s]" is "time"."""
     without_unit = re.sub(r"\s*[\[(].*?[\])]\s*", " ", name)
-    return re.sub(r"\W+", "_", without_unit.strip().lower()).strip("_")
+    return re.sub(r"\W+", "_", plain(without_unit)).strip("_")
 
 
 def _one_of(name: str, choices: Iterable[str]) -> str:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
+from .complaints import Complaints
 from .fault_names import FaultNames
-from .table import Columns, Table
+from .table import CellError, Columns, Table
 from .trial import NO_FAULT_WORD, REPEATED, Trial
 
 
@@ -72,6 +73,7 @@ def trials_of(
     finished: Mapping[str, bool],
     blocks: Mapping[str, int],
     duration: float | None,
+    complaints: Complaints,
 ) -> tuple[list[Trial], list[object]]:
     """Return the trials of a table, and the condition of each of its rows.
 
@@ -80,6 +82,7 @@ def trials_of(
         finished: what each cell of the column `finished` says; none where nothing does.
         blocks: a number for each block; none where they are numbers.
         duration: of every trial [s], where no column says it.
+        complaints: take the first row that is no trial for each column.
 
     Raises:
         IndicatorError: a row is no trial, two of a condition have one label, or some trials lasted
@@ -87,7 +90,14 @@ def trials_of(
     """
     unnamed = Path(columns.table.source).stem or columns.table.source  # a policy without a name
     rows = [Row(columns, position) for position in range(len(columns.table.cells))]
-    pairs = [(trial_of(row, unnamed, faults, finished, blocks, duration), row) for row in rows]
+    pairs = []
+    for row in rows:
+        try:
+            pairs.append((trial_of(row, unnamed, faults, finished, blocks, duration), row))
+        except CellError as error:
+            if error.column not in complaints.columns:
+                complaints.add(error)
+    complaints.raise_all()
     if "time" in columns.by_meaning:
         trials = events_of(pairs)
     else:
@@ -107,7 +117,7 @@ def trial_of(
     duration: float | None,
 ) -> Trial:
     """Return the trial of a row, of an event log without its times; arguments as of `trials_of`."""
-    performance = performance_of(row, finished)
+    performance, least = performance_of(row, finished, duration)
     n_robots = row.whole_or_none("n_robots", 1)
     fault = faults[row.text("fault")]
     faulty = row.whole_or_none("faulty", 0) or 0
@@ -139,6 +149,7 @@ def trial_of(
         performance,
         duration=duration,
         contacts=row.number_or_none("contacts"),
+        least=least,
     )
 
 
@@ -151,44 +162,65 @@ def check_labels(rows: Sequence[tuple[Trial, Row]]) -> None:
             raise row.error("trial", f"is in line {first.line} too: should name one run a row")
 
 
-def performance_of(row: Row, finished: Mapping[str, bool]) -> float:
-    """Return P of a row: what the column says, or work by time; 0 where the row is a delivery."""
+def performance_of(
+    row: Row, finished: Mapping[str, bool], limit: float | None
+) -> tuple[float, float | None]:
+    """Return P of a row, and the least that it may be if it is not known; see `Trial`.
+
+    It is what the column says, or work by time; 0 where the row is a delivery.
+    """
     if "time" in row.columns.by_meaning:
-        return 0.0
+        return 0.0, None
     if "time_to_finish" in row.columns.by_meaning:
-        return _rate(row, finished.get(row.text("finished")))
-    return row.number("performance", 0.0)
+        return _rate(row, finished.get(row.text("finished")), limit)
+    return row.number("performance", 0.0), None
 
 
-def _rate(row: Row, finished: bool | None) -> float:
-    """Return what was done in a trial by the time that it took [1/s, or 1/step]."""
-    if finished is None:
-        finished = bool(row.text("time_to_finish"))
+def _rate(row: Row, finished: bool | None, limit: float | None) -> tuple[float, float | None]:
+    """Return what was done in a trial by the time that it took [1/s, or 1/step], as above.
+
+    Args:
+        limit: at which trials end at the latest, where no column says it; None: nobody does.
+    """
+    is_timed = bool(row.text("time_to_finish"))
+    is_counted = "performance" in row.columns.by_meaning
+    if row.text("duration"):
+        limit = row.number("duration")
+    elif is_timed and limit is not None and finished is None and not is_counted:
+        finished = row.number("time_to_finish") < limit
+    finished = is_timed if finished is None else finished
+    if is_timed and limit is not None and row.number("time_to_finish") > limit:
+        raise row.error("time_to_finish", f"should not be after its duration {limit:g}")
+    work = row.number("work", 0.0) if "work" in row.columns.by_meaning else 1.0
     if finished:
         time = _time(row, "time_to_finish")
-        if row.text("duration") and time > row.number("duration"):
-            raise row.error(
-                "time_to_finish",
-                f"should not be after its duration {row.number('duration'):g}",
-            )
-        if "work" not in row.columns.by_meaning:
-            return 1.0 / time
-        work = row.number("work", 0.0)
-        if row.text("performance") and row.number("performance") < work:
-            raise row.error(
-                "performance",
-                f"should be its work of {work:g}, as the trial counts as finished; a column "
-                "'finished' says which did not",
-            )
-        return work / time
-    lasted = "duration" if row.text("duration") else "time_to_finish"
-    if not (row.text("performance") and row.text(lasted)):
+        if "work" in row.columns.by_meaning and row.text("performance"):
+            _check_all_is_done(row, work)
+        return work / time, None
+    if row.text("duration"):
+        lasted = _time(row, "duration")
+    elif is_timed:
+        lasted = _time(row, "time_to_finish")
+    else:
+        lasted = limit or 0.0
+    if not lasted or (is_counted and not row.text("performance")):
         raise row.error(
             "time_to_finish",
-            "of a trial that did not finish, columns should say how long it lasted (duration) and "
-            "what was done by then (performance)",
+            "of a trial that did not finish, columns should say how long it lasted (duration), or "
+            "--duration SECONDS, and what was done by then (performance), if anybody counted it",
         )
-    return row.number("performance", 0.0) / _time(row, lasted)
+    if is_counted:
+        return row.number("performance", 0.0) / lasted, None
+    return work / lasted, 0.0
+
+
+def _check_all_is_done(row: Row, work: float) -> None:
+    if row.number("performance") < work:
+        raise row.error(
+            "performance",
+            f"should be its work of {work:g}, as the trial counts as finished; a column "
+            "'finished' says which did not",
+        )
 
 
 def _time(row: Row, column: str) -> float:

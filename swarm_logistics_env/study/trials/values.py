@@ -8,10 +8,40 @@ from dataclasses import replace
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
-from .table import Table
-from .trial_columns import MEANING, meaning_of
+from .fault_names import usual_fault
+from .table import Table, like_a_number
+from .trial import NO_FAULT_WORD
+from .trial_columns import meaning_of
+from .words import CONSTANTS, MEANING, NOT_KNOWN
 
 _REPLACEMENT = re.compile(r"([^:]+):(.*)=([^=]*)", re.DOTALL)
+
+
+def with_constants(table: Table, columns: dict[str, str]) -> Table:
+    """Return a table with a column for each number that is the same in all trials.
+
+    Args:
+        columns: what a column is to its name in the table, or to such a number, which becomes a
+            name here. How many robots fail it is in trials with a fault.
+    """
+    for column, value in columns.items():
+        meaning = MEANING.get(column)
+        if value in table.index or meaning not in CONSTANTS or not like_a_number(value):
+            continue
+        texts = [value] * len(table.cells)
+        faults = [name for name in table.header if meaning_of(name) == "fault"]
+        fault = columns.get("fault", next(iter(faults), ""))
+        if meaning == "faulty" and fault in table.index:
+            names = [row[table.index[fault]] for row in table.cells]
+            harmless = [*map(usual_fault, names)]
+            texts = [
+                "" if word == NO_FAULT_WORD or name in NOT_KNOWN else value
+                for name, word in zip(names, harmless)
+            ]
+        cells = [[*row, text] for row, text in zip(table.cells, texts)]
+        table = replace(table, header=[*table.header, column], cells=cells)
+        columns[column] = column
+    return table
 
 
 def with_values(table: Table, columns: Mapping[str, str], values: Sequence[str]) -> Table:

@@ -83,6 +83,17 @@ class Cell:
         return p.reshape(several, -1) if several > 1 and not self.problem else p
 
     @property
+    def has_stopped(self) -> bool:
+        """Whether a trial was stopped, and nobody counted, so that P may be less."""
+        return any(outcome.least is not None for outcome in self.outcomes)
+
+    @cached_property
+    def least_by_seed(self) -> NDArray[np.float64]:
+        """The least that P may be, seed by seed, shape (n_seeds,), of trials that nobody plays."""
+        least = [o.delivered if o.least is None else o.least for o in self.outcomes]
+        return np.array(least, np.float64)
+
+    @property
     def n_seeds(self) -> int:
         """Number of runs that succeeded; of several trainings all together."""
         return len(self.outcomes)
@@ -95,11 +106,12 @@ class Cell:
     @cached_property
     def mean(self) -> Interval:
         """Mean P with its interval at `CONFIDENCE`; NaN: no run."""
-        return (
-            self._possible(spi.mean_interval(self.by_seed, CONFIDENCE))
-            if self.n_seeds
-            else _UNKNOWN
-        )
+        if not self.n_seeds:
+            return _UNKNOWN
+        mean = self._possible(spi.mean_interval(self.by_seed, CONFIDENCE))
+        if not self.has_stopped:
+            return mean
+        return mean._replace(low=spi.mean_interval(self.least_by_seed, CONFIDENCE).low)
 
     @cached_property
     def one_run(self) -> Interval:

@@ -22,6 +22,7 @@ from swarm_logistics_env.study.questions.comparison import (
 )
 
 from .cell import Cell, same_runs
+from .stopped_trials import equivalence_over_ends, estimate_over_ends, samples_at_ends
 
 POWER = 0.8
 UNAFFECTED: Literal["unaffected"] = "unaffected"
@@ -255,25 +256,39 @@ def judge_comparison(
         original, changed = (cells[arm] for arm in (comparison.original, comparison.changed))
         # The removed robots make the third condition another one by construction.
         identical = comparison.removed is None and same_runs(original.outcomes, changed.outcomes)
-        samples = {arm: cells[arm].by_seed for arm in comparison.arms}
+        samples = list(samples_at_ends(cells, comparison.arms))
+        arms = {"p_o": comparison.original, "p_new": comparison.changed}
+        if comparison.removed is not None:
+            arms["p_s"] = comparison.removed
         try:
-            estimate = comparison.estimate(
-                samples, capped=saturated, paired=paired, identical=identical, confidence=confidence
+            estimate = estimate_over_ends(
+                [
+                    comparison.estimate(
+                        performance,
+                        capped=saturated,
+                        paired=paired,
+                        identical=identical,
+                        confidence=confidence,
+                    )
+                    for performance in samples
+                ]
             )
             if has_equivalence:
-                arms = {"p_o": comparison.original, "p_new": comparison.changed}
-                if comparison.removed is not None:
-                    arms["p_s"] = comparison.removed
-                unchanged = equivalence(
-                    **{name: samples[arm] for name, arm in arms.items()},
-                    margin=margin,
-                    alpha=alpha,
-                    paired=paired,
-                    saturated=[name for name, arm in arms.items() if arm in saturated],
-                    identical=identical,
+                unchanged = equivalence_over_ends(
+                    [
+                        equivalence(
+                            **{name: performance[arm] for name, arm in arms.items()},
+                            margin=margin,
+                            alpha=alpha,
+                            paired=paired,
+                            saturated=[name for name, arm in arms.items() if arm in saturated],
+                            identical=identical,
+                        )
+                        for performance in samples
+                    ]
                 )
         except spi.IndicatorError as error:
-            delivers_nothing = not samples[comparison.original].any()
+            delivers_nothing = not cells[comparison.original].by_seed.any()
             estimate = None
             problems = ["it delivers nothing" if delivers_nothing else str(error)]
     on_equivalence = Decision(unchanged.verdict if unchanged else UNDEFINED)

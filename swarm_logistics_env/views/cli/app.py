@@ -7,7 +7,7 @@ import os
 import shlex
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -68,13 +68,13 @@ class Application:
             code = command(typed, PROGRAM, standalone_mode=False, obj=words)
             sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
-            return _complain("stopped", 130)
+            return _complain(["stopped"], 130)
         except SystemExit as error:  # no command of ours ends so, and 0 would say that all is well
             raise RuntimeError("a policy or a task called sys.exit()") from error
         except Exception as error:
-            sentence = _sentence(error)
-            if sentence is not None:
-                return _complain(sentence, 2)
+            sentences = _sentences(error)
+            if sentences:
+                return _complain(sentences, 2)
             report = _users_part(error)
             if report is None:
                 raise
@@ -125,21 +125,21 @@ def _options(
     """Take the options that stand before a command."""
 
 
-def _sentence(error: Exception) -> str | None:
-    """Return what to tell the user, or None for a bug, whose traceback should be seen."""
+def _sentences(error: Exception) -> Sequence[str]:
+    """Return what to tell the user, a line each; of a bug nothing, as its traceback should show."""
     # These are Typer's own errors of usage, whichever click they come from.
     format_message = getattr(error, "format_message", None)
     if format_message is not None:
         sentence = " ".join(str(format_message()).split())
         context = getattr(error, "ctx", None)
         if context is None:
-            return sentence
+            return [sentence]
         end = "" if sentence.endswith((".", "?")) else "."
-        return f"{sentence}{end} Help: {context.command_path} --help"
+        return [f"{sentence}{end} Help: {context.command_path} --help"]
     # The operating system refuses for reasons of its own: a disk that is full, a name too long.
-    if isinstance(error, SwarmLogisticsError | OSError):
-        return str(error)
-    return None
+    if isinstance(error, SwarmLogisticsError):
+        return error.lines or [str(error)]
+    return [str(error)] if isinstance(error, OSError) else []
 
 
 def _users_part(error: Exception) -> str | None:
@@ -155,6 +155,7 @@ def _users_part(error: Exception) -> str | None:
     return None
 
 
-def _complain(sentence: str, code: int) -> int:
-    sys.stderr.write(f"{PROGRAM}: {plain(sentence)}\n")  # it may repeat what was typed
+def _complain(sentences: Sequence[str], code: int) -> int:
+    text = "\n".join(map(plain, sentences))  # they may repeat what was typed
+    sys.stderr.write(f"{PROGRAM}: {text}\n")
     return code

@@ -33,23 +33,38 @@ TrialsArgument = Annotated[
     ),
 ]
 
+ColumnOption = Annotated[
+    Repeated,
+    Option(
+        "--column",
+        metavar="WHAT=NAME",
+        help="What a column of another name is, e.g. performance=boxes; or the number that all "
+        "trials have, e.g. robots=8; may be repeated.",
+    ),
+]
+WideOption = Annotated[
+    str | None,
+    Option(
+        metavar="WHAT",
+        help="What the columns of a wide table differ in: robots, fault, policy, trial "
+        "(repetitions), or a parameter's name.",
+    ),
+]
+
 
 def judge_trials_command(
     trials: TrialsArgument,
     out: JudgedOption = None,
-    columns: Annotated[
-        Repeated,
-        Option(
-            "--column",
-            metavar="WHAT=NAME",
-            help="What a column of another name is, e.g. performance=boxes; may be repeated.",
-        ),
-    ] = None,
+    columns: ColumnOption = None,
     ignore: Annotated[
         Repeated, Option(metavar="NAME", help="Column to leave out; may be repeated.")
     ] = None,
     duration: Annotated[
-        float | None, Option(help="Length of every trial in seconds, where no column says it.")
+        float | None,
+        Option(
+            help="Length of every trial in seconds, where no column says it; of a time to finish "
+            "the limit at which trials were stopped.",
+        ),
     ] = None,
     values: Annotated[
         Repeated,
@@ -79,6 +94,10 @@ def judge_trials_command(
     thousands: Annotated[
         str | None, Option(metavar=".|,", help="Sign between thousands; none if not given.")
     ] = None,
+    skip_missing: Annotated[
+        bool, Option("--skip-missing", help="Leave out rows that lack a value, and count them.")
+    ] = False,
+    wide: WideOption = None,
     check: Annotated[
         bool, Option("--check", help="Show how the trials are read, and judge nothing.")
     ] = False,
@@ -106,6 +125,8 @@ def judge_trials_command(
         "duration": duration,
         "decimal": decimal,
         "thousands": thousands,
+        "skip_missing": skip_missing,
+        "wide": wide,
     }
     judge_trials(trials, out, reading, setup=pairs("--setup", setup), only_check=check, full=full)
 

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.study.trials import read_trials
-from swarm_logistics_env.study.trials.finished import NO_WORDS, YES_WORDS
+from swarm_logistics_env.study.trials.words import NO_WORDS, YES_WORDS
 
 HEAD = "robots,completion_time,finished,work,delivered,duration\n"
 

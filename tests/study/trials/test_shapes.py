@@ -68,19 +68,19 @@ SHAPES = [
         "another name",
         "N,fault,m,boxes\n" + rows("8,{fault},{m},{p}"),
         "--column performance=boxes",
-        "say which it is by --column performance=NAME",
+        "say which it is by --column performance=boxes",
     ),
     Shape(
         "a note",
         "N,fault,m,P,note\n" + rows("8,{fault},{m},{p},ok").replace("ok", "battery", 1),
         "--ignore note",
-        "else --ignore 'note'",
+        "else --ignore note",
     ),
     Shape(
         "two performances",
         "N,fault,m,P,items\n" + rows("8,{fault},{m},{p},{p}"),
         "--ignore items",
-        "leave the other out by --ignore NAME",
+        "leave one of them out by --ignore items",
     ),
     Shape(
         "a row a robot",
@@ -88,7 +88,7 @@ SHAPES = [
         + rows("{k},0,8,{fault},{m},1")
         + rows("{k},1,8,{fault},{m},{p}"),
         "--sum-over robot",
-        "by --sum-over 'robot'",
+        "by --sum-over robot",
     ),
 ]  # fmt: skip
 

@@ -26,7 +26,7 @@ from swarm_logistics_env.study.runs.store import Runs
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts import results
 from swarm_logistics_env.study.verdicts.collapses import collapses, edges
-from swarm_logistics_env.views.cli import judge_trials
+from swarm_logistics_env.views.cli import app, judge_trials
 from swarm_logistics_env.views.cli.judging import names_policy
 from swarm_logistics_env.world.scenario import Scenario
 from tests.views.cli.conftest import Command
@@ -120,6 +120,22 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     assert "so this one is in results/judged/lab-2" in command(TRIALS)
     assert Path("results", "judged", "lab-2", "report.md").is_file()
     assert "holds a study already" in command(f"{TRIALS} --out {out}", code=2)
+
+
+def test_all_that_is_wrong_with_a_file_is_told_a_line_each(
+    command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("lab.csv").write_text(LAB + "8;wheel;;9\n8;wheel;1;NA\n")
+    assert app.run(TRIALS.split()) == 2
+    boxes, faulty = capsys.readouterr().err.splitlines()
+    for line in (boxes, faulty):
+        assert line.endswith(
+            "--skip-missing leaves out 2 rows that lack a value: 1 in 'faulty', 1 in 'boxes'"
+        )
+    printed = command(f"{TRIALS} --skip-missing --check")
+    assert "2 of 8 rows lack a value and are left out: 1 in 'faulty', 1 in 'boxes'." in printed
+    Path("lab.csv").write_text("4;8\n10;19\n11;20\n")
+    assert "'4' (robots 4), '8' (robots 8)" in command("judge lab.csv --wide robots --check")
 
 
 def calls_of(*functions: Callable[..., Any], during: Callable[[], object]) -> list[int]:

@@ -16,7 +16,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from swarm_logistics_env.spi.inputs import IndicatorError
-from swarm_logistics_env.study.trials.table import Table
+from swarm_logistics_env.study.trials.sheet import without_surroundings
+from swarm_logistics_env.study.trials.table import WORKBOOK, Table
 
 from . import csv_text, data_frame, folder
 
@@ -57,8 +58,8 @@ def _read_file(path: Path) -> Table:
     for kind in _kinds():
         table: Table | None = kind.read(path, content, digest)
         if table is not None:
-            return table
-    return csv_text.read(path, content, digest)
+            return without_surroundings(table) if table.kind == WORKBOOK else table
+    return without_surroundings(csv_text.read(path, content, digest))
 
 
 @cache

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.study.trials.table import NoTrialsError, Table
-from swarm_logistics_env.study.trials.trial_columns import MEANING, bare
+from swarm_logistics_env.study.trials.trial_columns import bare
+from swarm_logistics_env.study.trials.words import MEANING
 
 TRIAL_SUFFIXES = (".csv", ".tsv", ".txt", ".json", ".xlsx", ".xlsm", ".parquet")
 # What editors and systems put beside files: locks, drafts, pictures of a folder.

@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from swarm_logistics_env.study.trials.table import Table
-from swarm_logistics_env.study.trials.trial_columns import MEANING, bare
+from swarm_logistics_env.study.trials.trial_columns import bare
+from swarm_logistics_env.study.trials.words import MEANING
 
 from . import csv_text
 

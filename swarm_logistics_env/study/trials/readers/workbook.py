@@ -13,6 +13,7 @@ from typing import Any
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.study.trials.table import (
     LARGEST_EXACT,
+    WORKBOOK,
     Formula,
     MergedCell,
     NoTrialsError,
@@ -104,7 +105,7 @@ def _workbook(path: Path, content: bytes, digest: str) -> Table:
     width = len(header)
     padded = [(row + [""] * width)[:width] for row in shown.values()]
     return Table(
-        str(path), digest, header, padded, list(shown), "row", "a workbook", decimal=".",
+        str(path), digest, header, padded, list(shown), "row", WORKBOOK, decimal=".",
         notes=tuple(notes),
     )  # fmt: skip
 
