@@ -52,8 +52,8 @@ def without_rows(table: Table, complaints: Complaints) -> Table:
         IndicatorError: none is left.
     """
     left_out = {row for rows in complaints.missing.values() for row in rows}
-    kept = [row for row in range(len(table.cells)) if row not in left_out]
-    if not kept:
+    complete = [row for row in range(len(table.cells)) if row not in left_out]
+    if not complete:
         raise IndicatorError(
             f"--skip-missing: no row of {table.source} has all values: {complaints.counts} are "
             "missing; --ignore NAME leaves a column out"
@@ -62,9 +62,9 @@ def without_rows(table: Table, complaints: Complaints) -> Table:
     words = f"{len(left_out)} of {len(table.cells)} rows {lack} left out"
     return replace(
         table,
-        cells=[table.cells[row] for row in kept],
-        lines=[table.lines[row] for row in kept],
-        origins=[table.origins[row] for row in kept] if table.origins else (),
+        cells=[table.cells[row] for row in complete],
+        lines=[table.lines[row] for row in complete],
+        origins=[table.origins[row] for row in complete] if table.origins else (),
         notes=(*table.notes, f"{words}: {complaints.counts}."),
     )
 

@@ -29,17 +29,17 @@ def without_surroundings(table: Table) -> Table:
 
 
 def _without_rows_below(table: Table) -> Table:
-    kept = len(table.cells)
+    n_trials = len(table.cells)
     notes = []
-    while kept and (reason := _no_trial(table, kept - 1)):
-        kept -= 1
-        line = f"{table.line_word} {table.lines[kept]}"
-        text = next(filter(None, table.cells[kept]))
+    while n_trials and (reason := _no_trial(table, n_trials - 1)):
+        n_trials -= 1
+        line = f"{table.line_word} {table.lines[n_trials]}"
+        text = next(filter(None, table.cells[n_trials]))
         notes.append(f"{text!r} ({line}) is left out: {reason}.")
     return replace(
         table,
-        cells=table.cells[:kept],
-        lines=table.lines[:kept],
+        cells=table.cells[:n_trials],
+        lines=table.lines[:n_trials],
         notes=(*table.notes, *reversed(notes)),
     )
 

@@ -76,9 +76,10 @@ def long_of(
     names = {number: _UNIT.sub("", table.header[number]) for number in numbers}
     for read in (_size, _value, _repetition):
         conditions = {number: read(name) for number, name in names.items()}
-        told = {n: condition for n, condition in conditions.items() if condition is not None}
-        if len(told) > 1 and len({name for condition in told.values() for name in condition}) < 2:
-            return _melted(table, told, columns)
+        read_off = {n: condition for n, condition in conditions.items() if condition is not None}
+        parts = {name for condition in read_off.values() for name in condition}
+        if len(read_off) > 1 and len(parts) < 2:
+            return _melted(table, read_off, columns)
     faults = {number: _fault(name) for number, name in names.items()}
     is_told = all("faulty" in x or x["fault"] == NO_FAULT_WORD for x in faults.values())
     has_sound = any(x["fault"] == NO_FAULT_WORD for x in faults.values())
