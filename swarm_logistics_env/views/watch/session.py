@@ -166,7 +166,7 @@ class Session:
         self.compare(self.policy, self.against)
 
     def show_fault(self) -> None:
-        """Begin what README shows: two robots of 25 fail in FM4, beside them none; 32 times real time."""
+        """Begin, fast, what README shows: two of 25 robots fail in FM4, beside them none fails."""
         self._planned_faults = checked_faults("faults", [_SHOWN_FAULT])
         self._begin_again(_SHOWN_SCENARIO, _SHOWN_SEED, _SHOWN_POLICY, None)
         self.paused = False

@@ -37,7 +37,7 @@ const dark = matchMedia("(prefers-color-scheme: dark)"), touched = matchMedia("(
 const recorded = element("recording");
 let fixed = null, latest = null, frames = [], socket = null, retries = 0;
 let playhead = 0, before = 0, drawn = null, shown = null, problem = { text: "", until: 0 };
-let marked = null; // the events whose marks the timeline shows
+let marked = null; // tells which events the timeline shows
 let isBehind = false, isHeld = false; // whether the past is shown, and whether the timeline's handle is held
 const rate = { frames: 0, since: 0 }; // drawn frames, for measurements
 
@@ -55,6 +55,7 @@ function connect() {
 }
 
 function tell(text, kind) {
+  if (element("state").textContent === text) return;
   element("state").textContent = text;
   element("state").hidden = !text;
   for (const name of ["lost", "failed"]) document.body.classList.toggle(name, kind === name);
@@ -115,7 +116,9 @@ function animate(moment) {
   const last = frames.at(-1).time, pace = latest.paused || isHeld ? 0 : latest.speed;
   playhead += passed * pace;
   if (playhead >= last - LAG * pace && !isHeld) isBehind = false;
-  if (!recorded && !isBehind) playhead += (last - LAG * pace - playhead) * Math.min(1, 4 * passed);
+  const isFollowing = !recorded && !isBehind;
+  if (isFollowing) playhead += (last - LAG * pace - playhead) * Math.min(1, 4 * passed);
+  if (isFollowing && latest.paused && last - playhead < 0.01) playhead = last; // it would come ever nearer
   playhead = Math.max(frames[0].time, Math.min(last, playhead));
   const nth = Math.max(0, frameAt(playhead)), now = frames[nth], next = frames[nth + 1] ?? now;
   const share = next === now ? 0 : (playhead - now.time) / (next.time - now.time);
@@ -176,11 +179,12 @@ function showNow(now) {
 
 // The handle of the timeline, and the marks of events above it.
 function showMoment() {
-  const handle = element("moment"), end = endOfStrip();
-  if (Number(handle.max) !== end || marked !== latest.events) {
+  const handle = element("moment"), end = endOfStrip(), events = latest.events.filter(([moment]) => moment <= latest.time + 1e-6);
+  const marks = `${latest.episode} ${events.length} ${end}`;
+  if (marked !== marks) {
+    marked = marks;
     handle.max = end;
-    marked = latest.events;
-    showEvents(element("events"), marked, end, (moment, words) => { goTo(moment); say(words); });
+    showEvents(element("events"), events, end, (moment, words) => { goTo(moment); say(words); });
   }
   handle.value = playhead;
   handle.setAttribute("aria-valuetext", `${playhead.toFixed(1)} s`);

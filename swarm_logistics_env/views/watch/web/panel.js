@@ -39,7 +39,7 @@ function drawStrip(canvas, now, curves, end) {
     steps.push(at(Math.max(time, times.at(-1) ?? 0), times.length));
     line(pen, steps, thickness, colours[colour]);
   });
-  for (const [moment] of now.events) line(pen, [at(moment, 0), at(moment, most)], 1, colours.ITEM_EDGE);
+  for (const [moment] of now.events.filter(([when]) => when <= time + 1e-6)) line(pen, [at(moment, 0), at(moment, most)], 1, colours.ITEM_EDGE);
   line(pen, [at(time, 0), at(time, most)], 1, colours.INK);
   line(pen, [at(0, most), at(0, 0), at(end, 0)], 1, colours.INK);
 }
