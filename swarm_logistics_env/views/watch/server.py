@@ -258,6 +258,7 @@ class WatchServer:
         page = _Page(page_socket, transport, self.session)
         try:
             self._pages.add(page)
+            self.recording.note()
             await page_socket.send_str(self.recording.text())
             async for message in page_socket:
                 try:

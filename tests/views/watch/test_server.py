@@ -109,7 +109,7 @@ def test_the_page_is_shown_once_it_is_served() -> None:
 def test_frames_hold_what_changed_and_orders_are_obeyed(served: Served) -> None:
     assert served.server.session.run.world.state.step == 0  # no page was open
     past, first, second = messages(served, [], 3)
-    assert past == {"past": []}
+    assert [frame["time"] for frame in past["past"]] == [0.0]
     assert "swarm-dt" in first["fixed"]["choices"]
     assert len(first["poses0"]) == len(first["poses1"]) == 18
     assert second["time"] > first["time"]
@@ -254,4 +254,3 @@ def test_a_note_ends_and_no_page_that_is_opened_later_shows_it(
     assert "note" not in messages(served, [], 2)[-1]
     monkeypatch.setattr(server, "_NOTE_LASTS", 0.0)
     wait_until(lambda: not served.server.session.note)
-    assert messages(served, [], 2)[-1]["note"] == ""
