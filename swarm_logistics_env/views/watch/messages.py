@@ -291,10 +291,10 @@ class Recording:
             self._leave_out_every_second()
 
     def _leave_out_every_second(self) -> None:
-        first, *changes = map(json.loads, self._messages)
-        pairs = zip_longest(changes[::2], changes[1::2], fillvalue={})
+        changes: list[Message] = [json.loads(message) for message in self._messages]
+        pairs = zip_longest(changes[1::2], changes[2::2], fillvalue=Message())
         merged = [earlier | later for earlier, later in pairs]
-        self._messages = [encode(message) for message in (first, *merged)]
+        self._messages = [encode(message) for message in (changes[0], *merged)]
         self._spacing *= 2.0
 
     def text(self) -> str:

@@ -131,14 +131,15 @@ def test_timeline_goes_back_and_forth_and_plays_on_from_there(
 def test_a_long_run_is_kept_more_coarsely(played: dict[str, str], browser: Browser) -> None:
     browser.open(played["live"])
     browser.wait_for("drawn && latest.time === 20")
-    kept = """(() => { for (let time = 20; time < 20000; time++) take({ time });
+    play_long = """(() => { for (let time = 20; time < 20000; time++) take({ time });
     return [frames.length, frames[0].time, frames.at(-1).time] })()"""
-    length, first, last = browser.value(kept)
+    length, first, last = browser.value(play_long)
     assert length * SMALL.n_robots <= 100_000
     assert (first, last) == (0, 19999)
 
 
-FAILED = "[latest.robots0, latest.robots1].map((all) => all.filter((one) => one[2]).length)"
+FAILED = """[latest.robots0, latest.robots1]
+.map((robots) => robots.filter((robot) => robot[2]).length)"""
 
 
 def test_button_shows_what_a_fault_costs(browser: Browser) -> None:

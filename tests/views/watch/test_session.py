@@ -113,7 +113,8 @@ def test_a_fault_by_role_chooses_at_its_onset_and_each_of_its_robots_is_repaired
     assert [event.mode for event in session.events] == ["FM2"]
     while session.state.time < 6.0:
         session.advance()
-    first, second = (event.robot for event in session.events if event.mode == "FM4")
+    failed = [event.robot for event in session.events if event.mode == "FM4"]
+    first, second = (robot for robot in failed if robot is not None)
     assert {(event.time, event.mode) for event in session.events[1:]} == {(5, "FM4"), (3, "FM1")}
     assert "FM4" in session.state.failure_modes[first]
     chosen = [modes.count("FM4") for modes in session.beside.world.state.failure_modes]

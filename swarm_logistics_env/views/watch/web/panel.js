@@ -2,8 +2,9 @@
 
 // Draws deliveries over time: the chart, and the timeline.
 
-const LEFT = 46, RIGHT = 12, TOP = 4, BOTTOM = 34; // [px] about the chart
+const LEFT = 46, RIGHT = 18, TOP = 4, BOTTOM = 20; // [px] about the chart
 const ROUND = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 1e4, 2e4, 5e4, 1e5];
+const TICK = 46; // [px] the room of a time below the chart
 const HANDLE = 7, MARK = 42; // [px] of the timeline: half its handle; the room of a mark
 
 function drawStrip(canvas, now, curves, end) {
@@ -11,7 +12,7 @@ function drawStrip(canvas, now, curves, end) {
   const counts = [0, 1].map((number) => now[`deliveries${number}`]);
   const most = Math.max(4, ...counts.map((times) => times.length)), { time } = now;
   const at = (moment, count) => [LEFT + ((right - LEFT) * Math.min(end, moment)) / end, bottom - ((bottom - TOP) * count) / most];
-  const [everyMoment, everyCount] = [ROUND.find((step) => end / step <= 6), ROUND.find((step) => most / step <= 4)];
+  const [everyMoment, everyCount] = [ROUND.find((step) => (TICK * end) / step <= right - LEFT), ROUND.find((step) => most / step <= 4)];
   pen.font = "12px system-ui, sans-serif";
   pen.fillStyle = colours.FLOOR;
   pen.fillRect(LEFT, TOP, right - LEFT, bottom - TOP);
@@ -20,9 +21,8 @@ function drawStrip(canvas, now, curves, end) {
   pen.textAlign = "center";
   for (let moment = 0; moment <= end; moment += everyMoment) {
     line(pen, [at(moment, 0), at(moment, most)], 1, colours.FLOOR_LINE);
-    pen.fillText(moment, at(moment, 0)[0], bottom + 9);
+    pen.fillText(`${moment} s`, at(moment, 0)[0], bottom + 10);
   }
-  pen.fillText("time [s]", (LEFT + right) / 2, bottom + 25);
   pen.textAlign = "right";
   for (let count = 0; count <= most; count += everyCount) {
     line(pen, [at(0, count), at(end, count)], 1, colours.FLOOR_LINE);
@@ -59,14 +59,14 @@ function drawTimeline(canvas, first, latest, curves, end) {
 }
 
 // A button for each event, or for several that are near each other.
-function showEvents(place, events, end, act) {
+function showEvents(container, events, end, act) {
   const marks = [];
   for (const [moment, label, words] of [...events].sort((a, b) => a[0] - b[0])) {
-    if (!marks.length || moment - marks.at(-1).moment > (MARK * end) / place.clientWidth) marks.push({ moment, labels: [], words: [] });
+    if (!marks.length || moment - marks.at(-1).moment > (MARK * end) / container.clientWidth) marks.push({ moment, labels: [], words: [] });
     marks.at(-1).labels.push(label);
     marks.at(-1).words.push(words);
   }
-  place.replaceChildren(...marks.map(({ moment, labels, words }) => {
+  container.replaceChildren(...marks.map(({ moment, labels, words }) => {
     const button = document.createElement("button"), about = `${moment.toFixed(1)} s: ${words.join("; ")}`;
     button.textContent = [...new Set(labels)].map((label) => {
       const count = labels.filter((text) => text === label).length;

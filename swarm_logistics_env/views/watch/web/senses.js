@@ -11,7 +11,7 @@ function range(values) {
 function whereabouts(forward, left, unit = "m") {
   const turn = Math.round((Math.atan2(left, forward) * 180) / Math.PI), length = `${Math.hypot(forward, left).toFixed(1)} ${unit}`;
   if (Math.abs(turn) < 5) return `${length} ahead`;
-  if (Math.abs(turn) > 175) return `${length} behind`;
+  if (Math.abs(turn) > 175) return `${length} to the back`;
   return `${length}, ${Math.abs(turn)}° ${turn > 0 ? "left" : "right"}`;
 }
 
@@ -30,23 +30,23 @@ function things(flags, forward, left) {
 function sees(row, reach) {
   const items = (flags) => things(flags, row.item_x, row.item_y);
   return [
-    [`robots, by its beams: ${alongBeams(row.range_robots, reach)}`, "range_robots"],
-    [`walls, by its beams: ${alongBeams(row.range_walls, reach)}`, "range_walls"],
-    [`items, by its beams: ${alongBeams(row.range_items, reach)}`, "range_items"],
-    [`items in view: ${items(row.item_present)}`, "item_present, item_x, item_y"],
-    [`requested ones: ${items(row.item_requested)}`, "item_requested, item_x, item_y"],
-    [`put down lately: ${items(row.item_recently_held)}`, "item_recently_held, item_x, item_y"],
-    [`robots in view or heard: ${things(row.neighbour_present, row.neighbour_x, row.neighbour_y)}`, "neighbour_present, neighbour_x, neighbour_y"],
+    [`beams to robots: ${alongBeams(row.range_robots, reach)}`, "range_robots"],
+    [`beams to walls: ${alongBeams(row.range_walls, reach)}`, "range_walls"],
+    [`beams to items: ${alongBeams(row.range_items, reach)}`, "range_items"],
+    [`items: ${items(row.item_present)}`, "item_present, item_x, item_y"],
+    [`requested items: ${items(row.item_requested)}`, "item_requested, item_x, item_y"],
+    [`items put down lately: ${items(row.item_recently_held)}`, "item_recently_held, item_x, item_y"],
+    [`robots: ${things(row.neighbour_present, row.neighbour_x, row.neighbour_y)}`, "neighbour_present, neighbour_x, neighbour_y"],
   ];
 }
 
 function hears(row) {
   const timers = row.neighbour_timer.filter((_, nth) => row.neighbour_timer_heard[nth] > 0.5);
   const sender = whereabouts(row.lowest_timer_x[0], row.lowest_timer_y[0]);
-  const lowest = row.lowest_timer_present[0] > 0.5 ? `${range(row.lowest_timer)} s, from ${sender}` : "none";
+  const lowest = row.lowest_timer_present[0] > 0.5 ? `${range(row.lowest_timer)} s, ${sender}` : "none";
   const lines = [
-    [`timers near it: ${timers.length ? `${timers.length}, ${range(timers)} s` : "none"}`, "neighbour_timer_heard, neighbour_timer"],
-    [`the lowest timer: ${lowest}`, "lowest_timer_present, lowest_timer, lowest_timer_x, lowest_timer_y"],
+    [`timers: ${timers.length ? `${timers.length}, ${range(timers)} s` : "none"}`, "neighbour_timer_heard, neighbour_timer"],
+    [`lowest: ${lowest}`, "lowest_timer_present, lowest_timer, lowest_timer_x, lowest_timer_y"],
   ];
   if (row.neighbour_message) lines.push([`messages: ${range(row.neighbour_message)}`, "neighbour_message"]);
   return lines;
@@ -59,18 +59,18 @@ function holds(row) {
 
 function does(row) {
   const [forward, left] = row.velocity, turn = Math.round((row.turn_rate[0] * 180) / Math.PI);
+  const away = row.timer_runs[0] > 0.5 ? `left the delivery area ${range(row.timer)} s ago` : "is outside, its timer silent";
   return [
     [Math.hypot(forward, left) < 0.05 ? "stands" : `drives ${whereabouts(forward, left, "m/s")}`, "velocity"],
     [turn ? `turns ${Math.abs(turn)}°/s ${turn > 0 ? "left" : "right"}` : "does not turn", "turn_rate"],
     [row.contact[0] > 0.5 ? "touches something" : "touches nothing", "contact"],
-    [row.in_delivery_area[0] > 0.5 ? "is in the delivery area" : "is outside the delivery area", "in_delivery_area"],
-    [row.timer_runs[0] > 0.5 ? `left it ${range(row.timer)} s ago` : "its timer is silent", "timer_runs, timer"],
+    [row.in_delivery_area[0] > 0.5 ? "is in the delivery area" : away, "in_delivery_area, timer_runs, timer"],
   ];
 }
 
-function showSenses(place, { row, reach }) {
+function showSenses(container, { row, reach }) {
   const groups = [["sees", sees(row, reach)], ["hears", hears(row)], ["holds", holds(row)], ["does", does(row)]];
-  place.replaceChildren(...groups.map(([name, lines]) => {
+  container.replaceChildren(...groups.map(([name, lines]) => {
     const group = document.createElement("div"), heading = document.createElement("dt");
     heading.textContent = name;
     group.append(heading, ...lines.map(([words, names]) => {
