@@ -54,7 +54,7 @@ def browser_view(name: str) -> None:
         try:
             browser.open(page.as_uri())
             browser.wait_for("latest && playhead > 0")
-            browser.value("latest.paused = true, playhead = 149")
+            browser.value("latest.paused = true, goTo(149)")
             browser.wait_for("drawn && drawn.time >= 148")
             (MEDIA / name).write_bytes(browser.screenshot())
         finally:
@@ -64,9 +64,12 @@ def browser_view(name: str) -> None:
 
 def films() -> None:
     """Film a learned swarm without and with faults, each failure mode, and each kind of policy."""
-    sound = run("ppo-delivery", REALISTIC, 0)
-    faulty = run("ppo-delivery", REALISTIC, 0, [Fault("FM4", 2)])
-    takes = [Take("25 robots, no fault", sound), Take("two of them deliver nothing (FM4)", faulty)]
+    session = Session(TINY)
+    session.show_fault()  # the film and the button of the live view play the same
+    takes = [
+        Take("25 robots, no fault", session.beside),
+        Take("two of them deliver nothing (FM4)", session.run),
+    ]
     film = Film(takes, 240.0, speed=24.0, frame_rate=12.5, size=400)
     write_film(MEDIA / "fm4.gif", film.frames(), 12.5)
     # Scripts send no messages, so that a spoilt one changes nothing.

@@ -145,6 +145,10 @@ def watch_command(
     changes: SetOption = None,
     bodies: BodiesOption = None,
     faults: FaultOption = None,
+    show_fault: Annotated[
+        bool,
+        Option("--show-fault", help="Begin with what two robots in FM4 cost, as README shows it."),
+    ] = False,
     speed: Annotated[float, Option(help="How many times real time it plays.")] = 8.0,
     port: Annotated[
         int, Option(min=0, max=65535, help="Port of this machine; 0 takes any that is free.")
@@ -171,6 +175,11 @@ def watch_command(
         raise SetupError(f"--until {until:g}: should be above 0 s, together with --save")
     if save is not None and (save.is_dir() or not os.access(save.parent, os.W_OK)):
         raise SetupError(f"--save {save}: should be a file in a folder that can be written to")
+    if show_fault and any((against, preset, scenario_file, changes, bodies, faults)):
+        raise SetupError(
+            "--show-fault: has a world, policy and fault of its own: leave out --against, "
+            "--preset, --scenario, --set, --bodies and --fault"
+        )
     players = policies_of(filter(None, (policy, against)), trust_code, frame, normalize, env)
     scenario = scenario_of(preset, scenario_file, changes, bodies, policies=players)
     typed = {display_name(player.name): player for player in players}
@@ -183,6 +192,8 @@ def watch_command(
         speed,
         lambda name: typed[name].load() if name in typed else load(name, trust_code=trust_code),
     )
+    if show_fault:
+        session.show_fault()
     if save is None:
         from swarm_logistics_env.views.watch.server import serve  # needs aiohttp
 

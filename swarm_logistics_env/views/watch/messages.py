@@ -9,7 +9,9 @@ import json
 import re
 import zlib
 from collections.abc import Callable
+from functools import lru_cache
 from importlib import resources
+from itertools import zip_longest
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -18,7 +20,7 @@ from pydantic import ConfigDict, ValidationError, validate_call
 
 from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.policies.episode import Play
-from swarm_logistics_env.world.observations import columns, unflatten
+from swarm_logistics_env.world.observations import unflatten
 from swarm_logistics_env.world.rendering import palette
 from swarm_logistics_env.world.rendering.plan_shapes import dock_hue, plan_shapes
 from swarm_logistics_env.world.scenario import Scenario
@@ -29,7 +31,9 @@ from .session import SPEEDS, Session
 
 Message: TypeAlias = dict[str, Any]
 
-_SESSION_FIELDS = ("seed", "speed", "paused", "mode", "note", "failure", "policy", "against")
+_SESSION_FIELDS = (
+    "episode", "seed", "speed", "paused", "mode", "note", "failure", "policy", "against",
+)  # fmt: skip
 _SCENARIO_FIELDS = (
     "n_robots", "n_items", "warehouse_width", "warehouse_height", "delivery_width", "duration",
     "restock", "robot_radius", "item_radius", "obstacle_radius", "has_orders", "has_due_times",
@@ -38,7 +42,7 @@ _TIMER_STEPS = 8  # shades of the timer's halo
 
 
 def fixed_data(session: Session) -> Message:
-    """Return what never changes: colours, failure modes, speeds, policies, and the floor plan."""
+    """Return what holds for a world: colours, failure modes, speeds, policies, the floor plan."""
     light = palette.ROBOT_COLOURS | palette.PLAN_COLOURS
     return {
         "colours": {
@@ -56,6 +60,7 @@ def fixed_data(session: Session) -> Message:
     }
 
 
+@lru_cache(maxsize=4)
 def _plan_message(scenario: Scenario) -> Message | None:
     """Return boxes [mm] of each kind of cell and of each dock's connected parts, if any."""
     if scenario.plan is None:
@@ -80,6 +85,7 @@ def _plan_message(scenario: Scenario) -> Message | None:
 def frame_message(session: Session) -> Message:
     """Return what is true now. Lengths in mm, times in s, angles in mrad; x right, y up.
 
+    `events` are [time, label of the mark, sentence] of what was done to the run.
     For each of the two runs, with its number 0 or 1 behind the name: `poses` (3 N numbers: x, y,
     heading of each robot, or None where it is absent), `robots` ([activity, age of its timer in 1/8
     of the limit or None, mark, robot it follows] of each), `items` (x, y of each that is stored),
@@ -88,12 +94,13 @@ def frame_message(session: Session) -> Message:
     many orders wait) and `deliveries` (their times).
     """
     message: Message = {
+        "fixed": fixed_data(session),
         **{name: getattr(session, name) for name in _SESSION_FIELDS},
         "time": round(session.state.time, 3),
         "over": session.is_over,
         "scenario": {name: getattr(session.scenario, name) for name in _SCENARIO_FIELDS},
         "obstacles": _millimetres(session.state.obstacle_position),
-        "events": [[round(e.time, 1), e.robot, e.label] for e in session.events],
+        "events": [[round(e.time, 1), e.label, e.words] for e in session.events],
         "selected": _selected(session),
     }
     for number, play in enumerate((session.run, session.beside)):
@@ -128,6 +135,7 @@ _ORDERS: dict[str, Callable[..., object]] = {
     "repair": Session.repair_robot,
     "toggle": Session.toggle_robot,
     "resize": Session.resize,
+    "show": Session.show_fault,
     "widen": Session.set_delivery_width,
 }
 
@@ -166,6 +174,8 @@ def rehearse(session: Session) -> None:
             copy.break_robot()
             copy.step()
             frame_message(copy)
+        copy.show_fault()
+        copy.step()
 
 
 def _arena(play: Play) -> Message:
@@ -228,15 +238,10 @@ def _selected(session: Session) -> Message | None:
         "reach": round(float(state.ranger_range[robot]), 3),
         "view": round(float(state.view_range[robot]), 3),
         # Adding 0.0 turns a negative zero into zero.
-        "row": [
-            (
-                column.name,
-                column.unit,
-                [round(value, 2) + 0.0 for value in observation[column.name].tolist()],
-                column.high,
-            )
-            for column in columns(session.scenario)
-        ],
+        "row": {
+            name: [round(value, 2) + 0.0 for value in part.tolist()]
+            for name, part in observation.items()
+        },
     }
 
 
@@ -246,10 +251,14 @@ def _millimetres(positions: NDArray[np.float64]) -> list[list[int]]:
 
 
 _SPACING = 0.5  # [s] between frames; the page draws what lies between
+# Frames times robots of a recording, so that its memory is bounded: some 10 MB of text.
+MOST_POSES = 100_000
 
 
 class Recording:
     """What a session has shown of its present episode.
+
+    Beyond `MOST_POSES` every second frame goes, and further ones are as far apart.
 
     Args:
         session: the session; call `note` after each of its steps.
@@ -260,6 +269,7 @@ class Recording:
         self._play: object = None
         self._last: Message = {}
         self._messages: list[str] = []
+        self._spacing = _SPACING
 
     def note(self) -> None:
         """Keep the session as it is now, if it has gone on far enough."""
@@ -268,21 +278,33 @@ class Recording:
             self._play = session.run
             self._last = {}
             self._messages = []
+            self._spacing = _SPACING
         time = session.state.time
-        if self._last and time < self._last["time"] + _SPACING - 1e-9 and not session.is_over:
+        if self._last and time < self._last["time"] + self._spacing - 1e-9 and not session.is_over:
             return
         present = {**frame_message(session), "selected": None, "note": "", "paused": False}
         message = changes_since(self._last, present)
         if message:
             self._messages.append(encode(message))
         self._last = present
+        if len(self._messages) * session.state.n_robots > MOST_POSES:
+            self._leave_out_every_second()
+
+    def _leave_out_every_second(self) -> None:
+        changes: list[Message] = [json.loads(message) for message in self._messages]
+        pairs = zip_longest(changes[1::2], changes[2::2], fillvalue=Message())
+        merged = [earlier | later for earlier, later in pairs]
+        self._messages = [encode(message) for message in (changes[0], *merged)]
+        self._spacing *= 2.0
+
+    def text(self) -> str:
+        """Return the message that tells a page what was played."""
+        return f'{{"past":[{",".join(self._messages)}]}}'
 
     def page(self) -> str:
         """Return the recording as an HTML page that loads nothing."""
         self.note()
-        frames = ",".join(self._messages)
-        text = f'{{"fixed":{encode(fixed_data(self._session))},"frames":[{frames}]}}'
-        return _page_around(text)
+        return _page_around(self.text())
 
 
 def recorded_page(session: Session, until: float) -> str:
@@ -303,6 +325,7 @@ FILES = {
     "draw.js": "text/javascript",
     "legend.js": "text/javascript",
     "panel.js": "text/javascript",
+    "senses.js": "text/javascript",
     "page.js": "text/javascript",
 }
 

@@ -27,7 +27,6 @@ from .messages import (
     Recording,
     changes_since,
     encode,
-    fixed_data,
     frame_message,
     obey,
     rehearse,
@@ -103,10 +102,12 @@ class _Page:
     It is told the next thing once it has taken the last one, and dropped if it does not for long.
     """
 
-    def __init__(self, socket: web.WebSocketResponse, transport: asyncio.Transport) -> None:
+    def __init__(
+        self, socket: web.WebSocketResponse, transport: asyncio.Transport, session: Session
+    ) -> None:
         self._socket = socket
         self._transport = transport
-        self._sent_frame: Message = {}
+        self._sent_frame: Message = {"note": session.note}  # it was for those who were there
         self._sending: asyncio.Task[None] | None = None
         self._sent_at = 0.0
 
@@ -254,10 +255,11 @@ class WatchServer:
         if transport is None:
             return page_socket  # it has gone meanwhile
         self._silent_since.pop(transport, None)
-        page = _Page(page_socket, transport)
+        page = _Page(page_socket, transport, self.session)
         try:
             self._pages.add(page)
-            await page_socket.send_str(encode(fixed_data(self.session)))
+            self.recording.note()
+            await page_socket.send_str(self.recording.text())
             async for message in page_socket:
                 try:
                     obey(self.session, message.data if isinstance(message.data, str) else "")

@@ -129,13 +129,25 @@ def leader_of(state: WarehouseState, scenario: Scenario, robot: int) -> int:
 
 
 class Event(NamedTuple):
-    """A robot that failed, or was repaired: a mark on the time axis."""
+    """A robot that failed or was repaired, or another change: a mark on the time axis."""
 
     time: float  # [s]
-    robot: int
-    mode: str | None  # None if it was repaired
+    robot: int | None = None
+    mode: str | None = None  # None if the robot was repaired
+    note: str = ""  # what changed, if it was no robot
 
     @property
     def label(self) -> str:
         """The text of the mark."""
+        if self.robot is None:
+            return "i"
         return "ok" if self.mode is None else mark((self.mode,))
+
+    @property
+    def words(self) -> str:
+        """What happened."""
+        if self.robot is None:
+            return self.note
+        if self.mode is None:
+            return f"robot {self.robot} is repaired"
+        return f"robot {self.robot} fails in mode {self.mode}"

@@ -39,6 +39,7 @@ SMALL = " ".join(f"--set {field}" for field in (*FIELDS, "delivery_width=1"))
         ("run --film nowhere/film.mp4", "a folder that can be written to"),
         ("run --film film.mp4 --twin", "--fault should be given"),
         ("run --twin", "are for a film, with --film"),
+        ("watch --show-fault --preset paper", "--show-fault: has a world, policy and fault of its"),
         ("watch --until 5", "--until 5: should be above 0 s, together with --save"),
         ("watch --save nowhere/x.html", "should be a file in a folder that can be"),
         ("run --set scenario.duration=2", "'scenario.duration'; did you mean 'duration'?"),

@@ -92,8 +92,9 @@ def test_the_browser_opens_at_a_terminal_with_a_screen(
     assert show is (webbrowser.open if opens else None)
 
 
-def test_replay_is_written_without_a_server(command: Command) -> None:
-    assert ": 3 s, " in command("watch --set n_robots=5 --save run.html --until 3")
+@pytest.mark.parametrize("words", ["--set n_robots=5", "--show-fault"])
+def test_replay_is_written_without_a_server(words: str, command: Command) -> None:
+    assert ": 3 s, " in command(f"watch {words} --save run.html --until 3")
     page = Path("run.html").read_text(encoding="utf-8")
     assert "script-src 'sha256-" in page
     assert "http://" not in page

@@ -108,11 +108,12 @@ def test_the_page_is_shown_once_it_is_served() -> None:
 
 def test_frames_hold_what_changed_and_orders_are_obeyed(served: Served) -> None:
     assert served.server.session.run.world.state.step == 0  # no page was open
-    fixed, first, second = messages(served, [], 3)
-    assert "swarm-dt" in fixed["choices"]
+    past, first, second = messages(served, [], 3)
+    assert [frame["time"] for frame in past["past"]] == [0.0]
+    assert "swarm-dt" in first["fixed"]["choices"]
     assert len(first["poses0"]) == len(first["poses1"]) == 18
     assert second["time"] > first["time"]
-    assert "scenario" not in second
+    assert not {"scenario", "fixed"} & set(second)
     orders = [
         {"do": "choose", "mode": "FM1"},
         {"do": "toggle", "robot": 3},
@@ -124,6 +125,9 @@ def test_frames_hold_what_changed_and_orders_are_obeyed(served: Served) -> None:
     assert session.run.world.state.failure_modes[3] == ("FM1",)
     assert not session.beside.world.state.failed.any()
     assert session.paused
+    frames = messages(served, [], 1)[0]["past"]  # whoever comes later is told what was played
+    assert frames[0]["time"] == 0.0
+    assert frames[-1]["time"] > 0.0
 
 
 @pytest.mark.parametrize(
@@ -241,12 +245,12 @@ def test_a_policy_that_fails_is_told_to_the_page_and_the_server_stays(
         served.stop()
 
 
-def test_a_note_ends_and_who_opens_a_page_later_does_not_see_it(
+def test_a_note_ends_and_no_page_that_is_opened_later_shows_it(
     served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(server, "_NOTE_LASTS", LONG)
     order = json.dumps({"do": "toggle", "robot": 3})
     assert messages(served, [order], lambda message: bool(message.get("note")))
+    assert "note" not in messages(served, [], 2)[-1]
     monkeypatch.setattr(server, "_NOTE_LASTS", 0.0)
     wait_until(lambda: not served.server.session.note)
-    assert messages(served, [], 2)[-1]["note"] == ""

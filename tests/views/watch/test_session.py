@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import base64
+import itertools
 import json
 import re
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from swarm_logistics_env.core.errors import (
     SetupError,
     SwarmLogisticsError,
 )
-from swarm_logistics_env.views.watch import Session
+from swarm_logistics_env.views.watch import Session, messages
 from swarm_logistics_env.views.watch.messages import Recording, frame_message
 from swarm_logistics_env.world import observations
 from swarm_logistics_env.world.warehouse.state import NOBODY, STORED
@@ -111,7 +113,8 @@ def test_a_fault_by_role_chooses_at_its_onset_and_each_of_its_robots_is_repaired
     assert [event.mode for event in session.events] == ["FM2"]
     while session.state.time < 6.0:
         session.advance()
-    first, second = (event.robot for event in session.events if event.mode == "FM4")
+    failed = [event.robot for event in session.events if event.mode == "FM4"]
+    first, second = (robot for robot in failed if robot is not None)
     assert {(event.time, event.mode) for event in session.events[1:]} == {(5, "FM4"), (3, "FM1")}
     assert "FM4" in session.state.failure_modes[first]
     chosen = [modes.count("FM4") for modes in session.beside.world.state.failure_modes]
@@ -166,7 +169,8 @@ def test_swarm_size_next_seed_and_again_begin_anew_and_the_delivery_area_does_no
     for play in (session.run, session.beside):
         assert (play.world.state.time, play.world.state.n_robots) == (0.0, 8)
         assert play.world.scenario.delivery_width == 3.0
-    assert (session.seed, len(session.events)) == (4, 5)
+    assert (session.seed, len(session.events)) == (4, 6)
+    assert session.events[-1].words == session.note == "delivery area 3 m wide"
 
 
 def test_what_cannot_be_is_refused() -> None:
@@ -208,9 +212,8 @@ def test_what_the_selected_robot_senses_is_shown() -> None:
         session.select(robot)
         shown = frame_message(session)["selected"]
         parts = observations.unflatten(session.run.world.observe()[robot], scenario)
-        assert [name for name, *_ in shown["row"]] == list(parts)
-        for name, _, values, highest in shown["row"]:
-            assert max(values) <= highest
+        assert list(shown["row"]) == list(parts)
+        for name, values in shown["row"].items():
             assert values == pytest.approx(parts[name].tolist(), abs=0.0051)
         beams = [parts[f"range_{what}"] for what in ("robots", "walls", "items")]
         nearest = np.min(beams, axis=0).tolist()
@@ -228,8 +231,48 @@ def test_a_recording_begins_anew_with_each_episode() -> None:
         session.next_seed()
     recording.note()
     (packed,) = re.findall(r'id="recording">([^<]+)<', recording.page())
-    first, *later_frames = json.loads(zlib.decompress(base64.b64decode(packed)))["frames"]
+    first, *later_frames = json.loads(zlib.decompress(base64.b64decode(packed)))["past"]
     assert (first["seed"], first["time"], later_frames) == (2, 0.0, [])
+
+
+def frames_of(recording: Recording) -> list[dict[str, Any]]:
+    """Return the frames that a page makes of a recording."""
+    frames: list[dict[str, Any]] = [{}]
+    frames += itertools.accumulate(json.loads(recording.text())["past"], dict.__or__)
+    return frames[1:]
+
+
+def test_a_long_recording_is_bounded_and_its_frames_stay_right(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    session = Session(SMALL.replace(duration=60.0), "homing", faults=["FM4:2@7"])
+    recording = Recording(session)
+    poses = {}
+    monkeypatch.setattr(messages, "MOST_POSES", 8 * 40)
+    while not session.is_over:
+        poses[round(session.state.time, 3)] = frame_message(session)["poses0"]
+        recording.note()
+        session.advance()
+    recording.note()
+    frames = frames_of(recording)
+    times = [frame["time"] for frame in frames]
+    assert len(frames) <= 40
+    assert (times[0], times[-1]) == (0.0, session.state.time)
+    assert max(np.diff(times)) <= 2.0
+    assert [frame["poses0"] for frame in frames[:-1]] == [poses[time] for time in times[:-1]]
+    failed = [sum(robot[2] == "4" for robot in frame["robots0"]) for frame in frames]
+    assert failed == [2 if time >= 7.0 else 0 for time in times]
+
+
+def test_what_a_fault_costs_shows_within_ten_seconds() -> None:
+    session = Session(SMALL, "random-walk", against="homing")
+    session.pause()
+    session.show_fault()
+    assert (session.policy, session.against, session.paused) == ("ppo-delivery", None, False)
+    assert session.run.world.state.failed.sum() == 2
+    session.play(10.0)
+    assert session.beside.world.state.failed.sum() == 0
+    assert 2 * session.state.delivered < session.beside.world.state.delivered
 
 
 BROKEN = """

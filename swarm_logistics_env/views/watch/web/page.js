@@ -3,15 +3,19 @@
 // Plays frames, from the server or from a recording in the page, and sends orders to the server.
 
 const LAG = 0.15; // [s] behind the newest frame, so that there is a next one to move to
-const KEPT = 60; // frames of a live run
+const MOST_POSES = 1e5, LEAST_FRAMES = 20; // robots times frames that are kept, and frames whatever the robots
 const TRAIL = 2.5; // [s] of a run
 const KEYS = [
   [" ", "space", "pause, or go on", () => pause()],
-  ["ArrowRight", "right arrow", "one step", () => order({ do: "step" })],
+  ["ArrowLeft", "left arrow", "back in what was played", () => goTo(playhead - skip())],
+  ["ArrowRight", "right arrow", "forth; from its end one step", () => forth()],
+  ["Home", "Home", "to the beginning", () => goTo(0)],
+  ["End", "End", "to the end", () => goTo(Infinity)],
   ["+", "+", "faster", () => faster(1)],
   ["-", "-", "slower", () => faster(-1)],
   ["n", "n", "next seed", () => order({ do: "next" })],
   ["0", "0", "this seed again", () => order({ do: "again" })],
+  ["f", "f", "what a fault costs", () => order({ do: "show" })],
   ["m", "m", "next failure mode", () => nextMode(1)],
   ["M", "M", "failure mode before", () => nextMode(-1)],
   ["s", "s", "select the next robot", () => selectNext()],
@@ -33,6 +37,8 @@ const dark = matchMedia("(prefers-color-scheme: dark)"), touched = matchMedia("(
 const recorded = element("recording");
 let fixed = null, latest = null, frames = [], socket = null, retries = 0;
 let playhead = 0, before = 0, drawn = null, shown = null, problem = { text: "", until: 0 };
+let marked = null; // tells which events the timeline shows
+let isBehind = false, isHeld = false; // whether the past is shown, and whether the timeline's handle is held
 const rate = { frames: 0, since: 0 }; // drawn frames, for measurements
 
 // Frames from the server
@@ -49,6 +55,7 @@ function connect() {
 }
 
 function tell(text, kind) {
+  if (element("state").textContent === text) return;
   element("state").textContent = text;
   element("state").hidden = !text;
   for (const name of ["lost", "failed"]) document.body.classList.toggle(name, kind === name);
@@ -56,12 +63,15 @@ function tell(text, kind) {
 }
 
 function receive(message) {
-  if (message.colours) {
-    begin(message);
+  if (message.past) {
+    message.past.forEach(take);
+    goTo(Infinity);
   } else if (message.problem) {
     say(message.problem);
   } else {
+    const wasPlaying = latest && !latest.over;
     take(message);
+    if (wasPlaying && latest.over) say("The episode is over: take the next seed, or this one again.");
     showWords();
     const { failure } = latest;
     tell(failure && `The policy has failed: ${failure}. Choose another one, or begin again.`, failure && "failed");
@@ -76,18 +86,23 @@ function say(text) {
 
 function take(change) {
   const next = { ...latest, ...change };
-  if (latest && (next.time < latest.time || next.poses0.length !== latest.poses0.length || next.seed !== latest.seed)) frames = [];
+  if (latest && next.episode !== latest.episode) [frames, isBehind] = [[], false];
   if (!frames.length) playhead = next.time;
   if (frames.length && frames.at(-1).time === next.time) frames[frames.length - 1] = next;
   else frames.push(next);
-  const isFirst = !latest;
   latest = next;
-  if (isFirst) paint();
-  if (!recorded && frames.length > KEPT) frames.shift();
+  if (change.fixed) begin(change.fixed);
+  // Memory is bounded: of a long run every second frame goes, but of the newest, which are played.
+  if (frames.length * next.poses0.length > 3 * MOST_POSES && frames.length > 2 * LEAST_FRAMES) {
+    frames = frames.filter((_, nth) => nth % 2 === 0 || nth >= frames.length - LEAST_FRAMES);
+  }
 }
 
+// Orders are for the present, but for those that change nothing of the run.
 function order(what) {
-  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(what));
+  if (!socket || socket.readyState !== WebSocket.OPEN) return;
+  if (!["pause", "speed", "select", "choose"].includes(what.do)) goTo(Infinity);
+  socket.send(JSON.stringify(what));
 }
 
 // Frames on the screen
@@ -98,19 +113,23 @@ function animate(moment) {
   before = moment;
   rate.frames++;
   if (!latest) return;
-  const last = frames.at(-1).time, pace = latest.paused ? 0 : latest.speed;
+  const last = frames.at(-1).time, pace = latest.paused || isHeld ? 0 : latest.speed;
   playhead += passed * pace;
-  if (!recorded) playhead += (last - LAG * pace - playhead) * Math.min(1, 4 * passed);
+  if (playhead >= last - LAG * pace && !isHeld) isBehind = false;
+  const isFollowing = !recorded && !isBehind;
+  if (isFollowing) playhead += (last - LAG * pace - playhead) * Math.min(1, 4 * passed);
+  if (isFollowing && latest.paused && last - playhead < 0.01) playhead = last; // it would come ever nearer
   playhead = Math.max(frames[0].time, Math.min(last, playhead));
   const nth = Math.max(0, frameAt(playhead)), now = frames[nth], next = frames[nth + 1] ?? now;
   const share = next === now ? 0 : (playhead - now.time) / (next.time - now.time);
   shown = { now, next, share };
   for (const number of [0, 1]) {
     const trails = element("trails").checked ? trailsUntil(nth, number) : [];
-    drawArena(element(`arena${number}`), number, now, next, share, { trails, links: element("links").checked, selected: latest.selected });
+    drawArena(element(`arena${number}`), number, now, next, share, { trails, links: element("links").checked, selected: now.selected });
   }
   if (now !== drawn) showNow(now);
-  if (recorded && playhead === last) { latest.paused = true; element("pause").textContent = "play"; }
+  showMoment();
+  if (recorded && playhead === last && !isHeld && !latest.paused) pause();
 }
 
 // Arenas as large as the window allows: side by side, or one above the other where they are larger so.
@@ -123,7 +142,7 @@ function layOut() {
   const sideBySide = scaleOf((wide - gap) / 2, high), stacked = scaleOf(wide, (high - gap) / 2);
   arenas.classList.toggle("stacked", stacked > sideBySide);
   for (const number of [0, 1]) element(`arena${number}`).style.height = `${Math.max(sideBySide, stacked) * down + 2 * MARGIN}px`;
-  drawn = null;
+  drawn = marked = null;
 }
 
 function frameAt(time) {
@@ -145,6 +164,9 @@ function trailsUntil(nth, number) {
 function showNow(now) {
   drawn = now;
   element("clock").textContent = `${now.time.toFixed(1)} s`;
+  drawTimeline(element("played"), frames[0].time, latest, fixed.curves, endOfStrip());
+  element("senses").hidden = !now.selected;
+  if (now.selected) showSenses(element("senses"), now.selected);
   drawStrip(element("strip"), now, fixed.curves, endOfStrip());
   const total = now.scenario.restock ? "" : ` of ${now.scenario.n_items}`;
   for (const number of [0, 1]) {
@@ -155,7 +177,39 @@ function showNow(now) {
   }
 }
 
-// The time at the right end of the chart [s].
+// The handle of the timeline, and the marks of events above it.
+function showMoment() {
+  const handle = element("moment"), end = endOfStrip(), events = latest.events.filter(([moment]) => moment <= latest.time + 1e-6);
+  const marks = `${latest.episode} ${events.length} ${end}`;
+  if (marked !== marks) {
+    marked = marks;
+    handle.max = end;
+    showEvents(element("events"), events, end, (moment, words) => { goTo(moment); say(words); });
+  }
+  handle.value = playhead;
+  handle.setAttribute("aria-valuetext", `${playhead.toFixed(1)} s`);
+  element("now").disabled = !isBehind;
+}
+
+// Shows a moment of what was played, the nearest one that there is.
+function goTo(moment) {
+  if (!frames.length) return;
+  const last = frames.at(-1).time;
+  playhead = Math.max(frames[0].time, Math.min(last, moment));
+  isBehind = playhead < last;
+  showWords();
+}
+
+function skip() {
+  return endOfStrip() / 50;
+}
+
+function forth() {
+  if (isBehind || recorded) goTo(playhead + skip());
+  else order({ do: "step" });
+}
+
+// The time at the right end of chart and timeline [s].
 function endOfStrip() {
   const { duration } = latest.scenario;
   return recorded ? frames.at(-1).time : Math.min(duration, ROUND.find((end) => end >= Math.max(50, latest.time)) ?? duration);
@@ -167,26 +221,24 @@ function showWords() {
   if (!latest) return;
   const { scenario, selected } = latest;
   document.title = `${latest.policy}, seed ${latest.seed}`;
-  element("pause").textContent = latest.paused ? "go on" : "pause";
+  element("pause").textContent = latest.paused ? "play" : "pause";
   for (const id of ["pause", "step"]) element(id).disabled = !recorded && Boolean(latest.failure);
   element("speed").value = latest.speed;
   element("mode").value = latest.mode;
   element("policy").value = latest.policy;
   element("against").value = latest.against ?? "";
-  const over = latest.over && !recorded ? "The episode is over: take the next seed, or this one again." : latest.note;
-  element("note").textContent = Date.now() < problem.until ? problem.text : over;
+  element("note").textContent = Date.now() < problem.until ? problem.text : latest.note ?? "";
   for (const name of ["n_robots", "delivery_width"]) {
     if (document.activeElement !== element(name)) element(name).value = scenario[name];
   }
   const { meaning } = fixed.modes.find(({ name }) => name === latest.mode);
-  const does = selected ? `It is ${selected.activity} and ${selected.modes.length ? `fails: ${selected.modes.join(", ")}` : "sound"}. ` : "";
+  const present = selected ? `It is ${selected.activity} and ${selected.modes.length ? `fails: ${selected.modes.join(", ")}` : "sound"}. ` : "";
+  const does = isBehind ? "The past is shown; break and repair act on the present. " : present;
   element("meaning").textContent = `${does}${latest.mode}: ${meaning}.`;
   element("robot").textContent = selected ? `Robot ${selected.robot}` : `${touched.matches ? "Tap" : "Click"} a robot`;
   element("break").disabled = !selected || latest.over || selected.modes.includes(latest.mode);
   element("repair").disabled = !selected || latest.over || !selected.modes.length;
   element("indicators").hidden = Boolean(selected);
-  element("bars").hidden = !selected;
-  if (selected) drawSenses(element("bars"), selected.row);
 }
 
 function paint() {
@@ -209,18 +261,19 @@ function fill(list, entries) {
 function begin(message) {
   fixed = message;
   element("delivery_width").disabled = Boolean(fixed.plan);
-  if (fixed.plan) element("delivery_width").title = "The floor plan has the docks.";
+  element("delivery_width").title = fixed.plan ? "The floor plan has the docks." : "";
   fill(element("speed"), fixed.speeds.map((speed) => [speed, `${speed}×`]));
   fill(element("mode"), fixed.modes.map(({ name, mark }) => [name, mark ? `${name} (${mark})` : name]));
   fill(element("policy"), fixed.choices.map((name) => [name, name]));
   fill(element("against"), [["", "the same, no faults"], ...fixed.choices.map((name) => [name, `against ${name}`])]);
+  paint();
 }
 
 function pause() {
   if (!recorded) return order({ do: "pause" });
   latest.paused = !latest.paused;
   if (!latest.paused && playhead === frames.at(-1).time) playhead = 0;
-  element("pause").textContent = latest.paused ? "play" : "pause";
+  showWords();
 }
 
 function setSpeed(speed) {
@@ -281,8 +334,12 @@ function listen() {
       if (robot !== null) order({ do: "toggle", robot });
     });
   }
-  for (const name of ["step", "again", "next", "break", "repair"]) element(name).addEventListener("click", () => order({ do: name }));
+  for (const name of ["step", "again", "next", "show", "break", "repair"]) element(name).addEventListener("click", () => order({ do: name }));
   element("pause").addEventListener("click", pause);
+  element("now").addEventListener("click", () => goTo(Infinity));
+  element("moment").addEventListener("input", ({ target }) => goTo(Number(target.value)));
+  element("moment").addEventListener("pointerdown", () => { isHeld = true; });
+  for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => { isHeld = false; });
   element("speed").addEventListener("change", (event) => setSpeed(Number(event.target.value)));
   element("mode").addEventListener("change", (event) => order({ do: "choose", mode: event.target.value }));
   for (const name of ["policy", "against"]) {
@@ -293,9 +350,6 @@ function listen() {
   onNumber("delivery_width", (width) => order({ do: "widen", width }));
   element("help_button").addEventListener("click", help);
   element("help").addEventListener("click", () => element("help").close());
-  element("strip").addEventListener("click", ({ offsetX, target }) => {
-    if (recorded) playhead = momentAt(offsetX, target.clientWidth, endOfStrip());
-  });
   for (const [, label, meaning] of KEYS) {
     const row = element("keys").insertRow();
     for (const text of [label, meaning]) row.insertCell().textContent = text;
@@ -306,7 +360,7 @@ function listen() {
   // After a click with the mouse, keys mean the session again, not the button.
   document.addEventListener("click", (event) => {
     const focused = document.activeElement;
-    if (event.detail > 0 && focused && focused.tagName === "BUTTON") focused.blur();
+    if (event.detail > 0 && focused?.matches("button, [type=range]")) focused.blur();
   });
 }
 
@@ -325,13 +379,11 @@ async function replay() {
   document.body.classList.add("recorded");
   const packed = Uint8Array.from(atob(recorded.textContent), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const { fixed: message, frames: changes } = await new Response(stream).json();
-  begin(message);
+  const { past } = await new Response(stream).json();
+  past.forEach(take);
   for (const id of ["policy", "against"]) element(id).disabled = true;
-  changes.forEach(take);
-  playhead = 0;
+  goTo(0);
   showWords();
-  element("pause").textContent = "pause";
   tell("");
 }
 

@@ -1,21 +1,18 @@
 "use strict";
 
-// Draws the panels: deliveries over time, what a robot senses.
+// Draws deliveries over time: the chart, and the timeline.
 
-const LEFT = 46, RIGHT = 12, TOP = 4, BOTTOM = 34; // [px] about the chart
+const LEFT = 46, RIGHT = 18, TOP = 4, BOTTOM = 20; // [px] about the chart
 const ROUND = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 1e4, 2e4, 5e4, 1e5];
-const NAMES = 142, BARS = 66; // [px] a row of the inspector: name, bars, numbers
-
-function momentAt(x, width, end) {
-  return (end * Math.max(0, x - LEFT)) / (width - LEFT - RIGHT);
-}
+const TICK = 46; // [px] the room of a time below the chart
+const HANDLE = 7, MARK = 42; // [px] of the timeline: half its handle; the room of a mark
 
 function drawStrip(canvas, now, curves, end) {
   const { pen, width, height } = prepared(canvas), [right, bottom] = [width - RIGHT, height - BOTTOM];
   const counts = [0, 1].map((number) => now[`deliveries${number}`]);
   const most = Math.max(4, ...counts.map((times) => times.length)), { time } = now;
   const at = (moment, count) => [LEFT + ((right - LEFT) * Math.min(end, moment)) / end, bottom - ((bottom - TOP) * count) / most];
-  const [everyMoment, everyCount] = [ROUND.find((step) => end / step <= 6), ROUND.find((step) => most / step <= 4)];
+  const [everyMoment, everyCount] = [ROUND.find((step) => (TICK * end) / step <= right - LEFT), ROUND.find((step) => most / step <= 4)];
   pen.font = "12px system-ui, sans-serif";
   pen.fillStyle = colours.FLOOR;
   pen.fillRect(LEFT, TOP, right - LEFT, bottom - TOP);
@@ -24,9 +21,8 @@ function drawStrip(canvas, now, curves, end) {
   pen.textAlign = "center";
   for (let moment = 0; moment <= end; moment += everyMoment) {
     line(pen, [at(moment, 0), at(moment, most)], 1, colours.FLOOR_LINE);
-    pen.fillText(moment, at(moment, 0)[0], bottom + 9);
+    pen.fillText(`${moment} s`, at(moment, 0)[0], bottom + 10);
   }
-  pen.fillText("time [s]", (LEFT + right) / 2, bottom + 25);
   pen.textAlign = "right";
   for (let count = 0; count <= most; count += everyCount) {
     line(pen, [at(0, count), at(end, count)], 1, colours.FLOOR_LINE);
@@ -43,66 +39,42 @@ function drawStrip(canvas, now, curves, end) {
     steps.push(at(Math.max(time, times.at(-1) ?? 0), times.length));
     line(pen, steps, thickness, colours[colour]);
   });
-  drawEvents(pen, now.events.filter(([moment]) => moment <= time + 1e-6), at, most);
+  for (const [moment] of now.events.filter(([when]) => when <= time + 1e-6)) line(pen, [at(moment, 0), at(moment, most)], 1, colours.ITEM_EDGE);
   line(pen, [at(time, 0), at(time, most)], 1, colours.INK);
   line(pen, [at(0, most), at(0, 0), at(end, 0)], 1, colours.INK);
 }
 
-function drawEvents(pen, events, at, most) {
-  const marks = new Map();
-  for (const [moment, , label] of events) {
-    const key = `${Math.round(at(moment, 0)[0])} ${label}`;
-    marks.set(key, { moment, label, count: (marks.get(key)?.count ?? 0) + 1 });
+// What was played, and in it a tick for each delivery: those of the run above those beside it.
+function drawTimeline(canvas, first, latest, curves, end) {
+  const { pen, width, height } = prepared(canvas), at = (moment) => HANDLE + ((width - 2 * HANDLE) * moment) / end;
+  pen.fillStyle = colours.FLOOR;
+  pen.fillRect(at(first), 0, at(latest.time) - at(first), height);
+  pen.strokeStyle = colours.ITEM_EDGE;
+  pen.lineWidth = 1;
+  pen.strokeRect(HANDLE, 0.5, width - 2 * HANDLE, height - 1);
+  curves.forEach(([colour], number) => {
+    const top = number ? height / 2 + 1 : 2, bottom = number ? height - 2 : height / 2 - 1;
+    for (const moment of latest[`deliveries${number}`]) line(pen, [[at(moment), top], [at(moment), bottom]], 1.5, colours[colour]);
+  });
+}
+
+// A button for each event, or for several that are near each other.
+function showEvents(container, events, end, act) {
+  const marks = [];
+  for (const [moment, label, words] of [...events].sort((a, b) => a[0] - b[0])) {
+    if (!marks.length || moment - marks.at(-1).moment > (MARK * end) / container.clientWidth) marks.push({ moment, labels: [], words: [] });
+    marks.at(-1).labels.push(label);
+    marks.at(-1).words.push(words);
   }
-  let last = -1000, row = 0;
-  for (const { moment } of marks.values()) line(pen, [at(moment, 0), at(moment, most)], 1, colours.INK);
-  for (const { moment, label, count } of [...marks.values()].sort((a, b) => a.moment - b.moment)) {
-    const [x] = at(moment, 0);
-    row = x - last < 26 ? (row + 1) % 4 : 0;
-    last = x;
-    badge(pen, Math.max(x, LEFT + 22), TOP + 10 + 17 * row, 15, count > 1 ? `${label} ×${count}` : label);
-  }
-}
-
-// A row for each part of the observation: its name, a bar or a dot for each value, and numbers.
-function drawSenses(canvas, parts) {
-  const tall = 13, nColumns = Math.max(1, Math.floor(canvas.clientWidth / 290)), nRows = Math.ceil(parts.length / nColumns);
-  canvas.style.height = `${nRows * tall}px`;
-  const { pen, width } = prepared(canvas);
-  pen.font = "12px system-ui, sans-serif";
-  pen.textBaseline = "middle";
-  parts.forEach(([name, unit, values, limit], nth) => {
-    const left = (Math.floor(nth / nRows) * width) / nColumns, mid = tall * (nth % nRows) + tall / 2;
-    pen.fillStyle = colours.INK;
-    pen.fillText(name, left, mid, NAMES - 4);
-    pen.fillText(numbers(unit, values), left + NAMES + BARS + 8, mid, width / nColumns - NAMES - BARS - 16);
-    if (unit === "flag") drawFlags(pen, values, left + NAMES, mid);
-    else drawBars(pen, values, limit, left + NAMES, mid, tall - 2);
-  });
-}
-
-function numbers(unit, values) {
-  if (unit === "flag") return values.length > 1 ? `${values.filter((value) => value > 0.5).length} of ${values.length}` : values[0] > 0.5 ? "yes" : "no";
-  const [least, most] = [Math.min(...values), Math.max(...values)].map((value) => +value.toFixed(1));
-  const text = values.length < 3 ? values.join(", ") : least === most ? least : `${least} to ${most}`;
-  return unit === "1" ? text : `${text} ${unit}`;
-}
-
-function drawFlags(pen, values, left, mid) {
-  values.forEach((value, nth) => {
-    const x = left + 4 + nth * 8;
-    if (value > 0.5) disc(pen, x, mid, 3, colours.INK);
-    else ring(pen, x, mid, 2.5, 1, colours.ITEM_EDGE);
-  });
-}
-
-function drawBars(pen, values, limit, left, mid, tall) {
-  const isSigned = values.some((value) => value < 0), zero = isSigned ? mid : mid + tall / 2, reach = isSigned ? tall / 2 : tall;
-  const step = Math.min(8, BARS / values.length);
-  line(pen, [[left, zero], [left + step * values.length, zero]], 1, colours.ITEM_EDGE);
-  pen.fillStyle = colours.BEAM;
-  values.forEach((value, nth) => {
-    const high = (reach * value) / limit;
-    pen.fillRect(left + step * nth, Math.min(zero, zero - high), step - 1, Math.abs(high));
-  });
+  container.replaceChildren(...marks.map(({ moment, labels, words }) => {
+    const button = document.createElement("button"), about = `${moment.toFixed(1)} s: ${words.join("; ")}`;
+    button.textContent = [...new Set(labels)].map((label) => {
+      const count = labels.filter((text) => text === label).length;
+      return count > 1 ? `${label} ×${count}` : label;
+    }).join(" ");
+    button.title = about;
+    button.style.left = `clamp(.7rem, ${(100 * moment) / end}%, 100% - .7rem)`;
+    button.addEventListener("click", () => act(moment, about));
+    return button;
+  }));
 }
