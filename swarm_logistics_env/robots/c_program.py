@@ -13,7 +13,6 @@ from .c_parts import Parts
 from .c_statements import KernelWriter
 from .c_values import Function, Kind, Known, TupleOf, Value
 
-
 # What is a double in simulation, and a function of math.h or a number of that kind.
 _REALS = """\
 #ifdef SWARM_DOUBLE
