@@ -125,7 +125,7 @@ def test_the_c_file_decides_as_the_policy_does(name: str, tmp_path: Path) -> Non
     assert in_float.n_decisions == 20_000
     assert in_float.n_elsewhere <= 20
     assert in_float.n_rounded <= (2_000 if name == "homing-stock" else 100)
-    assert in_float.worst < 1.0
+    assert in_float.worst < 5.0
     assert (in_double.n_elsewhere, in_double.n_rounded) == (0, 0)
 
 
@@ -143,7 +143,7 @@ def test_the_c_file_decides_as_the_policy_does_in_a_quarter_of_a_million_decisio
     assert in_float.n_decisions == 250_000
     assert in_float.n_elsewhere <= 250
     assert in_float.n_rounded <= (25_000 if name == "homing-stock" else 1_250)
-    assert in_float.worst < 1.0
+    assert in_float.worst < 5.0
     assert (in_double.n_elsewhere, in_double.n_rounded) == (0, 0)
 
 
