@@ -267,13 +267,12 @@ class Expressions(Operators):
             )
         values = [a if isinstance(a, Value) else self._as_value(a) for a in arguments]
         if function in _MATH:
-            is_root = function is np.sqrt  # of floats it is a float
-            kind = FLOAT if is_root and values[0].kind is FLOAT else self._real
-            return self._math_call(_MATH[function], values, kind)
+            is_float = function is np.sqrt and values[0].kind is FLOAT
+            return self._math_call(_MATH[function], values, FLOAT if is_float else self._real)
         if function is math.isnan:
             return Value(f"isnan({values[0].text})", BOOL)
         if function is abs:
-            return self._math_call("fabs", values, FLOAT if values[0].kind is FLOAT else REAL)
+            return self._math_call("fabs", values, FLOAT if values[0].kind is FLOAT else self._real)
         if function in (min, max):
             kind = common_kind(*values)
             if kind not in (FLOAT, REAL):

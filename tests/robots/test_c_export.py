@@ -151,6 +151,7 @@ def test_the_c_file_decides_as_the_policy_does_in_a_quarter_of_a_million_decisio
 @pytest.mark.parametrize("name", NAMES)
 def test_it_compiles_without_a_warning_and_takes_little(name: str, tmp_path: Path) -> None:
     files = write_c(policies.load(name), SCENARIO, tmp_path / "robot.c")
+    assert sizes_of(files.source, ["gcc", "-DSWARM_DOUBLE"]).flash < 128 * 1024
     sizes = sizes_of(files.source, ["gcc"])
     assert sizes.flash < 128 * 1024
     assert sizes.stack is not None
@@ -182,7 +183,7 @@ def test_it_compiles_for_a_cortex_m4_and_fits(name: str, tmp_path: Path) -> None
     [
         ("homing-stock", 100_000),
         ("swarm-dt", 100_000),
-        *(pytest.param(name, 2_500_000, marks=pytest.mark.daily) for name in NAMES),
+        *(pytest.param(name, 10_000_000, marks=pytest.mark.daily) for name in NAMES),
     ],
 )
 def test_no_row_makes_it_read_or_compute_what_is_not_there(
