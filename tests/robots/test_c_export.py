@@ -96,7 +96,8 @@ def compare(commands: Commands, commands_in_c: Commands, scenario: Scenario, cou
 def velocities(commands: Commands, scenario: Scenario) -> NDArray[np.complex128]:
     """Return velocities (N,) [m/s], in the frames of the bodies as they stand before they turn."""
     turn = commands[:, 2] * scenario.max_turn_rate * scenario.control_period
-    return scenario.max_speed * (commands[:, 0] + 1j * commands[:, 1]) * np.exp(1j * turn)
+    ahead = scenario.max_speed * (commands[:, 0] + 1j * commands[:, 1])
+    return np.asarray(ahead * np.exp(1j * turn), np.complex128)
 
 
 def take_over(policy: Any, controller: CFile, robots: NDArray[np.int64]) -> None:
