@@ -66,6 +66,9 @@ STABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "robots.contract_of": (),
         "robots.Contract": ("to_yaml",),
         "robots.check_rows": (),
+        "robots.write_c": (),
+        "robots.FaultLayer": ("modes", "counts", "sensed", "driven", "broadcast"),
+        "robots.append_trial": (),
     },
     "Indicators": {
         "spi.scalability": (),

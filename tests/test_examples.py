@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,16 @@ def test_own_failure_mode_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(FAILURE_MODES, "hoarder", FAILURE_MODES["FM4"])  # gone again afterwards
     estimates = main("failure_mode", seeds=2, n_robots=10, m=3, duration=60.0)
     assert [estimate.indicator for estimate in estimates] == ["R", "FT"]
+
+
+@pytest.mark.daily
+@pytest.mark.skipif(not shutil.which("cc"), reason="needs a compiler of C")
+def test_trials_in_the_engine_of_the_study_are_its_runs(tmp_path: Path) -> None:
+    sizes: Any = {"seeds": 2, "duration": 40.0, "bodies": "chipmunk", "out": tmp_path}
+    tables = [findings.cell_table for findings in main("dotbot_trials", **sizes)]
+    of_study, of_trials = (dict(zip(t["cell"], t["mean"], strict=True)) for t in tables)
+    assert of_trials.items() <= of_study.items()
+    assert len(of_trials) == 2
 
 
 @pytest.mark.daily

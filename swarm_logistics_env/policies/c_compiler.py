@@ -102,8 +102,8 @@ def _compile(compiler: list[str], path: Path, program: Path) -> None:
     run_compiler([*compiler, *map(str, parts), "-lm", "-o", str(program)], path)
 
 
-def run_compiler(command: Sequence[str], path: Path) -> None:
-    """Run a compiler or linker.
+def run_compiler(command: Sequence[str], path: Path) -> str:
+    """Run a compiler, linker or another tool, and return what it prints.
 
     Raises:
         PolicyError: it fails; with the beginning of what it says of the file at `path`.
@@ -121,6 +121,7 @@ def run_compiler(command: Sequence[str], path: Path) -> None:
         lines = (done.stderr or done.stdout).strip().splitlines()
         message = "\n".join(lines[:_TOLD]) or f"exit status {done.returncode}"
         raise PolicyError(f"{path} cannot be compiled:\n{message}")
+    return done.stdout
 
 
 @functools.cache

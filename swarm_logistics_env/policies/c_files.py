@@ -32,7 +32,6 @@ _REQUEST = struct.Struct("IIQ")
 _RESET = 0
 _STEP = 1
 _TIME = 2
-_SECONDS = struct.Struct("d")
 
 
 def is_c_name(name: str) -> bool:
@@ -204,15 +203,14 @@ class CFile(Holding):
         commands = np.frombuffer(answer, np.float32, offset=n_bytes)
         return commands.reshape(self._n_robots, self._facts.command).astype(np.float64)
 
-    def seconds_of_step(self, observations: NDArray[np.float32]) -> float:
-        """Return how long a step of all robots takes by itself [s]; the robots stay as they are.
+    def seconds_of_step(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return how long each robot's step takes (N,) [s]; the robots stay as they are.
 
         Raises:
             PolicyError: as `act`.
         """
-        answer = self._ask(self._request(_TIME, observations), _SECONDS.size)
-        (seconds,) = _SECONDS.unpack(answer)
-        return float(seconds)
+        answer = self._ask(self._request(_TIME, observations), 8 * self._n_robots)
+        return np.frombuffer(answer, np.float64)
 
     def _request(self, what: int, observations: NDArray[np.float32]) -> bytes:
         if len(observations) != self._n_robots:

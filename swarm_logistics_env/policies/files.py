@@ -142,7 +142,7 @@ FORMAT = 8
 DEVIATIONS = "deviations"  # in the metadata
 
 
-def write_onnx(policy: Policy, path: Path | str) -> None:
+def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> None:
     """Write the network of a trained policy as an ONNX file.
 
     Its input "inputs" is float32 (robots, inputs), in the order of its card; its output "outputs"
@@ -154,6 +154,7 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
     Args:
         policy: a trained one, as `policies.load("ppo-delivery")`.
         path: of the file, which is replaced.
+        robots: how many rows it takes at a time, for runtimes that have to know; None: any number.
 
     Raises:
         PolicyError: the policy is no trained one, the package onnx is missing, or the file cannot
@@ -189,11 +190,12 @@ def write_onnx(policy: Policy, path: Path | str) -> None:
             layer_input = f"layers.{layer}.out"
             nodes.append(helper.make_node("Tanh", [total], [layer_input]))
     real = TensorProto.FLOAT
+    n_rows = robots or "robots"
     graph = helper.make_graph(
         nodes,
         policy.card.name,
-        [helper.make_tensor_value_info("inputs", real, ["robots", len(network.inputs)])],
-        [helper.make_tensor_value_info("outputs", real, ["robots", len(OUTPUTS)])],
+        [helper.make_tensor_value_info("inputs", real, [n_rows, len(network.inputs)])],
+        [helper.make_tensor_value_info("outputs", real, [n_rows, len(OUTPUTS)])],
         [numpy_helper.from_array(np.ascontiguousarray(t), n) for n, t in tensors.items()],
     )
     version = helper.make_opsetid("", OPERATORS)

@@ -1,8 +1,9 @@
 """Policies as C: one file and a header, of one robot, for small processors.
 
 The file is made of the kernels that decide in Python, so it does what they do, with `float` for
-their `double`: only what a robot remembers for minutes stays of double precision. It takes no
-memory but a structure of fixed size, and needs math.h alone.
+their `double`: only what a robot remembers for minutes stays of double precision. Compiled with
+SWARM_DOUBLE defined, all that is double in Python is double. It takes no memory but a structure of
+fixed size, and needs math.h alone.
 """
 
 from __future__ import annotations
@@ -192,6 +193,10 @@ void swarm_step(swarm_robot *robot, const float row[SWARM_ROW], float command[SW
             return;
         }}
     }}
+    real driven[SWARM_COMMAND];
     {call}
+    for (int32_t part = 0; part < SWARM_COMMAND; part++) {{
+        command[part] = (float)driven[part];
+    }}
 }}
 """

@@ -22,6 +22,7 @@ from .c_values import (
     DOUBLE,
     FLOAT,
     INT,
+    REAL,
     UNARY,
     WORD,
     ArrayOf,
@@ -34,7 +35,9 @@ from .c_values import (
     common_kind,
     constant,
     converted,
+    stored,
     tuple_of,
+    widened,
 )
 
 FunctionOf: TypeAlias = Callable[[Any, Sequence[Value | Known]], Function]
@@ -69,7 +72,7 @@ class Expressions(Operators):
         parts: Parts,
         function_of: FunctionOf,
         names: Mapping[str, Any],
-        real: Scalar = FLOAT,
+        real: Scalar = REAL,
     ) -> None:
         super().__init__(parts, real)
         self._function_of = function_of
@@ -97,7 +100,7 @@ class Expressions(Operators):
             case ast.Subscript():
                 item = self.item_of(node)
                 if isinstance(item, Value) and item.kind is DOUBLE:
-                    return Value(f"(float){item.text}", FLOAT, UNARY)
+                    return Value(f"(real){item.text}", REAL, UNARY)
                 return item
             case ast.BinOp():
                 return self.operation(node.op, self.value_of(node.left), self.value_of(node.right))
@@ -150,7 +153,7 @@ class Expressions(Operators):
             raise NoCError(f"{owner.text}.{name}")
         part = getattr(owner.value, name)
         if owner.is_fixed and isinstance(part, bool | int | float):
-            kind = FLOAT if isinstance(part, float) else constant(part).kind
+            kind = REAL if isinstance(part, float) else constant(part).kind
             return Value(f"{self._parts.record(owner)}.{name}", kind)
         if owner.is_fixed:
             return Known(part, f"{owner.name}_{name}", is_fixed=True)
@@ -210,7 +213,7 @@ class Expressions(Operators):
         table = self._parts.table(owner.name, np.asarray(owner.value))
         lengths = owner.value.shape
         texts = [self._index(*which) for which in zip(indices, nodes, lengths, strict=True)]
-        return Value(table + "".join(f"[{text}]" for text in texts), FLOAT)
+        return Value(table + "".join(f"[{text}]" for text in texts), REAL)
 
     def _joined(self, node: ast.BoolOp) -> Value:
         operands = [converted(self.value_of(operand), BOOL) for operand in node.values]
@@ -264,17 +267,18 @@ class Expressions(Operators):
             )
         values = [a if isinstance(a, Value) else self._as_value(a) for a in arguments]
         if function in _MATH:
-            name = _MATH[function] + ("" if self._real is DOUBLE else "f")
-            return Value(self._call_text(name, values, self._real), self._real)
+            is_float = function is np.sqrt and values[0].kind is FLOAT
+            return self._math_call(_MATH[function], values, FLOAT if is_float else self._real)
         if function is math.isnan:
             return Value(f"isnan({values[0].text})", BOOL)
         if function is abs:
-            return Value(self._call_text("fabsf", values, FLOAT), FLOAT)
+            return self._math_call("fabs", values, FLOAT if values[0].kind is FLOAT else self._real)
         if function in (min, max):
             kind = common_kind(*values)
-            if kind is not FLOAT:
+            if kind not in (FLOAT, REAL):
                 raise NoCError(f"{function.__name__} of integers")
-            return self.helped("smaller_of" if function is min else "larger_of", FLOAT, *values)
+            chosen = self.helped("smaller_of" if function is min else "larger_of", REAL, *values)
+            return stored(chosen, FLOAT) if kind is FLOAT else chosen
         if function is np.argmin:
             return self._of_array("place_of_smallest", INT, values[0])
         return self._converted_by(function, values[0])
@@ -282,12 +286,12 @@ class Expressions(Operators):
     def _converted_by(self, function: Any, value: Value) -> Value:
         """Return a number as the kind of Python or numpy that a call names."""
         if function is round:
-            nearest = self._call_text("rintf", [value], FLOAT)
-            return Value(f"{self._parts.use('whole_number')}({nearest})", INT)
+            nearest = self._math_call("rint", [value], REAL)
+            return Value(f"{self._parts.use('whole_number')}({nearest.text})", INT)
         if function is int:
             if value.kind is DOUBLE:
                 return Value(f"(int32_t){value.within(UNARY)}", INT, UNARY)
-            return Value(f"{self._parts.use('whole_number')}({converted(value, FLOAT).text})", INT)
+            return Value(f"{self._parts.use('whole_number')}({converted(value, REAL).text})", INT)
         if function is bool:
             return converted(value, BOOL)
         kinds = {float: self._real, np.float32: FLOAT, np.float64: self._real, np.uint64: WORD}
@@ -296,10 +300,15 @@ class Expressions(Operators):
         kind = kinds[function]
         if value.constant is not None:
             return constant(value.constant, kind)
-        return converted(value, kind)
+        if kind is FLOAT:
+            return stored(value, FLOAT)
+        return widened(value) if kind is REAL else converted(value, kind)
 
-    def _call_text(self, name: str, values: list[Value], kind: Scalar) -> str:
-        return f"{name}({', '.join(converted(value, kind).text for value in values)})"
+    def _math_call(self, name: str, values: list[Value], kind: Scalar) -> Value:
+        """Return a call of a function of math.h, which has an f at the end for floats."""
+        called = {DOUBLE: name, REAL: f"REAL({name})", FLOAT: f"{name}f"}[kind]
+        texts = ", ".join(converted(value, kind).text for value in values)
+        return Value(f"{called}({texts})", kind)
 
     def _length(self, array: Value) -> int:
         if not isinstance(array.kind, ArrayOf):

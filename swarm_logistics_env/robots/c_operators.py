@@ -15,10 +15,10 @@ from .c_values import (
     BITS,
     BOOL,
     COMPARISON,
-    FLOAT,
     INT,
     OR,
     PRODUCT,
+    REAL,
     SUM,
     UNARY,
     NoCError,
@@ -27,6 +27,7 @@ from .c_values import (
     common_kind,
     constant,
     converted,
+    widened,
 )
 
 _OPERATORS: dict[type, tuple[str, int, Callable[..., Any]]] = {
@@ -60,7 +61,7 @@ class Operators:
         match symbol:
             case ast.Mod():
                 name = "remainder_of" if is_whole else "modulo"
-                return self.helped(name, INT if is_whole else FLOAT, left, right)
+                return self.helped(name, INT if is_whole else REAL, left, right)
             case ast.BitOr() if left.kind is right.kind is BOOL:
                 return connected("||", [left, right])
             case ast.FloorDiv() if is_whole:
@@ -68,7 +69,7 @@ class Operators:
             case ast.Pow() if right.constant == 2:
                 if left.constant is not None:
                     return constant(left.constant**2, self.kind_of_number(left.constant))
-                return self.helped("squared", FLOAT, left)
+                return self.helped("squared", REAL, left)
         if type(symbol) not in _OPERATORS:
             raise NoCError(type(symbol).__name__)
         sign, strength, compute = _OPERATORS[type(symbol)]
@@ -82,6 +83,10 @@ class Operators:
             number = compute(left.constant, right.constant)
             if kind is not INT and not (_has_name(left) or _has_name(right)):
                 return constant(number, kind)
+        if kind is REAL and left.constant is not None:
+            right = widened(right)  # as an exact constant is written as a float
+        elif kind is REAL and right.constant is not None:
+            left = widened(left)
         left = converted(left, kind)
         right = converted(right, kind)
         # What binds as strongly is computed from the left.
@@ -112,4 +117,4 @@ def connected(sign: str, operands: Sequence[Value]) -> Value:
 
 def _has_name(value: Value) -> bool:
     """Return whether a constant is called by a name, which tells a reader more than its number."""
-    return re.search("[A-Z]{2}", value.text) is not None
+    return re.search("[A-Z]{2}", value.text.replace("REAL(", "")) is not None

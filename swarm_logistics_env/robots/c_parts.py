@@ -10,36 +10,34 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.core.errors import PolicyError
 
-from .c_values import BOOL, FLOAT, Known, number_text
-
-_NUMBERS_IN_LINE = 6
+from .c_values import BOOL, FLOAT, REAL, Known, Scalar, number_text
 
 # What Python's operators and functions do, where C's do something else.
 HELPERS = {
     "whole_number": """\
 /* Of a number that is none, and of one that is too large, the nearest that there is. */
-static inline int32_t whole_number(float x) {
+static inline int32_t whole_number(real x) {
     if (isnan(x)) {
         return 0;
     }
     return x > 1e9f ? 1000000000 : x < -1e9f ? -1000000000 : (int32_t)x;
 }""",
     "smaller_of": """\
-static inline float smaller_of(float a, float b) {
+static inline real smaller_of(real a, real b) {
     return b < a ? b : a;
 }""",
     "larger_of": """\
-static inline float larger_of(float a, float b) {
+static inline real larger_of(real a, real b) {
     return b > a ? b : a;
 }""",
     "squared": """\
-static inline float squared(float x) {
+static inline real squared(real x) {
     return x * x;
 }""",
     "modulo": """\
 /* In [0, by). */
-static inline float modulo(float x, float by) {
-    const float rest = fmodf(x, by);
+static inline real modulo(real x, real by) {
+    const real rest = REAL(fmod)(x, by);
     return rest < 0.0f ? rest + by : rest;
 }""",
     "remainder_of": """\
@@ -124,29 +122,24 @@ class Parts:
             value = f"({text})" if text.startswith("-") else text
             lines.append(f"#define {name} {value}")
         definitions = [text for name, text in HELPERS.items() if name in self._helpers]
-        definitions += [table_text(name, table) for name, table in self._tables.items()]
+        definitions += [table_text(name, table, REAL) for name, table in self._tables.items()]
         definitions += [_record_text(name, record) for name, record in self._records.items()]
         return ["\n".join(lines)] if lines else [], definitions
 
 
-def table_text(name: str, table: NDArray[Any]) -> str:
+def table_text(name: str, table: NDArray[Any], kind: Scalar = FLOAT) -> str:
     """Return the definition of an array of constants of one or two dimensions."""
     lengths = "".join(f"[{length}]" for length in table.shape)
-    head = f"static const float {name}{lengths} = {{"
-    rows = table if table.ndim > 1 else [*_in_lines(table)]
-    lines = [f"    {_numbers_text(row)}," for row in rows]
-    if table.ndim > 1:
-        lines = [f"    {{{_numbers_text(row)}}}," for row in rows]
+    head = f"static const {kind.name} {name}{lengths} = {{"
+    rows = table if table.ndim > 1 else [*_in_lines(table, 6 if kind is FLOAT else 3)]
+    lines = [", ".join(number_text(number, kind) for number in row.tolist()) for row in rows]
+    lines = [f"    {{{line}}}," if table.ndim > 1 else f"    {line}," for line in lines]
     return "\n".join([head, *lines, "};"])
 
 
-def _in_lines(table: NDArray[Any]) -> Iterator[NDArray[Any]]:
-    for start in range(0, len(table), _NUMBERS_IN_LINE):
-        yield table[start : start + _NUMBERS_IN_LINE]
-
-
-def _numbers_text(numbers: NDArray[Any]) -> str:
-    return ", ".join(number_text(number, FLOAT) for number in numbers.tolist())
+def _in_lines(table: NDArray[Any], length: int) -> Iterator[NDArray[Any]]:
+    for start in range(0, len(table), length):
+        yield table[start : start + length]
 
 
 def _record_text(name: str, record: Any) -> str:
@@ -154,7 +147,7 @@ def _record_text(name: str, record: Any) -> str:
     values = []
     for field, value in record._asdict().items():
         if isinstance(value, bool | int | float):
-            kind = BOOL if isinstance(value, bool) else FLOAT
+            kind = BOOL if isinstance(value, bool) else REAL
             fields.append(f"    {kind.name} {field};")
             values.append(f"    .{field} = {number_text(value, kind)},")
     return "\n".join(["static const struct {", *fields, f"}} {name} = {{", *values, "};"])

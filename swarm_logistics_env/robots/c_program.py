@@ -13,6 +13,18 @@ from .c_parts import Parts
 from .c_statements import KernelWriter
 from .c_values import Function, Kind, Known, TupleOf, Value
 
+# What is a double in simulation, and a function of math.h or a number of that kind.
+_REALS = """\
+#ifdef SWARM_DOUBLE
+typedef double real;
+#define REAL(name) name
+#define REAL_BITS 53
+#else
+typedef float real;
+#define REAL(name) name##f
+#define REAL_BITS 24
+#endif"""
+
 
 class Program:
     """Collects kernels and what they call, each once.
@@ -55,8 +67,13 @@ class Program:
                 name += "_2"
             self._names.add(name)
             is_exact = kernel in self._exact
-            writer = KernelWriter(self._parts, self.function, kernel, name, is_exact)
-            written = writer.write(arguments)
+            wide: set[str] = set()
+            is_settled = False
+            while not is_settled:
+                n_wide = len(wide)
+                writer = KernelWriter(self._parts, self.function, kernel, name, is_exact, wide)
+                written = writer.write(arguments)
+                is_settled = len(wide) == n_wide
             self._note_tuples(written)
             self._functions[key] = written
         return self._functions[key]
@@ -73,4 +90,4 @@ class Program:
             for kind in sorted(self._tuples, key=lambda kind: kind.name)
         ]
         functions = [function.text for function in self._functions.values()]
-        return "\n\n".join([*constants, *structures, *definitions, *functions])
+        return "\n\n".join([_REALS, *constants, *structures, *definitions, *functions])

@@ -23,6 +23,7 @@ from .c_values import (
     DOUBLE,
     FLOAT,
     INT,
+    REAL,
     ArrayOf,
     Function,
     Kind,
@@ -32,6 +33,7 @@ from .c_values import (
     Value,
     constant,
     converted,
+    stored,
 )
 from .c_variables import homes_of
 
@@ -45,6 +47,8 @@ class KernelWriter(Expressions):
         function: the kernel in Python.
         name: of the function in C.
         is_exact: whether its numbers have to be of double precision.
+        wide: variables that begin with a float and are a real later, as they are from the first
+            on; those that are new come in, and then the function has to be written again.
     """
 
     def __init__(
@@ -53,11 +57,13 @@ class KernelWriter(Expressions):
         function_of: FunctionOf,
         function: Callable[..., Any],
         name: str,
-        is_exact: bool = False,
+        is_exact: bool,
+        wide: set[str],
     ) -> None:
-        real = DOUBLE if is_exact else FLOAT
+        real = DOUBLE if is_exact else REAL
         super().__init__(parts, function_of, function.__globals__, real)
         self._name = name
+        self._wide = wide
         self._file = f"{function.__module__}.{function.__name__}"
         source = textwrap.dedent(inspect.getsource(function))
         definition = ast.parse(source).body[0]
@@ -86,8 +92,8 @@ class KernelWriter(Expressions):
         for name, argument in zip(names, arguments, strict=True):
             self._variables[name] = argument
             if isinstance(argument, Value):
-                self._kinds[name] = argument.kind
-                self._variables[name] = Value(name, argument.kind, root=name)
+                self._kinds[name] = self._kind_of(name, argument.kind)
+                self._variables[name] = Value(name, self._kinds[name], root=name)
         body = self._definition.body
         description = ast.get_docstring(self._definition) or ""
         self._comments = {n: text for n, text in self._comments.items() if n >= body[0].lineno}
@@ -229,7 +235,7 @@ class KernelWriter(Expressions):
             return
         value = self.value_of(node)
         if self._returned is None:
-            self._returned = FLOAT if value.kind is DOUBLE else value.kind
+            self._returned = REAL if value.kind is DOUBLE else value.kind
         self._emit(f"return {converted(value, self._returned).text};")
 
     def _assign(self, target: ast.expr, node: ast.expr) -> None:
@@ -306,11 +312,21 @@ class KernelWriter(Expressions):
             for home in self._homes.get(name, ())
         )
         if is_declared or name not in self._kinds:
-            self._kinds[name] = value.kind
+            self._kinds[name] = self._kind_of(name, value.kind)
             self._variables[name] = Value(name, self._kinds[name])
-        text = converted(value, self._kinds[name]).text
+        text = self._as_kind_of(name, value).text
         self._used.add(name)
         self._emit(f"{declared(name, self._kinds[name]) if is_declared else name} = {text};")
+
+    def _kind_of(self, name: str, kind: Kind) -> Kind:
+        return REAL if kind is FLOAT and name in self._wide else kind
+
+    def _as_kind_of(self, name: str, value: Value) -> Value:
+        """Return a value as one of a variable's kind, which may have to be another one."""
+        if self._kinds[name] is FLOAT and value.kind is REAL:
+            self._wide.add(name)
+            return stored(value, FLOAT)
+        return converted(value, self._kinds[name])
 
     def _assign_item(self, target: ast.Subscript, value: Value) -> None:
         """Write to an element, or to all elements of a slice."""
@@ -318,12 +334,12 @@ class KernelWriter(Expressions):
         assert isinstance(item, Value)
         self._written.add(item.root)
         if isinstance(item.kind, ArrayOf):
-            text = converted(value, item.kind.element).text
+            text = stored(value, item.kind.element).text
             self._emit(f"for (int32_t n = 0; n < {item.kind.shape[0]}; n++) {{")
             self._emit(f"{INDENT}{item.within(ATOM)}[n] = {text};")
             self._emit("}")
             return
-        self._emit(f"{item.text} = {converted(value, item.kind).text};")
+        self._emit(f"{item.text} = {stored(value, item.kind).text};")
 
     def _change(self, statement: ast.AugAssign) -> None:
         """Write `a = a + b` for `a += b`: C would convert by other rules."""
@@ -339,9 +355,11 @@ class KernelWriter(Expressions):
             target = Value(f"{target.text}[0]", target.kind.element, root=target.root)
         if isinstance(statement.target, ast.Subscript):
             self._written.add(target.root)
-        changed = converted(self.operation(statement.op, target, value), target.kind)
-        sign = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*="}.get(type(statement.op))
-        if sign is not None:
-            self._emit(f"{target.text} {sign} {converted(value, target.kind).text};")
+        sign = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*="}.get(type(statement.op), "=")
+        if sign == "=":
+            value = self.operation(statement.op, target, value)
+        if target.text in self._kinds:
+            value = self._as_kind_of(target.text, value)
         else:
-            self._emit(f"{target.text} = {changed.text};")
+            value = stored(value, target.kind)
+        self._emit(f"{target.text} {sign} {value.text};")

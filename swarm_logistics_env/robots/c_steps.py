@@ -26,7 +26,7 @@ from swarm_logistics_env.world.scenario import Scenario
 
 from .c_expressions import python_function
 from .c_parts import table_text
-from .c_values import DOUBLE, FLOAT, INT, WORD, ArrayOf, Function, Known, Value
+from .c_values import DOUBLE, FLOAT, INT, REAL, WORD, ArrayOf, Function, Known, Value
 
 N_COMMANDS = 4  # forward, left, turn, gripper
 
@@ -38,10 +38,10 @@ static uint64_t mixed(uint64_t value) {
     return value ^ (value >> 31);
 }
 
-/* Return a number of a stream in [0, 1). It has 24 bits, as many as a float holds. */
-static float uniform(uint64_t key, int32_t counter) {
+/* Return a number of a stream in [0, 1), with as many bits as a real holds. */
+static real uniform(uint64_t key, int32_t counter) {
     const uint64_t bits = mixed(key + ((uint64_t)counter + 1u) * 0x9e3779b97f4a7c15u);
-    return (float)(bits >> 40) * 5.9604645e-08f;
+    return (real)(bits >> (64 - REAL_BITS)) / (real)((uint64_t)1 << REAL_BITS);
 }"""
 
 _LAYER = f"""\
@@ -89,15 +89,15 @@ class Step:
 
 
 _ROW = Value("row", ArrayOf(FLOAT, (1, row.N_COLUMNS)), root="row")
-_COMMAND = Value("command", ArrayOf(FLOAT, (1, N_COMMANDS)), root="command")
+_COMMAND = Value("driven", ArrayOf(REAL, (1, N_COMMANDS)), root="driven")
 # Of double precision: the time since it first saw a wall, in steps of 0.1 s, is else a thousandth
 # off after 100 s, and with it the direction that it remembers.
 MEMORY = Value("robot->memory", ArrayOf(DOUBLE, (1, N_COLUMNS)), root="memory")
 _OUTPUTS = Value("robot->outputs", ArrayOf(FLOAT, (1, len(OUTPUTS))), root="outputs")
 KEY = Value("&robot->key", ArrayOf(WORD, (1,)), root="key")
 _COUNT = Value("&robot->count", ArrayOf(INT, (1,)), root="count")
-_TURNED = Value("&robot->turned", ArrayOf(FLOAT, (1,)), root="turned")
-_HEADING = Value("&robot->heading", ArrayOf(FLOAT, (1,)), root="heading")
+_TURNED = Value("&robot->turned", ArrayOf(DOUBLE, (1,)), root="turned")
+_HEADING = Value("&robot->heading", ArrayOf(DOUBLE, (1,)), root="heading")
 
 
 def step_of(policy: Policy, scenario: Scenario) -> Step:
@@ -194,4 +194,4 @@ def _network_function(policy: LearnedPolicy) -> Function:
     return Function("run_network", None, parameters, frozenset({2}), text)
 
 
-UNIFORM = Function("uniform", FLOAT, ((0, WORD), (1, INT)), frozenset(), _UNIFORM_TEXT)
+UNIFORM = Function("uniform", REAL, ((0, WORD), (1, INT)), frozenset(), _UNIFORM_TEXT)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,8 +24,9 @@ class Scalar:
 BOOL = Scalar("bool", 0)
 INT = Scalar("int32_t", 1)
 WORD = Scalar("uint64_t", 2)
-FLOAT = Scalar("float", 3)
-DOUBLE = Scalar("double", 4)
+FLOAT = Scalar("float", 3)  # of a row or a network, in Python as well
+REAL = Scalar("real", 4)  # float, or else double, where Python has double
+DOUBLE = Scalar("double", 5)
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class TupleOf:
 
     @property
     def name(self) -> str:
-        words = {BOOL: "bools", INT: "ints", FLOAT: "floats", DOUBLE: "doubles"}
+        words = {BOOL: "bools", INT: "ints", FLOAT: "floats", REAL: "reals", DOUBLE: "doubles"}
         return f"{words[self.element]}{self.length}"
 
 
@@ -111,16 +112,20 @@ def number_text(number: Any, kind: Scalar) -> str:
         return str(int(number))
     if kind is WORD:
         return f"{int(number):#x}u"
-    digits = repr(float(number) if kind is DOUBLE else float(str(np.float32(number))))
+    digits = repr(float(str(np.float32(number))) if kind is FLOAT else float(number))
     digits = {"inf": "INFINITY", "-inf": "-INFINITY", "nan": "NAN"}.get(digits, digits)
-    return digits if kind is DOUBLE or digits.endswith(("Y", "N")) else f"{digits}f"
+    if kind is DOUBLE or digits.endswith(("Y", "N")):
+        return digits
+    if kind is FLOAT or float(np.float32(number)) == number:
+        return f"{digits}f"
+    return f"REAL({digits})"
 
 
 def constant(number: Any, kind: Scalar | None = None) -> Value:
     """Return a number or truth value."""
     if kind is None:
-        kind = BOOL if isinstance(number, bool | np.bool_) else FLOAT
-        kind = INT if isinstance(number, int | np.integer) and kind is FLOAT else kind
+        kind = BOOL if isinstance(number, bool | np.bool_) else REAL
+        kind = INT if isinstance(number, int | np.integer) and kind is REAL else kind
     text = number_text(number, kind)
     return Value(text, kind, UNARY if text.startswith("-") else ATOM, constant=number)
 
@@ -146,7 +151,25 @@ def converted(value: Value, kind: Kind) -> Value:
         return Value(text, kind, UNARY, constant=value.constant)
     if kind.rank < value.kind.rank:
         raise NoCError(f"{value.text}, of kind {value.kind.name}, as {kind.name}")
+    if value.kind is FLOAT and kind is REAL:  # C does so by itself
+        return replace(value, kind=REAL)
     return Value(f"({kind.name}){value.within(UNARY)}", kind, UNARY)
+
+
+def widened(value: Value) -> Value:
+    """Return a number as a real, with which C computes as with one."""
+    if value.kind is FLOAT and value.constant is None:
+        return Value(f"(real){value.within(UNARY)}", REAL, UNARY)
+    return converted(value, REAL)
+
+
+def stored(value: Value, kind: Kind) -> Value:
+    """Return a value as one of another kind, which may be a float with less digits."""
+    if kind is not FLOAT or value.kind is not REAL:
+        return converted(value, kind)
+    if value.constant is not None:
+        return constant(value.constant, FLOAT)
+    return Value(f"(float){value.within(UNARY)}", FLOAT, UNARY)
 
 
 def common_kind(*values: Value) -> Kind:

@@ -207,7 +207,7 @@ def append_trial(
     """Append a trial to a table that `judge` reads; trials of one seed are compared as pairs.
 
     Args:
-        path: of a CSV file, which need not be there.
+        path: of a CSV file, which may be empty or not be there.
         faults: none, or one.
         delivered: P of the trial: items, or any number from 0 on.
 
@@ -221,7 +221,7 @@ def append_trial(
     for fault in checked:
         n_faulty = fault.robots if isinstance(fault.robots, int) else len(fault.robots)
         cells = (fault.mode, n_faulty, fault.onset)
-    is_new = not Path(path).exists()
+    is_new = not Path(path).exists() or Path(path).stat().st_size == 0
     with Path(path).open("a", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         if is_new:

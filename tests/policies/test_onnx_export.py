@@ -19,9 +19,9 @@ from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy
 from swarm_logistics_env.world.motion import INPUTS, MotionView
 
 
-def session_of(policy: Any, path: Path) -> Any:
+def session_of(policy: Any, path: Path, robots: int | None = None) -> Any:
     onnxruntime = pytest.importorskip("onnxruntime")
-    write_onnx(policy, path)
+    write_onnx(policy, path, robots)
     return onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
 
 
@@ -56,7 +56,8 @@ def test_one_that_does_not_listen_ignores_timers(
     card: PolicyCard, tensors: dict[str, NDArray[np.float32]], tmp_path: Path
 ) -> None:
     deaf = card.replace(network=card.network.replace(listens=False))
-    session = session_of(LearnedPolicy(deaf, tensors), tmp_path / "p.onnx")
+    session = session_of(LearnedPolicy(deaf, tensors), tmp_path / "p.onnx", robots=5)
+    assert session.get_inputs()[0].shape == [5, len(INPUTS)]
     rng = np.random.default_rng(0)
     inputs = rng.normal(size=(5, len(INPUTS))).astype(np.float32)
     changed = inputs.copy()

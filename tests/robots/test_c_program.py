@@ -161,5 +161,5 @@ def test_what_is_fixed_is_no_argument_and_what_is_only_read_is_constant() -> Non
     assert [number for number, _ in function.parameters] == [0, 1]
     assert function.written == {0}
     assert "static void change(float *numbers, const float *others) {" in program.text()
-    assert "#define PERIOD 0.1f" in program.text()
+    assert "#define PERIOD REAL(0.1)" in program.text()
     assert program.function(change, arguments) is function

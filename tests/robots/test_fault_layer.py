@@ -118,6 +118,7 @@ def test_a_late_radio_sends_what_was_said_before_it_failed() -> None:
 
 def test_trials_of_robots_are_a_table_that_judge_reads(tmp_path: Path) -> None:
     path = tmp_path / "trials.csv"
+    path.touch()  # an empty file gets its head, too
     swarm = Scenario(n_robots=12)
     for seed, (sound, broken) in enumerate([(20, 15), (22, 16), (19, 12)]):
         append_trial(path, [], swarm, seed, sound)

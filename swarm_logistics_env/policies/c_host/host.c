@@ -4,7 +4,8 @@
  * requests until its input ends: what to do, for how many robots, and the seed.
  *
  * To reset: it answers with the robots. To step: robots and rows follow; it answers with the robots
- * and their commands. To time: the same follow; it answers with the seconds that the steps took.
+ * and their commands. To time: the same follow; it answers with the seconds of each robot's step,
+ * the least of some, as the machine interrupts others.
  * All numbers are as this machine has them.
  */
 #include <stdint.h>
@@ -33,6 +34,8 @@ void host_reset(void *robot, uint64_t seed, uint32_t number);
 void host_step(void *robot, const float *row, float *command);
 
 #define LONGEST 60 /* [s] that an answer may take: a controller that never ends is ended */
+
+#define N_TIMES 5 /* that a step is timed */
 
 enum { RESET, STEP, TIME };
 
@@ -66,27 +69,46 @@ static void read_into(void *room, size_t count, size_t size) {
     }
 }
 
+static double seconds_of_step(const void *robot, const float *row, float *command, void *copy) {
+    double least = 0.0;
+    for (int time = 0; time < N_TIMES; time++) {
+        struct timespec start, end;
+        memcpy(copy, robot, host_robot_size());
+        timespec_get(&start, TIME_UTC);
+        host_step(copy, row, command);
+        timespec_get(&end, TIME_UTC);
+        const double nanoseconds = (double)(end.tv_nsec - start.tv_nsec);
+        const double seconds = difftime(end.tv_sec, start.tv_sec) + 1e-9 * nanoseconds;
+        least = time == 0 || seconds < least ? seconds : least;
+    }
+    return least;
+}
+
 static void answer(FILE *answers, const request_of_host *request) {
     const size_t n = request->n_robots;
     char *robots = room_for(n, host_robot_size());
     float *rows = room_for(n, host_row() * sizeof(float));
     float *commands = room_for(n, host_command() * sizeof(float));
+    double *seconds = room_for(n, sizeof(double));
+    char *copy = room_for(1, host_robot_size());
     if (request->what != RESET) {
         read_into(robots, n, host_robot_size());
         read_into(rows, n, host_row() * sizeof(float));
     }
-    const clock_t start = clock();
     for (size_t number = 0; number < n; number++) {
         void *robot = robots + number * host_robot_size();
+        const float *row = rows + number * host_row();
+        float *command = commands + number * host_command();
         if (request->what == RESET) {
             host_reset(robot, request->seed, (uint32_t)number);
+        } else if (request->what == STEP) {
+            host_step(robot, row, command);
         } else {
-            host_step(robot, rows + number * host_row(), commands + number * host_command());
+            seconds[number] = seconds_of_step(robot, row, command, copy);
         }
     }
     if (request->what == TIME) {
-        const double seconds = (double)(clock() - start) / (double)CLOCKS_PER_SEC;
-        fwrite(&seconds, sizeof seconds, 1, answers);
+        fwrite(seconds, sizeof(double), n, answers);
     } else {
         fwrite(robots, host_robot_size(), n, answers);
     }
@@ -94,6 +116,8 @@ static void answer(FILE *answers, const request_of_host *request) {
         fwrite(commands, host_command() * sizeof(float), n, answers);
     }
     fflush(answers);
+    free(copy);
+    free(seconds);
     free(commands);
     free(rows);
     free(robots);
