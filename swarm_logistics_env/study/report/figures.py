@@ -30,37 +30,36 @@ _COLUMNS = [
 ]  # fmt: skip
 
 
-def forest_points(results: StudyResults, answer: Answer) -> tuple[tuple[Point, ...], ...]:
-    """Return the values of each line of the answer; `published` is the threshold of each."""
+def forest_points(results: StudyResults, answer: Answer) -> tuple[Point, ...]:
+    """Return the value of each line of the answer; `published` is the threshold of each."""
     return tuple(
-        tuple(_point(results, verdict, "", verdict.compared.threshold) for verdict in line.verdicts)
-        for line in answer.lines
+        _point(results, line.verdict, "", line.verdict.compared.threshold) for line in answer.lines
     )
 
 
 def forest_label(answer: Answer) -> str:
     """Return the label of the values' axis, e.g. "R, FT: value"."""
-    return f"{', '.join(dict.fromkeys(line.indicator for line in answer.lines))}: value"
+    symbols = dict.fromkeys(line.verdict.compared.indicator for line in answer.lines)
+    return f"{', '.join(symbols)}: value"
 
 
-def forest_figure(
-    results: StudyResults, answer: Answer, points_by_line: Sequence[Sequence[Point]]
-) -> Figure:
-    """Return the lines of the answer as a forest of intervals."""
-    rows = list(zip(answer.questions, points_by_line))
-    verdicts = answer.verdicts
-    n_most = max(len(points) for _, points in rows)
-    order = ""
-    if n_most > 1:
-        order = " Marks in one row stand from top to bottom in the order of its label."
-    # Where there are several, each row names its own.
-    title = results.policies[0] if len(results.policies) == 1 else ""
+def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]) -> Figure:
+    """Return the lines of the answer as a forest of intervals, a group for each policy and task."""
+    rows: list[tuple[str, Point | None]] = []
+    groups = answer.lines_by_subject
+    for line, point in zip(answer.lines, points):
+        if len(groups) > 1 and line is groups[line.subject][0]:
+            rows.append((line.subject, None))
+        rows.append((line.question, point))
+    verdicts = [line.verdict for line in answer.lines]
+    # Where there are several, each group has its own.
+    title = results.policies[0] if len(groups) == 1 else ""
     return Figure(
         "answer",
-        f"{answer.scope} Every question with its interval. {_marks(verdicts)}.{order}"
+        f"{answer.scope} Every question with its interval. {_marks(verdicts)}."
         f"{_note_on_caps(verdicts)}",
         _rows(results, verdicts),
-        1.1 + (0.21 + 0.05 * min(n_most, 4)) * len(rows),
+        1.1 + 0.23 * len(rows),
         partial(drawing.forest, rows=rows, x_label=forest_label(answer), title=title),
     )
 

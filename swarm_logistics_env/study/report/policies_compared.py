@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from more_itertools import map_reduce
 
@@ -14,11 +14,11 @@ from swarm_logistics_env.study.verdicts.verdict import Verdict
 from . import section, templates
 
 
-def between_policies(results: StudyResults) -> list[Verdict]:
+def between_policies(verdicts: Iterable[Verdict]) -> list[Verdict]:
     """Return the verdicts on P of a policy and of the first one; a claimed ablation is none."""
     return [
         verdict
-        for verdict in results.verdicts
+        for verdict in verdicts
         if verdict.compared.definition.compares == "policy" and verdict.compared.claim is None
     ]
 
@@ -29,7 +29,7 @@ def comparison_in_words(results: StudyResults) -> str:
     Where it is smaller, the other one stands first. Empty: the study does not compare them.
     """
     by_policy: dict[str, list[Verdict]] = map_reduce(
-        between_policies(results), lambda verdict: verdict.compared.policy
+        between_policies(results.verdicts), lambda verdict: verdict.compared.policy
     )
     base = results.plan.specification.scenario
     return " ".join(_sentence(verdicts, base) for verdicts in by_policy.values())
