@@ -217,6 +217,7 @@ class Study:
                     end,
                     has_worked=bool(n_before),
                     more=next_runs if self.specification.until_clear else None,
+                    n_most=self._n_most if self.specification.until_clear else None,
                 )
         failed = [error for error in errors if error is not None]
         is_late = end is not None and time.monotonic() > end
@@ -271,6 +272,10 @@ class Study:
         if self._look is None or self._look[0] != errors:
             self._look = errors, latest_look(self.plan(), outcomes, self._judged)
         return self._look[1]
+
+    def _n_most(self) -> int:
+        """Return how many runs are left at most after the latest look at the outcomes."""
+        return 0 if self._look is None else self._look[1].n_most
 
     def _results(self, store: Runs) -> StudyResults:
         """Return what the stored runs say."""

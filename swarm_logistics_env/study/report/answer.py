@@ -24,7 +24,7 @@ from swarm_logistics_env.study.verdicts.verdict import (
 
 from . import section, templates
 from .answer_notes import notes
-from .policies_compared import between_policies, comparison_in_words
+from .policies_compared import between_policies, comparison_in_words, comparison_table
 from .section import Section
 from .templates import Slots, fill
 
@@ -90,27 +90,33 @@ class Answer(NamedTuple):
     """What a study found.
 
     Attributes:
-        comparison: by which factor P of policies differs; empty: they are not compared.
+        comparison: by which factor P of two policies differs; empty: they are not compared.
+        compared: the same of more than two, a row each; None: they are not compared.
         scope: how much was asked, of which policies, and over which seeds.
         subjects: what was found of each policy and task.
         lines: the questions.
         notes: what the words of the verdicts mean, and what is still open.
+        seeds: over which everything is.
     """
 
     comparison: str
+    compared: Section | None
     scope: str
     subjects: tuple[SubjectAnswer, ...]
     lines: tuple[Line, ...]
     notes: str
+    seeds: str
 
     @property
     def head(self) -> list[str]:
         """The answer in a few sentences: what is compared, P, and each indicator."""
         sentences = [self.comparison] if self.comparison else []
-        if len(self.subjects) != 1:
+        is_only = len(self.subjects) == 1
+        if not is_only:
             sentences.append(self.scope)
+        seeds = f"; {self.seeds}" if is_only else ""
         for subject in self.subjects:
-            sentences += [f"{subject.name}: {subject.performance}.", *subject.sentences]
+            sentences += [f"{subject.name}: {subject.performance}{seeds}.", *subject.sentences]
         return sentences
 
     @property
@@ -154,21 +160,24 @@ def answer(results: StudyResults) -> Answer:
     """Return what a study found."""
     lines = list(_lines(results))
     engine = _unusual_engine(results)
-    seeds = results.seeds_text
     subjects = []
     for name, cell in _sound_cells(results).items():
         of_subject = [line for line in lines if line.subject == name]
         subjects.append(
             SubjectAnswer(name, _performance(results, cell) + engine, tuple(_sentences(of_subject)))
         )
-    if len(subjects) == 1:
-        (only,) = subjects
-        subjects = [only._replace(performance=f"{only.performance}; {seeds}")]
     if not subjects:
         policies = section.join_names(results.policies)
         subjects = [SubjectAnswer(policies, templates.PERFORMANCE["nothing"], ())]
-    comparison = comparison_in_words(results)
-    return Answer(comparison, _scope(results), tuple(subjects), tuple(lines), notes(results))
+    return Answer(
+        comparison_in_words(results),
+        comparison_table(results),
+        _scope(results),
+        tuple(subjects),
+        tuple(lines),
+        notes(results),
+        results.seeds_text,
+    )
 
 
 def subject_of(case: Case, policy: str) -> str:

@@ -12,7 +12,13 @@ from .answer import Answer, answer
 from .answer_notes import warnings
 from .drawing import Point
 from .fault_sections import fault_sections
-from .figures import forest_figure, forest_points, indicator_figures, trade_off_figure
+from .figures import (
+    forest_figure,
+    forest_points,
+    indicator_figures,
+    policies_figure,
+    trade_off_figure,
+)
 from .for_a_paper import PaperTables, paper_tables
 from .section import Figure, Section, join_names
 from .sentences import sentence, verdict_sections
@@ -89,7 +95,11 @@ def document(results: StudyResults) -> Document:
     in_words = tuple(verdict_sections(results.verdicts, sentences))
     trade_offs = tuple(trade_off_figure(results))
     points = forest_points(results, study_answer)
-    figures = forest_figure(results, study_answer, points), *indicator_figures(results)
+    figures = (
+        *policies_figure(results),
+        forest_figure(results, study_answer, points),
+        *indicator_figures(results),
+    )
     measures = tuple(resiliences(results))
     of_faults = tuple(fault_sections(measures, results.seeds_text))
     cell_sections = tuple(cell_tables(results))

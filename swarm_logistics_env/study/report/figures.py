@@ -19,6 +19,7 @@ from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 from . import drawing
 from .answer import Answer
 from .drawing import Panel, Point
+from .policies_compared import between_policies, condition_of
 from .section import P_LEVEL, Figure, join_names, levels, slug
 
 if TYPE_CHECKING:
@@ -61,6 +62,55 @@ def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]
         _rows(results, verdicts),
         1.1 + 0.23 * len(rows),
         partial(drawing.forest, rows=rows, x_label=forest_label(answer), title=title),
+    )
+
+
+def policies_figure(results: StudyResults) -> Iterator[Figure]:
+    """Yield P of policies that are compared, in every condition; a panel for each task."""
+    import pandas as pd
+
+    compared = between_policies(results.verdicts)
+    if not compared:
+        return
+    keys = list(dict.fromkeys(arm.case.key for _, _, arm in results.plan.cells))
+    policies = list(dict.fromkeys([compared[0].after.name, *(v.compared.policy for v in compared)]))
+    points: dict[str, dict[str, Point]] = {}  # each condition of a policy once, by the task
+    for verdict in compared:
+        task = condition_of(verdict).removesuffix(verdict.after.condition).strip()
+        cells = results.cells_of(verdict.compared)
+        for arm in (verdict.compared.changed, verdict.compared.original):
+            policy = arm.case.policy.title
+            points.setdefault(task, {})[arm.case.key] = Point(
+                policy,
+                policies.index(policy),
+                verdict.after.condition,
+                *cells[arm].mean,
+                decided=True,
+                saturated=cells[arm].saturated,
+                link=f"condition-{keys.index(arm.case.key)}",
+            )
+    panels = tuple(
+        Panel(
+            task, f"performance {results.plan.name_of_p}", tuple(of_task.values()), (), "condition"
+        )
+        for task, of_task in points.items()
+    )
+    rows = [
+        (panel.title, point.series, point.category, point.value, point.low, point.high, CONFIDENCE)
+        for panel in panels
+        for point in panel.points
+    ]
+    columns = ["task", "policy", "condition", "mean", "low", "high", "confidence"]
+    yield Figure(
+        "policies",
+        f"P of {join_names(policies)} where they are compared: means, bars: {P_LEVEL} intervals. "
+        f"{results.seeds_text.capitalize()}.",
+        pd.DataFrame(rows, columns=columns),
+        0.5 + 2.7 * len(panels),
+        partial(drawing.intervals, panels=panels),
+        title=f"P of {join_names(policies)}",
+        panels=panels,
+        level=P_LEVEL,
     )
 
 

@@ -32,8 +32,10 @@ class Findings(StudyResults):
         return f"{title}\n{terminal_answer(self._answer)}"
 
     def _repr_html_(self) -> str:
-        sentences = [f"<p>{escape(sentence)}</p>" for sentence in self._answer.head]
-        return "".join(sentences) + html_table(self._answer.section)
+        compared = self._answer.compared
+        parts = [html_table(compared)] if compared else []
+        parts += [f"<p>{escape(sentence)}</p>" for sentence in self._answer.head]
+        return "".join([*parts, html_table(self._answer.section)])
 
 
 def html_table(section: Section) -> str:

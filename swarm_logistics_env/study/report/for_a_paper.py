@@ -90,7 +90,7 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
             "how": _preset_and_engine(results.plan),
             "seeds": results.seeds_text,
         },
-        "subjects": {"sentences": _subjects(results, answer)},
+        "subjects": {"sentences": _subjects(answer)},
         "method": {"error": section.percent(1.0 - CONFIDENCE)},
         "end": {},
     }
@@ -107,15 +107,12 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
     return "".join(fill(templates.FOR_A_PAPER, slots))
 
 
-def _subjects(results: StudyResults, answer: Answer) -> str:
+def _subjects(answer: Answer) -> str:
     """Return P and indicators of each policy and task, each in a sentence that names it."""
     sentences = []
     for subject in answer.subjects:
-        performance = subject.performance.removesuffix(f"; {results.seeds_text}")
-        clauses = [
-            performance,
-            *(clause[:1].lower() + clause[1:-1] for clause in subject.sentences),
-        ]
+        clauses = [subject.performance]
+        clauses += [f"{clause[0].lower()}{clause[1:-1]}" for clause in subject.sentences]
         sentences.append(f"{subject.name}: {'; '.join(clauses)}")
     return ". ".join(sentences)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
 from .answer import Answer
@@ -18,35 +18,39 @@ def terminal_answer(answer: Answer, width: int = PLAIN_WIDTH, *, shortens: bool 
         width: of the terminal [characters].
         shortens: whether questions are shortened so that no row is wider.
     """
-    head = [line for text in answer.head for line in _fold(text, width)]
-    return "\n".join(
-        [*head, *_rows(answer, width if shortens else None), *_fold(answer.notes, width)]
-    )
+    parts = [line for text in answer.head for line in _fold(text, width)]
+    widest = width if shortens else None
+    if answer.compared is not None:
+        parts = [*_in_columns([answer.compared.columns, *answer.compared.rows], widest), *parts]
+    cells = [("", *answer.columns[1:]), *(answer.row(line, line.question) for line in answer.lines)]
+    heading, *rows = _in_columns(cells, widest, right=1)
+    parts.append(heading)
+    groups = answer.lines_by_subject
+    for line, row in zip(answer.lines, rows):
+        if len(groups) > 1 and line is groups[line.subject][0]:
+            parts.append(f"{line.subject}:")
+        parts.append(row)
+    return "\n".join([*parts, *_fold(answer.notes, width)])
 
 
-def _rows(answer: Answer, width: int | None) -> Iterator[str]:
-    """Yield the lines in columns, below their headings; those on each policy and task together."""
-    columns = [
-        answer.columns,
-        *map(answer.row, answer.lines, [line.question for line in answer.lines]),
-    ]
-    question_width, *widths = [max(map(len, column)) for column in zip(*columns)]
+def _in_columns(
+    rows: Sequence[tuple[str, ...]], width: int | None, right: int | None = None
+) -> Iterator[str]:
+    """Yield rows in columns, no wider than `width` if the first column can be shortened so far.
+
+    Args:
+        right: the index of a column that is flush right; None: none is.
+    """
+    first_width, *widths = [max(map(len, column)) for column in zip(*rows)]
     if width is not None:
         rest = sum(widths) + 2 * len(widths)
-        question_width = max(_SHORTEST, min(question_width, width - rest))
-
-    def row(cells: tuple[str, ...]) -> str:
-        question, value, *others = cells
-        padded = [f"{cell:{width}}" for cell, width in zip(others, widths[1:])]
-        left = f"{_shortened(question, question_width):{question_width}}"
-        return "  ".join([left, f"{value:>{widths[0]}}", *padded]).rstrip()
-
-    yield row(("", *answer.columns[1:]))
-    groups = answer.lines_by_subject
-    for subject, lines in groups.items():
-        if len(groups) > 1:
-            yield f"{subject}:"
-        yield from (row(answer.row(line, line.question)) for line in lines)
+        first_width = max(_SHORTEST, min(first_width, width - rest))
+    for first, *others in rows:
+        padded = [
+            f"{cell:>{w}}" if index == right else f"{cell:{w}}"
+            for index, (cell, w) in enumerate(zip(others, widths), start=1)
+        ]
+        yield "  ".join([f"{_shortened(first, first_width):{first_width}}", *padded]).rstrip()
 
 
 def _shortened(text: str, width: int) -> str:

@@ -74,7 +74,7 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     assert (doubled.p_adjusted, doubled.stopped_at) == (None, 10)
     assert (half.conclusion, half.p_adjusted is None) == ("supported", False)
     study_answer = answer(study.findings())
-    assert study_answer.lines[0].verdict_text == "untestable: it cannot be below 0"
+    assert study_answer.lines[0].verdict.in_words == "untestable, never < 0"
     assert "untestable where it cannot lie below the threshold" in study_answer.notes
     text = sentence(study.findings(), doubled).text
     assert "it cannot lie below the threshold, so it is not tested" in text

@@ -10,9 +10,13 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from swarm_logistics_env.core.progress_bar import clock
 from swarm_logistics_env.study.report.answer import answer
+from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.verdicts.results import judge
 from swarm_logistics_env.views.cli import terminal
-from tests.made_up import looked_at, paper
+from swarm_logistics_env.views.cli.terminal import what_the_rest_takes
+from tests.made_up import delivered, looked_at, paper
 
 
 def console_of(width: int | None) -> Callable[..., Console]:
@@ -47,3 +51,22 @@ def test_terminal_pipe_and_file_have_the_same_content_and_no_row_is_folded(
             # A narrow terminal has room for the ends of a question alone.
             question = line.question if width in (120, None) else line.question.partition(" ")[0]
             assert any(row.startswith(question) for row in shown), line
+
+
+def test_how_long_the_rest_takes_is_told_and_of_a_slow_policy_what_fewer_seeds_would_tell() -> None:
+    study = Study(seeds=60, until_clear=True, faults=[{"modes": ["FM1"], "robots": [1, 2]}])
+    plan = study.plan()
+    runs = [run for run in plan.runs if not run.case.faults and run.seed < 10]
+    outcomes = {(run.case.key, run.seed): delivered(40 + 4 * (run.seed % 3)) for run in runs}
+    results = judge(plan, outcomes)
+    n_left = 10 * (len(plan.cases) - 1), 60 * len(plan.cases) - 10
+    fast = what_the_rest_takes(results, 0.1)
+    first, most = (clock(0.1 * n) for n in n_left)
+    assert fast.startswith(f"The first look comes in {first}, the whole takes at most {most} ")
+    slow = what_the_rest_takes(results, 4.0)
+    first, most = (clock(4.0 * n) for n in n_left)
+    assert slow.startswith(f"The first look comes in {first}, the whole takes at most {most} ")
+    assert "A run takes 4.0 s: --seeds 10 ends after the first look and tells effects of" in slow
+    effects = [float(number) for number in re.findall(r"about (\d\.\d\d)", slow)]
+    assert effects[0] == pytest.approx(effects[1] * 6**0.5, abs=0.02)
+    assert "--seeds" not in fast
