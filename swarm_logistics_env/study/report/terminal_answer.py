@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
 from .answer import Answer
 
 PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
+_NO_BREAK = "\N{NO-BREAK SPACE}"
 _SHORTEST = 8  # letters of a question
 
 
@@ -64,5 +66,8 @@ def _shortened(text: str, width: int) -> str:
 
 
 def _fold(text: str, width: int) -> list[str]:
+    # No line ends within "N = 25", "< 10 %" or "95 %".
+    unbroken = re.sub(r"(?<=[Nmn=<]) (?=[=<\d])| (?=%)", _NO_BREAK, text)
     # Paths and names are longer than a line sometimes: they are broken, never cut.
-    return wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)
+    folded = wrap(unbroken, width, subsequent_indent="  ", break_on_hyphens=False)
+    return [line.replace(_NO_BREAK, " ") for line in folded]
