@@ -113,7 +113,7 @@ MORE_SEEDS = {
     "within_reach": "{count} open may be decided by {n_seeds} {runs} or more",
     "beyond": "{count} open by more than {reach} {runs} alone ({named})",
     "none": "{count} open by no number in reach ({named})",
-    "small": "{count} open have an effect below {effect:g}, for which more are not worth while",
+    "small": "{count} open of an effect below {effect:g}, for which more are not worth while",
 }
 
 EXPLORATORY = "exploratory: over other seeds or P than were declared before the first run"
