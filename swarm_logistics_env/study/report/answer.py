@@ -11,9 +11,9 @@ from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.runs.recorded import RecordedScenario
 from swarm_logistics_env.study.tasks.task import Case
 from swarm_logistics_env.study.tasks.task_world import counted_in, world_of
+from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import (

@@ -240,13 +240,14 @@ def _dots(axes: Axes, x: float, reach: float, point: Point) -> None:
         )
 
 
-def _mark(axes: Axes, at: float, point: Point, marker: str = "") -> None:
+def _mark(axes: Axes, at: float, point: Point, marker: str = "", shrink: float = 1.0) -> None:
     """Draw a value, if there is one, with its interval: upright, or level with a marker named."""
     value = point.value
     low = point.low
     high = point.high
     if value is None:
         return
+    sizes = _matplotlib().rcParams
     colour = COLOURS[point.style % len(COLOURS)]
     error = None
     if low is not None and high is not None:
@@ -260,6 +261,8 @@ def _mark(axes: Axes, at: float, point: Point, marker: str = "") -> None:
         fmt=marker or marker_of(point.style),
         color=colour,
         markerfacecolor=colour if point.decided else PAPER,
+        markersize=sizes["lines.markersize"] * shrink,
+        capsize=sizes["errorbar.capsize"] * shrink,
         label=point.series,
     )
     for artist in (line, *caps, *bars):
@@ -267,20 +270,22 @@ def _mark(axes: Axes, at: float, point: Point, marker: str = "") -> None:
 
 
 def forest(
-    canvas: Canvas, rows: Sequence[tuple[str, Point | None]], x_label: str, title: str = ""
+    canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]], x_label: str, title: str = ""
 ) -> None:
-    """Draw a row for each question: its value with its interval, from top to bottom.
+    """Draw a row for each question: its values with their intervals, from top to bottom.
 
     Args:
         canvas: to draw on.
-        rows: the label of each, and its point, whose `published` is its threshold; None: a heading.
+        rows: the label of each, and its points; a point's `published` is its threshold. None:
+            the label is a heading.
         x_label: of the axis of the values.
         title: above the axes.
     """
     axes = canvas.subplots()
-    for row, (_, point) in enumerate(rows):
-        if point is not None:
-            _mark(axes, row, point, MARKERS[0])
+    for row, (_, points) in enumerate(rows):
+        for index, point in enumerate(points):
+            height = row + 0.6 * ((index + 0.5) / len(points) - 0.5)
+            _mark(axes, height, point, MARKERS[index % len(MARKERS)], min(1.0, 4.0 / len(points)))
             if point.published:
                 axes.vlines(point.published, row - 0.4, row + 0.4, color=INK, linewidth=0.8)
     axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
@@ -288,7 +293,7 @@ def forest(
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
     axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel=x_label, title=title)
-    axes.set_xlim(limits([point for _, point in rows if point is not None]))
+    axes.set_xlim(limits([point for _, points in rows for point in points]))
 
 
 def trade_off(canvas: Canvas, panels: Mapping[str, Sequence[tuple[Point, Interval]]]) -> None:

@@ -46,12 +46,12 @@ def forest_label(answer: Answer) -> str:
 
 def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]) -> Figure:
     """Return the lines of the answer as a forest of intervals, a group for each policy and task."""
-    rows: list[tuple[str, Point | None]] = []
+    rows: list[tuple[str, list[Point]]] = []
     groups = answer.lines_by_subject
     for line, point in zip(answer.lines, points):
         if len(groups) > 1 and line is groups[line.subject][0]:
-            rows.append((line.subject, None))
-        rows.append((line.question, point))
+            rows.append((line.subject, []))
+        rows.append((line.question, [point]))
     verdicts = [line.verdict for line in answer.lines]
     # Where there are several, each group has its own.
     title = results.policies[0] if len(groups) == 1 else ""

@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.study.runs.recorded import RecordedScenario
+from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 

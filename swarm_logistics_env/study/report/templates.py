@@ -111,8 +111,8 @@ MEANINGS = {
 # How many more seeds open questions need: the cases that apply, one after the other.
 MORE_SEEDS = {
     "within_reach": "{count} open may be decided by {n_seeds} {runs} or more",
-    "beyond": "{count} open by more than {reach} {runs} alone ({named})",
-    "none": "{count} open by no number in reach ({named})",
+    "beyond": "{count} open need more than {reach} {runs} ({named})",
+    "none": "{count} open: no number in reach will do ({named})",
     "small": "{count} open of an effect below {effect:g}, for which more are not worth while",
 }
 
