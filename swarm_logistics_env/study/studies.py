@@ -172,8 +172,7 @@ class Study:
             address: the address of the Ray cluster; None starts one on this machine.
             shard: the part to play, if other machines play the others; None means all.
             minutes: begin no further run after this time; the same call goes on. None: no end.
-            run_limit: wall-clock time after which a worker process ends a run, which has failed
-                then [s]; None: an hour.
+            run_limit: wall-clock time after which a worker process fails a run [s]; None: an hour.
             after_look: called with the results so far when all runs of a look are played, and
                 before, when P of the condition that most comparisons share has the seeds of the
                 first look; in a study that runs until it is clear.
