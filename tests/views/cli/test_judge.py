@@ -244,7 +244,7 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     cells = study.performance()
     p = cells[cells["factor"] == "none"]["mean"].iloc[0]
     world = "in a warehouse of 3 m x 3 m with 6 items that come back, robots of 2 m/s"
-    assert f"For a paper: homing {world} (preset " in printed
+    assert f"For a paper: homing {world} (engine chipmunk), 5 paired seeds (" in printed
     assert f"homing: P [95 %] = {p:.1f} [" in printed
     needs = more_seeds(study.findings())
     new_seeds = study.plan().seeds[-1] + 1
@@ -275,7 +275,7 @@ def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
 def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(command: Command) -> None:
     words = "--processes 1 --seeds 3 --out card"
     printed = command(f"judge judged_policy:Failing {words}", code=1)
-    assert "P: no run has succeeded." in printed
+    assert "P: no run has succeeded; 3 paired seeds" in " ".join(printed.split())
     *_, played, stopped = printed.splitlines()
     # Of 12: each of the four conditions at the first seed, and one of them at the next.
     assert "5 failed, the first with RuntimeError: no more" in played
