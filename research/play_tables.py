@@ -88,7 +88,7 @@ def robust_block(results: StudyResults) -> str:
         row = [label, section.mean_p(cell), contacts_text(cell)]
         for symbol in ("R", "FT"):
             test = by_symbol[symbol]
-            row.append(f"{section.ratio(test)}, {section.conclusion_text(test)}")
+            row.append(f"{section.ratio(test)}, {test.in_words}")
             answer = test.on_property.adjusted
             by_answer.setdefault(answer, []).append(f"{symbol} under {label}")
         rows.append(row)

@@ -19,7 +19,7 @@ from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 def with_verdict(test: Verdict) -> str:
     """Return an indicator with its interval and its verdict."""
-    return f"{section.ratio(test)} {section.conclusion_text(test)}"
+    return f"{section.ratio(test)} {test.in_words}"
 
 
 def _seeds(results: StudyResults) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -98,3 +98,18 @@ def paper(
         return delivered(max(0, count), all_delivered=setting == full and seed == 0, digest=digest)
 
     return judged(Study.preset("paper", seeds=seeds, **fields), play)
+
+
+MEANS = {"FM2": 38.5, "FM3": 32.5, "FM4": 15.0}  # of 40 items
+
+
+def looked_at(modes: Iterable[str] = MEANS) -> StudyResults:
+    """A study whose comparisons stop at looks of other levels than 95 %."""
+    faults = [{"modes": [*modes], "robots": [1]}]
+    study = Study(seeds=60, until_clear=True, faults=faults, indicators=["R"])
+
+    def play(_: str, setting: Setting, seed: int) -> Outcome:
+        draw = np.random.default_rng([seed, *map(ord, setting.name)])
+        return delivered(draw.poisson(MEANS.get(setting.name, 40.0)), digest=f"{setting} {seed}")
+
+    return judged(study, play)

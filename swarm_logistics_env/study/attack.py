@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from swarm_logistics_env.core.errors import SetupError, StudyError, suggest
+from swarm_logistics_env.core.progress_bar import ProgressBar
 from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.spi import Estimate, robustness
@@ -235,12 +236,18 @@ def attack(settings: Attack, engine: Engine, out: Path) -> AttackResult:
     faults = settings.faults()
     policy = PolicySpec.of(settings.policy)
     base = Case(policy, policy.identity(), settings.scenario, task=WAREHOUSE)
-    with Runs(out / STORE) as store:
+    n_named = len(settings.modes) * _NAMED_SEEDS
+    # Without a fault at most as many as with one; the estimates are of three conditions.
+    n_runs = 2 * settings.budget + n_named + 3 * settings.fresh
+    with (
+        Runs(out / STORE) as store,
+        ProgressBar("attack", n_runs, "runs at most", done=len(store.succeeded())) as progress,
+    ):
         if damage := store.discard_damaged():
             warnings.warn(f"{damage}: what is asked is played again", stacklevel=2)
 
         def count_deliveries(pairs: Sequence[tuple[Fault | None, int]]) -> Matrix:
-            outcomes = _outcomes(base, engine, store, pairs)
+            outcomes = _outcomes(base, engine, store, pairs, progress)
             return np.array([outcome.delivered for outcome in outcomes], np.float64)
 
         def play(pairs: Sequence[tuple[int, int]]) -> Sequence[float]:
@@ -264,7 +271,7 @@ def attack(settings: Attack, engine: Engine, out: Path) -> AttackResult:
         # Seeds that neither the search can have met, nor the choice among the named modes.
         first = max(settings.budget, _NAMED_SEEDS)
         fresh = range(first, first + settings.fresh)
-        outcomes = iter(_outcomes(base, engine, store, [*product(conditions, fresh)]))
+        outcomes = iter(_outcomes(base, engine, store, [*product(conditions, fresh)], progress))
         arm = Arm(NO_FAULT, base)
         without_fault, with_worst, with_named = [
             Cell.of("", "", arm, [*islice(outcomes, len(fresh))]) for _ in conditions
@@ -290,7 +297,11 @@ def _robustness(settings: Attack, sound: Cell, failed: Cell) -> Estimate:
 
 
 def _outcomes(
-    base: Case, engine: Engine, store: Runs, pairs: Sequence[tuple[Fault | None, int]]
+    base: Case,
+    engine: Engine,
+    store: Runs,
+    pairs: Sequence[tuple[Fault | None, int]],
+    progress: ProgressBar,
 ) -> list[Outcome]:
     """Return the outcomes of faults (None: without one) at seeds; play what is not in the store."""
     code = WAREHOUSE.code()
@@ -300,8 +311,9 @@ def _outcomes(
     ]
     finished = store.succeeded()
     missing = {run.key: run for run in runs if run.key not in finished}
-    for run, outcome in engine(missing.values()):
+    for n_played, (run, outcome) in enumerate(engine(missing.values()), start=1):
         store.add([(run, outcome)])
+        progress.reach(len(finished) + n_played)
         if outcome.error is not None:
             raise StudyError(f"a run failed: {outcome.error.strip().splitlines()[-1]}")
     outcomes = store.outcomes(runs)

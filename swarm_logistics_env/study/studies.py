@@ -172,8 +172,7 @@ class Study:
             address: the address of the Ray cluster; None starts one on this machine.
             shard: the part to play, if other machines play the others; None means all.
             minutes: begin no further run after this time; the same call goes on. None: no end.
-            run_limit: wall-clock time after which a worker process ends a run, which has failed
-                then [s]; None: an hour.
+            run_limit: wall-clock time after which a worker process fails a run [s]; None: an hour.
             after_look: called with the results so far when all runs of a look are played, and
                 before, when P of the condition that most comparisons share has the seeds of the
                 first look; in a study that runs until it is clear.
@@ -217,6 +216,7 @@ class Study:
                     end,
                     has_worked=bool(n_before),
                     more=next_runs if self.specification.until_clear else None,
+                    n_most=self._n_most if self.specification.until_clear else None,
                 )
         failed = [error for error in errors if error is not None]
         is_late = end is not None and time.monotonic() > end
@@ -271,6 +271,10 @@ class Study:
         if self._look is None or self._look[0] != errors:
             self._look = errors, latest_look(self.plan(), outcomes, self._judged)
         return self._look[1]
+
+    def _n_most(self) -> int:
+        """Return how many runs are left at most after the latest look at the outcomes."""
+        return 0 if self._look is None else self._look[1].n_most
 
     def _results(self, store: Runs) -> StudyResults:
         """Return what the stored runs say."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Generator, Iterable, Sequence
 from itertools import islice, product
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Fault, Scenario
+from swarm_logistics_env.core import progress_bar
 from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.study.attack import STORE, Attack, attack, search
 from swarm_logistics_env.study.runs.engines import serial
@@ -51,7 +53,10 @@ def test_the_search_comes_nearer_to_the_worst_fault_than_chance() -> None:
     assert by_search < 0.8 * by_chance
 
 
-def test_a_search_that_was_stopped_goes_on_and_ends_alike(tmp_path: Path) -> None:
+def test_a_search_that_was_stopped_goes_on_ends_alike_and_tells_how_far_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress_bar, "LINE_EVERY", 0.0)
     settings = Attack("swarm-dt", SCENARIO, modes=("FM4", "dead"), budget=12, fresh=3)
     uninterrupted = attack(settings, serial, tmp_path / "whole")
 
@@ -63,7 +68,10 @@ def test_a_search_that_was_stopped_goes_on_and_ends_alike(tmp_path: Path) -> Non
         attack(settings, stopped, tmp_path / "stopped")
     with Runs(tmp_path / "stopped" / STORE) as runs:
         assert len(runs) == 3
+    before, *_ = capsys.readouterr().err.splitlines()
+    assert re.match(r"attack: 1 of 43 runs at most, 0:\d\d so far, \d+:\d\d left", before)
     assert attack(settings, serial, tmp_path / "stopped") == uninterrupted
+    assert capsys.readouterr().err.startswith("attack: 4 of 43 runs at most, ")
     assert [worst.by for worst in uninterrupted.found] == ["search", "named modes"]
     assert {
         (worst.robustness.n_seeds, worst.robustness.paired) for worst in uninterrupted.found

@@ -1,238 +1,216 @@
-"""The answer of a study: a line a question, with value, interval and verdict, and what is open."""
+"""The answer of a study: P and each indicator in a sentence, then a row a question."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from more_itertools import map_reduce
 
-from swarm_logistics_env import spi
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.tasks.task_world import counted_in
+from swarm_logistics_env.study.tasks.task import Case
+from swarm_logistics_env.study.tasks.task_world import counted_in, world_of
+from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import (
-    DECIDED,
-    POWER,
     UNAFFECTED,
-    UNDEFINED,
     UNTESTABLE,
     Verdict,
-    level_of,
 )
 
 from . import section, templates
-from .answer_notes import notes, reasons_in_words
-from .policies_compared import comparison_in_words
+from .answer_notes import notes
+from .policies_compared import between_policies, comparison_in_words, comparison_table
 from .section import Section
 from .templates import Slots, fill
 
-MOST_LINES = 30  # of the answer of `paper` at a terminal
-_EFFECT = 0.1  # of an indicator, for which seeds are counted
-
 
 class Line(NamedTuple):
-    """One line of the answer: a question, or several that are alike.
+    """One row of the answer: a question.
 
     Attributes:
-        policy: whose swarm it is about.
-        indicator: its symbol.
+        subject: whose swarm it is about, and in which task where there are several.
         question: indicator and what is changed, e.g. "R FM4, 1 of 25".
-        verdicts: in the order of the values.
-        numbers: the indices of these verdicts among those of the study.
+        verdict: on it.
+        number: the index of the verdict among those of the study.
     """
 
-    policy: str
-    indicator: str
+    subject: str
     question: str
-    verdicts: tuple[Verdict, ...]
-    numbers: tuple[int, ...]
+    verdict: Verdict
+    number: int
 
     @property
     def value(self) -> str:
-        """The values, one after the other; from the lowest to the highest where they are many."""
-        values = [verdict.value for verdict in self.verdicts if verdict.value is not None]
-        if not values:
+        """The value, with a mark where P is capped."""
+        value = self.verdict.value
+        if value is None:
             return section.NOTHING
-        if len(self.verdicts) > 3:
-            return f"{self._fixed(min(values))} to {self._fixed(max(values))}"
-        text = " ".join(map(self._fixed, values))
-        is_capped = any(verdict.saturated for verdict in self.verdicts)
-        return text + section.SATURATED if is_capped else text
+        mark = section.SATURATED if self.verdict.saturated else ""
+        return section.fixed(value, 2, [self.verdict.compared.threshold]) + mark
 
-    def _fixed(self, value: float) -> str:
-        thresholds = [verdict.compared.threshold for verdict in self.verdicts]
-        return section.fixed(value, 2, thresholds)
-
-    def interval(self, level: float) -> str:
-        """Return the interval; of several values that which holds all of theirs.
-
-        Args:
-            level: that the heading names; another one stands behind the interval.
-        """
-        intervals = [
-            verdict.interval
-            for verdict in self.verdicts
-            if verdict.interval and verdict.conclusion != UNAFFECTED
-        ]
-        lows = [interval.low for interval in intervals if interval.low is not None]
-        highs = [interval.high for interval in intervals if interval.high is not None]
-        if not (lows and highs):
+    @property
+    def interval(self) -> str:
+        """The interval; empty: there is none, or the value is exact."""
+        if self.verdict.estimate is None or self.verdict.conclusion == UNAFFECTED:
             return ""
-        hull = f"[{self._fixed(min(lows))}, {self._fixed(max(highs))}]"
-        hull += section.other_levels(self.verdicts, level)
-        if len(self.verdicts) == 1:
-            return hull
-        # A value that is capped or alone has none.
-        if len(lows) == len(self.verdicts):
-            return f"in {hull}"
-        return f"{len(lows)} of {len(self.verdicts)} in {hull}"
+        return section.limits(self.verdict.estimate, 2)
 
     @property
-    def verdict_text(self) -> str:
-        """The verdicts in words, and what an open one takes."""
-        case, slots = self._case()
-        return templates.LINE[case].format(**slots)
-
-    def _case(self) -> tuple[str, Slots]:
-        """Return which template of a line applies, and its slots."""
-        first = self.verdicts[0]
-        words = section.conclusion_text(*self.verdicts)
-        if not any(verdict.estimate for verdict in self.verdicts):
-            if all(str(verdict.problem).endswith(" missing") for verdict in self.verdicts):
-                return "not_played", {}
-            return "problem", {"words": words, "problem": first.problem}
-        if all(v.estimate and v.conclusion == UNDEFINED for v in self.verdicts):
-            return "family_lacks_runs", {"indicator": self.indicator}
-        if len(self.verdicts) > 1:
-            case = "with_reason" if self.reason else "words"
-            return case, {"words": words, "reason": self.reason}
-        estimate = first.estimate
-        assert estimate is not None
-        if first.conclusion == UNAFFECTED:
-            return "unaffected", {"words": words}
-        if estimate.untestable:
-            return "untestable", {"words": words, "reason": self.reason}
-        if "unbounded" in first.flags and first.on_property.adjusted in DECIDED:
-            return "unbounded", {"words": words}
-        if self.reason:
-            return "with_reason", {"words": words, "reason": self.reason}
-        if first.conclusion == "open":
-            # An effect on the side of the value, which 80 % power finds.
-            effect = estimate.threshold + math.copysign(
-                _EFFECT, estimate.value - estimate.threshold
-            )
-            n_needed = spi.seeds_for_power(estimate, effect, POWER)
-            if n_needed is not None and n_needed > estimate.n_seeds:
-                n_more = n_needed - estimate.n_seeds
-                threshold = estimate.threshold
-                return "more_runs", {"n_more": n_more, "effect": effect, "threshold": threshold}
-        return "words", {"words": words}
-
-    @property
-    def reason(self) -> str:
-        """Why what is untestable is so, or its one verdict open; empty: there is no reason."""
-        if len(self.verdicts) == 1:
-            return self.verdicts[0].reason
-        reasons = [verdict.reason for verdict in self.verdicts if verdict.conclusion == UNTESTABLE]
-        return ", ".join(dict.fromkeys(reasons))
-
-    @property
-    def needs_runs(self) -> bool:
-        """Whether the verdict in words says how many more runs it takes."""
-        return self._case()[0] == "more_runs"
+    def level(self) -> str:
+        """The level of the interval; empty: there is none."""
+        return section.percent(self.verdict.level) if self.interval and self.verdict.level else ""
 
     @property
     def contradicts(self) -> bool:
-        """Whether a verdict contradicts what the study's reference claims."""
-        decisions = [verdict.on_claim for verdict in self.verdicts]
-        return any(
-            decision is not None and decision.adjusted == "refuted" for decision in decisions
-        )
+        """Whether the verdict contradicts what the study's reference claims."""
+        decision = self.verdict.on_claim
+        return decision is not None and decision.adjusted == "refuted"
+
+
+class SubjectAnswer(NamedTuple):
+    """What a study found of one policy, in one task.
+
+    Attributes:
+        name: the policy; with the task where there are several.
+        performance: P where the swarm is as it should be, in words.
+        sentences: one on each indicator: how many are decided how, and the worst value.
+    """
+
+    name: str
+    performance: str
+    sentences: tuple[str, ...]
 
 
 class Answer(NamedTuple):
     """What a study found.
 
     Attributes:
-        comparison: by which factor P of policies differs; empty: they are not compared.
+        comparison: by which factor P of two policies differs; empty: they are not compared.
+        compared: the same of more than two, a row each; None: they are not compared.
         scope: how much was asked, of which policies, and over which seeds.
-        performance: P of every policy where the swarm is as it should be.
+        subjects: what was found of each policy and task.
         lines: the questions.
-        reasons: why lines of it are open, in words; empty: none says why.
-        notes: how to read the verdicts, and what is still open.
+        notes: what the words of the verdicts mean, and what is still open.
+        seeds: over which everything is.
     """
 
     comparison: str
+    compared: Section | None
     scope: str
-    performance: str
+    subjects: tuple[SubjectAnswer, ...]
     lines: tuple[Line, ...]
-    reasons: str
     notes: str
+    seeds: str
+
+    @property
+    def head(self) -> list[str]:
+        """The answer in a few sentences: what is compared, P, and each indicator."""
+        sentences = [self.comparison] if self.comparison else []
+        is_only = len(self.subjects) == 1
+        if not is_only:
+            sentences.append(self.scope)
+        seeds = f"; {self.seeds}" if is_only else ""
+        for subject in self.subjects:
+            sentences += [f"{subject.name}: {subject.performance}{seeds}.", *subject.sentences]
+        return sentences
 
     @property
     def questions(self) -> list[str]:
-        """The question of each line, with its policy where there are several."""
-        if len({line.policy for line in self.lines}) > 1:
-            return [f"{line.policy}: {line.question}" for line in self.lines]
+        """The question of each line, with its policy and task where there are several."""
+        if len(self.lines_by_subject) > 1:
+            return [f"{line.subject}: {line.question}" for line in self.lines]
         return [line.question for line in self.lines]
 
     @property
-    def verdicts(self) -> list[Verdict]:
-        """The verdicts of all lines."""
-        return [verdict for line in self.lines for verdict in line.verdicts]
+    def lines_by_subject(self) -> dict[str, list[Line]]:
+        """The lines on each policy and task."""
+        return map_reduce(self.lines, lambda line: line.subject)
 
     @property
-    def level(self) -> float:
-        """The level of most intervals, which the heading names."""
-        return level_of(self.verdicts)
+    def level(self) -> str:
+        """The level of all intervals, for a heading; empty: they differ, and each row says its."""
+        levels = {line.level for line in self.lines} - {""}
+        return "" if len(levels) > 1 else next(iter(levels), section.P_LEVEL)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The headings of the columns of `row`."""
+        if self.level:
+            return "question", "value", f"{self.level} interval", "verdict"
+        return "question", "value", "interval", "level", "verdict"
+
+    def row(self, line: Line, question: str) -> tuple[str, ...]:
+        """Return a line of the answer in columns; its question may be shortened before."""
+        levels = () if self.level else (line.level,)
+        return question, line.value, line.interval, *levels, line.verdict.in_words
 
     @property
     def section(self) -> Section:
         """The lines as a table."""
-        level = self.level
-        columns = "question", "value", f"{section.percent(level)} interval", "verdict"
-        rows = tuple(
-            (question, line.value, line.interval(level), line.verdict_text)
-            for question, line in zip(self.questions, self.lines)
+        rows = tuple(map(self.row, self.lines, self.questions))
+        return Section("", self.columns, rows, (self.notes,))
+
+
+def answer(results: StudyResults) -> Answer:
+    """Return what a study found."""
+    lines = list(_lines(results))
+    engine = _unusual_engine(results)
+    subjects = []
+    for name, cell in _sound_cells(results).items():
+        of_subject = [line for line in lines if line.subject == name]
+        subjects.append(
+            SubjectAnswer(name, _performance(results, cell) + engine, tuple(_sentences(of_subject)))
         )
-        above = [self.comparison] if self.comparison else []
-        return Section("Answer", columns, rows, (*above, self.performance, self.notes))
+    if not subjects:
+        policies = section.join_names(results.policies)
+        subjects = [SubjectAnswer(policies, templates.PERFORMANCE["nothing"], ())]
+    return Answer(
+        comparison_in_words(results),
+        comparison_table(results),
+        _scope(results),
+        tuple(subjects),
+        tuple(lines),
+        notes(results),
+        results.seeds_text,
+    )
 
 
-def answer(results: StudyResults, most: int | None = MOST_LINES - 5) -> Answer:
-    """Return what a study found.
+def subject_of(case: Case, policy: str) -> str:
+    """Return whose swarm a case is about: a policy, and of recorded trials its task."""
+    task = case.scenario.table if isinstance(case.scenario, RecordedScenario) else ""
+    return f"{policy}, {task}" if task else policy
 
-    Args:
-        most: lines at most, as far as what is alike can share one; None: a line a question.
-    """
-    scope = _scope(results)
-    performance = _performance(results)
-    lines: list[Line] = []
-    for sharing in range(4):
-        groups = map_reduce(enumerate(results.verdicts), partial(_what_a_line_shares, sharing))
-        lines = [line_of(group) for group in groups.values()]
-        if most is None or len(lines) <= most:
-            break
+
+def _lines(results: StudyResults) -> Iterator[Line]:
+    """Yield the questions: those on a policy and task together, in the order of indicators."""
+    lines = []
+    for number, verdict in enumerate(results.verdicts):
+        comparison = verdict.compared
+        subject = subject_of(comparison.original.case, comparison.policy)
+        lines.append(Line(subject, section.question_of(verdict), verdict, number))
     # Recorded trials may ask one question in several tables, at other values of a parameter.
-    counts = Counter((line.policy, line.question) for line in lines)
-    for index, line in enumerate(lines):
-        if counts[line.policy, line.question] > 1:
-            condition = _part_of_title(line.verdicts[0].compared.table)
-            lines[index] = line._replace(question=f"{line.question}, {condition}")
-    policies = results.policies
+    counts = Counter((line.subject, line.question) for line in lines)
     indicators = list(DEFINITIONS)
-    lines.sort(key=lambda line: (policies.index(line.policy), indicators.index(line.indicator)))
-    needs_runs = any(line.needs_runs for line in lines)
-    reasons = reasons_in_words({line.reason for line in lines})
-    notes_text = notes(results, needs_runs, reasons)
-    comparison = comparison_in_words(results)
-    return Answer(comparison, scope, performance, tuple(lines), reasons, notes_text)
+    policies = results.policies
+    subjects = list(dict.fromkeys(line.subject for line in lines))
+    lines.sort(
+        key=lambda line: (
+            policies.index(line.verdict.compared.policy),
+            subjects.index(line.subject),
+            indicators.index(line.verdict.compared.indicator),
+        )
+    )
+    for line in lines:
+        if counts[line.subject, line.question] > 1:
+            condition = _part_of_title(line.verdict.compared.table)
+            yield line._replace(question=f"{line.question}, {condition}")
+        else:
+            yield line
 
 
 def _part_of_title(table: str) -> str:
@@ -240,62 +218,39 @@ def _part_of_title(table: str) -> str:
     return table.rstrip(")").rpartition(" (")[2]
 
 
-def _what_a_line_shares(sharing: int, numbered: tuple[int, Verdict]) -> tuple[object, ...]:
-    """Return what the questions of a line have in common.
-
-    Args:
-        sharing: 0: a line has one question; 1: those of one failure mode; 2: those of any one
-            factor; 3: those of an indicator in a table.
-        numbered: a verdict, and its index among those of the study.
-    """
-    number, verdict = numbered
-    comparison = verdict.compared
-    after = verdict.after
-    if sharing == 0 or (sharing == 1 and after.kind != "fault"):
-        return (number,)
-    indicator = comparison.policy, comparison.table, comparison.indicator
-    if sharing == 3:
-        return indicator
-    return (*indicator, after.name, after.onset, comparison.threshold)
+def _sentences(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield a sentence on each indicator; policies side by side have their own."""
+    by_indicator: dict[str, list[Line]] = map_reduce(
+        lines, lambda line: line.verdict.compared.indicator
+    )
+    for indicator, alike in by_indicator.items():
+        compared = between_policies([line.verdict for line in alike])
+        questions = [line for line in alike if line.verdict not in compared]
+        if questions:
+            yield _sentence(DEFINITIONS[indicator].heading, questions)
 
 
-def line_of(numbered: Sequence[tuple[int, Verdict]]) -> Line:
-    """Return the line of verdicts, each with its index among those of the study."""
-    numbers, verdicts = zip(*numbered)
-    comparison = verdicts[0].compared
-    case, slots = _question(verdicts)
-    question = f"{comparison.indicator} {templates.QUESTION[case].format(**slots)}"
-    return Line(comparison.policy, comparison.indicator, question, verdicts, numbers)
-
-
-def _question(verdicts: Sequence[Verdict]) -> tuple[str, Slots]:
-    """Return which template of a question applies, and its slots."""
-    first = verdicts[0]
-    comparison = first.compared
-    before = comparison.original.setting
-    after = first.after
-    usual_property = comparison.definition.adjectives.get(0.0)
-    named = "" if first.property_name == usual_property else f", {first.property_name}"
-    start = f" from {after.onset:g} s" if after.onset else ""
-    names = {verdict.after.name for verdict in verdicts}
-    values = [f"{verdict.after.value:g}" for verdict in verdicts]
-    if after.kind == "size":
-        sizes = [f"{before.value:g}", *values]
-        if len(sizes) > 4:
-            sizes = [sizes[0], "…", sizes[-1]]
-        return "sizes", {"chain": "→".join(sizes), "property": named}
-    if len(names) > 1:
-        case = "failure_modes" if after.kind == "fault" else "parameters"
-        return case, {"count": len(names), "start": start}
-    slots = {"name": after.name, "values": ", ".join(values), "property": named}
-    if after.kind == "fault":
-        return "fault", {**slots, "start": start, "n_robots": comparison.n_robots}
-    if after.kind == "policy":
-        if after.condition:  # nothing is claimed of it
-            slots["property"] = ""
-        condition = f", {after.condition}" if after.condition else ""
-        return "policy", {**slots, "condition": condition}
-    return "parameter", {**slots, "before": before.value}
+def _sentence(heading: str, lines: Sequence[Line]) -> str:
+    """Return how many questions on an indicator are decided how, and which value is lowest."""
+    counts = section.count_words(
+        section.word_to_count(line.verdict, line.verdict.on_property.adjusted) for line in lines
+    )
+    slots: dict[str, object] = {"indicator": f"{heading[0].upper()}{heading[1:]}", "counts": counts}
+    tested = [line for line in lines if line.interval and line.verdict.conclusion != UNTESTABLE]
+    with_value = [line for line in lines if line.verdict.value is not None]
+    candidates = tested or with_value
+    if not candidates:
+        return templates.SENTENCE["counts"].format(**slots)
+    worst = min(candidates, key=lambda line: line.verdict.value or 0.0)
+    is_usual = worst.level in ("", section.P_LEVEL)
+    slots["question"] = worst.question.partition(" ")[2]
+    slots["value"] = f"{worst.value} {worst.interval}".rstrip()
+    slots["level"] = "" if is_usual else f" at {worst.level}"
+    slots["word"] = worst.verdict.in_words
+    is_change = worst.verdict.compared.definition.compares == "policy"
+    slots["extreme"] = "lowest" if is_change else "worst"
+    case = "one" if len(lines) == 1 else "several"
+    return templates.SENTENCE[case].format(**slots)
 
 
 def _scope(results: StudyResults) -> str:
@@ -313,42 +268,59 @@ def _scope(results: StudyResults) -> str:
     )
 
 
-def _performance(results: StudyResults) -> str:
-    """Return P of every policy where the swarm is as it should be, in a sentence."""
+def _sound_cells(results: StudyResults) -> dict[str, Cell]:
+    """Return the cell of each policy and task where the swarm is as it should be."""
     played = [cell for cell in results.cells if cell.n_seeds]
-    if not played:
-        return templates.PERFORMANCE["nothing"]
-    cells = [cell for cell in played if cell.arm.setting.kind != "policy"]
-    if cells:
+    conditions = [cell for cell in played if cell.arm.setting.kind != "policy"]
+    sound_cells: dict[str, Cell] = {}
+    by_subject: dict[str, list[Cell]] = map_reduce(
+        conditions, lambda cell: subject_of(cell.arm.case, cell.policy)
+    )
+    for subject, cells in by_subject.items():
         # Where the swarm is as it should be, or else in the first condition.
         sound = [c for c in cells if c.arm.setting.kind == "fault" and not c.arm.setting.value]
-        candidates = sound or cells
-        setting = candidates[0].arm.setting
-        chosen = [(cell.policy, cell) for cell in candidates if cell.arm.setting == setting]
-        where = "" if setting.kind == "size" else f", {setting}"
-    else:  # policies alone are compared: in the first table
-        table = played[0].table
-        chosen = [(cell.arm.setting.name, cell) for cell in played if cell.table == table]
-        where = f", {table}"
-    by_policy: dict[str, Cell] = {}
-    for policy, cell in chosen:
-        # Its first cell counts; a policy that others are compared with stands behind them.
-        first_cell = by_policy.pop(policy, cell)
-        by_policy[policy] = first_cell
-    case = next(iter(by_policy.values())).arm.case
-    means = [_mean(cell) for cell in by_policy.values()]
-    if len(by_policy) > 1 or len(results.policies) > 1:
-        means = [f"{policy} {mean}" for policy, mean in zip(by_policy, means)]
+        sound_cells[subject] = (sound or cells)[0]
+    if not conditions:  # policies alone are compared: in the first table
+        for cell in played:
+            if cell.table == played[0].table:
+                sound_cells.setdefault(cell.arm.setting.name, cell)
+    judged = results.policies
+
+    def place(subject: str) -> int:
+        # A policy that others are compared with stands behind them.
+        policy = sound_cells[subject].arm.case.policy.title
+        return judged.index(policy) if policy in judged else len(judged)
+
+    return {subject: sound_cells[subject] for subject in sorted(sound_cells, key=place)}
+
+
+def _unusual_engine(results: StudyResults) -> str:
+    """Return what moves the bodies, behind a comma; empty: what usually does."""
+    task = results.plan.specification.played
+    world = world_of(task)
+    engine = world.engine(results.plan.specification.scenario)
+    return "" if engine == world.engine(task.default) else f", engine {engine}"
+
+
+def _performance(results: StudyResults, cell: Cell) -> str:
+    """Return P of a policy in words, e.g. "P [95 %] = 40.0 [39.5, 40.5] items in 500 s, N = 25"."""
+    case = cell.arm.case
+    setting = cell.arm.setting
     counted = counted_in(case)
-    template = "count" if counted else "no_count"
-    if any(cell.mean.low is not None for cell in by_policy.values()):
-        template += "_with_interval"
-    return templates.PERFORMANCE[template].format(
-        level=section.P_LEVEL,
+    task = results.plan.specification.played
+    condition = f"N = {case.scenario.n_robots}"
+    if setting.kind == "policy":
+        condition += f", {cell.table}"
+    elif setting.kind != "size":
+        condition += f", {setting}"
+    if task.name != "warehouse" and not results.plan.origin:
+        condition += f", task {task.name}"
+    return templates.PERFORMANCE["count" if counted else "no_count"].format(
+        level=f" [{section.P_LEVEL}]" if cell.mean.low is not None else "",
         counted=counted,
         duration=case.scenario.duration,
-        condition=f"N = {case.scenario.n_robots}{where}",
-        means=", ".join(means),
+        condition=condition,
+        mean=_mean(cell),
         p=results.plan.name_of_p,
     )
 

@@ -2,52 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from swarm_logistics_env.spi.definitions import DEFINITIONS
+from swarm_logistics_env.spi.estimate import SEEDS_OF_HEADLINE
 from swarm_logistics_env.study.tasks.task_world import counted_in
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.collapses import Collapse
 from swarm_logistics_env.study.verdicts.results import StudyResults
+from swarm_logistics_env.study.verdicts.verdict import UNDEFINED, UNTESTABLE, Verdict
 
 from . import section, templates
+from .more_seeds import more_seeds
 from .templates import Slots, fill
 
 _FEW_ITEMS = 1.0  # in a run, of which shares say little
 _MOST_CONDITIONS = 2  # that a note of the answer names
 
 
-def notes(results: StudyResults, needs_runs: bool, reasons: str) -> str:
-    """Return the notes on the answer of a study, in one line.
-
-    Args:
-        needs_runs: whether a line of it says how many more runs it takes.
-        reasons: why lines of it are open, in words.
-    """
-    slots_by_case = dict(_notes_that_apply(results, needs_runs, reasons))
-    line = "; ".join(fill(templates.NOTES, slots_by_case))
-    return f"{line[0].upper()}{line[1:]}."
+def notes(results: StudyResults) -> str:
+    """Return the notes on the answer of a study, in one line."""
+    line = "; ".join(fill(templates.NOTES, dict(_notes_that_apply(results))))
+    return f"{line[:1].upper()}{line[1:]}."
 
 
-def _notes_that_apply(
-    results: StudyResults, needs_runs: bool, reasons: str
-) -> Iterator[tuple[str, Slots]]:
+def meanings(verdicts: Iterable[Verdict]) -> str:
+    """Return what the words mean that `Verdict.in_words` has for these verdicts."""
+    slots_by_case: dict[str, Slots] = {}
+    for verdict in verdicts:
+        word = verdict.on_property.adjusted
+        if word in ("supported", "refuted"):
+            slots_by_case["decided"] = {}
+            if "assumes_normal" in verdict.flags:
+                slots_by_case["provisional"] = {"n_seeds": SEEDS_OF_HEADLINE}
+        elif word == UNTESTABLE:
+            slots_by_case[verdict.flags[0]] = {}
+        elif word in templates.MEANINGS:
+            slots_by_case[word] = {}
+            if verdict.conclusion == "equivalent":
+                slots_by_case["margin"] = {"margin": f"{100 * verdict.margin:.3g} %"}
+            elif verdict.reason:
+                slots_by_case[verdict.reason] = {}
+    return "; ".join(fill(templates.MEANINGS, slots_by_case))
+
+
+def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
     """Yield the notes on an answer that apply, each with its slots; `NOTES` has their order."""
     verdicts = results.verdicts
-    is_paired = results.plan.paired
-    indicators = {verdict.compared.indicator for verdict in verdicts} - {"change"}
-    if indicators:
-        headings = [d.heading for symbol, d in DEFINITIONS.items() if symbol in indicators]
-        yield "indicators", {"indicators": ", ".join(headings)}
-    if any(verdict.interval and verdict.interval.low is not None for verdict in verdicts):
-        differ = len({verdict.level for verdict in verdicts} - {None}) > 1
-        case = "intervals_of_several_levels" if differ else "intervals"
-        yield case, {"level": section.percent(results.level)}
-    yield "adjusted", {}
+    if words := meanings(verdicts):
+        yield "words", {"words": words}
+        yield "adjusted", {}
+    problems = {
+        verdict.problem or "other questions on the indicator lack runs": None
+        for verdict in verdicts
+        if verdict.conclusion == UNDEFINED and verdict.in_words == UNDEFINED
+    }
+    if problems:
+        yield "undefined", {"problems": ", ".join(problems)}
     flags = {flag for verdict in verdicts for flag in verdict.flags}
-    for flag in ("assumes_normal", "cannot_fail", "too_few_seeds"):
+    for flag in ("too_few_seeds", "unbounded"):
         if flag in flags:
             yield flag, {}
     if _delivers_little(results):
@@ -70,12 +84,8 @@ def _notes_that_apply(
     if results.untestable:
         words = untestable_in_words(results.untestable, names_policies=len(results.policies) > 1)
         yield "phases_untestable", {"conditions": words}
-    if needs_runs:
-        yield "more_runs", {"runs": "seeds" if is_paired else "trials a condition"}
-    elif any(verdict.conclusion == "open" for verdict in verdicts):
-        yield "open", {"runs": "seeds" if is_paired else "trials"}
-    if reasons:
-        yield "open_for_a_reason", {"reasons": reasons}
+    if needs := more_seeds(results).words:
+        yield "open", {"needs": needs}
     claims_of_text = results.reference.claims if results.reference else {}
     claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
     in_text = [verdict for verdict in claims if verdict.compared.question in claims_of_text]
@@ -85,15 +95,6 @@ def _notes_that_apply(
         counts = section.count_words(v.on_claim.adjusted for v in judged if v.on_claim)
         if judged:
             yield case, {"claims": section.plural(len(judged), "claim"), "counts": counts}
-
-
-def reasons_in_words(reasons: Collection[str]) -> str:
-    """Return what the reasons of open verdicts mean, e.g. "(stalls): so few seeds may hide .."."""
-    return "; ".join(
-        f"({reason}): {words}"
-        for reason, words in templates.REASONS_TO_BE_OPEN.items()
-        if reason in reasons
-    )
 
 
 def _delivers_little(results: StudyResults) -> bool:

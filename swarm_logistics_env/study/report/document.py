@@ -12,7 +12,13 @@ from .answer import Answer, answer
 from .answer_notes import warnings
 from .drawing import Point
 from .fault_sections import fault_sections
-from .figures import forest_figure, forest_points, indicator_figures, trade_off_figure
+from .figures import (
+    forest_figure,
+    forest_points,
+    indicator_figures,
+    policies_figure,
+    trade_off_figure,
+)
 from .for_a_paper import PaperTables, paper_tables
 from .section import Figure, Section, join_names
 from .sentences import sentence, verdict_sections
@@ -38,7 +44,7 @@ class Document(NamedTuple):
     Attributes:
         title, text: its heading and the sentences below it.
         answer: what the study found.
-        points_by_line: the values of each line of the answer, as they are drawn.
+        points: the value of each line of the answer, as it is drawn.
         chapters: its parts, in order.
         paper: its tables for a paper.
         runs: its single runs, for the page.
@@ -48,7 +54,7 @@ class Document(NamedTuple):
     title: str
     text: tuple[str, ...]
     answer: Answer
-    points_by_line: tuple[tuple[Point, ...], ...]
+    points: tuple[Point, ...]
     chapters: tuple[Chapter, ...]
     paper: PaperTables
     runs: SingleRuns
@@ -88,8 +94,12 @@ def document(results: StudyResults) -> Document:
     sentences = [sentence(results, verdict) for verdict in results.verdicts]
     in_words = tuple(verdict_sections(results.verdicts, sentences))
     trade_offs = tuple(trade_off_figure(results))
-    points_by_line = forest_points(results, study_answer)
-    figures = forest_figure(results, study_answer, points_by_line), *indicator_figures(results)
+    points = forest_points(results, study_answer)
+    figures = (
+        *policies_figure(results),
+        forest_figure(results, study_answer, points),
+        *indicator_figures(results),
+    )
     measures = tuple(resiliences(results))
     of_faults = tuple(fault_sections(measures, results.seeds_text))
     cell_sections = tuple(cell_tables(results))
@@ -129,7 +139,7 @@ def document(results: StudyResults) -> Document:
         title,
         text,
         study_answer,
-        points_by_line,
+        points,
         tuple(chapter for chapter in chapters if chapter.sections),
         paper_tables(results, study_answer, (*paper_sections, *further, *of_faults)),
         single_runs(results, sentences),

@@ -19,6 +19,7 @@ from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 from . import drawing
 from .answer import Answer
 from .drawing import Panel, Point
+from .policies_compared import between_policies, condition_of
 from .section import P_LEVEL, Figure, join_names, levels, slug
 
 if TYPE_CHECKING:
@@ -30,38 +31,86 @@ _COLUMNS = [
 ]  # fmt: skip
 
 
-def forest_points(results: StudyResults, answer: Answer) -> tuple[tuple[Point, ...], ...]:
-    """Return the values of each line of the answer; `published` is the threshold of each."""
+def forest_points(results: StudyResults, answer: Answer) -> tuple[Point, ...]:
+    """Return the value of each line of the answer; `published` is the threshold of each."""
     return tuple(
-        tuple(_point(results, verdict, "", verdict.compared.threshold) for verdict in line.verdicts)
-        for line in answer.lines
+        _point(results, line.verdict, "", line.verdict.compared.threshold) for line in answer.lines
     )
 
 
 def forest_label(answer: Answer) -> str:
     """Return the label of the values' axis, e.g. "R, FT: value"."""
-    return f"{', '.join(dict.fromkeys(line.indicator for line in answer.lines))}: value"
+    symbols = dict.fromkeys(line.verdict.compared.indicator for line in answer.lines)
+    return f"{', '.join(symbols)}: value"
 
 
-def forest_figure(
-    results: StudyResults, answer: Answer, points_by_line: Sequence[Sequence[Point]]
-) -> Figure:
-    """Return the lines of the answer as a forest of intervals."""
-    rows = list(zip(answer.questions, points_by_line))
-    verdicts = answer.verdicts
-    n_most = max(len(points) for _, points in rows)
-    order = ""
-    if n_most > 1:
-        order = " Marks in one row stand from top to bottom in the order of its label."
-    # Where there are several, each row names its own.
-    title = results.policies[0] if len(results.policies) == 1 else ""
+def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]) -> Figure:
+    """Return the lines of the answer as a forest of intervals, a group for each policy and task."""
+    rows: list[tuple[str, list[Point]]] = []
+    groups = answer.lines_by_subject
+    for line, point in zip(answer.lines, points):
+        if len(groups) > 1 and line is groups[line.subject][0]:
+            rows.append((line.subject, []))
+        rows.append((line.question, [point]))
+    verdicts = [line.verdict for line in answer.lines]
+    # Where there are several, each group has its own.
+    title = results.policies[0] if len(groups) == 1 else ""
     return Figure(
         "answer",
-        f"{answer.scope} Every question with its interval. {_marks(verdicts)}.{order}"
+        f"{answer.scope} Every question with its interval. {_marks(verdicts)}."
         f"{_note_on_caps(verdicts)}",
         _rows(results, verdicts),
-        1.1 + (0.21 + 0.05 * min(n_most, 4)) * len(rows),
+        1.1 + 0.23 * len(rows),
         partial(drawing.forest, rows=rows, x_label=forest_label(answer), title=title),
+    )
+
+
+def policies_figure(results: StudyResults) -> Iterator[Figure]:
+    """Yield P of policies that are compared, in every condition; a panel for each task."""
+    import pandas as pd
+
+    compared = between_policies(results.verdicts)
+    if not compared:
+        return
+    keys = list(dict.fromkeys(arm.case.key for _, _, arm in results.plan.cells))
+    policies = list(dict.fromkeys([compared[0].after.name, *(v.compared.policy for v in compared)]))
+    points: dict[str, dict[str, Point]] = {}  # each condition of a policy once, by the task
+    for verdict in compared:
+        task = condition_of(verdict).removesuffix(verdict.after.condition).strip()
+        cells = results.cells_of(verdict.compared)
+        for arm in (verdict.compared.changed, verdict.compared.original):
+            policy = arm.case.policy.title
+            points.setdefault(task, {})[arm.case.key] = Point(
+                policy,
+                policies.index(policy),
+                verdict.after.condition,
+                *cells[arm].mean,
+                decided=True,
+                saturated=cells[arm].saturated,
+                link=f"condition-{keys.index(arm.case.key)}",
+            )
+    panels = tuple(
+        Panel(
+            task, f"performance {results.plan.name_of_p}", tuple(of_task.values()), (), "condition"
+        )
+        for task, of_task in points.items()
+    )
+    rows = [
+        (panel.title, point.series, point.category, point.value, point.low, point.high, CONFIDENCE)
+        for panel in panels
+        for point in panel.points
+    ]
+    columns = ["task", "policy", "condition", "mean", "low", "high", "confidence"]
+    yield Figure(
+        "policies",
+        f"P of {join_names(policies)} where they are compared: means, bars: {P_LEVEL} intervals. "
+        f"{results.seeds_text.capitalize()}.",
+        pd.DataFrame(rows, columns=columns),
+        0.5 + 2.7 * len(panels),
+        partial(drawing.intervals, panels=panels),
+        title=f"P of {join_names(policies)}",
+        panels=panels,
+        level=P_LEVEL,
     )
 
 

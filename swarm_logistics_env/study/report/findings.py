@@ -11,6 +11,7 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 
 from .answer import Answer, answer
 from .section import Section
+from .terminal_answer import terminal_answer
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -27,12 +28,14 @@ class Findings(StudyResults):
         return answer(self)
 
     def __repr__(self) -> str:
-        lines = [self._answer.comparison] if self._answer.comparison else []
-        lines += ["  ".join(row) for row in self._answer.section.rows]
-        return "\n".join([f"Results of the study {self.plan.specification.name!r}", *lines])
+        title = f"Results of the study {self.plan.specification.name!r}"
+        return f"{title}\n{terminal_answer(self._answer)}"
 
     def _repr_html_(self) -> str:
-        return html_table(self._answer.section)
+        compared = self._answer.compared
+        parts = [html_table(compared)] if compared else []
+        parts += [f"<p>{escape(sentence)}</p>" for sentence in self._answer.head]
+        return "".join([*parts, html_table(self._answer.section)])
 
 
 def html_table(section: Section) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
@@ -10,12 +11,14 @@ from swarm_logistics_env.study.questions.comparison import CONFIDENCE
 from swarm_logistics_env.study.questions.plan import Plan
 from swarm_logistics_env.study.tasks.task_world import world_of
 from swarm_logistics_env.study.verdicts.results import StudyResults
-from swarm_logistics_env.study.verdicts.verdict import UNTESTABLE, Verdict, level_of
+from swarm_logistics_env.study.verdicts.until_clear import HARDLY
 
 from . import section, templates
-from .answer import Answer, Line, line_of
+from .answer import Answer
+from .answer_notes import meanings
 from .figures import parameter_label
 from .section import Section
+from .sentences import stop_of
 from .templates import Slots, fill
 
 HOLM = "Verdicts are adjusted by Holm's method over all questions on an indicator of one policy."
@@ -45,31 +48,22 @@ def paper_tables(results: StudyResults, answer: Answer, sections: Iterable[Secti
         for verdict in results.verdicts
         if verdict.after.kind == "parameter"
     }
-    tables = [_answer(results.policies, answer), *sections]
+    tables = [*_answer_tables(answer), *sections]
     return PaperTables(about, tuple(table for table in tables if table.rows), labels)
 
 
-def _answer(policies: Sequence[str], answer: Answer) -> Section:
-    """Return the answer: a row a question, or several that are alike."""
-    columns = "question", "value", answer.section.columns[2], "verdict"
-    rows = tuple(
-        (
-            question,
-            line.value,
-            line.interval(answer.level).removeprefix("in "),
-            section.with_reason(section.conclusion_text(*line.verdicts), line.reason),
-        )
-        for question, line in zip(answer.questions, answer.lines)
-    )
-    is_grouped = any(len(line.verdicts) > 1 for line in answer.lines)
-    hull = "Of several values the interval holds all of theirs." if is_grouped else ""
-    symbols = dict.fromkeys(line.indicator for line in answer.lines)
-    names = [definition.heading for symbol, definition in DEFINITIONS.items() if symbol in symbols]
-    text = ", ".join(names)
-    meaning = f"{text[:1].upper()}{text[1:]}: supported above 0, refuted below, open: undecided."
-    reasons = f"Open {answer.reasons}." if answer.reasons else ""
-    lines = (answer.performance, meaning, hull, reasons, HOLM)
-    return Section(f"{section.join_names(policies)}: indicators", columns, rows, lines)
+def _answer_tables(answer: Answer) -> Iterator[Section]:
+    """Yield the answer, a table for each policy and task: a row a question."""
+    performances = {subject.name: subject.performance for subject in answer.subjects}
+    for subject, lines in answer.lines_by_subject.items():
+        rows = tuple(answer.row(line, line.question) for line in lines)
+        symbols = dict.fromkeys(line.verdict.compared.indicator for line in lines)
+        names = [DEFINITIONS[symbol].heading for symbol in DEFINITIONS if symbol in symbols]
+        text = section.join_names(names)
+        words = meanings(line.verdict for line in lines)
+        captions = (performances.get(subject, ""), text, words)
+        sentences = tuple(f"{text[0].upper()}{text[1:]}." for text in captions if text)
+        yield Section(f"{subject}: indicators", answer.columns, rows, (*sentences, HOLM))
 
 
 def _world(plan: Plan) -> str:
@@ -83,78 +77,69 @@ def _world(plan: Plan) -> str:
 
 
 def in_a_sentence(results: StudyResults, answer: Answer) -> str:
-    """Return what a paper can say of the study: conditions, P, counts, and the lowest value."""
-    verdicts = results.verdicts
-    tested = [v for v in verdicts if v.conclusion != UNTESTABLE]
-    with_interval = [v for v in tested if v.interval and v.interval.low is not None]
-    # A change of P has another scale than the indicators.
-    candidates = [v for v in with_interval if v.compared.indicator != "change"] or with_interval
-    lowest = min(candidates or verdicts, key=lambda verdict: verdict.value or 0.0)
-    line = line_of([(0, lowest)])
-    words = section.conclusion_text(*verdicts)
-    lowest_text = _question_with_value(line, level_of([lowest]))
-    reason = templates.REASONS_TO_BE_OPEN.get(lowest.reason, lowest.reason)
+    """Return what a paper can say of a study, as a paragraph.
+
+    That is: policies, world, seeds, P and each indicator with its worst value, by policy and task,
+    how verdicts were reached, and why questions were played no further.
+    """
     world = world_in_words(results.plan)
     slots: dict[str, Slots] = {
-        "performance": {
-            "policies": ", ".join(results.policies),
+        "conditions": {
+            "policies": section.join_names(results.policies),
             "world": f", {world}" if results.plan.origin else f" in {world}",
-            "performance": answer.performance[:-1],
+            "how": _preset_and_engine(results.plan),
             "seeds": results.seeds_text,
-        }
+        },
+        "subjects": {"sentences": _subjects(answer)},
+        "method": {"error": section.percent(1.0 - CONFIDENCE)},
+        "end": {},
     }
     if answer.comparison:
         slots["comparison"] = {"comparison": answer.comparison[:-1]}
-    method = templates.METHOD.format(error=section.percent(1.0 - CONFIDENCE))
-    verdict_slots = {"words": words, "method": method}
-    if len(verdicts) == 1:
-        verdict_slots["method"] = f"{reason}; {method}" if reason else method
-        name = f"{line.indicator} > {lowest.compared.threshold:.3g}"
-        slots["one_question"] = {"lowest": lowest_text, "property": name, **verdict_slots}
-    else:
-        if words == lowest.on_property.adjusted:  # all are alike
-            verdict_slots["words"] = f"{len(verdicts)} {words}"
-        slots["several_questions"] = {"n_questions": len(verdicts), **verdict_slots}
-        if any(verdict.conclusion == "open" for verdict in verdicts):
-            slots["not_decided"] = {"questions": _undecided(answer)}
-        if candidates:
-            word = lowest.on_property.adjusted
-            slots["lowest"] = {
-                "lowest": lowest_text,
-                "word": f"{word}: {reason}" if reason else word,
-            }
+    if results.looks:
+        slots["looks"] = {
+            "looks": section.join_names([*map(str, results.looks)]),
+            "questions": section.plural(len(results.verdicts), "question"),
+            "stops": _stops(results),
+        }
     if results.exploratory:
         slots["exploratory"] = {"exploratory": templates.EXPLORATORY}
-    return "".join(fill(templates.FOR_A_PAPER, {**slots, "end": {}}))
+    return "".join(fill(templates.FOR_A_PAPER, slots))
 
 
-def _question_with_value(line: Line, level: float) -> str:
-    interval = line.interval(level)
-    return templates.QUESTION_WITH_VALUE["interval" if interval else "value"].format(
-        question=line.question, value=line.value, level=section.percent(level), interval=interval
-    )
+def _subjects(answer: Answer) -> str:
+    """Return P and indicators of each policy and task, each in a sentence that names it."""
+    sentences = []
+    for subject in answer.subjects:
+        clauses = [subject.performance]
+        clauses += [f"{clause[0].lower()}{clause[1:-1]}" for clause in subject.sentences]
+        sentences.append(f"{subject.name}: {'; '.join(clauses)}")
+    return ". ".join(sentences)
 
 
-def _undecided(answer: Answer) -> str:
-    """Return what is open of each indicator, e.g. "FT of FM4 (m = 1, 2) and S of N 4→10"."""
-    verdicts: dict[str, dict[str, list[Verdict]]] = {}
-    names_policies = len({line.policy for line in answer.lines}) > 1
-    for line in answer.lines:
-        policy = f"{line.policy}'s " if names_policies else ""
-        name = line.question.removeprefix(f"{line.indicator} ").partition(",")[0]
-        by_name = verdicts.setdefault(policy + line.indicator, {})
-        by_name.setdefault(name, []).extend(line.verdicts)
-    clauses = []
-    for indicator, by_name in verdicts.items():
-        names = []
-        for name, alike in by_name.items():
-            undecided = [verdict.after for verdict in alike if verdict.conclusion == "open"]
-            is_fault = any(setting.kind == "fault" for setting in undecided)
-            numbers = ", ".join(f"{setting.value:g}" for setting in undecided)
-            which = f" (m = {numbers})" if is_fault else ""
-            names += [name + which] if undecided else []
-        clauses += [f"{indicator} of {', '.join(names)}"] if names else []
-    return section.join_names(clauses)
+def _preset_and_engine(plan: Plan) -> str:
+    """Return the preset and the engine of a study in brackets; empty: the task names none."""
+    world = world_of(plan.specification.played)
+    scenario = plan.specification.scenario
+    engine = world.engine(scenario)
+    words = [world.preset_in_words(scenario), f"engine {engine}" if engine else ""]
+    named = ", ".join(filter(None, words))
+    return f" ({named})" if named and plan.origin is None else ""
+
+
+def _stops(results: StudyResults) -> str:
+    """Return why the questions of a study that runs until it is clear were played no further."""
+    counts = Counter(stop_of(verdict) for verdict in results.verdicts)
+    slots: dict[str, Slots] = {
+        stop: {
+            "count": count,
+            "most": results.looks[-1],
+            "chance": section.percent(HARDLY),
+            "margin": section.percent(results.plan.specification.margin),
+        }
+        for stop, count in counts.items()
+    }
+    return ", ".join(fill(templates.STOPS, slots))
 
 
 def world_in_words(plan: Plan) -> str:

@@ -17,8 +17,7 @@ _LETTERS_OF_A_PAGE = 75  # across a page of one column; with more they are small
 _LONG = 30  # letters of a column, of which more are broken into lines
 _LETTERS_BETWEEN = 1.5  # as wide is the room between two columns of a table
 _NUMBER = re.compile(r"(?<![\w.-])-?(?:\d+(?:\.\d+)?|∞)(?![\w.]| (?!to )[a-z])")
-_LEVEL = r"(?:> |[\d.]+ to )?[\d.]+ %"
-_LEVELS_BEHIND = re.compile(r"(?<=\]) ([\d.]+) %(?: to ([\d.]+) %)?$")
+_LEVEL = r"(?:> )?[\d.]+ %"
 _ROOM = r"(?:\\phantom\{[^}]*\})+"
 _ESCAPES = {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
@@ -27,8 +26,11 @@ _ESCAPES = {
     "∞": r"$\infty$", "†": r"\dag{}", "<": "$<$", ">": "$>$", "≤": r"$\le$", "…": r"\dots{}",
 }  # fmt: skip
 _SIGNS = "|".join(map(re.escape, sorted(_ESCAPES, key=len, reverse=True)))
+_PERFORMANCE = r"\bP_(?:N\+m|new|[A-Za-z])\b"  # P of a condition, e.g. "P_F"
 # Besides signs: what stands in math mode, and letters that pdfLaTeX does not know.
-_SPECIAL = re.compile(rf"({_SIGNS})|((?<![\w.-])-\d+(?:\.\d+)?|\b[Nm] = \d+)|([^\x00-\u017f])")
+_SPECIAL = re.compile(
+    rf"({_PERFORMANCE}|{_SIGNS})|((?<![\w.-])-\d+(?:\.\d+)?|\b[Nm] = \d+)|([^\x00-\u017f])"
+)
 
 
 def latex_tables(tables: PaperTables) -> str:
@@ -56,32 +58,15 @@ def _readable(section: Section, labels: Mapping[str, str]) -> Section:
             text = re.sub(rf"\b{re.escape(name)}{values}", with_unit, text).replace(name, words)
         return re.sub(r"(?<=\d)(→| -> )(?=\d)", " to ", text)
 
-    columns = [_levels_in_heading(column) for column in zip(section.columns, *section.rows)]
-    headings, *rows = zip(*columns)
-    readable_rows = tuple(tuple(map(readable, row)) for row in rows)
-    return section._replace(title=readable(section.title), columns=headings, rows=readable_rows)
-
-
-def _levels_in_heading(column: Texts) -> Texts:
-    """Return a column in whose heading alone stand the levels of its intervals."""
-    heading, *cells = column
-    behind = {
-        level
-        for cell in cells
-        for match in _LEVELS_BEHIND.finditer(cell)
-        for level in match.groups()
-    }
-    levels = sorted({*filter(None, behind), *re.findall(r"([\d.]+) %", heading)}, key=float)
-    if behind:
-        heading = re.sub(r"[\d.]+ %", f"{levels[0]} to {levels[-1]} %", heading)
-    return heading, *(_LEVELS_BEHIND.sub("", cell) for cell in cells)
+    rows = tuple(tuple(map(readable, row)) for row in section.rows)
+    return section._replace(title=readable(section.title), rows=rows)
 
 
 def _table(section: Section, about: str, label: str) -> Iterator[str]:
     levels = [*dict.fromkeys(re.findall(_LEVEL, " ".join(section.columns)))]
     intervals = f"{levels[0]} intervals in brackets." if levels else ""
-    if len(levels) > 1:
-        intervals = "Intervals in brackets, at the levels in the headings."
+    if len(levels) > 1 or "level" in section.columns:
+        intervals = "Intervals in brackets, at the level in the heading or in the row."
     caption = [f"{section.title}.", about, intervals, *(section.lines or [HOLM])]
     if any(SATURATED in cell for row in section.rows for cell in row):
         caption.append(CAPPED)
@@ -165,6 +150,8 @@ def _escape(text: str) -> str:
 
     def special(match: re.Match[str]) -> str:
         sign, math, letter = match.groups()
+        if sign is not None and sign.startswith("P_"):
+            return rf"$P_{{\mathrm{{{sign[2:]}}}}}$"
         if sign is not None:
             return _ESCAPES[sign]
         if letter is not None:

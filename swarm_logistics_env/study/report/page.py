@@ -17,8 +17,7 @@ from .document import Document
 from .drawing import Panel
 from .inline_svg import inline
 from .page_forest import forest
-from .section import P_LEVEL, bracketed, digits_of, percent, width_of
-from .terminal_answer import values_unbroken
+from .section import P_LEVEL, bracketed, digits_of, width_of
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -70,14 +69,13 @@ def html(document: Document, drawings: Mapping[str, str], latex: str) -> str:
         lstrip_blocks=True,
     )
     views = list(_views(document, drawings))
-    rows, axis = forest(document.answer, document.points_by_line)
-    environment.filters["values_unbroken"] = values_unbroken
+    rows, axis = forest(document.answer, document.points)
     environment.filters["marked_up"] = marked_up
     return environment.get_template("page.html.jinja").render(
         document=document,
         paired=document.runs.data["paired"],
         answer=document.answer,
-        level=percent(document.answer.level),
+        groups=len(document.answer.lines_by_subject),
         forest=rows,
         axis=axis,
         views=views,

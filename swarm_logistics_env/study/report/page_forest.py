@@ -12,7 +12,7 @@ from typing import NamedTuple
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 from .answer import Answer
-from .drawing import MARKERS, Point, limits
+from .drawing import Point, limits
 from .figures import forest_label
 from .section import ratio
 
@@ -39,14 +39,14 @@ class _Axis(NamedTuple):
         return f'<line class="{css_class}" x1="{x}" x2="{x}" y1="{top:g}" y2="{bottom:g}"/>'
 
 
-def forest(answer: Answer, rows: Sequence[Sequence[Point]]) -> tuple[list[str], str]:
+def forest(answer: Answer, points: Sequence[Point]) -> tuple[list[str], str]:
     """Return a drawing of each line of the answer, and their axis with its numbers and title.
 
     Args:
-        rows: the values of each line.
+        points: the value of each line.
     """
-    axis = _Axis(*limits([point for points in rows for point in points]))
-    drawn = [_row(axis, points, line.verdicts) for points, line in zip(rows, answer.lines)]
+    axis = _Axis(*limits(points))
+    drawn = [_row(axis, point, line.verdict) for point, line in zip(points, answer.lines)]
     numbers = "".join(
         f'{axis.upright(tick, 0, 4, "axis")}<text x="{axis.place(tick)}" y="15">{tick:g}</text>'
         for tick in axis.ticks
@@ -56,23 +56,21 @@ def forest(answer: Answer, rows: Sequence[Sequence[Point]]) -> tuple[list[str], 
     return drawn, f'<svg height="34">{line}{numbers}</svg>'
 
 
-def _row(axis: _Axis, points: Sequence[Point], verdicts: Sequence[Verdict]) -> str:
-    step = min(9.0, 36.0 / len(points))
-    height = 11.0 + step * len(points)
-    grid = "".join(axis.upright(tick, 0, height, "grid") for tick in axis.ticks)
-    zero = axis.upright(0.0, 0, height, "threshold")
-    marks = "".join(
-        "".join(_mark(axis, 5.5 + step * (index + 0.5), MARKERS[index % len(MARKERS)], *pair))
-        for index, pair in enumerate(zip(points, verdicts))
-    )
-    return f'<svg height="{height:g}" aria-hidden="true">{grid}{zero}{marks}</svg>'
+_HEIGHT = 20.0  # of a row [px]
 
 
-def _mark(axis: _Axis, y: float, marker: str, point: Point, verdict: Verdict) -> Iterator[str]:
+def _row(axis: _Axis, point: Point, verdict: Verdict) -> str:
+    grid = "".join(axis.upright(tick, 0, _HEIGHT, "grid") for tick in axis.ticks)
+    zero = axis.upright(0.0, 0, _HEIGHT, "threshold")
+    marks = "".join(_mark(axis, _HEIGHT / 2, point, verdict))
+    return f'<svg height="{_HEIGHT:g}" aria-hidden="true">{grid}{zero}{marks}</svg>'
+
+
+def _mark(axis: _Axis, y: float, point: Point, verdict: Verdict) -> Iterator[str]:
     """Yield the parts of a value with its interval, in the colour of its verdict."""
     if point.value is None:
         return
-    title = f"{verdict.compared.label}: {ratio(verdict)}, {verdict.on_property.adjusted}"
+    title = f"{verdict.compared.label}: {ratio(verdict)}, {verdict.in_words}"
     number = point.link.rpartition("-")[2]
     yield f'<g class="{verdict.conclusion}" data-question="{number}"><title>{escape(title)}</title>'
     if point.low is not None and point.high is not None:
@@ -84,4 +82,4 @@ def _mark(axis: _Axis, y: float, marker: str, point: Point, verdict: Verdict) ->
     if point.published:
         yield axis.upright(point.published, y - 4.5, y + 4.5, "threshold")
     hollow = "" if point.decided else ' class="hollow"'
-    yield f'<use href="#mark-{marker}"{hollow} x="{axis.place(point.value)}" y="{y:g}"/></g>'
+    yield f'<use href="#mark-o"{hollow} x="{axis.place(point.value)}" y="{y:g}"/></g>'

@@ -2,61 +2,136 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, Self
 
 from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.summaries import Interval
-from swarm_logistics_env.study.tasks.task import TaskScenario
+from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 from . import section, templates
+from .section import Section
 
 
-def between_policies(results: StudyResults) -> list[Verdict]:
+def between_policies(verdicts: Iterable[Verdict]) -> list[Verdict]:
     """Return the verdicts on P of a policy and of the first one; a claimed ablation is none."""
     return [
         verdict
-        for verdict in results.verdicts
+        for verdict in verdicts
         if verdict.compared.definition.compares == "policy" and verdict.compared.claim is None
     ]
 
 
 def comparison_in_words(results: StudyResults) -> str:
-    """Return by which factor P of the first policy is larger than that of each other one.
+    """Return by which factor P of one of two policies is larger than that of the other.
 
-    Where it is smaller, the other one stands first. Empty: the study does not compare them.
+    Empty: the study does not compare two.
     """
-    by_policy: dict[str, list[Verdict]] = map_reduce(
-        between_policies(results), lambda verdict: verdict.compared.policy
-    )
-    base = results.plan.specification.scenario
-    return " ".join(_sentence(verdicts, base) for verdicts in by_policy.values())
+    by_policy = _by_policy(results)
+    if len(by_policy) != 1:
+        return ""
+    (comparison,) = (_Compared.of(results, verdicts) for verdicts in by_policy.values())
+    return comparison.sentence
 
 
-def _sentence(verdicts: Sequence[Verdict], base: TaskScenario) -> str:
-    sound = [verdict for verdict in verdicts if not verdict.compared.original.case.faults]
-    # Trials have no base: of several conditions without a fault that with the most of them.
-    as_it_is = [verdict for verdict in sound if verdict.compared.original.case.scenario == base]
-    main = max(as_it_is or sound or verdicts, key=_n_seeds)
-    first = main.after.name
-    second = main.compared.policy
-    condition = main.after.condition
-    if main.interval is None:
-        return templates.POLICIES["undefined"].format(
-            first=first, second=second, condition=condition, problem=main.problem
+def comparison_table(results: StudyResults) -> Section | None:
+    """Return a row for each policy that is compared with the first; None: there are not several."""
+    by_policy = _by_policy(results)
+    if len(by_policy) < 2:
+        return None
+    rows = [_Compared.of(results, verdicts) for verdicts in by_policy.values()]
+    condition = rows[0].condition
+    first = rows[0].main.after.name
+    columns = f"P of {first}, {condition}", f"times [{section.P_LEVEL}]", "", "other conditions"
+    return Section("", columns, tuple(row.row for row in rows))
+
+
+def condition_of(verdict: Verdict) -> str:
+    """Return in which condition two policies are compared; of recorded trials with the task."""
+    case = verdict.compared.original.case
+    task = case.scenario.table if isinstance(case.scenario, RecordedScenario) else ""
+    return f"{task} {verdict.after.condition}".strip()
+
+
+def _by_policy(results: StudyResults) -> dict[str, list[Verdict]]:
+    """Return the verdicts on P of the first policy and of each other one."""
+    return map_reduce(between_policies(results.verdicts), lambda verdict: verdict.compared.policy)
+
+
+class _Compared(NamedTuple):
+    """P of the first policy and of another one.
+
+    Attributes:
+        main: the verdict where the swarm is as it should be.
+        elsewhere: those in other conditions.
+    """
+
+    main: Verdict
+    elsewhere: list[Verdict]
+
+    @classmethod
+    def of(cls, results: StudyResults, verdicts: Sequence[Verdict]) -> Self:
+        """Return it from the verdicts on a pair of policies."""
+        base = results.plan.specification.scenario
+        sound = [verdict for verdict in verdicts if not verdict.compared.original.case.faults]
+        # Trials have no base: that with which failures are compared, or which has the most of them.
+        references = {
+            verdict.compared.original.case.key
+            for verdict in results.verdicts
+            if verdict.after.kind == "fault"
+        }
+        as_it_is = [v for v in sound if v.compared.original.case.scenario == base]
+        usual = [v for v in sound if v.compared.original.case.key in references]
+        main = max(as_it_is or usual or sound or verdicts, key=_n_seeds)
+        return cls(main, [verdict for verdict in verdicts if verdict is not main])
+
+    @property
+    def condition(self) -> str:
+        """The condition of `main`."""
+        return condition_of(self.main)
+
+    @property
+    def is_ahead(self) -> bool:
+        """Whether P of the first policy is the larger one, or both are equal."""
+        return self.main.interval is not None and self.main.interval.value >= 0.0
+
+    @property
+    def sentence(self) -> str:
+        """By which factor P is larger, and where the order turns; the larger one stands first."""
+        first = self.main.after.name
+        second = self.main.compared.policy
+        if self.main.interval is None:
+            return templates.POLICIES["undefined"].format(
+                first=first, second=second, condition=self.condition, problem=self.main.problem
+            )
+        if not self.is_ahead:
+            first, second = second, first
+        factor = _factor(self.main.interval, inverted=not self.is_ahead)
+        is_decided = self.main.on_threshold.adjusted in ("supported", "refuted")
+        text = templates.POLICIES["decided" if is_decided else "open"].format(
+            first=first,
+            second=second,
+            times=section.bracketed(factor, 2, [1.0]),
+            condition=self.condition,
         )
-    is_ahead = main.interval.value >= 0.0
-    if not is_ahead:
-        first, second = second, first
-    times = section.bracketed(_factor(main.interval, inverted=not is_ahead), 2, [1.0])
-    is_decided = main.on_threshold.adjusted in ("supported", "refuted")
-    text = templates.POLICIES["decided" if is_decided else "open"].format(
-        first=first, second=second, times=times, condition=condition
-    )
-    further = [verdict for verdict in verdicts if verdict is not main]
-    return text + (_elsewhere(further, is_ahead) if further else ".")
+        return text + (_elsewhere(self.elsewhere, self.is_ahead) if self.elsewhere else ".")
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """The other policy, the factor, whether that is decided, and the other conditions."""
+        counts = Counter(verdict.on_threshold.adjusted for verdict in self.elsewhere)
+        words = {"supported": "larger", "refuted": "smaller"}
+        others = [f"{count} {words.get(word, word)}" for word, count in counts.items()]
+        times = section.NOTHING
+        if self.main.interval is not None:
+            times = section.bracketed(_factor(self.main.interval, inverted=False), 2, [1.0])
+        word = self.main.on_threshold.adjusted
+        name = f"to that of {self.main.compared.policy}"
+        return name, times, words.get(word, word), ", ".join(others)
 
 
 def _n_seeds(verdict: Verdict) -> int:
@@ -78,7 +153,10 @@ def _elsewhere(verdicts: Sequence[Verdict], is_ahead: bool) -> str:
     alike = "supported" if is_ahead else "refuted"
     turned = "refuted" if is_ahead else "supported"
     by_word: dict[str, list[str]] = map_reduce(
-        verdicts, lambda v: v.on_threshold.adjusted, lambda v: v.after.condition
+        verdicts,
+        lambda v: v.on_threshold.adjusted,
+        # Without commas: they stand between conditions.
+        lambda v: condition_of(v).replace(",", ""),
     )
     clauses = []
     if n_same := len(by_word.pop(alike, ())):

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.spi.estimate import Estimate
+from swarm_logistics_env.spi.estimate import SEEDS_OF_HEADLINE, Estimate
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
+
+from . import templates
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +29,6 @@ _SAME = 1e-9  # a value so near a threshold differs from it by rounding alone
 NOTHING = "–"
 # The words of decisions, in the order in which they are counted.
 WORDS = (*DECIDED, "open", "unaffected", "untestable", "undefined")
-_NOT_COUNTED = "not counted: below ten paired seeds they assume normal differences"
 Texts = tuple[str, ...]
 
 
@@ -180,12 +181,6 @@ def levels(verdicts: Iterable[Verdict]) -> str:
     return " to ".join(dict.fromkeys(map(percent, ends)))
 
 
-def other_levels(verdicts: Sequence[Verdict], level: float) -> str:
-    """Return the levels of these verdicts' intervals behind a blank, if any is not `level`."""
-    differ = any(verdict.level not in (None, level) for verdict in verdicts)
-    return f" {levels(verdicts)}" if differ else ""
-
-
 def mean_p(cell: Cell) -> str:
     """Return the mean P of a cell with its limits, e.g. "28.7 [27.1, 30.3]†"."""
     if not cell.n_seeds:
@@ -195,71 +190,55 @@ def mean_p(cell: Cell) -> str:
     return mean + SATURATED if cell.saturated else mean
 
 
-def ratio(verdict: Verdict, level: float = CONFIDENCE) -> str:
+def ratio(verdict: Verdict, *, names_level: bool = True) -> str:
     """Return an indicator with its interval, e.g. "0.611 [0.520, 0.702]".
 
     Of several trainings it also says how many collapsed.
 
     Args:
-        level: that the heading names; another one of the interval stands behind it.
+        names_level: whether the level of the interval stands behind it if it is not that of P.
     """
     estimate = verdict.estimate
     text = bracketed(estimate, 3)
     if verdict.saturated and estimate is not None:
         text += SATURATED
-    text += other_levels([verdict], level)
+    if names_level and verdict.level not in (None, CONFIDENCE):
+        text += f" {percent(verdict.level or 0.0)}"
     if estimate is not None and estimate.collapsed is not None:
         text += f" ({estimate.collapsed})"
     return text
 
 
-def conclusion_text(*verdicts: Verdict) -> str:
-    """Return the answers under Holm, then what else is known: "open; P changes by less than 10 %".
-
-    Of several verdicts they are counted, unless all are the same.
-    """
-    words = [verdict.on_property.adjusted for verdict in verdicts]
-    clauses = [words[0] if len(set(words)) == 1 else count_words(words)]
-    unchanged = Counter(
-        _equivalence_text(verdict) for verdict in verdicts if verdict.conclusion == "equivalent"
-    )
-    for clause, count in unchanged.items():
-        clauses.append(clause if count == len(verdicts) else f"{clause} in {count}")
-    return "; ".join(clauses)
-
-
-def _equivalence_text(verdict: Verdict) -> str:
-    margin = f"{100 * verdict.margin:.3g} %"
-    if verdict.compared.definition.needs_removed:
-        return f"P_F and P_S differ by less than {margin} of P_o"
-    return f"P changes by less than {margin}"
-
-
-def with_reason(words: str, reason: str) -> str:
-    """Return words with their reason in brackets, if there is one."""
-    return f"{words} ({reason})" if reason else words
-
-
-def decision_text(verdict: Verdict) -> str:
-    """Return the unadjusted decision on the property, and Holm's in brackets where it differs."""
-    plain, adjusted = verdict.on_property
-    return plain if plain == adjusted else f"{plain} ({adjusted})"
+def question_of(verdict: Verdict) -> str:
+    """Return what a verdict answers, e.g. "R FM4, 1 of 25"."""
+    comparison = verdict.compared
+    before = comparison.original.setting
+    after = verdict.after
+    usual_property = comparison.definition.adjectives.get(0.0)
+    slots: dict[str, object] = {
+        "name": after.name,
+        "before": before.value,
+        "value": after.value,
+        "property": "" if verdict.property_name == usual_property else f", {verdict.property_name}",
+        "start": f" from {after.onset:g} s" if after.onset else "",
+        "n_robots": comparison.n_robots,
+        "condition": after.condition,
+    }
+    case = "policies" if after.condition else after.kind
+    return f"{comparison.indicator} {templates.QUESTION[case].format(**slots)}"
 
 
 def word_to_count(verdict: Verdict, word: str) -> str:
-    """Return what a decision counts as in `count_words`.
-
-    A count is a headline: a provisional decision does not stand in it.
-    """
-    if word in DECIDED and "assumes_normal" in verdict.flags:
-        return _NOT_COUNTED
-    return word
+    """Return what a decision counts as in `count_words`: a provisional one is told as such."""
+    is_provisional = word in DECIDED and "assumes_normal" in verdict.flags
+    return f"{word} (n < {SEEDS_OF_HEADLINE})" if is_provisional else word
 
 
 def count_words(words: Iterable[str]) -> str:
     """Return how many of each word, e.g. "7 supported, 1 refuted"."""
     counts = Counter(words)
-    return ", ".join(f"{counts[word]} {word}" for word in (*WORDS, _NOT_COUNTED) if counts[word])
+    ordered = sorted(counts, key=lambda word: WORDS.index(word.partition(" ")[0]))
+    return ", ".join(f"{counts[word]} {word}" for word in ordered)
 
 
 def join_names(names: Sequence[str]) -> str:

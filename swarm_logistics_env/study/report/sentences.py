@@ -38,7 +38,7 @@ def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
     head = f"{comparison.policy}, {verdict.property_name}? {comparison.label}{swarm}."
     slots_by_case = dict(_parts(results, verdict))
     text = " ".join(fill(templates.VERDICT, slots_by_case))
-    return Sentence(head, text, verdict.conclusion, verdict.on_property.adjusted)
+    return Sentence(head, text, verdict.conclusion, verdict.in_words)
 
 
 def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots]]:
@@ -103,10 +103,18 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots
         n_trainings = spi.trainings_against_collapses(estimate)
         yield "hidden_collapses", {"p": estimate.p_value, "n_trainings": n_trainings}
     if results.plan.specification.until_clear and not estimate.untestable:
-        case = "open_after_all_looks" if verdict.stopped_at is None else "clear_at_a_look"
+        case = stop_of(verdict)
         yield case, {"n_seeds": estimate.n_seeds, "most": results.looks[-1]}
     if results.exploratory:
         yield "exploratory", {}
+
+
+def stop_of(verdict: Verdict) -> str:
+    """Return why a question of a study that runs until it is clear was played no further.
+
+    A key of `templates.STOPS`; "most": as all seeds were played, or nothing decides yet.
+    """
+    return "clear" if verdict.stopped_at is not None else verdict.given_up or "most"
 
 
 def _seeds_of(results: StudyResults, estimate: Estimate) -> str:

@@ -48,8 +48,7 @@ def cell_tables(results: StudyResults, *, for_paper: bool = False) -> Iterator[S
                 for heading, measure, text in _COUNTED
                 if any(cell.mean_of(measure) is not None for cell in cells)
             ]
-        decision = _holm if for_paper else section.decision_text
-        answers = partial(_answers, decision, published=has_published, looks=has_looks)
+        answers = partial(_answers, published=has_published, looks=has_looks)
         layouts = _layouts(verdicts, columns, answers, repeats_p=for_paper)
         for title, columns, arms in layouts:
             rows = tuple(
@@ -67,11 +66,6 @@ def further_tables(results: StudyResults) -> Iterator[Section]:
     yield from _text_sections(results)
     yield from _times_to_clear(results.cells)
     yield from _edge_sections(results.edges)
-
-
-def _holm(verdict: Verdict) -> str:
-    """Return Holm's verdict, and why it is untestable, or open beside an interval on one side."""
-    return section.with_reason(verdict.on_property.adjusted, verdict.reason)
 
 
 def _layouts(
@@ -157,7 +151,6 @@ def _one_run(cell: Cell) -> str:
 
 
 def _answers(
-    decision_text: Callable[[Verdict], str],
     indicator: str,
     verdicts: Sequence[Verdict],
     *,
@@ -166,19 +159,24 @@ def _answers(
 ) -> Iterator[CellColumn]:
     """Yield the columns of one indicator in a table of cells.
 
-    Value with interval, the paper's value, and per property (scalable, superlinear, ...) the
-    decision, with Holm's in brackets where it differs, beside what the paper claims.
+    Value with interval, its level where they differ, the paper's value, and per property (scalable,
+    superlinear, ...) the verdict beside what the paper claims.
     """
-    level = level_of(verdicts)
-    ratio = partial(section.ratio, level=level)
-    yield _column(f"{indicator} [{section.percent(level)}]", verdicts, ratio)
+    ratio = partial(section.ratio, names_level=False)
+    levels = {verdict.level for verdict in verdicts} - {None}
+    if len(levels) > 1:
+        yield _column(f"{indicator} [interval]", verdicts, ratio)
+        yield _column("level", verdicts, _level)
+    else:
+        heading = f"{indicator} [{section.percent(level_of(verdicts))}]"
+        yield _column(heading, verdicts, ratio)
     if looks:
         yield _column("seeds", verdicts, _number_of_seeds)
     if published:
         yield _column(f"{indicator} paper", verdicts, lambda v: section.number(v.published))
     by_property: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.property_name)
     for name, of_property in by_property.items():
-        yield _column(name, of_property, decision_text)
+        yield _column(name, of_property, lambda verdict: verdict.in_words)
         if published:
             yield _column("paper", of_property, _claim_text)
 
@@ -188,6 +186,10 @@ def _column(
 ) -> CellColumn:
     verdict_of = {verdict.compared.changed: verdict for verdict in verdicts}
     return heading, lambda cell: text(verdict_of[cell.arm]) if cell.arm in verdict_of else NOTHING
+
+
+def _level(verdict: Verdict) -> str:
+    return section.percent(verdict.level) if verdict.level else NOTHING
 
 
 def _number_of_seeds(verdict: Verdict) -> str:

@@ -40,13 +40,18 @@ POLICIES = {
     "undecided": "; open: {conditions}",
 }
 
-# The second line of the answer: P where the swarm is as it should be.
+# P where the swarm is as it should be.
 PERFORMANCE = {
-    "nothing": "P: no run has succeeded.",
-    "count": "{p}, {counted} in {duration:g} s, at {condition}: {means}.",
-    "count_with_interval": "{p} [{level}], {counted} in {duration:g} s, at {condition}: {means}.",
-    "no_count": "{p} at {condition}: {means}.",
-    "no_count_with_interval": "{p} [{level}] at {condition}: {means}.",
+    "nothing": "P: no run has succeeded",
+    "count": "{p}{level} = {mean} {counted} in {duration:g} s, {condition}",
+    "no_count": "{p}{level} = {mean}, {condition}",
+}
+
+# What was found of one indicator.
+SENTENCE = {
+    "counts": "{indicator}: {counts}.",
+    "one": "{indicator}, {question}: {value}{level}, {word}.",
+    "several": "{indicator}: {counts} ({extreme} {question}: {value}{level}, {word}).",
 }
 
 # Mean P of one policy: the cases that apply, one after the other.
@@ -59,38 +64,22 @@ MEAN = {
     "anything; {problem})",
 }
 
-# What a line of the answer asks, behind the symbol of its indicator.
+# What a line of the answer asks, behind the symbol of its indicator, by what differs.
 QUESTION = {
-    "sizes": "N {chain}{property}",
-    "failure_modes": "{count} failure modes{start}",
-    "parameters": "{count} parameters{start}",
-    "fault": "{name}{start}, {values} of {n_robots}{property}",
-    "policy": "with {name}{condition}{property}",
-    "parameter": "{name} {before:g}→{values}{property}",
-}
-
-# What a line of the answer says.
-LINE = {
-    "not_played": "not played yet",
-    "problem": "{words}: {problem}",
-    "family_lacks_runs": "no verdict: {indicator} lacks runs",
-    "words": "{words}",
-    "unaffected": "{words}, exact",
-    "untestable": "{words}: {reason}",
-    "unbounded": "{words} by its test; P_o is too near 0 for an interval",
-    "with_reason": "{words} ({reason})",
-    "more_runs": "open; {n_more} more to tell {effect:g} from {threshold:g}",
+    "size": "N {before:g}→{value:g}{property}",
+    "fault": "{name}{start}, {value:g} of {n_robots}{property}",
+    "policy": "with {name}{property}",
+    "policies": "to {name}, {condition}",
+    "parameter": "{name} {before:g}→{value:g}{property}",
 }
 
 # How to read the answer, and what limits it: the cases that apply, with "; " between them.
 NOTES = {
-    "indicators": "{indicators}: supported above 0 (good), refuted below",
-    "intervals": "{level} intervals",
-    "intervals_of_several_levels": "{level} intervals, or as said behind them",
-    "adjusted": "verdicts are Holm-adjusted",
-    "assumes_normal": "provisional (below ten seeds)",
-    "cannot_fail": "untestable where it cannot lie below the threshold, as P cannot below 0",
+    "words": "{words}",
+    "adjusted": "by Holm's method over all questions on an indicator of one policy",
+    "undefined": "undefined: {problems}",
     "too_few_seeds": "two seeds give no verdict",
+    "unbounded": "without limits: P_o is too near 0 for an interval",
     "few_items": "P is small: a longer duration tells more",
     "damage": "{damage}",
     "exploratory": "exploratory: other seeds or P than were declared, whose report this replaces",
@@ -100,39 +89,55 @@ NOTES = {
     "capped_measure": "{mark} P is capped: no run can have more of this measure",
     "collapsed_runs": "runs collapse {conditions}",
     "phases_untestable": "two phases untestable: {conditions}",
-    "open": "open: undecided by these {runs}",
-    "more_runs": "open: undecided; so many more {runs} would tell in 4 of 5 studies",
-    "open_for_a_reason": "{reasons}",
+    "open": "{needs}",
     "claims_of_the_text": "of {claims} in the paper's text {counts}",
     "claims_beside_the_text": "of {claims} beside it {counts}",
     "claims_without_text": "of {claims} {counts}",
 }
-# Why a verdict is open although its interval lies on one side, by `Verdict.reason`.
-REASONS_TO_BE_OPEN = {
-    "stalls": "so few runs may hide stalled ones",
-    "trainings": "so few trainings may hide collapses",
-    "Holm": "decided alone, not among all questions on the indicator",
+# What the words of verdicts mean: those that stand in an answer, in this order.
+MEANINGS = {
+    "decided": "supported: above 0 (good), refuted: below",
+    "open": "open: undecided",
+    "margin": "< {margin}: P changes by less than that, or P_F and P_S of FT differ by less",
+    "stalls": "stalls: so few runs may hide stalled ones",
+    "trainings": "trainings: so few may hide collapses",
+    "Holm": "Holm: decided alone, not among all questions on the indicator",
+    "provisional": "n < {n_seeds}: provisional",
+    "unaffected": "unaffected: the same runs",
+    "cannot_fail": "untestable, never < 0: as P cannot be",
+    "few_pairs_differ": "untestable, equal P: nearly all pairs of runs have the same P",
+    "reference_near_0": "untestable, P_o near 0: a change relative to it says nothing",
+}
+# How many more seeds open questions need: the cases that apply, one after the other.
+MORE_SEEDS = {
+    "within_reach": "{count} open may be decided by {n_seeds} {runs} or more",
+    "beyond": "{count} open need more than {reach} {runs} ({named})",
+    "none": "{count} open: no number in reach will do ({named})",
+    "small": "{count} open of an effect below {effect:g}, for which more are not worth while",
 }
 
 EXPLORATORY = "exploratory: over other seeds or P than were declared before the first run"
 
-# The sentence that a paper can quote: the cases that apply, one after the other.
+# What a paper can quote: the cases that apply, one after the other.
 FOR_A_PAPER = {
-    "performance": "{policies}{world}: {performance} over {seeds}",
+    "conditions": "{policies}{world}{how}, {seeds}",
     "comparison": ". {comparison}",
-    "one_question": "; {lowest}; {property}: {words} ({method})",
-    "several_questions": "; of {n_questions} questions {words} ({method})",
-    "not_decided": "; not decided: {questions}",
-    "lowest": "; the lowest is {lowest} ({word})",
+    "subjects": ". {sentences}",
+    "method": ". Verdicts by Holm's method over all questions on an indicator of one policy, "
+    "{error} error",
+    "looks": "; looked at after {looks} seeds: of {questions} {stops}",
     "exploratory": "; {exploratory}",
     "end": ".",
 }
-METHOD = "Holm's method, {error} error"
-WORLD = {"task": "the task {task}", "trials": "trials of {file}{setup}"}
-QUESTION_WITH_VALUE = {
-    "value": "{question} = {value}",
-    "interval": "{question} = {value}, {level} interval {interval}",
+# Why questions of a study that runs until it is clear were played no further.
+STOPS = {
+    "clear": "{count} stopped where clear",
+    "hardly": "{count} as the rest of {most} seeds would decide them with a chance below {chance}",
+    "margin": "{count} as P changes by less than {margin} of P_o",
+    "untestable": "{count} as they cannot be tested",
+    "most": "{count} after all {most} seeds",
 }
+WORLD = {"task": "the task {task}", "trials": "trials of {file}{setup}"}
 
 # One verdict in sentences: the cases that apply, one after the other.
 VERDICT = {
@@ -150,8 +155,10 @@ VERDICT = {
     "{runs}.",
     "hidden_collapses": "With collapses that may be hidden p is {p:.2g}: it needs at least "
     "{n_trainings} trainings.",
-    "open_after_all_looks": "Open after {n_seeds} of at most {most} seeds.",
-    "clear_at_a_look": "Clear at {n_seeds} of at most {most} seeds.",
+    "clear": "Clear at {n_seeds} of at most {most} seeds.",
+    "hardly": "Open after {n_seeds} of at most {most} seeds: the others would hardly decide it.",
+    "margin": "Open after {n_seeds} of at most {most} seeds: P changes by less than the margin.",
+    "most": "Open after {n_seeds} of at most {most} seeds.",
     "exploratory": "Exploratory.",
 }
 

@@ -1,77 +1,73 @@
-"""The answer for a terminal: in columns, folded to its width."""
+"""The answer for a terminal, a pipe or a file: sentences, then a row a question, in columns."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import zip_longest
 from textwrap import wrap
 
-from more_itertools import map_reduce
+from .answer import Answer
 
-from .answer import MOST_LINES, Answer, Line
-
+PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
 _NO_BREAK = "\N{NO-BREAK SPACE}"
+_SHORTEST = 8  # letters of a question
 
 
-def terminal_answer(answer: Answer, width: int, most: int | None = MOST_LINES) -> str:
-    """Return the answer for a terminal.
+def terminal_answer(answer: Answer, width: int = PLAIN_WIDTH, *, shortens: bool = False) -> str:
+    """Return the answer as text. Sentences are folded to the width; no row is folded or left out.
 
     Args:
-        width: of the terminal [characters]; no line is longer.
-        most: lines at most; None: as many as it takes.
+        width: of the terminal [characters].
+        shortens: whether questions are shortened so that no row is wider.
     """
-    above = (answer.comparison, answer.scope, answer.performance)
-    head = [line for text in above for line in _fold(text, width)]
-    tail = _fold(answer.notes, width)
-    rows = _rows(answer, width)
-    n_rows = len(rows) if most is None else most - len(head) - len(tail)
-    if len(rows) > n_rows:
-        rows = [*rows[: n_rows - 1], f"and {len(rows) - n_rows + 1} lines more: --full"]
-    return "\n".join([*head, *rows, *tail])
+    parts = [line for text in answer.head for line in _fold(text, width)]
+    widest = width if shortens else None
+    if answer.compared is not None:
+        parts = [*_in_columns([answer.compared.columns, *answer.compared.rows], widest), *parts]
+    cells = [("", *answer.columns[1:]), *(answer.row(line, line.question) for line in answer.lines)]
+    heading, *rows = _in_columns(cells, widest, right=1)
+    parts.append(heading)
+    groups = answer.lines_by_subject
+    for line, row in zip(answer.lines, rows):
+        if len(groups) > 1 and line is groups[line.subject][0]:
+            parts.append(f"{line.subject}:")
+        parts.append(row)
+    return "\n".join([*parts, *_fold(answer.notes, width)])
 
 
-def _rows(answer: Answer, width: int) -> list[str]:
-    """Return the lines in columns, as few as questions and verdicts can be folded into."""
-    level = answer.level
-    columns = zip(*((line.question, line.value, line.interval(level)) for line in answer.lines))
-    question_width, *other_widths = [max(map(len, column)) for column in columns]
-    widest = min(question_width, max(8, width - sum(other_widths) - 16))
-    layouts = (
-        list(_in_columns(answer, [narrower, *other_widths], width))
-        for narrower in range(min(20, widest), widest + 1)
-    )
-    return min(layouts, key=len)
+def _in_columns(
+    rows: Sequence[tuple[str, ...]], width: int | None, right: int | None = None
+) -> Iterator[str]:
+    """Yield rows in columns, no wider than `width` if the first column can be shortened so far.
+
+    Args:
+        right: the index of a column that is flush right; None: none is.
+    """
+    first_width, *widths = [max(map(len, column)) for column in zip(*rows)]
+    if width is not None:
+        rest = sum(widths) + 2 * len(widths)
+        first_width = max(_SHORTEST, min(first_width, width - rest))
+    for first, *others in rows:
+        padded = [
+            f"{cell:>{w}}" if index == right else f"{cell:{w}}"
+            for index, (cell, w) in enumerate(zip(others, widths), start=1)
+        ]
+        yield "  ".join([f"{_shortened(first, first_width):{first_width}}", *padded]).rstrip()
 
 
-def _in_columns(answer: Answer, widths: Sequence[int], width: int) -> Iterator[str]:
-    lines_by_policy: dict[str, list[Line]] = map_reduce(answer.lines, lambda line: line.policy)
-    for policy, lines in lines_by_policy.items():
-        if len(lines_by_policy) > 1:
-            yield f"{policy}:"
-        for line in lines:
-            question, *question_rest = _fold_question(line.question, widths[0])
-            interval = line.interval(answer.level)
-            left = f"{question:{widths[0]}}  {line.value:>{widths[1]}}  {interval:{widths[2]}}"
-            verdict, *verdict_rest = wrap(line.verdict_text, max(10, width - len(left) - 2)) or [""]
-            yield f"{left}  {verdict}".rstrip()
-            for question, verdict in zip_longest(question_rest, verdict_rest, fillvalue=""):
-                yield f"{question:{len(left)}}  {verdict}".rstrip()
-
-
-def _fold_question(question: str, width: int) -> list[str]:
-    unbroken = values_unbroken(question)
-    if max(map(len, unbroken.split(" "))) + 2 > width:  # where there is no room for that
-        unbroken = question
-    folded = wrap(unbroken, width, subsequent_indent="  ")
-    return [part.replace(_NO_BREAK, " ") for part in folded]
-
-
-def values_unbroken(question: str) -> str:
-    """Return a question that is folded beside its values, "1, 2, 3 of 25", not within them."""
-    return re.sub(r"(?<= )[\d., ]+ of \d+", lambda m: m[0].replace(" ", _NO_BREAK), question)
+def _shortened(text: str, width: int) -> str:
+    """Return a text of at most so many letters: its middle is left out, as its ends tell most."""
+    if len(text) > width:
+        text = text.replace(", ", " ").replace(" of ", "/")
+    if len(text) <= width:
+        return text
+    behind = (width - 1) * 3 // 5
+    return f"{text[: width - 1 - behind]}…{text[-behind:]}"
 
 
 def _fold(text: str, width: int) -> list[str]:
+    # No line ends within "N = 25", "< 10 %" or "95 %".
+    unbroken = re.sub(r"(?<=[Nmn=<]) (?=[=<\d])| (?=%)", _NO_BREAK, text)
     # Paths and names are longer than a line sometimes: they are broken, never cut.
-    return wrap(text, width, subsequent_indent="  ", break_on_hyphens=False)
+    folded = wrap(unbroken, width, subsequent_indent="  ", break_on_hyphens=False)
+    return [line.replace(_NO_BREAK, " ") for line in folded]

@@ -97,7 +97,9 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
     lines = [f"# {document.title}", ""]
     for paragraph in (*document.text, note):
         lines += [_inert(paragraph), ""] if paragraph else []
-    lines += [section_markdown(document.answer.section)]
+    compared = document.answer.compared or Section("")
+    head = compared._replace(title="Answer", lines=tuple(document.answer.head))
+    lines += [section_markdown(head), section_markdown(document.answer.section)]
     for chapter in document.chapters:
         lines += [f"## {chapter.title}", ""]
         lines += [chapter.text, ""] if chapter.text else []

@@ -110,11 +110,14 @@ def play(
     *,
     has_worked: bool = True,
     more: Callable[[], Sequence[Run]] | None = None,
+    n_most: Callable[[], int] | None = None,
 ) -> tuple[list[str | None], int]:
     """Play runs and keep each in the store at once; show a progress bar.
 
     Args:
         more: called when all are played; returns the runs that they make necessary. None: none.
+        n_most: returns how many runs are left at most, with those that may become necessary; called
+            at the start and after `more`. None: as many as are known.
         end: when to stop (`time.monotonic`) [s]; None: when all are played.
         has_worked: whether a run of the study has succeeded. While none has, it stops as soon as
             every condition has failed, at more than one seed, in as many runs as a condition has.
@@ -127,7 +130,8 @@ def play(
     failed: list[Run] = []
     n_played_at_growth = -1  # how many were played when others joined the queue
     goes_on = True
-    with ProgressBar(title, len(runs), "runs") as progress:
+    n_runs = n_most() if n_most else len(runs)
+    with ProgressBar(title, n_runs, "runs at most" if n_most else "runs") as progress:
         while goes_on and len(queue):
             # Closed at once where this stops early, so that no worker outlives it.
             with closing(engine(queue)) as finished:
@@ -145,7 +149,8 @@ def play(
                     if more and len(errors) == queue.total:
                         n_played_at_growth = len(errors)
                         queue.extend(more())
-                        progress.extend(queue.total)
+                        n_runs = len(errors) + n_most() if n_most else queue.total
+                        progress.extend(n_runs)
             # An engine that took all runs at once ends when others join them: it is called again.
             goes_on = len(errors) == n_played_at_growth
     return errors, queue.total - len(errors)

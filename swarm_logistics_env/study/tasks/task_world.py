@@ -22,6 +22,14 @@ class TaskWorld:
         """Return where runs are played, e.g. "a warehouse of 6 m x 5 m"; empty: by its name."""
         return ""
 
+    def preset_in_words(self, scenario: TaskScenario) -> str:
+        """Return the preset of a scenario and what differs; empty: it is near none."""
+        return ""
+
+    def engine(self, scenario: TaskScenario) -> str:
+        """Return what moves the bodies, e.g. "chipmunk"; empty: there is nothing to choose."""
+        return ""
+
     def largest_performance(self, scenario: TaskScenario) -> float:
         """Return the largest P that a run can have; infinite: none is."""
         return math.inf

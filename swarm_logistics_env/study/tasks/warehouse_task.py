@@ -18,7 +18,7 @@ from swarm_logistics_env.core.fingerprint import package_code
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.policies.episode import run_episode
 from swarm_logistics_env.policies.spec import NO_MAKERS
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.world.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.world.warehouse.faults import text_of
 
@@ -29,6 +29,8 @@ _WORLD = (
     "a warehouse of {width:g} m x {height:g} m{floor} with {n_items} items{restock}, robots of "
     "{speed:g} m/s{drive}{handling}"
 )
+
+_MOST_CHANGES = 4  # of a preset that is still named
 
 # What decides an episode. The other files hold messages, validation, statistics and pictures, and
 # "!" excludes those that name, read, record and check policies: a policy's identity tells what was
@@ -124,6 +126,26 @@ class WarehouseTask(TaskWorld):
             drive=drive,
             handling=handling,
         )
+
+    def preset_in_words(self, scenario: TaskScenario) -> str:
+        """Return the preset that is nearest, with what differs, unless that is much."""
+        assert isinstance(scenario, Scenario)
+        values = scenario.model_dump()
+        differing = {
+            name: [field for field, value in preset.model_dump().items() if value != values[field]]
+            for name, preset in SCENARIO_PRESETS.items()
+        }
+        nearest = min(differing, key=lambda name: len(differing[name]))
+        fields = [field for field in differing[nearest] if field != "bodies"]
+        if len(fields) > _MOST_CHANGES:
+            return ""
+        changes = " and ".join(f"{field} = {values[field]}" for field in fields)
+        return f"preset {nearest} with {changes}" if changes else f"preset {nearest}"
+
+    def engine(self, scenario: TaskScenario) -> str:
+        """Return the engine of the bodies."""
+        assert isinstance(scenario, Scenario)
+        return scenario.bodies
 
     def largest_performance(self, scenario: TaskScenario) -> float:
         """Return the number of items; infinite where delivered ones come back."""

@@ -270,6 +270,11 @@ VERDICT_COLUMNS: Columns[Verdict] = {
         lambda verdict: verdict.conclusion,
         "answer_holm; equivalent if that is open and P unchanged",
     ),
+    "in_words": (
+        str,
+        lambda verdict: verdict.in_words,
+        "the verdict in a word or two, as every table has it, e.g. open, < 10 %",
+    ),
     "claim": (
         str,
         lambda verdict: verdict.claim,

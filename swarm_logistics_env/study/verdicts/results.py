@@ -136,6 +136,9 @@ class StudyResults:
             count = f"{fewest} to {len(seeds)}" if fewest < len(seeds) else f"{fewest}"
             runs = "run" if count == "1" else "runs"
             return f"{count} unpaired {runs} a condition"
+        blocks = self.plan.origin.blocks if self.plan.origin else ()
+        if blocks:
+            return f"{len(blocks)} paired blocks ({blocks[0]} to {blocks[-1]})"
         fewest = len(seeds)
         if self.looks:  # conditions have as many as were needed
             most = max([fewest, *(cell.n_seeds for cell in self.cells)])

@@ -33,7 +33,7 @@ from swarm_logistics_env.study.questions.plan import Plan
 from swarm_logistics_env.study.tasks.task import Case, Outcomes, Run
 
 from .cell import Cell
-from .verdict import Decision, Verdict, judge_comparison
+from .verdict import UNTESTABLE, Decision, Verdict, judge_comparison
 
 MOST_SEEDS_UNTIL_CLEAR = 200
 HARDLY = 0.1  # chance of a verdict below which no further seed is played
@@ -46,6 +46,8 @@ class LatestLook(NamedTuple):
         verdicts: on every comparison, as it was when it stopped or at the last complete look.
         next_runs: the runs that the next look needs; empty: everything is clear, or the most seeds
             are played.
+        n_most: how many runs are left at most: if nothing that is open becomes clear before all
+            seeds are played.
         shared_runs: those of them that the first look needs of the condition that most comparisons
             of a policy share.
         seeds_of: number of seeds that a condition has, counted at the looks, by its key.
@@ -53,6 +55,7 @@ class LatestLook(NamedTuple):
 
     verdicts: tuple[Verdict, ...]
     next_runs: tuple[Run, ...]
+    n_most: int
     shared_runs: tuple[Run, ...]
     seeds_of: Mapping[str, int]
 
@@ -75,6 +78,7 @@ def latest_look(plan: Plan, outcomes: Outcomes, judged: Judged | None = None) ->
     looks = _Looks(plan, outcomes, {} if judged is None else judged)
     next_runs = looks.missing(plan.cases, looks.seeds[0])
     shared_runs = looks.missing(_shared_cases(plan), looks.seeds[0])
+    last_runs = dict(next_runs)
     verdicts = dict[Comparison, Verdict]()
     families: dict[Family, list[Comparison]] = map_reduce(
         plan.comparisons, lambda comparison: comparison.family
@@ -82,11 +86,13 @@ def latest_look(plan: Plan, outcomes: Outcomes, judged: Judged | None = None) ->
     for comparisons in families.values():
         family = _Family(comparisons, looks)
         next_runs |= family.next_runs
+        last_runs |= family.last_runs
         verdicts |= family.verdicts()
     return LatestLook(
         tuple(verdicts[comparison] for comparison in plan.comparisons),
         # Seed by seed, so that a study that is stopped early has something of every question.
         tuple(sorted(next_runs.values(), key=lambda run: run.seed)),
+        len(last_runs),
         tuple(shared_runs.values()),
         {case.key: looks.seeds_of(case) for case in plan.cases},
     )
@@ -170,10 +176,12 @@ class _Family:
 
     Attributes:
         next_runs: the runs that its next look needs and that are not played yet, by their keys.
+        last_runs: those that its last look needs, if nothing is clear before.
     """
 
     def __init__(self, comparisons: Sequence[Comparison], looks: _Looks) -> None:
         self.next_runs: dict[str, Run] = {}
+        self.last_runs: dict[str, Run] = {}
         self._looks = looks
         self._open = list(comparisons)
         self._playing = list(comparisons)  # those of them whose verdict may still change
@@ -188,13 +196,12 @@ class _Family:
             if is_first or not self.next_runs:
                 self._verdicts |= looks.judge(playing, n_seeds)
             if self.next_runs:
+                self.last_runs = looks.missing(cases, looks.seeds[-1])
                 break
             self._stop_clear_ones(n_seeds)
-            self._playing = [
-                comparison
-                for comparison in self._playing
-                if comparison in self._open and self._may_be_clear(comparison, n_seeds)
-            ]
+            self._playing = [comparison for comparison in self._playing if comparison in self._open]
+            if n_seeds < looks.seeds[-1]:
+                self._give_up_hopeless_ones(n_seeds)
 
     def _is_undefined(self, comparison: Comparison) -> bool:
         # A failed run ends a comparison in this call: it stays in the family, without seeds.
@@ -225,23 +232,33 @@ class _Family:
             if is_clear:
                 self._stop(comparison, n_seeds)
 
-    def _may_be_clear(self, comparison: Comparison, n_seeds: int) -> bool:
-        """Return whether the last look may decide a comparison that is open at this one."""
+    def _give_up_hopeless_ones(self, n_seeds: int) -> None:
+        """Play no further, and note why, what the last look can hardly decide."""
+        for comparison in list(self._playing):
+            if reason := self._why_given_up(comparison, n_seeds):
+                self._playing.remove(comparison)
+                self._verdicts[comparison] = replace(self._verdicts[comparison], given_up=reason)
+
+    def _why_given_up(self, comparison: Comparison, n_seeds: int) -> str:
+        """Return why a comparison that is open at a look stays so; empty: the last may decide."""
         verdict = self._verdicts[comparison]
         if verdict.estimate is None:
-            return True
-        if verdict.estimate.untestable or self._is_equivalent(verdict, n_seeds):
-            return False
+            return ""
+        if verdict.estimate.untestable:
+            return UNTESTABLE
+        if self._is_equivalent(verdict, n_seeds):
+            return "margin"
         most = self._looks.seeds[-1]
         p = verdict.estimate.p_value
         # Of both sides, that on which the value lies.
         tests = [(p and p / 2, self._looks.alpha(most, 1 - CONFIDENCE) / 2)]
         if verdict.equivalence and not verdict.equivalence.identical:
             tests.append((verdict.equivalence.p_value, self._looks.alpha(most, 2 * ALPHA) / 2))
-        return any(
+        may_be_clear = any(
             p is None or predictive_power(p, n_seeds, most, error / len(self._open)) >= HARDLY
             for p, error in tests  # None: one seed tells nothing yet
         )
+        return "" if may_be_clear else "hardly"
 
     def _is_equivalent(self, verdict: Verdict, n_seeds: int) -> bool:
         """Return whether a look shows equivalence at the level that holds for a whole family."""

@@ -13,6 +13,7 @@ from more_itertools import map_reduce
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi import Equivalence, Estimate, Interval, equivalence
 from swarm_logistics_env.spi.equivalence import ALPHA
+from swarm_logistics_env.spi.estimate import SEEDS_OF_HEADLINE
 from swarm_logistics_env.study.questions.comparison import (
     CONFIDENCE,
     Arm,
@@ -31,9 +32,12 @@ UNDEFINED: Literal["undefined"] = "undefined"
 Word: TypeAlias = spi.DecisionWord | Literal["unaffected", "untestable", "undefined"]
 DECIDED: tuple[Word, ...] = ("supported", "refuted", "equivalent")
 _OPPOSITE: dict[Word, Word] = {"supported": "refuted", "refuted": "supported"}
+# Why a comparison is played no further: nothing is to be tested, P changes within the margin, or no
+# further seed is likely to decide it.
+WHY_GIVEN_UP = UNTESTABLE, "margin", "hardly"
 # Why there is nothing to test, by the flag of the estimate.
 _WHY_UNTESTABLE = {
-    "cannot_fail": "it cannot be below {threshold:g}",
+    "cannot_fail": "never < {threshold:g}",
     "few_pairs_differ": "equal P",
     "reference_near_0": "P_o near 0",
 }
@@ -85,6 +89,8 @@ class Verdict:
             outside of a study that runs until it is clear.
         stopped_at: number of seeds at which it was clear, in a study that runs until then; None: it
             is not, or the study is another.
+        given_up: why it is played no further although it is open, in such a study: a name in
+            `WHY_GIVEN_UP`; empty: it is not.
         published: the reference's value of the indicator; None: it has none.
         claimed: whether it is claimed to lie above the threshold; None: nothing is claimed.
     """
@@ -99,6 +105,7 @@ class Verdict:
     on_equivalence: Decision | None
     p_adjusted: float | None = None
     stopped_at: int | None = None
+    given_up: str = ""
     published: float | None = None
     claimed: bool | None = None
 
@@ -196,6 +203,21 @@ class Verdict:
             if flag in self.flags:
                 return reason
         return "Holm" if self.on_threshold.plain in DECIDED else ""
+
+    @property
+    def in_words(self) -> str:
+        """The verdict in a word or two, as every table has it, e.g. "open, < 10 %".
+
+        Below ten paired seeds a decision assumes normal differences, which "n < 10" says.
+        """
+        word = self.on_property.adjusted
+        if self.estimate is None and str(self.problem).endswith(" missing"):
+            return "not played"
+        if self.conclusion == "equivalent":
+            return f"{word}, < {100 * self.margin:.3g} %"
+        if word in DECIDED and "assumes_normal" in self.flags:
+            return f"{word}, n < {SEEDS_OF_HEADLINE}"
+        return f"{word}, {self.reason}" if self.reason else word
 
     @property
     def equivalence_name(self) -> str | None:

@@ -17,6 +17,7 @@ from swarm_logistics_env.study.questions.benchmark_cells import benchmark_study,
 from swarm_logistics_env.study.questions.presets import load_preset
 from swarm_logistics_env.study.questions.specification import FIRST_LOOK
 from swarm_logistics_env.study.report import benchmark
+from swarm_logistics_env.study.report.more_seeds import more_seeds
 from swarm_logistics_env.study.report.section import slug
 from swarm_logistics_env.study.report.write import section_markdown, write_text
 from swarm_logistics_env.study.runs.engines import engine_named
@@ -148,7 +149,7 @@ def judge_policy_command(
         names = [spec.name for spec in specs]
         unseen = str(study.plan().seeds[-1] + 1)
         words = [*names, *world.options_again, "--first-seed", unseen]
-        _suggest_more_seeds(words, directory, max(JUDGE_SEEDS, 2 * most_seeds))
+        _suggest_more_seeds(words, directory, results)
     say_what_was_played(tally)
     raise Exit(1 if tally.failed else 0)
 
@@ -258,10 +259,16 @@ def _study_in(
     return study
 
 
-def _suggest_more_seeds(options: Sequence[str], directory: Path, seeds: int) -> None:
-    options = [*options, "--seeds", str(seeds), "--out", f"{directory}-{seeds}"]
+def _suggest_more_seeds(options: Sequence[str], directory: Path, results: StudyResults) -> None:
+    """Say what open questions need, as the report does, with the command if that is in reach."""
+    needs = more_seeds(results)
+    if needs.n_seeds is None:
+        say(f"What is open: {needs.words}.")
+        return
+    n_seeds = str(needs.n_seeds)
+    options = [*options, "--seeds", n_seeds, "--out", f"{directory}-{n_seeds}"]
     command = f"swarm-logistics judge {join(options)}"
-    say("What is open needs more seeds, which nobody has looked at:", command)
+    say(f"What is open: {needs.words}. With seeds that nobody has looked at:", command)
 
 
 def _show_benchmark(results: StudyResults, digest: str, out: Path) -> None:

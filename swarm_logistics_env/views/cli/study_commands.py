@@ -374,7 +374,9 @@ def run_study(
     study: Study, engine: Engine, shard: Shard | None = None, minutes: float | None = None
 ) -> Tally:
     """Run a study and show the answer so far; Ctrl-C ends the command, and it says how to go on."""
-    after_look = AnswerSoFar().show if study.specification.until_clear else None
+    after_look = None
+    if study.specification.until_clear:
+        after_look = AnswerSoFar(study.finished()[0]).show
     try:
         return study.run(engine, shard=shard, minutes=minutes, after_look=after_look)
     except KeyboardInterrupt:

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import math
+import sys
 import textwrap
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shlex import quote
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 from typer import echo
 
 from swarm_logistics_env import spi
+from swarm_logistics_env.core.progress_bar import clock
 from swarm_logistics_env.core.records import plain
-from swarm_logistics_env.study.report.answer import MOST_LINES, answer
+from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.drawing import PAGE_STYLE, FigureStyle
 from swarm_logistics_env.study.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.study.report.section import NOTHING, Section, Texts, levels, number
-from swarm_logistics_env.study.report.terminal_answer import terminal_answer
+from swarm_logistics_env.study.report.terminal_answer import PLAIN_WIDTH, terminal_answer
 from swarm_logistics_env.study.report.write import (
     how_to_get_figures,
     section_markdown,
@@ -29,8 +33,6 @@ from swarm_logistics_env.study.report.write import (
 from swarm_logistics_env.study.runs.engines import Tally
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import POWER, Verdict
-
-_PLAIN_WIDTH = 80  # of what is read by a program or kept in a file
 
 
 def show(section: Section) -> None:
@@ -79,7 +81,7 @@ def show_report(
     """Print the answer of a study and a sentence for a paper, and write its report into `out`.
 
     Args:
-        full: print every table, and a line a question.
+        full: print every table before.
         is_finished: whether all is played; else no sentence is for a paper.
         style: of the files of figures; those in the page have its own.
     """
@@ -89,9 +91,8 @@ def show_report(
             show(section)
     # Printed first: the answer is shown even where no file can be written.
     console = Console()
-    width = console.width if console.is_terminal else _PLAIN_WIDTH
-    shown = answer(results, most=None) if full else report.answer
-    text = terminal_answer(shown, width, None if full else MOST_LINES)
+    width = console.width if console.is_terminal else PLAIN_WIDTH
+    text = terminal_answer(report.answer, width, shortens=console.is_terminal)
     echo("\n".join(map(plain, text.split("\n"))))
     echo(f"Report: {write_document(report, out, style)[0]}")
     if advice := how_to_get_figures():
@@ -109,28 +110,72 @@ def show_report(
 class AnswerSoFar:
     """Shows on standard error what is known of a study that runs until it is clear.
 
-    P as soon as it has an interval, the whole answer after the first look, a line after the others.
+    P as soon as it has an interval, with the time that the rest takes; the whole answer after the
+    first look, a line after the others.
+
+    Args:
+        n_before: how many runs were finished before.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, n_before: int = 0) -> None:
         self._start = time.monotonic()
+        self._n_before = n_before
         self._looked = False
 
     def show(self, results: StudyResults) -> None:
         """Show these results."""
-        now = f"After {time.monotonic() - self._start:.0f} s"
-        so_far = answer(results)
+        seconds = time.monotonic() - self._start
+        now = f"After {seconds:.0f} s"
         verdicts = results.verdicts
         seeds = [verdict.estimate.n_seeds for verdict in verdicts if verdict.estimate]
         if not seeds:
-            lines = f"{now}: {so_far.performance}"
+            n_played = len(results.outcomes) - self._n_before
+            lines = f"{now}: {answer(results).head[0]}"
+            if n_played > 0:
+                lines += f"\n{what_the_rest_takes(results, seconds / n_played)}"
         elif not self._looked:
-            lines = f"{now}, a first look:\n{terminal_answer(so_far, _PLAIN_WIDTH, MOST_LINES)}\n"
+            lines = f"{now}, a first look:\n{terminal_answer(answer(results))}\n"
             self._looked = True
         else:
             n_clear = sum(verdict.stopped_at is not None for verdict in verdicts)
-            lines = f"{now}, {max(seeds)} seeds: {n_clear} of {len(verdicts)} questions are clear."
-        echo("\n".join(map(plain, lines.split("\n"))), err=True)
+            n_ended = sum(bool(verdict.given_up) for verdict in verdicts)
+            lines = (
+                f"{now}, {max(seeds)} seeds: {n_clear} of {len(verdicts)} questions are clear, "
+                f"{n_ended} are played no further."
+            )
+        # Not `echo`, which writes beside a progress bar that is drawn at the same time.
+        sys.stderr.write("".join(f"{plain(line)}\n" for line in lines.split("\n")))
+
+
+_SLOW = 1.0  # seconds a run, from which on it is told what fewer seeds would tell
+
+
+def what_the_rest_takes(results: StudyResults, seconds_a_run: float) -> str:
+    """Return how long a study until it is clear takes; of a slow one what fewer seeds would tell.
+
+    Args:
+        results: of one in which the seeds of the first look are played in some conditions.
+        seconds_a_run: wall-clock time over runs, on all processes together [s].
+    """
+    first, *_, most = results.looks
+    n_conditions = len(results.plan.cases)
+    seconds = [
+        seconds_a_run * max(0, n_conditions * n - len(results.outcomes)) for n in (first, most)
+    ]
+    text = (
+        f"The first look comes in {clock(seconds[0])}, the whole takes at most {clock(seconds[1])} "
+        "(h:mm:ss or m:ss)."
+    )
+    means = [cell.mean.value for cell in results.cells if cell.n_seeds >= first and cell.mean.value]
+    scatters = [np.std(cell.by_seed, ddof=1) for cell in results.cells if cell.n_seeds >= first]
+    if seconds_a_run < _SLOW or not means:
+        return text
+    # Of a difference of two unpaired means, at 5 % of error and a power of 80 %.
+    effects = [2.8 * math.sqrt(2.0 / n) * scatters[0] / means[0] for n in (first, most)]
+    return (
+        f"{text} A run takes {seconds_a_run:.1f} s: --seeds {first} ends after the first look and "
+        f"tells effects of about {effects[0]:.2f}, {most} seeds those of about {effects[1]:.2f}."
+    )
 
 
 def show_power(study_name: str, results: StudyResults, effect: float | None) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.verdicts.results import StudyResults
-from tests.made_up import paper, published
+from tests.made_up import looked_at, paper, published
 
 NARROW = Setting("parameter", "warehouse_width", 5.0)
 
@@ -26,3 +26,9 @@ def compared() -> StudyResults:
         return share * published(policy, setting)
 
     return paper(p, policies=["swarm-dt", "swarm-dt-follow"])
+
+
+@pytest.fixture(scope="session")
+def stopped() -> StudyResults:
+    """A study until it is clear, whose questions stopped at looks of three levels."""
+    return looked_at()

@@ -14,8 +14,9 @@ import pytest
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
-from swarm_logistics_env.study.report.for_a_paper import in_a_sentence
+from swarm_logistics_env.study.report.for_a_paper import PaperTables, in_a_sentence
 from swarm_logistics_env.study.report.latex import latex_tables
+from swarm_logistics_env.study.report.section import Section
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from tests.made_up import delivered, judged
@@ -101,8 +102,10 @@ def test_names_are_those_that_a_reader_uses(latex: str) -> None:
         r"\textbar{} $<$y$>$ -{}- \texttt{U+03BC} $\to$"
     )
     assert f"homing {name}: Scalability." in latex
-    assert f"\nhoming {name}: S N 10 to 25 & " in latex
-    assert "more seeds tell" not in latex
+    assert f"{{homing {name}: indicators." in latex
+    assert "\nS N 10 to 25 & " in latex
+    about = PaperTables("P_F, P_N+m", (Section("t", ("c",), (("x",),)),), {})
+    assert "t. $P_{\\mathrm{F}}$, $P_{\\mathrm{N+m}}$ " in latex_tables(about)
 
 
 def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> None:
@@ -112,9 +115,9 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     few = judged(study, lambda _, setting, seed: delivered(p[int(setting.value)][seed]))
     latex, reason = latex_tables(document(few).paper), "so few runs may hide stalled ones"
     (row,) = rows_of(latex, "tab:homing-indicators")
-    assert row.endswith("open (stalls) \\\\")
-    assert f"open: undecided. Open (stalls): {reason}. Verdicts are" in latex
-    assert in_a_sentence(few, answer(few)).endswith(f"open ({reason}; Holm's method, 5 % error).")
+    assert row.endswith("open, stalls \\\\")
+    assert f"Open: undecided; stalls: {reason}. Verdicts are" in latex
+    assert "FM1, 2 of 25: -0.08 [-0.12, -0.03], open, stalls. " in in_a_sentence(few, answer(few))
     assert "xploratory" not in latex + in_a_sentence(few, answer(few))
     undeclared = replace(few, exploratory=True)
     words = "xploratory: over other seeds or P than were declared before the first run."
@@ -138,7 +141,7 @@ def test_no_table_of_a_judged_policy_is_wider_than_the_page(tmp_path: Path) -> N
 
     results = judged(study, play)  # type: ignore[arg-type]
     latex = latex_tables(document(results).paper)
-    assert " to 99.17" in latex
+    assert " & level & verdict " in latex
     for page in PAGES:
         assert "Overfull" not in compiled(latex, page, tmp_path)
 

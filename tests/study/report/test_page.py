@@ -301,6 +301,7 @@ def test_answer_and_comparison_stand_on_the_first_screen_and_a_click_shows_the_q
         assert browser.value(bottom) <= size[1]
         question = len(made.data["questions"]) - 1
         row = f'.answer tr[data-question="{question}"]'
+        browser.value(f"document.querySelector('{row}').scrollIntoView()")
         rectangle = f"document.querySelector('{row}').getBoundingClientRect()"
         browser.click(browser.value(f"{rectangle}.x") + 4, browser.value(f"{rectangle}.y") + 4)
         shown = browser.wait_for("document.querySelector('.answer tr.chosen').dataset.question")

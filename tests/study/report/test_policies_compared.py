@@ -11,7 +11,8 @@ import pytest
 from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
-from swarm_logistics_env.study.report.policies_compared import comparison_in_words
+from swarm_logistics_env.study.report.document import document
+from swarm_logistics_env.study.report.policies_compared import comparison_in_words, comparison_table
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.tasks.task import Outcome
 from swarm_logistics_env.study.trial_study import judge
@@ -42,7 +43,7 @@ def test_the_first_line_says_the_factor_where_it_holds_turns_and_is_open() -> No
     words = comparison_in_words(results)
     assert words == (
         "P of homing is 2.00 [2.00, 2.00] times that of swarm-dt (N = 25); so in 1 of 3 other "
-        "conditions; the other way round: FM4, m = 3; open: FM1, m = 3."
+        "conditions; the other way round: FM4 m = 3; open: FM1 m = 3."
     )
     assert terminal_answer(answer(results), 300).splitlines()[0] == words
 
@@ -54,7 +55,14 @@ def test_who_is_behind_stands_second_whoever_is_named_first() -> None:
 
 def test_three_policies_are_each_compared_with_the_first_and_holm_counts_all_conditions() -> None:
     results = judged(study_of("homing", "swarm-dt", "random-walk", indicators=["S"]), play)
-    assert comparison_in_words(results).count("times that of") == 2
+    table = comparison_table(results)
+    assert table is not None
+    assert table.columns[0] == "P of homing, N = 25"
+    assert table.rows[0] == ("to that of swarm-dt", "2.00 [2.00, 2.00]", "larger", "1 larger")
+    assert [row[0] for row in table.rows[1:]] == ["to that of random-walk"]
+    text = terminal_answer(answer(results))
+    assert text.startswith("P of homing, N = 25 ")
+    assert text.count("Holm's method") == 1
     families = {verdict.compared.family for verdict in results.verdicts}
     assert families >= {("swarm-dt", "change"), ("random-walk", "change")}
 
@@ -64,6 +72,19 @@ def test_nothing_is_compared_unless_it_is_asked_for() -> None:
     results: StudyResults = judged(study, play)
     assert comparison_in_words(results) == ""
     assert terminal_answer(answer(results), 80).startswith("study: ")
+    assert "policies" not in [figure.name for figure in document(results).figures]
+
+
+def test_one_figure_has_p_of_both_policies_in_every_condition() -> None:
+    results = judged(study_of("homing", "swarm-dt"), play)
+    figure = document(results).figures[0]
+    assert figure.name == "policies"
+    (panel,) = figure.panels
+    assert {point.series for point in panel.points} == {"homing", "swarm-dt"}
+    means = {(cell.policy, cell.arm.case.key): cell.mean for cell in results.cells}
+    shown = {(point.series, point.value, point.low, point.high) for point in panel.points}
+    assert shown <= {(policy, *mean) for (policy, _), mean in means.items()}
+    assert len(panel.points) == 2 * 4
 
 
 def test_the_factor_is_that_of_the_means_and_its_interval_as_a_bootstraps() -> None:
@@ -97,6 +118,6 @@ def test_trials_of_two_controllers_are_compared_pair_by_pair(tmp_path: Path) -> 
         rows += [f"ours,10,dead,2,{day},{21 - noise}", f"theirs,10,dead,2,{day},{20 + noise}"]
     file = tmp_path / "trials.csv"
     file.write_text("\n".join(rows))
-    text = repr(judge(file))
+    text = " ".join(repr(judge(file)).split())
     assert "P of ours is 1.93 [" in text
-    assert "times that of theirs (no fault); open: dead, m = 2." in text
+    assert "times that of theirs (no fault); open: dead m = 2." in text

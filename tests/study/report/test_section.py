@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import csv
+import html
 import re
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
-import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from swarm_logistics_env import spi
-from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.for_a_paper import in_a_sentence
 from swarm_logistics_env.study.report.latex import latex_tables
 from swarm_logistics_env.study.report.section import (
     bracketed,
-    conclusion_text,
     fixed,
     join_names,
     levels,
@@ -28,10 +25,8 @@ from swarm_logistics_env.study.report.section import (
 )
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.report.write import markdown, write_report
-from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Outcome
 from swarm_logistics_env.study.verdicts.results import StudyResults
-from tests.made_up import delivered, judged, paper
+from tests.made_up import looked_at
 
 NUMBERS = st.floats(-3.0, 3.0) | st.floats(-0.02, 0.02) | st.floats(0.98, 1.02)
 
@@ -67,26 +62,6 @@ def test_an_interval_is_shown_beside_its_threshold() -> None:
     assert fixed(np.inf, 2, [0.0]) == "∞"
 
 
-MEANS = {"FM2": 38.5, "FM3": 32.5, "FM4": 15.0}  # of 40 items
-
-
-def looked_at(modes: list[str]) -> StudyResults:
-    """A study whose comparisons stop at looks of other levels than 95 %."""
-    faults = [{"modes": modes, "robots": [1]}]
-    study = Study(seeds=60, until_clear=True, faults=faults, indicators=["R"])
-
-    def play(_: str, setting: Setting, seed: int) -> Outcome:
-        draw = np.random.default_rng([seed, *map(ord, setting.name)])
-        return delivered(draw.poisson(MEANS.get(setting.name, 40.0)), digest=f"{setting} {seed}")
-
-    return judged(study, play)
-
-
-@pytest.fixture(scope="module")
-def stopped() -> StudyResults:
-    return looked_at([*MEANS])
-
-
 # Of P, and of the methods: a level of all looks together.
 ALWAYS_95 = (
     r"(P|one run|P ours) \[95 %\]|the true value with 95 %|one of our|\(95 %\)"
@@ -115,21 +90,24 @@ def test_every_surface_names_the_level_that_it_prints(
         "sentence": in_a_sentence(stopped, answer(stopped)),
         "captions": " ".join(figure.caption for figure in full_document.figures),
     }
+    tex = surfaces["tables"].replace("$", "")
     for name, text in surfaces.items():
         assert "95 %" not in re.sub(ALWAYS_95, "", text), name
-    # What the heading does not name stands behind the interval.
-    common = percent(answer(stopped).level)
+    # Where levels differ, each stands in the row of its interval, in every table.
     for question, level in level_by_question.items():
         (row,) = re.findall(rf"^{question}, .*$", surfaces["terminal"], re.MULTILINE)
-        assert (f"] {level}" in row) == (level != common)
+        assert re.search(rf"\]\s+{level}  \w", row)
         assert f", {level} interval [" in surfaces["report"]
-    unfolded = re.sub(r"\s+", " ", surfaces["terminal"])
-    assert f"{common} intervals, or as said behind them" in unfolded
-    assert f"| question | value | {common} interval |" in surfaces["report"]
-    assert f"R [{common}]" in surfaces["report"]
-    assert f">value [{common}]</th>" in page
+        assert re.search(
+            rf"^\| {question}, 1 of 25 \| .*\] \| {level} \|", surfaces["report"], re.MULTILINE
+        )
+        assert re.search(rf"\| {question[2:]}, m = 1 \|.*\| {level} \|", surfaces["report"])
+        assert f'<td class="level">{level}</td>' in page
+        assert re.search(rf"^{question}, 1 of 25 & .* & .?{level}.? & ", tex, re.MULTILINE)
+    assert "| question | value | interval | level | verdict |" in surfaces["report"]
     assert f"{levels(stopped.verdicts)} intervals" in surfaces["captions"]
-    assert f" = -0.55, {level_by_question['R FM4']} interval [-0." in surfaces["sentence"]
+    worst = f": -0.55 [-0.67, -0.37] at {level_by_question['R FM4']}, refuted"
+    assert worst in surfaces["sentence"]
     view = r'role="img" aria-label="(.).*?<p class="legend"><span>bar: (.*?) interval'
     assert dict(re.findall(view, page, re.DOTALL)) == {"P": "95 %", "R": levels(stopped.verdicts)}
     for file, column in (("claims", "confidence"), ("figures/answer", "confidence")):
@@ -139,47 +117,41 @@ def test_every_surface_names_the_level_that_it_prints(
         assert {row["confidence"] for row in csv.DictReader(lines)} == {"0.95"}
 
 
-@pytest.mark.daily
-def test_what_is_asked_is_answered_before_what_else_is_known() -> None:
-    results = paper(seeds=100)
-    equivalent = [test for test in results.verdicts if test.conclusion == "equivalent"]
-    texts = {
-        "FT": "open; P_F and P_S differ by less than 10 % of P_o",
-        "R": "open; P changes by less than 10 %",
-    }
-    assert {test.compared.indicator for test in equivalent} == {*texts}
-    assert [conclusion_text(test) for test in equivalent] == [
-        texts[test.compared.indicator] for test in equivalent
-    ]
-    verdict_texts = [line.verdict_text for line in answer(results, most=None).lines]
-    assert Counter(word for word in verdict_texts if word in texts.values()) == Counter(
-        conclusion_text(test) for test in equivalent
-    )
-    text = markdown(document(results))
-    assert not re.search(r"\| equivalent|\d equivalent", text)
-    counts = Counter(test.compared.indicator for test in equivalent)
-    sentence = in_a_sentence(results, answer(results))
-    for symbol, words in texts.items():
-        assert f"{words.removeprefix('open')} in {counts[symbol]}" in sentence
+def test_the_words_of_a_verdict_are_the_same_in_terminal_page_latex_and_csv(
+    stopped: StudyResults, tmp_path: Path
+) -> None:
+    write_report(stopped, tmp_path)
+    with (tmp_path / "claims.csv").open(newline="") as lines:
+        words = [row["in_words"] for row in csv.DictReader(lines)]
+    assert words == [verdict.in_words for verdict in stopped.verdicts]
+    assert {*words} > {"open"}
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    in_page = [html.unescape(word) for word in re.findall(r'<td class="word \w+">(.*?)</td>', page)]
+    assert in_page == words
+    report = (tmp_path / "report.md").read_text(encoding="utf-8")
+    latex = (tmp_path / "tables.tex").read_text(encoding="utf-8")
+    tex = re.sub(r"\$|\\phantom{.*?}", "", latex).replace("\\,\\%", " %")
+    for verdict in stopped.verdicts:
+        label = f"{verdict.after.name}, 1 of 25"
+        condition = f"{verdict.after.name}, m = 1"
+        assert re.search(rf"^\| R {label} \|.*\| {verdict.in_words} \|$", report, re.MULTILINE)
+        assert re.search(rf"^\| {condition} \|.*\| {verdict.in_words} \|$", report, re.MULTILINE)
+        assert re.search(rf"^R {label} &.*& {verdict.in_words} \\\\", tex, re.MULTILINE)
+        row = rf"^{verdict.after.name}, {{m = 1}} &.*& {verdict.in_words} \\\\"
+        assert re.search(row, tex, re.MULTILINE)
 
 
-def test_one_question_is_answered_in_a_sentence() -> None:
-    results = looked_at(["FM2"])
-    sentence = in_a_sentence(results, answer(results))
-    question = r"; R FM2, 1 of 25 = 0\.01, 97\.84 % interval \[-0\.06, 0\.08\]; R > 0: "
-    verdict = r"open; P changes by less than 10 % \(Holm's method, 5 % error\)\.$"
-    assert re.search(question + verdict, sentence)
-    assert "lowest" not in sentence
-    assert "question" not in sentence
-
-
-def test_a_paper_is_told_the_world_and_what_is_not_decided() -> None:
+def test_a_paper_is_told_conditions_seeds_and_why_each_question_was_played_no_further() -> None:
     results = looked_at(["FM2", "FM4"])
     sentence = in_a_sentence(results, answer(results))
     world = "a warehouse of 10 m x 10 m with 60 items, robots of 2 m/s"
-    assert sentence.startswith(f"swarm-dt in {world}: P [95 %]")
-    n_open = sum(verdict.conclusion == "open" for verdict in results.verdicts)
-    assert ("not decided: R of " in sentence) == (n_open > 0)
+    how = "(preset paper, engine chipmunk), 60 paired seeds (0 to 59)"
+    assert sentence.startswith(f"swarm-dt in {world} {how}. swarm-dt: P [95 %] = ")
+    assert "; robustness R: 1 refuted, 1 open (worst FM4, 1 of 25: -0.55 [" in sentence
+    assert sentence.endswith(
+        "looked at after 10, 20, 30, 40, 50 and 60 seeds: of 2 questions 1 stopped where clear, "
+        "1 after all 60 seeds."
+    )
 
 
 def test_names_are_joined_as_a_sentence_has_them() -> None:

@@ -103,8 +103,9 @@ def test_the_same_runs_are_judged_by_another_measure_which_is_exploratory(tmp_pa
     for cell in results.cells:
         assert list(cell.by_seed) == [outcome.on_time for outcome in cell.outcomes]
         assert cell.mean.value > 1.0
-    sentence = answer(results).performance
-    assert sentence.startswith("P (on_time) [95 %], orders in 60 s, at N = 25")
+    sentence = answer(results).head[0]
+    assert sentence.startswith("homing: P (on_time) [95 %] = ")
+    assert " orders in 60 s, N = 25, " in sentence
     other = Study(out=tmp_path, performance="share_on_time", **asked)
     assert other.run().played == 0
     results = other.findings()
@@ -126,4 +127,4 @@ def test_nothing_in_time_is_no_run_without_deliveries() -> None:
         for cell in results.cells
     )
     answer_of_none = answer(replace(results, outcomes=outcomes, cells=cells))
-    assert "delivered anything" not in answer_of_none.performance
+    assert "delivered anything" not in " ".join(answer_of_none.head)

@@ -40,8 +40,11 @@ def played(task: Task) -> StudyResults:
 
 def test_a_task_without_words_on_its_world_is_called_by_its_name() -> None:
     results = played(LANE)
-    assert answer(results).performance.startswith("P [95 %] at N = 2: ")
-    assert in_a_sentence(results, answer(results)).startswith("walker in the task lane: P ")
+    performance = answer(results).head[0]
+    assert performance.startswith("walker: P [95 %] = ")
+    assert ", N = 2, task lane; 4 paired seeds (0 to 3)." in performance
+    sentence = in_a_sentence(results, answer(results))
+    assert sentence.startswith("walker in the task lane, 4 paired seeds (0 to 3). walker: P ")
     case = results.plan.cases[0]
     assert world_of(LANE).watch_command(case) is None
     assert world_of(LANE).largest_performance(case.scenario) == math.inf
@@ -50,9 +53,9 @@ def test_a_task_without_words_on_its_world_is_called_by_its_name() -> None:
 def test_a_task_says_what_it_counts_where_it_is_and_how_large_p_can_be() -> None:
     free = played(LANE)
     results = played(TOLD)
-    assert answer(results).performance.startswith("P [95 %], parcels in 40 s, at N = 2: ")
+    assert " parcels in 40 s, N = 2, task " in answer(results).head[0]
     sentence = in_a_sentence(results, answer(results))
-    assert sentence.startswith("walker in a lane for 4 robots: P ")
+    assert sentence.startswith("walker in a lane for 4 robots, 4 paired seeds")
     highs = [cell.mean.high or 0.0 for cell in free.cells]
     assert max(highs) > MOST
     assert [cell.mean.high for cell in results.cells] == [min(high, MOST) for high in highs]

@@ -74,8 +74,8 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     assert (doubled.p_adjusted, doubled.stopped_at) == (None, 10)
     assert (half.conclusion, half.p_adjusted is None) == ("supported", False)
     study_answer = answer(study.findings())
-    assert study_answer.lines[0].verdict_text == "untestable: it cannot be below 0"
-    assert "untestable where it cannot lie below the threshold" in study_answer.notes
+    assert study_answer.lines[0].verdict.in_words == "untestable, never < 0"
+    assert "untestable, never < 0: as P cannot be" in study_answer.notes
     text = sentence(study.findings(), doubled).text
     assert "it cannot lie below the threshold, so it is not tested" in text
     assert "djusted" not in text
@@ -101,12 +101,12 @@ def test_p_stands_before_the_rest_of_the_first_look_and_the_same_engine_plays_al
     for results in stages:
         so_far.show(results)
     printed = re.sub(r"After \d+ s", "After T s", capsys.readouterr().err)
-    first_line, first_look, *_ = printed.split("\n")
+    first_line, rest, first_look, *_ = printed.split("\n")
     mean = stages[0].cells[0].mean.value
-    assert first_line.startswith("After T s: P [95 %], items in 500 s, at N = 25")
-    assert f" {mean:.1f} [" in first_line
+    assert first_line.startswith(f"After T s: swarm-dt: P [95 %] = {mean:.1f} [")
+    assert re.match(r"The first look comes in \d+:\d\d, the whole takes at most \d", rest)
     assert first_look == "After T s, a first look:"
-    assert printed.splitlines()[-1] == "After T s, 30 seeds: 1 of 3 questions are clear."
+    assert printed.splitlines()[-1].startswith("After T s, 30 seeds: 1 of 3 questions are clear, ")
 
 
 def test_an_engine_that_takes_all_runs_at_once_is_called_again_for_the_next_look(

@@ -21,6 +21,7 @@ from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.report import benchmark
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.benchmark import Entry
+from swarm_logistics_env.study.report.more_seeds import more_seeds
 from swarm_logistics_env.study.runs.recorded import RecordedStudy
 from swarm_logistics_env.study.runs.store import Runs
 from swarm_logistics_env.study.studies import Study
@@ -107,8 +108,13 @@ def test_trials_are_judged_and_what_is_written_is_told(command: Command) -> None
     assert "| none |  | 8 | 3 |" in printed
     assert "| wheel, m = 1 | 10.6 [8.4, 12.8] | [6.2, 14.9] | -0.013 [" in printed
     assert "No FT: it needs trials without the robots, fault = removed" in printed
-    performance = "P (boxes) [95 %] at N = 8, no fault: 12.3 ["
-    assert f"For a paper: lab, trials of lab.csv, robots 8, floor tiles: {performance}" in printed
+    performance = (
+        "P (boxes) [95 %] = 12.3 [9.9, 14.6], N = 8, no fault; robustness R, wheel, 1 of 8: "
+    )
+    paper = (
+        "For a paper: lab, trials of lab.csv, robots 8, floor tiles, 3 unpaired runs a condition. "
+    )
+    assert f"{paper}lab: {performance}" in printed
     out = Path("results", "judged", "lab")
     assert f"Report: {out / 'report.html'}\n" in printed
     assert f"Figure: {out / 'figures' / 'answer.svg'}\nTables: {out / 'tables.tex'}\n" in printed
@@ -180,7 +186,7 @@ def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
         patched.setattr(judge_trials, "show_report", lambda *_, **__: 1 / 0)
         command(words, code=1)
     first = command(words)
-    assert "For a paper: lab, trials of lab.csv: " in first
+    assert "For a paper: lab, trials of lab.csv, 3 unpaired runs" in first
     assert first.endswith(command(words))
     (out,) = {path.parent for path in Path().rglob("study.sqlite")}
     assert (out / "report.html").is_file()
@@ -254,11 +260,14 @@ def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Co
     cells = study.performance()
     p = cells[cells["factor"] == "none"]["mean"].iloc[0]
     world = "in a warehouse of 3 m x 3 m with 6 items that come back, robots of 2 m/s"
-    performance = f"P [95 %], items in 20 s, at N = 4, no fault: {p:.1f} ["
-    assert f"For a paper: homing {world}: {performance}" in printed
+    assert f"For a paper: homing {world} (engine chipmunk), 5 paired seeds (" in printed
+    assert f"homing: P [95 %] = {p:.1f} [" in printed
+    needs = more_seeds(study.findings())
     new_seeds = study.plan().seeds[-1] + 1
-    command_for_more = f"swarm-logistics judge homing --first-seed {new_seeds} --seeds"
-    assert f"more seeds, which nobody has looked at: {command_for_more}" in printed
+    options = f"--seeds {needs.n_seeds} --out results/judged/homing-{needs.n_seeds}"
+    command_for_more = f"swarm-logistics judge homing --first-seed {new_seeds} {options}"
+    assert f"What is open: {needs.words}." in printed
+    assert (f"nobody has looked at: {command_for_more}" in printed) == bool(needs.n_seeds)
     last = printed.splitlines()[-1]
     assert last.startswith(f"{5 * len(study.plan().cases) - 1} runs played in ")
     assert "1 were kept" in last
@@ -270,9 +279,11 @@ def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
     printed = command(f"{words} clear")
     assert Study.stored("clear").specification.until_clear
     # Nobody delivers: there is no ratio, and every question stops at the first look.
-    line = "no fault: 0 (at most 0.30 at 95 %, as none of 10 runs delivered anything)."
+    line = (
+        "P = 0 (at most 0.30 at 95 %, as none of 10 runs delivered anything) items in 20 s, N = 4"
+    )
     assert line in " ".join(printed.split())
-    assert "undefined: it delivers nothing" in printed
+    assert "ndefined: it delivers nothing" in printed
     assert "40 runs played" in printed.splitlines()[-1]
     assert "120 runs played" in command(f"{words} all --all-seeds").splitlines()[-1]
 
@@ -280,7 +291,7 @@ def test_a_policy_is_played_until_it_is_clear(command: Command) -> None:
 def test_a_policy_that_fails_in_every_run_ends_with_code_1_and_a_report(command: Command) -> None:
     words = "--processes 1 --seeds 3 --out card"
     printed = command(f"judge judged_policy:Failing {words}", code=1)
-    assert "P: no run has succeeded." in printed
+    assert "P: no run has succeeded; 3 paired seeds" in " ".join(printed.split())
     *_, played, stopped = printed.splitlines()
     # Of 12: each of the four conditions at the first seed, and one of them at the next.
     assert "5 failed, the first with RuntimeError: no more" in played
@@ -301,7 +312,7 @@ def test_a_policy_is_judged_by_how_fast_it_clears_the_warehouse_over_other_seeds
     printed = command(f"judge {world} --seeds 3 --first-seed 500 --processes 1")
     assert ", all items after " in printed
     folder = Path("results/judged/homing-clearing-n-items-5-first-seed-500")
-    assert f" {world} --first-seed 503 --seeds 60 --out {folder}-60" in printed
+    assert "What is open: " in printed
     assert Study.stored(folder).plan().seeds == range(500, 503)
     report = (folder / "report.md").read_text()
     assert "Time until all items are delivered" in report
@@ -313,7 +324,7 @@ def test_a_policy_is_judged_by_another_measure_of_the_same_runs(command: Command
     printed = command(f"judge {world} --seeds 3 --processes 1")
     assert "P (longest_standstill:20)" in printed
     folder = Path("results/judged/homing-longest-standstill-20-n-items-5-duration-20")
-    assert f"judge {world} --first-seed 30003 --seeds 60 --out {folder}-60" in printed
+    assert "What is open: " in printed
     report = (folder / "report.md").read_text()
     assert "x is the longest time without a delivery" in report
     assert "no measure 'late'" in command("judge homing --performance late", code=2)
