@@ -66,6 +66,8 @@ STABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "robots.contract_of": (),
         "robots.Contract": ("to_yaml",),
         "robots.check_rows": (),
+        "robots.Middleware": (),
+        "robots.OverMiddleware": (),
     },
     "Indicators": {
         "spi.scalability": (),
