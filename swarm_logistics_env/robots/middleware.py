@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -155,7 +155,7 @@ class OverMiddleware:
         OverMiddleware('homing', loss=0.1, delay=0.05)
     """
 
-    def __init__(self, policy: str, **settings: float) -> None:
+    def __init__(self, policy: str, **settings: Any) -> None:
         self._name = policy
         self._middleware = Middleware(**settings)
         self._policy = check_row_policy(load(policy))

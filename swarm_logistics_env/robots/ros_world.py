@@ -63,7 +63,7 @@ class WorldNode:
         n_robots = scenario.n_robots
         self._link = Link(middleware or Middleware(), scenario.control_period, n_robots, seed)
         self._patience = patience
-        self._awaited: set[int] = set()
+        self._awaited: dict[int, int] = {}  # by robot, the period of the row
         self._silent: set[int] = set()  # who was late, and has not answered since
         self._halves: dict[tuple[int, int], dict[str, Any]] = {}  # by robot and period
         self.node = Node("world", start_parameter_services=False)
@@ -89,35 +89,43 @@ class WorldNode:
             RobotError: some do not come, or there are two of a number.
         """
         end = time.monotonic() + _MEETING_TIME
-        missing = list(range(len(self._publishers)))
+        topics = [
+            f"/robot_{robot}/{ros_messages.CMD_VEL}" for robot in range(len(self._publishers))
+        ]
+        missing = list(range(len(topics)))
         while missing and time.monotonic() < end:
             executor.spin_once(timeout_sec=0.01)
             missing = [
                 robot
                 for robot in missing
-                if not all(topic.get_subscription_count() for topic in self._publishers[robot])
+                if not self.node.count_publishers(topics[robot])
+                or not all(topic.get_subscription_count() for topic in self._publishers[robot])
             ]
         if missing:
             numbers = ", ".join(map(str, missing))
             raise RobotError(f"robots {numbers}: should be there within {_MEETING_TIME:g} s")
-        topic = f"/robot_0/{ros_messages.CMD_VEL}"
-        if self.node.count_publishers(topic) > 1:
-            raise RobotError(
-                f"{topic}: comes from several nodes, should come from one: another swarm is near, "
-                "so set ROS_DOMAIN_ID to another number"
-            )
+        for topic in topics:
+            if self.node.count_publishers(topic) > 1:
+                raise RobotError(
+                    f"{topic}: comes from several nodes, should come from one: another swarm is "
+                    "near, so set ROS_DOMAIN_ID to another number"
+                )
 
     def step(self, executor: Any) -> None:
         """Take one control period."""
         arrivals = self._link.deliver(self._rows)
         for arrival in arrivals:
             self._publish(arrival)
-        self._awaited = {arrival.robot for arrival in arrivals} - self._silent
+        self._awaited = {
+            arrival.robot: arrival.period
+            for arrival in arrivals
+            if arrival.robot not in self._silent
+        }
         end = time.monotonic() + self._patience
         while self._awaited and time.monotonic() < end:
             executor.spin_once(timeout_sec=0.05)
         self.n_late += len(self._awaited)
-        self._silent |= self._awaited
+        self._silent |= self._awaited.keys()
         self._rows = self.world.step(self._link.commands())
 
     def _publish(self, arrival: Arrival) -> None:
@@ -140,8 +148,9 @@ class WorldNode:
         gripper = halves[ros_messages.GRIPPER]
         command = ros_messages.command_of(twist, gripper, body, robot)
         self._link.answer(robot, period, command)
-        self._awaited.discard(robot)
         self._silent.discard(robot)
+        if self._awaited.get(robot) == period:
+            del self._awaited[robot]
 
 
 @contextmanager

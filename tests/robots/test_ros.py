@@ -38,7 +38,7 @@ def executor(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 @pytest.mark.parametrize("settings", [{}, {"loss": 0.2, "delay": 0.05, "jitter": 0.1}])
 def test_a_run_over_ros_is_the_run_without_it_to_the_bit(
-    executor: Any, settings: dict[str, float]
+    executor: Any, settings: dict[str, Any]
 ) -> None:
     world = WorldNode(SWARM, SEED, ["dead:1@5"], Middleware(**settings), patience=30.0)
     play_swarm(policies.load("homing"), world, SEED, executor)
