@@ -19,8 +19,6 @@ from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.commands import MESSAGE
 from swarm_logistics_env.world.warehouse.faults import FaultLike
 
-STAND = np.zeros(MESSAGE)  # and the gripper stays as it is
-
 
 class RobotNode:
     """The node `/robot_3/robot`: it subscribes to `scan` and `senses`, see `ros_messages`.
@@ -101,8 +99,12 @@ class RobotNode:
         if not self._is_late:
             self.node.get_logger().warning(f"no row for {waited:.2f} s: the robot stands")
         self._is_late = True
-        self._publish(STAND, self._last_stamp)
+        self.stand()
         return True
+
+    def stand(self) -> None:
+        """Tell the robot to stand; its gripper stays as it is."""
+        self._publish(np.zeros(MESSAGE), self._last_stamp or self._clock.now().to_msg())
 
     def _take_scan(self, scan: Any) -> None:
         self._scan = scan

@@ -110,6 +110,8 @@ def test_a_robot_stands_when_its_row_is_late_or_when_it_is_dead(
     assert (decided > 0.0) == (not faults)
     assert stopped == 0.0
     assert robot.stop_if_late()
+    robot.stand()
+    assert listener.wait_for(3)[2] == 0.0
 
 
 def test_a_robot_may_leave_out_what_its_policy_ignores() -> None:

@@ -47,7 +47,10 @@ def ros_command(
         int, Option(help="A robot stands where its row is older [control periods].")
     ] = 5,
     patience: Annotated[
-        float, Option(help="How long the world waits for commands, each period [s of the clock].")
+        float,
+        Option(
+            min=0.0, help="How long the world waits for commands, each period [s of the clock]."
+        ),
     ] = 1.0,
     only: Annotated[
         str | None,
@@ -68,8 +71,11 @@ def ros_command(
             )
             echo(f"Robot {number} runs {spec.title}; Ctrl-C ends it.")
             executor.add_node(robot.node)
-            while True:
-                executor.spin_once(timeout_sec=0.1)
+            try:
+                while True:
+                    executor.spin_once(timeout_sec=0.1)
+            finally:
+                robot.stand()
         world = WorldNode(scenario, seed, scheduled, middleware, patience)
         if only == WORLD:
             play_world(world, executor)
