@@ -139,6 +139,36 @@ def _first_period_from(moment: float) -> int:
     return math.ceil(moment - 1e-9)
 
 
+class RobotOverMiddleware:
+    """One robot whose rows may be lost, or come late.
+
+    Its memory counts control periods and adds up its turns. So it decides upon a row once for each
+    period since the row before, and the last decision is its command.
+
+    Args:
+        robot: which it steers by.
+        stop_after: the most periods that it catches up with, as the robot stood thereafter.
+    """
+
+    def __init__(self, robot: Robot, stop_after: int) -> None:
+        self._robot = robot
+        self._most = stop_after
+        self._has_begun = False
+
+    def step(self, row: ArrayLike, n_periods: int) -> NDArray[np.float64]:
+        """Return the command (4,) upon a row (D,) that was sensed `n_periods` after the last one.
+
+        Raises:
+            PolicyError: see `Robot.step`.
+        """
+        n_missed = min(n_periods - 1, self._most) if self._has_begun else 0
+        for _ in range(n_missed):
+            self._robot.step(row)
+        command = self._robot.step(row)
+        self._has_begun = True
+        return command
+
+
 class OverMiddleware:
     """Steers each robot by itself, over middleware: what that costs, in any study, without ROS.
 
@@ -175,13 +205,18 @@ class OverMiddleware:
         """Begin an episode of `n_robots` rows."""
         body = self._scenario
         period = body.control_period
+        stop_after = self._middleware.stop_after
         self._link = Link(self._middleware, period, n_robots, seed)
         self._robots = [
-            Robot(self._policy, body, period, seed, number) for number in range(n_robots)
+            RobotOverMiddleware(Robot(self._policy, body, period, seed, number), stop_after)
+            for number in range(n_robots)
         ]
+        self._newest_rows = [0] * n_robots
 
     def act(self, observations: Row) -> NDArray[np.float64]:
         """Return what the motors do now (N, 4), for observation rows (N, D)."""
         for robot, period, row in self._link.deliver(observations):
-            self._link.answer(robot, period, self._robots[robot].step(row))
+            n_periods = period - self._newest_rows[robot]
+            self._newest_rows[robot] = period
+            self._link.answer(robot, period, self._robots[robot].step(row, n_periods))
         return self._link.commands()

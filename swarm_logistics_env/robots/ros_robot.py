@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,6 +12,7 @@ from swarm_logistics_env.core.errors import SwarmLogisticsError
 from swarm_logistics_env.policies.row_policy import Robot, check_row_policy
 from swarm_logistics_env.robots import ros_messages
 from swarm_logistics_env.robots.fault_layer import FaultLayer
+from swarm_logistics_env.robots.middleware import RobotOverMiddleware
 from swarm_logistics_env.robots.ros_messages import load_rclpy
 from swarm_logistics_env.world.observations import n_columns
 from swarm_logistics_env.world.scenario import Scenario
@@ -34,8 +34,9 @@ class RobotNode:
         seed: of the swarm, or of the trial.
         faults: with which the robot fails, by a `FaultLayer`, from its first row on; where the
             world lets robots fail, none.
-        stop_after: control periods; None: never, as a simulated world stops robots itself, in its
-            own time, and sends reliably. Else senders need not be reliable, as drivers are not.
+        stop_after: control periods.
+        is_alone: its clock says when a row is late, and senders need not be reliable, as drivers
+            are not; else a simulated world stops robots itself, in its own time, and is reliable.
 
     Attributes:
         node: the node of rclpy, for an executor.
@@ -54,7 +55,8 @@ class RobotNode:
         seed: int,
         *,
         faults: Sequence[FaultLike] = (),
-        stop_after: int | None = 5,
+        stop_after: int = 5,
+        is_alone: bool = True,
     ) -> None:
         load_rclpy()
         from geometry_msgs.msg import TwistStamped
@@ -64,12 +66,13 @@ class RobotNode:
 
         # Another one decides first, so that kernels are compiled before a row comes.
         Robot(policy, body, body.control_period, seed, number).step(np.zeros(n_columns(body)))
-        self._robot = Robot(policy, body, body.control_period, seed, number)
+        robot = Robot(policy, body, body.control_period, seed, number)
+        self._robot = RobotOverMiddleware(robot, stop_after)
         self._ignores = check_row_policy(policy).ignores
         self._body = body
         self._number = number
         self._layer = FaultLayer(faults, body, number, seed) if faults else None
-        self._patience = math.inf if stop_after is None else stop_after * body.control_period
+        self._patience = stop_after * body.control_period
         self._scan: Any = None
         self._senses: Any = None
         self._first_stamp: Any = None
@@ -78,7 +81,7 @@ class RobotNode:
         self.node = Node("robot", namespace=f"robot_{number}", start_parameter_services=False)
         self._clock = self.node.get_clock()
         self._decided_at = self._clock.now()
-        quality = QoSProfile(depth=10) if stop_after is None else qos_profile_sensor_data
+        quality = qos_profile_sensor_data if is_alone else QoSProfile(depth=10)
         self._twists = self.node.create_publisher(TwistStamped, ros_messages.CMD_VEL, 10)
         self._grippers = self.node.create_publisher(JointState, ros_messages.GRIPPER, 10)
         self._subscriptions = (
@@ -87,7 +90,7 @@ class RobotNode:
                 PointCloud2, ros_messages.SENSES, self._take_senses, quality
             ),
         )
-        if stop_after is not None:
+        if is_alone:
             self._timer = self.node.create_timer(body.control_period, self.stop_if_late)
 
     def stop_if_late(self) -> bool:
@@ -137,12 +140,15 @@ class RobotNode:
         self._publish(command, stamp)
 
     def _decision(self, row: ArrayLike, stamp: Any) -> ArrayLike:
+        now = ros_messages.seconds_of(stamp)
+        elapsed = now - ros_messages.seconds_of(self._last_stamp or stamp)
+        n_periods = round(elapsed / self._body.control_period)
         if self._layer is None:
-            return self._robot.step(row)
+            return self._robot.step(row, n_periods)
         self._first_stamp = self._first_stamp or stamp
-        time = ros_messages.seconds_of(stamp) - ros_messages.seconds_of(self._first_stamp)
+        time = now - ros_messages.seconds_of(self._first_stamp)
         sensed = self._layer.sensed(row, time)
-        return self._layer.driven(self._robot.step(sensed), sensed, time)
+        return self._layer.driven(self._robot.step(sensed, n_periods), sensed, time)
 
     def _publish(self, command: ArrayLike, stamp: Any) -> None:
         twist, gripper = ros_messages.messages_of(command, self._body, self._number, stamp)

@@ -38,6 +38,7 @@ class WorldNode:
     Attributes:
         node: the node of rclpy, for an executor.
         world: the world.
+        middleware: as given.
         n_late: answers that did not come in time.
 
     Raises:
@@ -61,7 +62,8 @@ class WorldNode:
         self._rows = self.world.reset(seed, faults)
         self.n_late = 0
         n_robots = scenario.n_robots
-        self._link = Link(middleware or Middleware(), scenario.control_period, n_robots, seed)
+        self.middleware = middleware or Middleware()
+        self._link = Link(self.middleware, scenario.control_period, n_robots, seed)
         self._patience = patience
         self._awaited: dict[int, int] = {}  # by robot, the period of the row
         self._silent: set[int] = set()  # who was late, and has not answered since
@@ -189,7 +191,10 @@ def play_swarm(policy: object, world: WorldNode, seed: int, executor: Any) -> No
     """
     body = world.world.scenario
     for number in range(body.n_robots):
-        executor.add_node(RobotNode(policy, body, number, seed, stop_after=None).node)
+        robot = RobotNode(
+            policy, body, number, seed, stop_after=world.middleware.stop_after, is_alone=False
+        )
+        executor.add_node(robot.node)
     play_world(world, executor)
 
 

@@ -9,7 +9,13 @@ import pytest
 
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.core.errors import PolicyError, RobotError
-from swarm_logistics_env.robots.middleware import Link, Middleware, OverMiddleware
+from swarm_logistics_env.policies.row_policy import Robot
+from swarm_logistics_env.robots.middleware import (
+    Link,
+    Middleware,
+    OverMiddleware,
+    RobotOverMiddleware,
+)
 
 SWARM = Scenario(n_robots=4, n_items=8, warehouse_width=5.0, warehouse_height=4.0)
 N_STEPS = 60
@@ -88,6 +94,22 @@ def test_what_is_lost_does_not_depend_on_other_settings_or_on_other_robots() -> 
         for _ in range(5)
     ]
     assert arrivals == of_first
+
+
+def test_a_robot_whose_rows_are_lost_decides_once_for_each_period() -> None:
+    rows = Warehouse(SWARM).reset(2)
+
+    def robot() -> Robot:
+        return Robot(policies.load("homing"), SWARM, 0.1, seed=0)
+
+    few_rows = RobotOverMiddleware(robot(), stop_after=5)
+    all_rows = robot()
+    few_rows.step(rows[0], n_periods=7)  # nothing came before
+    all_rows.step(rows[0])
+    for row, n_periods, n_decisions in ((rows[1], 3, 3), (rows[2], 99, 6), (rows[3], 0, 1)):
+        command = few_rows.step(row, n_periods)
+        commands = [all_rows.step(row) for _ in range(n_decisions)]
+        np.testing.assert_array_equal(command, commands[-1])
 
 
 def test_what_cannot_be_is_refused() -> None:
