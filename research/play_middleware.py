@@ -3,7 +3,7 @@
 Plays policies over middleware that loses and delays rows and commands, without ROS, with and
 without broken robots, and writes the table of docs/robots.md. What is played stays in
 results/middleware, and the same command goes on after an interruption. 20 seeds take about
-40 minutes of a core.
+45 minutes of a core.
 """
 
 from __future__ import annotations
