@@ -20,6 +20,7 @@ SUPERSUIT := .venvs/supersuit
 LEARNERS  := .venvs/learners
 TASKS     := .venvs/tasks
 DOTBOTS   := .venvs/dotbots
+ROS       := .venvs/ros
 
 INSTALLED := .venvs/lowest .venvs/newest
 
@@ -33,7 +34,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots bodies docs docs-check dist absolute-links format clean
+.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots ros bodies docs docs-check dist absolute-links format clean
 
 help:
 	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
@@ -56,6 +57,7 @@ help:
 	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; six learners with P before and after; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
 	@echo "make dotbots         bodies in the DotBots' simulator: the tests, and 20 DotBots for 20 s (half a minute, once pydotbot is installed)"
+	@echo "make ros             a swarm over ROS 2: the tests, and 25 robots for 20 s with losses (a minute, once ROS 2 is installed)"
 	@echo "make bodies          how far results carry to MuJoCo and to the DotBots' simulator: the tables of docs/bodies.md (two core-hours)"
 	@echo "make docs            the documentation site, site/index.html"
 	@echo "make daily           once a day: tests of whole commands, pages, examples and processes, which the gate leaves out"
@@ -174,6 +176,10 @@ dotbots: $(DOTBOTS)/installed
 	$(DOTBOTS)/bin/python -m pytest tests/world/bodies/test_pose_guard.py tests/world/bodies/test_dotbots_bodies.py
 	$(DOTBOTS)/bin/swarm-logistics run --policy homing --preset dotbots --bodies dotbots --set duration=20
 
+ros: $(ROS)/installed
+	$(ROS)/bin/python -m pytest tests/robots/test_ros.py
+	$(ROS)/bin/swarm-logistics ros homing --preset realistic --set duration=20 --loss 0.1 --delay 0.05
+
 # study: autodoc reads the package. -W: a warning is an error.
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python -m docs.generate
@@ -232,6 +238,8 @@ $(LEARNERS)/installed: OTHERS := cma sb3-contrib skrl
 $(LEARNERS)/installed: BARE := imitation
 $(DOTBOTS)/installed: EXTRAS := dotbots
 $(DOTBOTS)/installed: OTHERS := hypothesis pytest
+$(ROS)/installed: EXTRAS := ros
+$(ROS)/installed: OTHERS := hypothesis pytest
 
 # The wheel, with the oldest dependencies that pyproject.toml allows, or the newest that there are.
 .venvs/lowest.txt: pyproject.toml verification/lowest.py

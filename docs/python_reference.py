@@ -69,6 +69,8 @@ STABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "robots.write_c": (),
         "robots.FaultLayer": ("modes", "counts", "sensed", "driven", "broadcast"),
         "robots.append_trial": (),
+        "robots.Middleware": (),
+        "robots.OverMiddleware": (),
     },
     "Indicators": {
         "spi.scalability": (),

@@ -31,6 +31,7 @@ COMMANDS = {
     "attack": ("attacking", "attack_command"),
     "record": ("recording", "record_command"),
     "export": ("exporting", "export_command"),
+    "ros": ("over_ros", "ros_command"),
     "list": ("playing", "list_command"),
     "study": ("study_commands", "study_app"),
 }
