@@ -250,10 +250,10 @@ def blocked_request(world: World, payment: Payment, earned: Numbers) -> None:
 
 @engine_kernel
 def held_inside(world: World, payment: Payment, earned: Numbers) -> None:
-    """1 to the robot that brings an item nobody asks for inside, -1 where it no longer holds it so.
+    """1 to the robot that brings an unrequested item into the delivery area, -1 when that ends.
 
-    Inside is the delivery area, where the item is delivered at once when it is asked for; that it
-    is asked for costs nothing. Privileged: as `approach`.
+    It ends where the robot leaves with it or lets go of it. That the item is asked for, and so
+    delivered at once, costs nothing. Privileged: as `approach`.
     """
     before = payment.before
     ways = payment.ways

@@ -22,7 +22,8 @@ from swarm_logistics_env.world.motion.frame import OUTPUTS
 
 ROUNDS = 12  # of collecting rows and learning from all rows so far
 BATCH = 1024
-LAST_RATE = 0.1  # of the first one
+LATE = 0.75  # share of the rounds after which the rate is lower
+LATE_RATE = 0.4  # times the settings' rate
 NOISE_SHARES = np.array([1.0, 1.0, 0.5])  # of the settings' noise, of each output
 
 
@@ -60,8 +61,9 @@ def _imitate(training: Training, settings: Teaching, learner: Any) -> None:
             new = slice(number * n_new, (number + 1) * n_new)
             share = settings.share_at(done)
             columns = _collect(learner, columns, share, settings.noise, rng, rows[new], labels[new])
+            rate = settings.rate * (LATE_RATE if done > LATE else 1.0)
             for group in optimizer.param_groups:
-                group["lr"] = settings.rate * (1.0 + done * (LAST_RATE - 1.0))
+                group["lr"] = rate
             for _ in range(max(1, settings.epochs * n_new // BATCH)):
                 batch = rng.integers(new.stop, size=BATCH)
                 answers = policy.answers_of(torch.from_numpy(rows[batch]).to(learner.device))

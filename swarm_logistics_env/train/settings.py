@@ -140,7 +140,8 @@ class PPOSettings(Part):
         max_grad_norm: the length to which longer gradients are shortened.
         target_kl: an update stops early beyond 1.5 times this divergence; without it, never.
         deviations: standard deviations of the outputs' exploration noise at the start, one for each
-            output; they are learned. A network that says classes has none of these three.
+            output; they are learned. Of a network that says classes nothing of
+            this, `least_deviation` and `least_until` may be set.
         least_deviation: the lower limit of deviations at the start and at the end; it changes
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.
@@ -205,7 +206,7 @@ class Teaching(Part):
         shares: of the robots that do what it says meanwhile, at first and at last; the others do
             what the network says.
         noise: standard deviation of noise on what they do meanwhile, half of that on the gripper.
-        rate: Adam's learning rate at first; it falls linearly to a tenth.
+        rate: Adam's learning rate; 0.4 times that in the last quarter.
         epochs: how often a row is learned from, on average over all.
         warm_up: PPO's first updates in which the value network alone learns: an actor that learns
             from values of an untrained one forgets what it imitated.

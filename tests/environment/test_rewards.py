@@ -241,7 +241,7 @@ AS_IN_NUMPY = {
     "on_time": "3e07b377de94b3ee", "lift_requested": "6917a09046765144",
     "approach": "7c9a11b917969e3a", "stocking": "f6596a7128d8857c",
     "contact": "f3f2492c746aab5d", "collision": "c1451041662cc8ae",
-    "blocked_request": "c2d56fa08699cfd7",
+    "blocked_request": "c2d56fa08699cfd7", "held_inside": "6ee653addd7c647b",
 }  # fmt: skip
 
 

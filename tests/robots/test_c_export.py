@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies.c_files import CFile
+from swarm_logistics_env.policies.files import write_policy
+from swarm_logistics_env.policies.learned import Network, PolicyCard, tensor_shapes
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.robots.c_export import write_c
 from swarm_logistics_env.robots.c_sizes import ARM, CORTEX_M4, sizes_of
@@ -102,6 +104,20 @@ def test_the_c_file_decides_as_the_policy_does(name: str, tmp_path: Path) -> Non
     assert counts.n_decisions == 20_000
     assert counts.n_elsewhere <= 20
     assert counts.n_rounded <= (2_000 if name == "homing-stock" else 100)
+
+
+@needs_gcc
+@pytest.mark.compiled
+def test_a_network_that_says_classes_and_has_a_role_decides_so_in_c(tmp_path: Path) -> None:
+    network = Network(hidden=(12,), head="classes", role=True, exploration=0.5, decides_every=2)
+    rng = np.random.default_rng(0)
+    shapes = tensor_shapes(network)
+    tensors = {name: rng.normal(0, 0.5, shape).astype("f4") for name, shape in shapes.items()}
+    path = tmp_path / "classes.safetensors"
+    write_policy(path, PolicyCard(name="classes", network=network), tensors)
+    counts = replay(str(path), SCENARIO.replace(duration=10.0), range(1), tmp_path)
+    assert counts.n_decisions == 2_500
+    assert counts.n_elsewhere <= 10
 
 
 @needs_gcc
