@@ -127,7 +127,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         super().__init__(
             worlds,
             Box(-np.inf, np.inf, (n_columns,), np.float32),
-            MultiDiscrete(GROUPS) if self._says_classes else actions,
+            MultiDiscrete(list(GROUPS)) if self._says_classes else actions,
         )
 
     def __getstate__(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from stable_baselines3.common.callbacks import ConvertCallback
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.policies.learned import Network
+from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.train import trainer
 from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import make_learner, tensors_of
@@ -80,13 +81,15 @@ def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_
 ) -> None:
     teacher = {"policy": "homing", "decisions": 4000, "warm_up": 2, "shares": [1.0, 0.5]}
     training = small(network=network, teacher=teacher)
-    view = NetworkView(training)
-    learner = make_learner(view, network, training.ppo, training.seed, "cpu")
-    columns = torch.from_numpy(view.reset())[:, : network.widths[0]]
-    labels = torch.from_numpy(view.labels)
+    other = NetworkView(training)
+    other.seed(1)
+    columns = torch.from_numpy(other.reset())[:, : network.widths[0]]
+    labels = torch.from_numpy(other.labels)
+    learner = make_learner(NetworkView(training), network, training.ppo, training.seed, "cpu")
     policy = learner.policy
     before = policy.error(policy.answers_of(columns), labels).mean().item()
-    imitate(training, learner, TrainingLog())
+    with one_thread():
+        imitate(training, learner, TrainingLog())
     assert policy.error(policy.answers_of(columns), labels).mean().item() < 0.8 * before
     imitated = {name: tensor.tobytes() for name, tensor in tensors_of(learner.policy).items()}
     shorter = training.replace(agent_steps=320)
