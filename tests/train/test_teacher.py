@@ -79,7 +79,7 @@ def test_a_training_with_a_teacher_goes_on_to_the_same_bits_and_keeps_the_best_n
 def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_alone(
     small: Any, tmp_path: Path, network: Network
 ) -> None:
-    teacher = {"policy": "homing", "decisions": 4000, "warm_up": 2, "shares": [1.0, 0.5]}
+    teacher = {"policy": "homing", "decisions": 4000, "warm_up": 2, "rate": 0.03}
     training = small(network=network, teacher=teacher)
     other = NetworkView(training)
     other.seed(1)
