@@ -117,7 +117,10 @@ def test_a_network_that_says_classes_and_has_a_role_decides_so_in_c(tmp_path: Pa
     write_policy(path, PolicyCard(name="classes", network=network), tensors)
     counts = replay(str(path), SCENARIO.replace(duration=10.0), range(1), tmp_path)
     assert counts.n_decisions == 2_500
-    assert counts.n_elsewhere <= 10
+    assert counts.n_rounded <= 10
+    # Every other direction lies halfway between two beams, where `float` may round the frame to
+    # the other one: about one decision in sixty.
+    assert counts.n_elsewhere <= 75
 
 
 @needs_gcc
