@@ -44,7 +44,9 @@ ROOMS = (
     "core", "compiler", "spi", "world", "environment", "wrappers", "policies", "adapters", "robots",
     "study", "train", "views",
 )  # fmt: skip
-PARTS = ("network", "worlds", "conditions", "indicators", "ppo", "evaluation", "scores")
+PARTS = (
+    "network", "worlds", "conditions", "indicators", "teacher", "ppo", "evaluation", "scores",
+)  # fmt: skip
 
 
 def environment() -> dict[str, str]:

@@ -257,6 +257,7 @@ def rewards(
             if who == robot and not is_delivered:
                 stocked += min(now.item_position[item, 0], nearest)
                 stocked -= min(before.item_position[item, 0], nearest)
+        held, was_held = (_held_inside(moment, robot, edge) for moment in (now, before))
         delivers = now.delivers[robot]
         deeper = 2.0 * (max(x, edge) - max(x_before, edge)) if carries_on else 0.0
         nearer = min(x, edge) - min(x_before, edge) if carries_on else 0.0
@@ -270,10 +271,18 @@ def rewards(
             "contact": period * now.robot_contact[robot],
             "collision": _closing(scenario, before, now, robot),
             "blocked_request": (period + deeper) * (is_ in _asked(now) and not delivers),
+            "held_inside": len(held - was_held - _asked(now))
+            - len(was_held - held - _asked(before) - _asked(now)) * (robot not in new),
         }
         paid = sum(weights.get(name, 0.0) * value for name, value in terms.items())
         total.append(paid if before.robot_present[robot] else 0.0)
     return total
+
+
+def _held_inside(moment: State, robot: int, edge: float) -> set[int]:
+    """Return the item that a robot holds in the delivery area, if any."""
+    item = moment.robot_item[robot]
+    return {item} if item != NOBODY and moment.item_position[item, 0] >= edge else set()
 
 
 def _closing(scenario: Scenario, before: State, now: State, robot: int) -> float:

@@ -27,7 +27,7 @@ _GRACE = 1e-6  # [s]; times are sums of periods
 
 # Numbers of terms.
 DELIVERY, OWN_DELIVERY, ON_TIME, LIFT_REQUESTED, APPROACH = range(5)
-STOCKING, CONTACT, COLLISION, BLOCKED_REQUEST = range(5, 9)
+STOCKING, CONTACT, COLLISION, BLOCKED_REQUEST, HELD_INSIDE = range(5, 10)
 
 
 class Moment(NamedTuple):
@@ -122,6 +122,8 @@ def fill_earned(world: World, payment: Payment, wanted: int, earned: Numbers) ->
         collision(world, payment, earned)
     elif wanted == BLOCKED_REQUEST:
         blocked_request(world, payment, earned)
+    elif wanted == HELD_INSIDE:
+        held_inside(world, payment, earned)
 
 
 @engine_kernel
@@ -247,6 +249,33 @@ def blocked_request(world: World, payment: Payment, earned: Numbers) -> None:
 
 
 @engine_kernel
+def held_inside(world: World, payment: Payment, earned: Numbers) -> None:
+    """1 to the robot that brings an unrequested item into the delivery area, -1 when that ends.
+
+    It ends where the robot leaves with it or lets go of it. That the item is asked for, and so
+    delivered at once, costs nothing. Privileged: as `approach`.
+    """
+    before = payment.before
+    ways = payment.ways
+    for item in range(len(before.carriers)):
+        carrier = world.items.carrier[item]
+        previous = before.carriers[item]
+        if is_requested(world, item) or (carrier == NOBODY and previous == NOBODY):
+            continue
+        along = way_along(ways, world.items.position[item], NO_DOCK)
+        along_before = way_along(ways, before.item_position[item], NO_DOCK)
+        is_held = carrier != NOBODY and along >= ways.edge
+        was_held = previous != NOBODY and along_before >= ways.edge
+        if is_held and was_held and carrier == previous:
+            continue
+        if is_held:
+            earned[carrier] += 1.0
+        is_asked_for = before.requested[item] or has_delivered(world, previous)
+        if was_held and not is_asked_for:
+            earned[previous] -= 1.0
+
+
+@engine_kernel
 def dock_of(world: World, item: int) -> int:
     """Return the dock that the oldest request for an item names, or `NO_DOCK`."""
     for request in range(len(world.progress.requested)):
@@ -290,4 +319,5 @@ REWARD_TERMS: dict[str, Term] = {
     "contact": contact,
     "collision": collision,
     "blocked_request": blocked_request,
+    "held_inside": held_inside,
 }

@@ -23,7 +23,6 @@ from swarm_logistics_env.policies.c_files import CFile, is_c_name
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, check_tensors
 from swarm_logistics_env.policies.policy import Policy
 from swarm_logistics_env.policies.sb3_files import SB3_SUFFIX, from_sb3
-from swarm_logistics_env.world.motion.frame import OUTPUTS
 from swarm_logistics_env.world.motion.network_inputs import LEAD
 
 SUFFIX = ".safetensors"
@@ -140,6 +139,7 @@ def file_content(card: str, tensors: Mapping[str, NDArray[Any]]) -> bytes:
 OPERATORS = 17
 FORMAT = 8
 DEVIATIONS = "deviations"  # in the metadata
+TEMPERATURE = "temperature"
 
 
 def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> None:
@@ -150,6 +150,9 @@ def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> N
     commands of outputs, is `motion.MotionView`; docs/training.md has an example. The metadata hold
     the card, and as "deviations" three numbers: the standard deviations of the noise that is added
     to the outputs at each step, zeros for a policy that does not explore.
+
+    Of a network that says classes the output is "logits" (robots, 40), see `motion.classes`, and
+    the metadata have "temperature" instead, with which classes are drawn; 0 means the likeliest.
 
     Args:
         policy: a trained one, as `policies.load("ppo-delivery")`.
@@ -173,7 +176,12 @@ def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> N
         ) from error
     network = policy.card.network
     tensors = dict(policy.tensors)
-    deviations = tensors.pop(DEVIATIONS) * np.float32(network.exploration)
+    noise = {TEMPERATURE: str(network.exploration)}
+    said = "logits"
+    if not network.says_classes:
+        deviations = tensors.pop(DEVIATIONS) * np.float32(network.exploration)
+        noise = {DEVIATIONS: " ".join(map(str, deviations.tolist()))}
+        said = "outputs"
     if not network.listens:
         # Such a policy reads zeros there. Without their weights it may be given anything.
         tensors["layers.0.weight"] = tensors["layers.0.weight"].copy()
@@ -184,7 +192,7 @@ def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> N
         is_last = layer == len(network.hidden)
         weight = f"layers.{layer}.weight"
         bias = f"layers.{layer}.bias"
-        total = "outputs" if is_last else f"layers.{layer}.sum"
+        total = said if is_last else f"layers.{layer}.sum"
         nodes.append(helper.make_node("Gemm", [layer_input, weight, bias], [total], transB=1))
         if not is_last:
             layer_input = f"layers.{layer}.out"
@@ -194,14 +202,13 @@ def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> N
     graph = helper.make_graph(
         nodes,
         policy.card.name,
-        [helper.make_tensor_value_info("inputs", real, [n_rows, len(network.inputs)])],
-        [helper.make_tensor_value_info("outputs", real, [n_rows, len(OUTPUTS)])],
+        [helper.make_tensor_value_info("inputs", real, [n_rows, network.widths[0]])],
+        [helper.make_tensor_value_info(said, real, [n_rows, network.widths[-1]])],
         [numpy_helper.from_array(np.ascontiguousarray(t), n) for n, t in tensors.items()],
     )
     version = helper.make_opsetid("", OPERATORS)
     model = helper.make_model(graph, opset_imports=[version], ir_version=FORMAT)
-    about = {CARD: policy.card.to_json(), DEVIATIONS: " ".join(map(str, deviations.tolist()))}
-    helper.set_model_props(model, about)
+    helper.set_model_props(model, {CARD: policy.card.to_json(), **noise})
     checker.check_model(model)
     with atomic_write(Path(path), PolicyError) as part:
         part.write_bytes(model.SerializeToString())

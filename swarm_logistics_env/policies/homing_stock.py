@@ -72,7 +72,6 @@ from swarm_logistics_env.policies.stocking import (
     hold_direction,
     is_gap,
     item_to_stock,
-    role_of,
 )
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import command_own_frames
@@ -80,6 +79,7 @@ from swarm_logistics_env.world.motion.memory import MEMORY, has_failed, kept_hom
 from swarm_logistics_env.world.motion.network_inputs import (
     random_heading,
     random_heading_number,
+    role_of,
     turn_frames,
 )
 from swarm_logistics_env.world.motion.steering import set_velocity

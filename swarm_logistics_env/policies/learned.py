@@ -21,6 +21,7 @@ from pydantic import (
     PositiveInt,
     ValidationInfo,
     field_validator,
+    model_serializer,
 )
 
 from swarm_logistics_env.compiler.packing import packed
@@ -28,8 +29,9 @@ from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.policies.policy import Described
 from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
+from swarm_logistics_env.world.motion.classes import N_CLASSES
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.world.motion.network_inputs import INPUTS
+from swarm_logistics_env.world.motion.network_inputs import INPUTS, ROLE_INPUTS
 from swarm_logistics_env.world.scenario import Scenario
 
 from .layers import Layers, in_blocks, padded, run_network
@@ -49,12 +51,17 @@ class Network(_Part):
         inputs: the names of its inputs in order, see `world.motion.INPUTS`.
         outputs: the names of its outputs in order, see `world.motion.OUTPUTS`.
         listens: whether it reads the lowest timer heard; if not, those inputs are zeros.
+        role: whether it reads two inputs more, behind the others: a number from -1 to 1 that each
+            robot draws evenly every 40 s, and on which side of 0.2 that lies.
         hidden: widths of the hidden layers.
         activation: the activation function between layers.
         decides_every: control steps from one decision to the next; in between outputs keep their
             direction.
+        head: what the last layer says: "outputs", or the logits of "classes", which are 32
+            directions in the frame of motion, 5 speeds and 3 grips (`world.motion.classes`).
         exploration: the training's noise, times this factor, is added to the outputs, from each
-            robot's own stream; 0 means none.
+            robot's own stream; 0 means none. Of classes it is the temperature with which they are
+            drawn, in a training as well; 0 means the likeliest, in a training a temperature of 1.
 
     Raises:
         PolicyError: the inputs or outputs are not those that this version knows.
@@ -63,9 +70,11 @@ class Network(_Part):
     inputs: tuple[str, ...] = INPUTS
     outputs: tuple[str, ...] = OUTPUTS
     listens: bool = True
+    role: bool = False
     hidden: Annotated[tuple[Width, ...], Field(max_length=8)] = (128, 128)
     activation: Literal["tanh"] = "tanh"
     decides_every: PositiveInt = 1
+    head: Literal["outputs", "classes"] = "outputs"
     exploration: NonNegativeFloat = 0.0
 
     @field_validator("inputs", "outputs")
@@ -76,10 +85,24 @@ class Network(_Part):
             raise ValueError(f"should be the {len(expected)} names that this version knows")
         return names
 
+    @model_serializer(mode="wrap")
+    def _leave_out_later_fields(self, serialize: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+        # Cards and identities of networks without them stay as they were before these fields.
+        fields = serialize(self)
+        later = {"role": False, "head": "outputs"}
+        return {name: v for name, v in fields.items() if name not in later or v != later[name]}
+
+    @property
+    def says_classes(self) -> bool:
+        """Whether its last layer says logits of classes."""
+        return self.head == "classes"
+
     @property
     def widths(self) -> list[int]:
-        """The numbers of inputs, of each hidden layer's values, and of outputs."""
-        return [len(self.inputs), *self.hidden, len(self.outputs)]
+        """The numbers of inputs, of each hidden layer's values, and of what the last layer says."""
+        n_inputs = len(self.inputs) + (len(ROLE_INPUTS) if self.role else 0)
+        n_said = N_CLASSES if self.says_classes else len(self.outputs)
+        return [n_inputs, *self.hidden, n_said]
 
 
 class Score(_Part):
@@ -184,7 +207,8 @@ class LearnedPolicy(RowPolicy, Described):
         )
         self._decides_every = network.decides_every
         self._listens = network.listens
-        self._deviations = tensors["deviations"] * np.float32(network.exploration)
+        deviations = tensors.get("deviations", np.ones(1, np.float32))
+        self._noise = deviations * np.float32(network.exploration)
         self.parameters = LearnedParameters(network=network, weights=digest(tensors))
         self.configure(Scenario.preset("paper"))
 
@@ -197,7 +221,8 @@ class LearnedPolicy(RowPolicy, Described):
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows: its control period and its body."""
-        self._frame = MotionView(scenario, self.card.network.listens)
+        network = self.card.network
+        self._frame = MotionView(scenario, network.listens, network.role)
         self.reset(0, 0)
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
@@ -217,7 +242,7 @@ class LearnedPolicy(RowPolicy, Described):
         frame = self._frame
         self._arrays = StepArrays(
             frame.period, self._listens, frame.memory, frame.keys, frame.counts, frame.turned,
-            self._outputs, self._deviations, self._layers,
+            self._outputs, self._noise, self._layers,
         )  # fmt: skip
         self._words = packed(self._arrays)
         self._address: int = self._words.ctypes.data
@@ -280,8 +305,8 @@ class LearnedPolicy(RowPolicy, Described):
         return n_steps, is_eventful
 
     def outputs_of(self, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the network's outputs (N, k) for rows of its inputs, without noise."""
-        outputs = np.empty((len(inputs), len(OUTPUTS)), np.float32)
+        """Return what the last layer says (N, k) for rows of its inputs, without noise."""
+        outputs = np.empty((len(inputs), self.card.network.widths[-1]), np.float32)
         run_network(np.ascontiguousarray(inputs), self._layers, outputs)
         return outputs
 
@@ -290,9 +315,11 @@ def tensor_shapes(network: Network) -> dict[str, tuple[int, ...]]:
     """Return the shape of each tensor that such a policy has.
 
     `layers` are as torch has them, weight (outputs, inputs); `deviations` those of the training's
-    noise, of each output.
+    noise, of each output; a network that says classes has none.
     """
-    shapes: dict[str, tuple[int, ...]] = {"deviations": (len(network.outputs),)}
+    shapes: dict[str, tuple[int, ...]] = {}
+    if not network.says_classes:
+        shapes["deviations"] = (len(network.outputs),)
     for layer, (n_in, n_out) in enumerate(pairwise(network.widths)):
         shapes[f"layers.{layer}.weight"] = (n_out, n_in)
         shapes[f"layers.{layer}.bias"] = (n_out,)

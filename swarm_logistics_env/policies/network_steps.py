@@ -6,13 +6,28 @@ kernel costs a tenth of a microsecond.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.compiler.addresses import unpacked_at
-from swarm_logistics_env.compiler.kernels import engine_kernel, gaussian, kernel, pair_key
+from swarm_logistics_env.compiler.kernels import (
+    engine_kernel,
+    gaussian,
+    kernel,
+    pair_key,
+    uniform,
+)
+from swarm_logistics_env.world.motion.classes import (
+    DIRECTIONS_ALONG,
+    DIRECTIONS_ASIDE,
+    N_CLASSES,
+    N_DIRECTIONS,
+    N_GRIPS,
+    N_SPEEDS,
+)
 from swarm_logistics_env.world.motion.frame import command_rows, hold_rows
 from swarm_logistics_env.world.motion.network_inputs import read_observations
 from swarm_logistics_env.world.warehouse.commands import MESSAGE
@@ -32,7 +47,7 @@ class StepArrays(NamedTuple):
     counts: Annotated[NDArray[np.int64], "n_robots"]
     turned: Annotated[NDArray[np.float64], "n_robots"]
     outputs: Annotated[NDArray[np.float32], "n_robots", "n_outputs"]
-    deviations: Annotated[NDArray[np.float32], "n_outputs"]
+    noise: Annotated[NDArray[np.float32], "n_noise"]  # as `decide` has it
     layers: Layers
 
 
@@ -50,7 +65,7 @@ def act_at(
         layers = Layers(pack.layers.weights, pack.layers.biases, pack.layers.widths)
         decide(
             rows, pack.period, pack.memories, pack.counts, pack.turned, pack.keys, pack.listens,
-            layers, pack.deviations, pack.outputs,
+            layers, pack.noise, pack.outputs,
         )  # fmt: skip
     else:
         hold_rows(rows, pack.period, pack.memories, pack.counts, pack.turned)
@@ -95,16 +110,25 @@ def decide(
     keys: NDArray[np.uint64],
     listens: bool,
     layers: Layers,
-    deviations: NDArray[np.float32],
+    noise: NDArray[np.float32],
     outputs: NDArray[np.float32],
 ) -> None:
-    """Fill the network's outputs (N, k), with its noise, upon rows (N, D); memories go on."""
+    """Fill the network's outputs (N, 3), with its noise, upon rows (N, D); memories go on.
+
+    Args:
+        noise: the deviation of each output; of a network that says classes their temperature alone.
+    """
     inputs = np.empty((rows.shape[0], layers.widths[0]), np.float32)
     read_observations(rows, period, memories, keys, counts, listens, inputs, turned)
     counts += 1
-    run_network(inputs, layers, outputs)
-    if deviations.any():
-        explore(keys, counts, deviations, outputs)
+    if layers.widths[-1] == N_CLASSES:
+        logits = np.empty((rows.shape[0], N_CLASSES), np.float32)
+        run_network(inputs, layers, logits)
+        choose_outputs(keys, counts, np.float64(noise[0]), logits, outputs)
+    else:
+        run_network(inputs, layers, outputs)
+        if noise.any():
+            explore(keys, counts, noise, outputs)
 
 
 @kernel
@@ -123,3 +147,60 @@ def explore(
         for output in range(outputs.shape[1]):
             noise = gaussian(pair_key(keys[robot], output), counts[robot] - 1)
             outputs[robot, output] += np.float32(np.float64(deviations[output]) * noise)
+
+
+@kernel
+def choose_outputs(
+    keys: NDArray[np.uint64],
+    counts: NDArray[np.int64],
+    temperature: float,
+    logits: NDArray[np.float32],
+    outputs: NDArray[np.float32],
+) -> None:
+    """Fill outputs (N, 3) of the classes that logits (N, N_CLASSES) say, see `motion.classes`.
+
+    Args:
+        counts: as `explore` has them.
+        temperature: what logits are divided by before a class of each group is drawn from their
+            softmax, by a number of the robot's own stream; with 0 it is the likeliest.
+    """
+    for robot in range(outputs.shape[0]):
+        said = logits[robot]
+        key = keys[robot]
+        number = counts[robot] - 1
+        drawn = uniform(pair_key(key, 0), number)
+        direction = choose(said, 0, N_DIRECTIONS, temperature, drawn)
+        drawn = uniform(pair_key(key, 1), number)
+        speed = choose(said, N_DIRECTIONS, N_SPEEDS, temperature, drawn) / (N_SPEEDS - 1)
+        drawn = uniform(pair_key(key, 2), number)
+        grip = choose(said, N_DIRECTIONS + N_SPEEDS, N_GRIPS, temperature, drawn)
+        outputs[robot, 0] = speed * DIRECTIONS_ALONG[direction]
+        outputs[robot, 1] = speed * DIRECTIONS_ASIDE[direction]
+        outputs[robot, 2] = grip - 1.0
+
+
+@kernel
+def choose(
+    logits: NDArray[np.float32], first: int, n_classes: int, temperature: float, drawn: float
+) -> int:
+    """Return the number of a class in its group, whose logits begin at `first`.
+
+    Args:
+        drawn: even in [0, 1).
+    """
+    likeliest = 0
+    for index in range(n_classes):
+        if logits[first + index] > logits[first + likeliest]:
+            likeliest = index
+    if temperature <= 0.0:
+        return likeliest
+    most = np.float64(logits[first + likeliest])
+    total = 0.0
+    for index in range(n_classes):
+        total += math.exp((np.float64(logits[first + index]) - most) / temperature)
+    left = drawn * total
+    for index in range(n_classes):
+        left -= math.exp((np.float64(logits[first + index]) - most) / temperature)
+        if left < 0.0:
+            return index
+    return likeliest

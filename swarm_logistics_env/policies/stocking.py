@@ -8,30 +8,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_logistics_env.compiler.kernels import kernel, uniform
+from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.policies.driving import away_from_neighbours
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import CLEARING_TIME, MEMORY, length_of
-from swarm_logistics_env.world.motion.network_inputs import RANDOM_HEADING_TIME
 
-ROLE_TIME = 40.0  # [s]
-FIRST_ROLE = 2_000_003  # number in the robot's stream
 ITEM_SPACING = 0.6  # between the centres of items, so that laden robots get through
 DEPTH = 0.3  # of robots that hold items inside
 SPREAD_GAIN = 0.3  # along the border, away from neighbours
 SPREAD_RANGE = 1.5
 LOST = 0.8  # that a reckoned distance may be wrong
-
-
-@kernel
-def role_of(key: np.uint64, heading_number: int) -> float:
-    """Return the number in [0, 1) that decides a robot's role at present.
-
-    Robots change their roles at different times.
-    """
-    n_roles = heading_number * RANDOM_HEADING_TIME / ROLE_TIME
-    role = int(n_roles + uniform(key, FIRST_ROLE))
-    return uniform(key, FIRST_ROLE + 1 + role)
 
 
 @kernel

@@ -6,6 +6,7 @@ import ast
 import builtins
 import inspect
 import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -49,6 +50,14 @@ _COMPARISONS = {
     ast.LtE: "<=",
     ast.Gt: ">",
     ast.GtE: ">=",
+}
+_COMPARED: dict[type, Callable[[Any, Any], bool]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
 }
 # Functions of math.h, which have an f at the end for floats.
 _MATH = {
@@ -221,6 +230,10 @@ class Expressions(Operators):
 
     def _comparison(self, node: ast.Compare) -> Value:
         values = [self.value_of(operand) for operand in (node.left, *node.comparators)]
+        numbers = [value.constant for value in values]
+        if None not in numbers:
+            pairs = zip(node.ops, numbers, numbers[1:])
+            return constant(all(_COMPARED[type(symbol)](a, b) for symbol, a, b in pairs))
         texts = []
         for symbol, left, right in zip(node.ops, values, values[1:]):
             kind = common_kind(left, right)

@@ -131,7 +131,7 @@ def _network_step(policy: LearnedPolicy, period: Known) -> Step:
     network = policy.card.network
     arguments = (
         _ROW, period, MEMORY, _COUNT, _TURNED, KEY, Known(network.listens, "LISTENS", True),
-        Known(policy._layers, "layers", True), Known(policy._deviations, "deviations", True),
+        Known(policy._layers, "layers", True), Known(policy._noise, "noise", True),
         Known(network.decides_every, "DECIDES_EVERY", True), _OUTPUTS, _COMMAND,
     )  # fmt: skip
     by_hand = {python_function(run_network): _network_function(policy)}
@@ -147,7 +147,7 @@ def act_network(
     keys: NDArray[np.uint64],
     listens: bool,
     layers: Layers,
-    deviations: NDArray[np.float32],
+    noise: NDArray[np.float32],
     decides_every: int,
     outputs: NDArray[np.float32],
     commands: NDArray[np.float64],
@@ -155,7 +155,7 @@ def act_network(
     """Fill the command of a step upon a row, as `network_steps.act_at` does; memory goes on."""
     if counts[0] % decides_every == 0:
         decide(
-            rows, period, memories, counts, turned, keys, listens, layers, deviations, outputs
+            rows, period, memories, counts, turned, keys, listens, layers, noise, outputs
         )  # fmt: skip
     else:
         hold_rows(rows, period, memories, counts, turned)

@@ -1,4 +1,4 @@
-"""The learner: stable-baselines3's PPO, its networks, and the checkpoints it goes on from.
+"""The learner: stable-baselines3's PPO, and the checkpoints it goes on from.
 
 The value network reads more than a robot can sense, see `privileged`.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import math
 import os
 from pathlib import Path
 from typing import Any
@@ -16,15 +15,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
-from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.torch_layers import create_mlp
 
 from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.core.records import atomic_write
 from swarm_logistics_env.policies.learned import Network
-from swarm_logistics_env.train.privileged import PRIVILEGED
+from swarm_logistics_env.train.actor_critic import ClassesPolicy, GaussianPolicy
 from swarm_logistics_env.train.settings import PPOSettings
 from swarm_logistics_env.train.training_worlds import NetworkView, check_finite
+from swarm_logistics_env.world.motion.classes import N_DIRECTIONS, classes_of
 
 CHECKPOINT = "checkpoint.pt"
 STATE = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # of the learner
@@ -32,14 +30,19 @@ STATE = ("num_timesteps", "_n_updates", "_last_obs", "_last_episode_starts")  # 
 # The outputs of an untrained network, whatever it reads: it drives ahead, so that it meets things.
 # One that trembles on the spot would learn very slowly that searching pays.
 FIRST_OUTPUTS = (0.8, 0.0, 0.0)
+FIRST_LOGIT = 3.0  # of its direction and speed, where a network says classes
 
 
 def make_learner(
     view: NetworkView, network: Network, ppo: PPOSettings, seed: int, device: str
 ) -> PPO:
     """Return PPO as the settings ask for it; seeds the worlds and global generators."""
+    net_arch = {"pi": list(network.hidden), "vf": list(ppo.value_hidden)}
+    of_policy: dict[str, Any] = {"net_arch": net_arch, "n_inputs": network.widths[0]}
+    if network.says_classes:
+        of_policy["temperature"] = network.exploration or 1.0
     learner = PPO(
-        AsymmetricPolicy,
+        ClassesPolicy if network.says_classes else GaussianPolicy,
         view,
         learning_rate=lambda left: ppo.rate(1.0 - left),
         n_steps=ppo.n_steps,
@@ -52,14 +55,27 @@ def make_learner(
         vf_coef=ppo.value_weight,
         max_grad_norm=ppo.max_grad_norm,
         target_kl=ppo.target_kl,
-        policy_kwargs={"net_arch": {"pi": list(network.hidden), "vf": list(ppo.value_hidden)}},
+        policy_kwargs=of_policy,
         seed=seed,
         device=device,
     )
+    policy = learner.policy
     with torch.no_grad():
-        learner.policy.log_std.copy_(torch.tensor(ppo.deviations).log())
-        learner.policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
+        if network.says_classes:
+            direction, speed, _ = classes_of(np.array([FIRST_OUTPUTS]))[0]
+            policy.action_net.bias[[direction, N_DIRECTIONS + speed]] = FIRST_LOGIT
+        else:
+            policy.log_std.copy_(torch.tensor(ppo.deviations).log())
+            policy.action_net.bias.copy_(torch.tensor(FIRST_OUTPUTS))
     return learner
+
+
+def pull_by(learner: PPO, pull: float, ppo: PPOSettings) -> None:
+    """Let the learner's losses have a teacher's error in them from now on, with that weight."""
+    policy = learner.policy
+    policy.pull = pull
+    policy.entropy_weight = ppo.entropy
+    learner.ent_coef = 1.0 if pull > 0.0 else ppo.entropy
 
 
 def check_learner(learner: Any) -> None:
@@ -69,7 +85,8 @@ def check_learner(learner: Any) -> None:
     check_finite("a loss", np.array(losses))
     policy = learner.policy
     averages = [mean for means in policy.optimizer.state.values() for mean in means.values()]
-    for numbers in (*policy.parameters(), policy.log_std.exp(), *averages):
+    deviations = [policy.log_std.exp()] if isinstance(policy, GaussianPolicy) else []
+    for numbers in (*policy.parameters(), *deviations, *averages):
         check_finite("a number of the networks", numbers.detach().cpu().numpy())
 
 
@@ -87,7 +104,9 @@ def device_of(name: str | None) -> str:
 
 def tensors_of(policy: Any) -> dict[str, NDArray[np.float32]]:
     """Return the tensors of a policy file (`policies.learned.tensor_shapes`) from PPO's policy."""
-    tensors = {"deviations": _array(policy.log_std.exp())}
+    tensors = {}
+    if isinstance(policy, GaussianPolicy):
+        tensors["deviations"] = _array(policy.log_std.exp())
     hidden = [m for m in policy.mlp_extractor.policy_net if isinstance(m, torch.nn.Linear)]
     for layer, linear in enumerate([*hidden, policy.action_net]):
         tensors[f"layers.{layer}.weight"] = _array(linear.weight)
@@ -177,66 +196,3 @@ def restore(learner: PPO, state: dict[str, Any]) -> None:
     if torch.cuda.is_available():
         torch.cuda.set_rng_state_all(state["cuda"])
     np.random.set_state(state["numpy"])  # noqa: NPY002 - see above
-
-
-class AsymmetricPolicy(ActorCriticPolicy):  # type: ignore[misc]  # not in the environment of the type check
-    """PPO's two networks: the critic reads more columns than the actor, see `NetworkView`."""
-
-    def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = _TwoReaders(self.features_dim, self.net_arch)
-
-    # As the base class has them, to the bit, without what it builds and checks around every batch.
-
-    def forward(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Return outputs drawn for each row, values and the outputs' log probabilities."""
-        means, deviations, values = self._answers(columns)
-        outputs = means + torch.empty_like(means).normal_() * deviations
-        return outputs, values, _log_probability(outputs, means, deviations)
-
-    def evaluate_actions(
-        self, columns: torch.Tensor, outputs: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Return values, and log probabilities and entropies of outputs, of each row."""
-        means, deviations, values = self._answers(columns)
-        entropy = 0.5 + 0.5 * math.log(2.0 * math.pi) + torch.log(deviations)
-        return values, _log_probability(outputs, means, deviations), entropy.sum(dim=1)
-
-    def _answers(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        for_outputs, for_values = self.mlp_extractor(columns)
-        means = self.action_net(for_outputs)
-        check_finite("an output of the network", means.detach().cpu().numpy())
-        deviations = torch.ones_like(means) * self.log_std.exp()
-        return means, deviations, self.value_net(for_values)
-
-
-def _log_probability(
-    outputs: torch.Tensor, means: torch.Tensor, deviations: torch.Tensor
-) -> torch.Tensor:
-    """Return that of outputs (n, 3) that are distributed normally, (n,)."""
-    squares = -((outputs - means) ** 2) / (2 * deviations**2)
-    densities = squares - deviations.log() - math.log(math.sqrt(2.0 * math.pi))
-    return densities.sum(dim=1)
-
-
-class _TwoReaders(torch.nn.Module):  # type: ignore[misc]  # torch is Any to mypy
-    def __init__(self, n_columns: int, widths: dict[str, list[int]]) -> None:
-        super().__init__()
-        self.n_inputs = n_columns - len(PRIVILEGED)
-        self.policy_net = torch.nn.Sequential(
-            *create_mlp(self.n_inputs, -1, widths["pi"], torch.nn.Tanh)
-        )
-        # Cheaper than tanh, and as good for values.
-        self.value_net = torch.nn.Sequential(
-            *create_mlp(n_columns, -1, widths["vf"], torch.nn.LeakyReLU)
-        )
-        self.latent_dim_pi = widths["pi"][-1]
-        self.latent_dim_vf = widths["vf"][-1]
-
-    def forward(self, columns: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        return self.forward_actor(columns), self.forward_critic(columns)
-
-    def forward_actor(self, columns: torch.Tensor) -> Any:
-        return self.policy_net(columns[:, : self.n_inputs])
-
-    def forward_critic(self, columns: torch.Tensor) -> Any:
-        return self.value_net(columns)

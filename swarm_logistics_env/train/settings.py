@@ -20,10 +20,13 @@ from pydantic import (
 
 from swarm_logistics_env.core.errors import TrainingError
 from swarm_logistics_env.core.records import Record, each_of
+from swarm_logistics_env.policies.homing import Homing
+from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.failure_modes import failure_mode
 
 Fraction = Annotated[float, Field(gt=0, le=1)]
+Share = Annotated[float, Field(ge=0, le=1)]
 
 
 def _check_mode(mode: str) -> str:
@@ -137,7 +140,8 @@ class PPOSettings(Part):
         max_grad_norm: the length to which longer gradients are shortened.
         target_kl: an update stops early beyond 1.5 times this divergence; without it, never.
         deviations: standard deviations of the outputs' exploration noise at the start, one for each
-            output; they are learned.
+            output; they are learned. Of a network that says classes nothing of
+            this, `least_deviation` and `least_until` may be set.
         least_deviation: the lower limit of deviations at the start and at the end; it changes
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.
@@ -190,6 +194,55 @@ class PPOSettings(Part):
         """Return the least deviation once a share `done` of the training is over."""
         first, last = self.least_deviation
         return first * math.pow(last / first, min(1.0, done / self.least_until))
+
+
+class Teaching(Part):
+    """A script that the network imitates before PPO begins, and is pulled to for a while after.
+
+    Args:
+        policy: `homing` or `homing-stock`, or a table of its name and parameters.
+        decisions: rows to imitate it upon, which `agent_steps` does not count; 0: none. They are
+            kept in memory, some 400 bytes a row.
+        shares: of the robots that do what it says meanwhile, at first and at last; the others do
+            what the network says.
+        noise: standard deviation of noise on what they do meanwhile, half of that on the gripper.
+        rate: Adam's learning rate; 0.4 times that in the last quarter.
+        epochs: how often a row is learned from, on average over all.
+        warm_up: PPO's first updates in which the value network alone learns: an actor that learns
+            from values of an untrained one forgets what it imitated.
+        pull: the weight of the error beside the teacher in PPO's loss at first: the cross entropy
+            of classes, or the mean square of outputs; 0: none.
+        pull_until: the share of the training at which it has fallen linearly to 0.
+    """
+
+    policy: Annotated[PolicySpec, BeforeValidator(PolicySpec.of)]
+    decisions: NonNegativeInt = 1_000_000
+    shares: tuple[Share, Share] = (1.0, 0.3)
+    noise: NonNegativeFloat = 0.15
+    rate: PositiveFloat = 1e-3
+    epochs: PositiveInt = 10
+    warm_up: NonNegativeInt = 10
+    pull: NonNegativeFloat = 0.0
+    pull_until: Fraction = 1.0
+
+    @field_validator("policy")
+    @classmethod
+    def _check_policy(cls, policy: PolicySpec) -> PolicySpec:
+        if policy.runs_code or not isinstance(policy.load(), Homing):
+            raise ValueError(
+                f"policy = {policy.title!r}: should be homing or homing-stock, which decide by "
+                "rows, remember as networks do and say where to drive"
+            )
+        return policy
+
+    def share_at(self, done: float) -> float:
+        """Return the teacher's share of the robots once a share `done` of the rows is there."""
+        first, last = self.shares
+        return first + done * (last - first)
+
+    def pull_at(self, done: float) -> float:
+        """Return the weight of the pull once a share `done` of the training is over."""
+        return self.pull * max(0.0, 1.0 - done / self.pull_until)
 
 
 class Evaluation(Part):

@@ -21,26 +21,29 @@ from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.core.progress_bar import ProgressBar
 from swarm_logistics_env.core.records import atomic_write, read_table, remove_parts
 from swarm_logistics_env.policies import Policy, load
-from swarm_logistics_env.policies.files import write_policy
+from swarm_logistics_env.policies.files import read_policy, write_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.study.report.drawing import COLOURS, INK, MARKERS, WIDTH, images
 from swarm_logistics_env.train.evaluation import evaluate, evaluate_score, versions
+from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import (
     check_learner,
     device_of,
     make_learner,
+    pull_by,
     read_checkpoint,
     restore,
     save_checkpoint,
     tensors_of,
 )
+from swarm_logistics_env.train.settings import Teaching
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.train.training_worlds import NetworkView
 
 RECORD = "training.json"  # of how it was made
 # Fields that may change when a training goes on, because they change nothing of what was done.
-MAY_CHANGE = frozenset({"about", "threads", "scores"})
+MAY_CHANGE = frozenset({"about", "threads", "scores", "keep"})
 CHECKPOINT_EVERY = 20.0  # seconds
 CURVE = "curve.csv"
 PICTURE = "curve.png"
@@ -59,7 +62,8 @@ def train(
     """Train a policy, or go on with it, and return the path of its file.
 
     What is in `out` afterwards: the policy file NAME.safetensors, as it was at the end, and
-    best.safetensors, as it was when it measured the highest P; training.json, how it was made;
+    best.safetensors, as it was when it measured the highest P, which `keep` may make the former
+    as well; training.json, how it was made;
     curve.csv and curve.png, what was measured on the way (see `TrainingLog`); tensorboard/;
     scores/, the study behind the card; and the checkpoint, from which the same call goes on after a
     crash. The result is the same, bit by bit, as without one (on a CPU).
@@ -141,12 +145,19 @@ def _train(
         restore(learner, state)
     if learner.num_timesteps < training.agent_steps:
         with _explain_end(training, out, learner, log):
+            if state is None:
+                imitate(training, learner, log)
             _learn(training, out, learner, log, callbacks)
     learner.env.close()
     evaluation = training.evaluation
     log.draw(out / PICTURE, f"{training.name}, N = {evaluation.n_robots}", evaluation.seeds)
-    card = _card(training, learner.num_timesteps, log, command)
+    n_steps = learner.num_timesteps
     tensors = tensors_of(learner.policy)
+    if training.keep == "best":
+        best = read_policy(out / BEST)
+        n_steps = best.card.agent_steps
+        tensors = best.tensors
+    card = _card(training, n_steps, log, command)
     path = out / f"{training.name}.safetensors"
     # The file is written before the scores are measured, which takes minutes.
     write_policy(path, card, tensors)
@@ -297,9 +308,12 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         progress = self.num_timesteps / self._training.agent_steps
         if self._training.final_rewards:
             self.model.env.change_rewards(self._training.rewards_at(progress))
-        floor = self._training.ppo.floor(progress)
-        with torch.no_grad():
-            self.model.policy.log_std.clamp_(min=math.log(floor))
+        if not self._training.network.says_classes:
+            floor = self._training.ppo.floor(progress)
+            with torch.no_grad():
+                self.model.policy.log_std.clamp_(min=math.log(floor))
+        if self._training.teacher is not None:
+            self._follow_teacher(self._training.teacher, progress)
         curve = self._log.curve
         due = curve[-1]["agent_steps"] + self._training.evaluation.every if curve else 0
         if self.num_timesteps >= due:
@@ -307,6 +321,17 @@ class TrainingCallback(BaseCallback):  # type: ignore[misc]  # not in the enviro
         if time.monotonic() - self._saved_at >= CHECKPOINT_EVERY:
             self._save()
         self._cpu = time.process_time()
+
+    def _follow_teacher(self, teaching: Teaching, progress: float) -> None:
+        """Let the value network warm up, and the teacher pull or go."""
+        ppo = self._training.ppo
+        n_updates = self.num_timesteps // (self._training.rows * ppo.n_steps)
+        for parameter in self.model.policy.actor_parameters():
+            parameter.requires_grad_(n_updates >= teaching.warm_up)
+        pull = teaching.pull_at(progress)
+        pull_by(self.model, pull, ppo)
+        if pull == 0.0:
+            self.model.env.teacher = None
 
     def _on_rollout_end(self) -> None:
         training = self._training

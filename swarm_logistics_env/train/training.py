@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, PositiveInt, field_validator, model_validator
 
@@ -20,6 +20,7 @@ from swarm_logistics_env.train.settings import (
     Part,
     PPOSettings,
     Scores,
+    Teaching,
     WorldKind,
 )
 from swarm_logistics_env.world.scenario import Scenario
@@ -55,9 +56,12 @@ class Training(Part):
         indicators: the indicators that are paid beside the task reward; none: the task reward.
         conditions: kinds of episodes that are mixed; none: no robot fails.
         network: what the policy reads and commands.
+        teacher: a script that it imitates at first; none: it learns from nothing.
         ppo: settings of the learner.
         evaluation: what is measured during the training.
         scores: what is measured at its end.
+        keep: the network of the policy file: the "last" one, or the "best" one by the evaluations'
+            P, which are played with the noise of the policy (`network.exploration`).
 
     Raises:
         TrainingError: a field is unknown, or its value is not allowed.
@@ -78,9 +82,11 @@ class Training(Part):
     indicators: Annotated[Indicators | None, BeforeValidator(one_of(Indicators))] = None
     conditions: Annotated[tuple[Conditions, ...], BeforeValidator(each_of(Conditions))] = ()
     network: Annotated[Network, BeforeValidator(one_of(Network))] = Network()
+    teacher: Annotated[Teaching | None, BeforeValidator(one_of(Teaching))] = None
     ppo: Annotated[PPOSettings, BeforeValidator(one_of(PPOSettings))] = PPOSettings()
     evaluation: Annotated[Evaluation, BeforeValidator(one_of(Evaluation))] = Evaluation()
     scores: Annotated[Scores, BeforeValidator(one_of(Scores))] = Scores()
+    keep: Literal["last", "best"] = "last"
 
     @field_validator("rewards")
     @classmethod
@@ -93,6 +99,12 @@ class Training(Part):
         if any(scenario.message_size for _, scenario in self.each_world):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         self._check_decisions()
+        if self.network.says_classes:
+            for name in ("deviations", "least_deviation", "least_until"):
+                if getattr(self.ppo, name) != PPOSettings.model_fields[name].default:
+                    raise ValueError(
+                        f'ppo.{name}: should be left out, as head = "classes" has no deviations'
+                    )
         RewardTerms(self.final_rewards)
         for term in self.final_rewards:
             if term not in self.rewards:

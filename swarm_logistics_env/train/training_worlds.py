@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, MultiDiscrete
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
@@ -18,10 +18,11 @@ from swarm_logistics_env.environment.requests import faults_among, scenario_fiel
 from swarm_logistics_env.policies.learned import STREAM
 from swarm_logistics_env.train.privileged import PRIVILEGED, fill_privileged
 from swarm_logistics_env.train.settings import Conditions
+from swarm_logistics_env.train.teacher import Teacher
 from swarm_logistics_env.train.training import Training
+from swarm_logistics_env.world.motion.classes import GROUPS, classes_of, outputs_of
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.world.motion.memory import body_of
-from swarm_logistics_env.world.motion.network_inputs import INPUTS
 from swarm_logistics_env.world.warehouse import Fault
 from swarm_logistics_env.wrappers import IndicatorReward, Wrapper
 
@@ -91,13 +92,16 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
     """Turns observation rows into a network's inputs, and its outputs into commands.
 
     By the code that plays the policy afterwards, so that both see the same. What the value network
-    alone reads, `PRIVILEGED`, stands behind these inputs.
+    alone reads, `PRIVILEGED`, stands behind these inputs; where a teacher pulls, its `labels` do
+    behind that.
 
     Args:
         training: whose worlds these are; every robot is a row.
 
     Attributes:
         frame: of each robot's motion, with its memory.
+        teacher: of the training; None where it has nothing to say (any more).
+        advice: the outputs (num_envs, 3) that the teacher would give at this decision.
 
     Raises:
         TrainingError, SetupError, ScenarioError, FaultError: the worlds cannot be.
@@ -106,15 +110,24 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
 
     def __init__(self, training: Training) -> None:
         worlds = make_worlds(training)
-        self.frame = MotionView(training.scenario, training.network.listens)
+        network = training.network
+        self.frame = MotionView(training.scenario, network.listens, network.role)
+        self._says_classes = network.says_classes
+        teaching = training.teacher
+        self.teacher = None if teaching is None else Teacher(teaching.policy, worlds)
+        self.advice = np.zeros((worlds.num_envs, len(OUTPUTS)))
+        self._has_labels = teaching is not None and teaching.pull > 0.0
         self._privileged = np.zeros((worlds.num_envs, len(PRIVILEGED)), np.float32)
         self._n_episodes = 0
         self._seed = 0
-        self._n_held = training.network.decides_every - 1
+        self._n_held = network.decides_every - 1
+        n_columns = network.widths[0] + len(PRIVILEGED)
+        n_columns += len(OUTPUTS) if self._has_labels else 0
+        actions = Box(-1.0, 1.0, (len(OUTPUTS),), np.float32)
         super().__init__(
             worlds,
-            Box(-np.inf, np.inf, (len(INPUTS) + len(PRIVILEGED),), np.float32),
-            Box(-1.0, 1.0, (len(OUTPUTS),), np.float32),
+            Box(-np.inf, np.inf, (n_columns,), np.float32),
+            MultiDiscrete(list(GROUPS)) if self._says_classes else actions,
         )
 
     def __getstate__(self) -> dict[str, Any]:
@@ -138,19 +151,31 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         """Begin an episode in every world."""
         observations = self.venv.reset()
         self.frame.begin(self._keys(), self._bodies())
+        self._begin_teacher(range(len(self.venv.worlds)))
         return self._read(observations)
 
-    def step_async(self, actions: NDArray[np.float32]) -> None:
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Take the outputs or classes (num_envs, 3) of the step that `step_wait` makes."""
+        self.give_outputs(outputs_of(actions) if self._says_classes else actions)
+
+    def give_outputs(self, outputs: NDArray[np.floating]) -> None:
         """Take the outputs (num_envs, 3) of the step that `step_wait` makes."""
-        self._outputs = actions
-        self.venv.step_async(self.frame.command(actions))
+        self._outputs = outputs
+        self._command()
+
+    def _command(self) -> None:
+        self.venv.step_async(self.frame.command(self._outputs))
+        if self.teacher is not None:
+            self.teacher.note_commands(self.frame.memory)
 
     def step_wait(self) -> Any:
         """Step every world until the next decision."""
         observations, rewards, dones, infos = self.venv.step_wait()
         for _ in range(self._n_held):
             self.frame.hold(observations)
-            self.venv.step_async(self.frame.command(self._outputs))
+            if self.teacher is not None:
+                self.teacher.act(observations)
+            self._command()
             observations, more, dones, infos = self.venv.step_wait()
             rewards = rewards + more
         check_finite("a reward", rewards)
@@ -158,10 +183,12 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         if ended.size:
             last = np.stack([infos[row]["terminal_observation"] for row in ended.tolist()])
             # The value network knows of one step before: the next episode has begun already.
-            inputs = np.hstack([self.frame.peek(last, ended), self._privileged[ended]])
+            inputs = np.hstack([self.frame.peek(last, ended), *self._known(ended)])
             for row, terminal_inputs in zip(ended.tolist(), inputs):
                 infos[row]["terminal_observation"] = terminal_inputs
             self.frame.begin_rows(ended, self._keys()[ended], self._bodies()[ended])
+            rows_of_worlds = enumerate(self.venv.rows_of_worlds)
+            self._begin_teacher([world for world, rows in rows_of_worlds if dones[rows].all()])
         return self._read(observations), rewards, dones, infos
 
     def change_rewards(self, rewards: Mapping[str, float]) -> None:
@@ -185,7 +212,28 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             floor = warehouse.floor
             to_delivery = floor.edge - floor.along(warehouse.state.robot_position)
             fill_privileged(warehouse.address, turned, to_delivery, self._privileged[rows])
-        return np.hstack([inputs, self._privileged])
+        if self.teacher is not None:
+            self.advice = self.teacher.advise(observations, self.frame.turned)
+        return np.hstack([inputs, *self._known(slice(None))])
+
+    def _known(self, rows: slice | NDArray[np.int64]) -> list[NDArray[np.float32]]:
+        """Return what stands behind the inputs of these rows."""
+        known = [self._privileged[rows]]
+        if self._has_labels:
+            known.append(self.labels[rows])
+        return known
+
+    @property
+    def labels(self) -> NDArray[np.float32]:
+        """What the network should say by the teacher's advice (num_envs, 3): outputs or classes."""
+        advice = classes_of(self.advice) if self._says_classes else self.advice
+        return advice.astype(np.float32)
+
+    def _begin_teacher(self, worlds: Iterable[int]) -> None:
+        if self.teacher is not None:
+            for world in worlds:
+                keys = self.frame.keys[self.venv.rows_of_worlds[world]]
+                self.teacher.begin(world, self.venv.worlds[world].warehouse.scenario, keys)
 
     def _keys(self) -> NDArray[np.uint64]:
         # Every episode of every row gets a stream of its own.

@@ -120,6 +120,15 @@ PAYS: dict[str, tuple[dict[str, float] | None, list[Act], list[tuple[list[Act], 
         {"blocked_request": -1.0}, [(disable, 1), (give, 1, 2), (to, 1, STORAGE - 1.0, 1.0)], [
         ([(to, 1, STORAGE + 0.5, 1.0)], [0.0, -1.1, 0.0, 0.0]),
         ([(to, 1, STORAGE - 1.0, 1.0)], [0.0, 0.9, 0.0, 0.0])]),
+    "held_inside for what nobody asks for, until it leaves or is let go": (
+        {"held_inside": 1.0}, [(give, 1, 3), (lay, 3, STORAGE - 0.1, 1.0)], [
+        ([(lay, 3, STORAGE + 0.1, 1.0)], [0.0, 1.0, 0.0, 0.0]), ([], NOTHING),
+        ([(lay, 3, STORAGE - 0.1, 1.0)], [0.0, -1.0, 0.0, 0.0]),
+        ([(lay, 3, STORAGE + 0.1, 1.0)], [0.0, 1.0, 0.0, 0.0]),
+        ([(put_down, 1), (give, 2, 3)], [0.0, -1.0, 1.0, 0.0])]),
+    "nothing more once that is asked for": (
+        {"held_inside": 1.0}, [(give, 1, 3), (lay, 3, STORAGE + 0.1, 1.0)], [
+        ([(deliver, 0, 3)], NOTHING), ([(deliver, 1, 4), (lay, 3, 1.0, 1.0)], NOTHING)]),
     "nothing for a lift or its end to one that cannot deliver": (
         {"lift_requested": 1.0}, [(disable, 1)], [
         ([(give, 1, 2)], NOTHING), ([(put_down, 1)], NOTHING)]),
@@ -232,7 +241,7 @@ AS_IN_NUMPY = {
     "on_time": "3e07b377de94b3ee", "lift_requested": "6917a09046765144",
     "approach": "7c9a11b917969e3a", "stocking": "f6596a7128d8857c",
     "contact": "f3f2492c746aab5d", "collision": "c1451041662cc8ae",
-    "blocked_request": "c2d56fa08699cfd7",
+    "blocked_request": "c2d56fa08699cfd7", "held_inside": "6ee653addd7c647b",
 }  # fmt: skip
 
 

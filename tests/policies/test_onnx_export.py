@@ -14,9 +14,10 @@ from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.streams import row_keys
 from swarm_logistics_env.policies import PolicyCard
-from swarm_logistics_env.policies.files import CARD, DEVIATIONS, write_onnx
-from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy
+from swarm_logistics_env.policies.files import CARD, DEVIATIONS, TEMPERATURE, write_onnx
+from swarm_logistics_env.policies.learned import STREAM, LearnedPolicy, Network, tensor_shapes
 from swarm_logistics_env.world.motion import INPUTS, MotionView
+from swarm_logistics_env.world.motion.network_inputs import ROLE_INPUTS
 
 
 def session_of(policy: Any, path: Path, robots: int | None = None) -> Any:
@@ -50,6 +51,19 @@ def test_it_says_what_the_network_says_on_every_row_of_an_episode(tmp_path: Path
         [outputs] = session.run(None, {"inputs": inputs})
         np.testing.assert_allclose(outputs, policy.outputs_of(inputs), rtol=0, atol=1e-5)
         rows = world.step(frame.command(outputs))
+
+
+def test_one_that_says_classes_gives_their_logits(tmp_path: Path) -> None:
+    network = Network(hidden=(8,), head="classes", role=True, exploration=0.5)
+    rng = np.random.default_rng(0)
+    shapes = tensor_shapes(network)
+    tensors = {name: rng.normal(size=shape).astype(np.float32) for name, shape in shapes.items()}
+    policy = LearnedPolicy(PolicyCard(name="classes", network=network), tensors)
+    session = session_of(policy, tmp_path / "p.onnx")
+    assert session.get_modelmeta().custom_metadata_map[TEMPERATURE] == "0.5"
+    inputs = rng.normal(size=(5, len(INPUTS) + len(ROLE_INPUTS))).astype(np.float32)
+    [logits] = session.run(["logits"], {"inputs": inputs})
+    np.testing.assert_allclose(logits, policy.outputs_of(inputs), rtol=0, atol=1e-5)
 
 
 def test_one_that_does_not_listen_ignores_timers(

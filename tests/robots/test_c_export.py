@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies.c_files import CFile
+from swarm_logistics_env.policies.files import write_policy
+from swarm_logistics_env.policies.learned import Network, PolicyCard, tensor_shapes
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.robots.c_export import write_c
 from swarm_logistics_env.robots.c_sizes import compiler_for_cortex_m4, sizes_of
@@ -128,6 +130,23 @@ def test_the_c_file_decides_as_the_policy_does(name: str, tmp_path: Path) -> Non
     assert in_float.n_rounded <= (2_000 if name == "homing-stock" else 100)
     assert in_float.worst < 5.0
     assert (in_double.n_elsewhere, in_double.n_rounded) == (0, 0)
+
+
+@needs_gcc
+@pytest.mark.compiled
+def test_a_network_that_says_classes_and_has_a_role_decides_so_in_c(tmp_path: Path) -> None:
+    network = Network(hidden=(12,), head="classes", role=True, exploration=0.5, decides_every=2)
+    rng = np.random.default_rng(0)
+    shapes = tensor_shapes(network)
+    tensors = {name: rng.normal(0, 0.5, shape).astype("f4") for name, shape in shapes.items()}
+    path = tmp_path / "classes.safetensors"
+    write_policy(path, PolicyCard(name="classes", network=network), tensors)
+    counts = replay(str(path), SCENARIO.replace(duration=10.0), range(1), tmp_path)
+    assert counts.n_decisions == 2_500
+    assert counts.n_rounded <= 10
+    # Every other direction lies halfway between two beams, where `float` may round the frame to
+    # the other one: about one decision in sixty.
+    assert counts.n_elsewhere <= 75
 
 
 @needs_gcc

@@ -38,6 +38,7 @@ from swarm_logistics_env.train.trainer import train
 from swarm_logistics_env.train.training_worlds import NetworkView
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.world.motion import INPUTS, MotionView
+from swarm_logistics_env.world.motion.classes import GROUPS
 
 
 def weights(path: Path) -> dict[str, bytes]:
@@ -102,8 +103,9 @@ def test_scores_that_could_not_be_measured_are_told_and_measured_by_the_next_cal
     assert later.versions["simulation"] == trained_with
 
 
-def test_torch_and_the_policy_file_agree(small: Any) -> None:
-    training = small()
+@pytest.mark.parametrize("head", ["outputs", "classes"])
+def test_torch_and_the_policy_file_agree(small: Any, head: str) -> None:
+    training = small(network={"hidden": (8,), "head": head})
     learner = make_learner(NetworkView(training), training.network, training.ppo, 0, "cpu")
     with torch.no_grad():
         for parameter in learner.policy.parameters():
@@ -114,6 +116,11 @@ def test_torch_and_the_policy_file_agree(small: Any) -> None:
     # What PPO takes for the most likely action.
     likely, _ = learner.predict(inputs.astype(np.float32), deterministic=True)
     outputs = outputs_of(inputs[:, : len(INPUTS)].astype(np.float32))
+    if head == "classes":
+        groups = np.split(outputs, np.cumsum(GROUPS)[:-1], axis=1)
+        outputs = np.stack([group.argmax(axis=1) for group in groups], axis=1)
+        assert (outputs == likely).all()
+        return
     np.testing.assert_allclose(np.clip(outputs, -1.0, 1.0), likely, rtol=0, atol=1e-5)
 
 

@@ -25,7 +25,7 @@ from swarm_logistics_env.world.motion.memory import (
 from swarm_logistics_env.world.motion.steering import clear_the_way, steer
 from swarm_logistics_env.world.scenario import Scenario
 
-from .network_inputs import COSINES, INPUTS, SINES, TURNS, read_observations
+from .network_inputs import COSINES, INPUTS, ROLE_INPUTS, SINES, TURNS, read_observations
 
 OUTPUTS = ("along", "aside", "gripper")
 
@@ -38,6 +38,7 @@ class MotionView:
     Args:
         scenario: for its control period and for what robots know of their bodies.
         listens: whether the lowest timer heard is read; zeros if not, so that no liar leads.
+        has_role: whether `ROLE_INPUTS` stand behind the other inputs.
 
     Attributes:
         keys: of each row's stream (N,).
@@ -47,10 +48,11 @@ class MotionView:
         turned: how far each row's frame is turned from its robot's body (N,) [rad].
     """
 
-    def __init__(self, scenario: Scenario, listens: bool = True) -> None:
+    def __init__(self, scenario: Scenario, listens: bool = True, has_role: bool = False) -> None:
         self.period = scenario.control_period
         self._body = body_of(scenario)
         self._listens = listens
+        self._n_inputs = len(INPUTS) + (len(ROLE_INPUTS) if has_role else 0)
         self.begin(np.empty(0, np.uint64))
 
     def begin(self, keys: NDArray[np.uint64], bodies: NDArray[np.float64] | None = None) -> None:
@@ -86,7 +88,7 @@ class MotionView:
         return {**dict(columns), "turned_by": self.turned, "decisions": self.counts}
 
     def read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the inputs (N, len(INPUTS)) of the next decision; memories and time go on.
+        """Return the inputs (N, k) of the next decision; memories and time go on.
 
         Raises:
             PolicyError: there are more or fewer rows than keys at `begin`.
@@ -131,7 +133,7 @@ class MotionView:
         counts: NDArray[np.int64],
         turned: NDArray[np.float64],
     ) -> NDArray[np.float32]:
-        inputs = np.empty((len(observations), len(INPUTS)), np.float32)
+        inputs = np.empty((len(observations), self._n_inputs), np.float32)
         period = self.period
         listens = self._listens
         read_observations(observations, period, memory, keys, counts, listens, inputs, turned)

@@ -34,6 +34,9 @@ NEAR = 0.5  # [m]
 RANDOM_HEADING_TIME = 0.8  # [s] that a random direction lasts
 FARTHEST = 8.0  # [m] from the delivery area, as far as a network is told
 FIRST_RANDOM_HEADING = 1_000_003  # number in the robot's stream
+ROLE_TIME = 40.0  # [s] that a role lasts
+FIRST_ROLE = 2_000_003  # number in the robot's stream
+ROLE_EDGE = 0.6  # a network is told on which side of it the role lies
 # Of frames that are turned by 0, 1, .. beams [rad]; the cosines and sines are those of `math`.
 TURNS = 2.0 * math.pi * np.arange(row.N_BEAMS) / row.N_BEAMS
 COSINES = np.array([math.cos(turn) for turn in TURNS])
@@ -60,6 +63,9 @@ INPUTS: tuple[str, ...] = (
 _Columns = namedtuple("_Columns", INPUTS)  # type: ignore[misc]  # by their names, as above
 INPUT: Any = _Columns(*range(len(INPUTS)))  # the column of each input
 LEAD = slice(INPUT.lead_present, INPUT.lead_timer + 1)
+# Of a network with a role, behind the others.
+ROLE_INPUTS = ("role", "role_edge")
+ROLE = len(INPUTS)  # the column of the first of them
 
 
 @inlined_kernel
@@ -93,7 +99,7 @@ def read_observations(
     inputs: NDArray[np.float32],
     turned: NDArray[np.float64],
 ) -> None:
-    """Do as `turn_frames`, and fill inputs (N, len(INPUTS)).
+    """Do as `turn_frames`, and fill inputs (N, len(INPUTS)), or with `ROLE_INPUTS` behind them.
 
     Args:
         counts: the decisions of each row before this one (N,).
@@ -123,6 +129,10 @@ def read_observations(
         angle = random_heading(keys[robot], counts[robot], period) - turned[robot]
         read[INPUT.whim_along], read[INPUT.whim_aside] = math.cos(angle), math.sin(angle)
         read_memory(memory, certainty, confidence, kept_home, frame, read)
+        if inputs.shape[1] > ROLE:
+            role = role_of(keys[robot], random_heading_number(counts[robot], period))
+            read[ROLE] = 2.0 * role - 1.0
+            read[ROLE + 1] = 1.0 if role < ROLE_EDGE else -1.0
 
 
 @inlined_kernel
@@ -278,3 +288,14 @@ def random_heading(key: np.uint64, count: int, period: float) -> float:
     """Return a robot's random direction after so many decisions, in its own frame [rad]."""
     number = FIRST_RANDOM_HEADING + random_heading_number(count, period)
     return 2.0 * math.pi * uniform(key, number)
+
+
+@kernel
+def role_of(key: np.uint64, heading_number: int) -> float:
+    """Return the number in [0, 1) that decides a robot's role at present.
+
+    Robots change their roles at different times.
+    """
+    n_roles = heading_number * RANDOM_HEADING_TIME / ROLE_TIME
+    role = int(n_roles + uniform(key, FIRST_ROLE))
+    return uniform(key, FIRST_ROLE + 1 + role)

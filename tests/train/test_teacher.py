@@ -1,0 +1,97 @@
+"""Trainings with a teacher: it says what it would do itself, and what follows is reproducible."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from safetensors.numpy import load_file
+
+pytest.importorskip("torch")
+pytest.importorskip("stable_baselines3")
+
+import torch
+from stable_baselines3.common.callbacks import ConvertCallback
+
+from swarm_logistics_env import policies
+from swarm_logistics_env.policies.learned import Network
+from swarm_logistics_env.policies.policy import one_thread
+from swarm_logistics_env.train import trainer
+from swarm_logistics_env.train.imitation import imitate
+from swarm_logistics_env.train.learner import make_learner, tensors_of
+from swarm_logistics_env.train.trainer import TrainingLog, train
+from swarm_logistics_env.train.training_worlds import NetworkView
+
+CLASSES = Network(hidden=(8,), head="classes", role=True, exploration=0.5)
+
+
+def weights(path: Path) -> dict[str, bytes]:
+    return {name: tensor.tobytes() for name, tensor in load_file(path).items()}
+
+
+@pytest.mark.parametrize("drive", ["holonomic", "differential"])
+def test_robots_that_do_what_it_says_go_where_it_goes_itself(small: Any, drive: str) -> None:
+    scenario = small().scenario.replace(drive=drive, duration=40.0)
+    kinds = [{"n_robots": 6}]
+    training = small(scenario=scenario, worlds=kinds, teacher={"policy": "homing-stock"})
+    views = NetworkView(training), NetworkView(training)
+    for view in views:
+        view.seed(3)
+    views[0].reset()
+    rows = views[1].venv.reset()
+    teacher: Any = policies.load("homing-stock")
+    teacher.configure(scenario.replace(n_robots=6))
+    teacher.begin(views[0].frame.keys)
+    for _ in range(350):
+        views[0].give_outputs(views[0].advice)
+        views[0].step_wait()
+        rows, *_ = views[1].venv.step(teacher.act(rows))
+    states = [view.venv.worlds[0].warehouse.state for view in views]
+    assert states[0].delivered == states[1].delivered > 0
+    np.testing.assert_allclose(states[0].robot_position, states[1].robot_position, atol=1e-6)
+
+
+def test_a_training_with_a_teacher_goes_on_to_the_same_bits_and_keeps_the_best_network(
+    small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    teacher = {"policy": "homing", "decisions": 200, "warm_up": 1, "pull": 0.1, "pull_until": 0.6}
+    rewards = {"delivery": 1.0, "held_inside": 0.3, "contact": -0.1}
+    training = small(network=CLASSES, teacher=teacher, rewards=rewards, keep="best")
+
+    def interrupt(inside: dict[str, Any], _: object) -> bool:
+        if inside["self"].num_timesteps > 330:
+            raise KeyboardInterrupt
+        return True
+
+    uncut = weights(train(training, tmp_path / "uncut"))
+    assert uncut == weights(tmp_path / "uncut/best.safetensors")
+    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    with pytest.raises(KeyboardInterrupt):
+        train(training, tmp_path / "cut", callbacks=[ConvertCallback(interrupt)])
+    assert weights(train(training, tmp_path / "cut")) == uncut
+    last = weights(train(training.replace(keep="last"), tmp_path / "cut"))
+    assert last == weights(train(training.replace(keep="last"), tmp_path / "uncut"))
+
+
+@pytest.mark.parametrize("network", [CLASSES, Network(hidden=(8,))])
+def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_alone(
+    small: Any, tmp_path: Path, network: Network
+) -> None:
+    teacher = {"policy": "homing", "decisions": 4000, "warm_up": 2, "rate": 0.03}
+    training = small(network=network, teacher=teacher)
+    other = NetworkView(training)
+    other.seed(1)
+    columns = torch.from_numpy(other.reset())[:, : network.widths[0]]
+    labels = torch.from_numpy(other.labels)
+    learner = make_learner(NetworkView(training), network, training.ppo, training.seed, "cpu")
+    policy = learner.policy
+    before = policy.error(policy.answers_of(columns), labels).mean().item()
+    with one_thread():
+        imitate(training, learner, TrainingLog())
+    assert policy.error(policy.answers_of(columns), labels).mean().item() < 0.8 * before
+    imitated = {name: tensor.tobytes() for name, tensor in tensors_of(learner.policy).items()}
+    shorter = training.replace(agent_steps=320)
+    assert weights(train(shorter, tmp_path / "warm")) == imitated
+    assert weights(train(training, tmp_path / "on")) != imitated
