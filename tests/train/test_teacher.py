@@ -53,6 +53,7 @@ def test_robots_that_do_what_it_says_go_where_it_goes_itself(small: Any, drive: 
     np.testing.assert_allclose(states[0].robot_position, states[1].robot_position, atol=1e-6)
 
 
+@pytest.mark.daily
 def test_a_training_with_a_teacher_goes_on_to_the_same_bits_and_keeps_the_best_network(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
