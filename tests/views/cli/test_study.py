@@ -178,7 +178,7 @@ def test_other_seeds_than_the_declared_ones_are_exploratory_and_the_command_says
     printed = command(f"{RUN} --out out --seeds 4")
     # It warns before it plays, so that one can still stop it.
     warning = printed.index("This study declared other seeds or another P before its first run")
-    assert warning < printed.index("1 question, swarm-dt, 4 paired seeds.")
+    assert warning < printed.index("4 paired seeds")
     assert "exploratory: they are over other seeds" in Path("out", "report.md").read_text()
     assert "holds the study 'mine'" in command("study run quick --out out", code=2)
     # What it proposes is a study whose verdicts stand.
