@@ -276,8 +276,8 @@ def forest(
 
     Args:
         canvas: to draw on.
-        rows: the label of each, and its points; a point's `published` is its threshold. None:
-            the label is a heading.
+        rows: the label of each, and its points; a point's `published` is its threshold. A label
+            without points is a heading.
         x_label: of the axis of the values.
         title: above the axes.
     """
