@@ -177,11 +177,11 @@ def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> N
     network = policy.card.network
     tensors = dict(policy.tensors)
     noise = {TEMPERATURE: str(network.exploration)}
-    said = "logits"
+    output_name = "logits"
     if not network.says_classes:
         deviations = tensors.pop(DEVIATIONS) * np.float32(network.exploration)
         noise = {DEVIATIONS: " ".join(map(str, deviations.tolist()))}
-        said = "outputs"
+        output_name = "outputs"
     if not network.listens:
         # Such a policy reads zeros there. Without their weights it may be given anything.
         tensors["layers.0.weight"] = tensors["layers.0.weight"].copy()
@@ -192,7 +192,7 @@ def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> N
         is_last = layer == len(network.hidden)
         weight = f"layers.{layer}.weight"
         bias = f"layers.{layer}.bias"
-        total = said if is_last else f"layers.{layer}.sum"
+        total = output_name if is_last else f"layers.{layer}.sum"
         nodes.append(helper.make_node("Gemm", [layer_input, weight, bias], [total], transB=1))
         if not is_last:
             layer_input = f"layers.{layer}.out"
@@ -203,7 +203,7 @@ def write_onnx(policy: Policy, path: Path | str, robots: int | None = None) -> N
         nodes,
         policy.card.name,
         [helper.make_tensor_value_info("inputs", real, [n_rows, network.widths[0]])],
-        [helper.make_tensor_value_info(said, real, [n_rows, network.widths[-1]])],
+        [helper.make_tensor_value_info(output_name, real, [n_rows, network.widths[-1]])],
         [numpy_helper.from_array(np.ascontiguousarray(t), n) for n, t in tensors.items()],
     )
     version = helper.make_opsetid("", OPERATORS)

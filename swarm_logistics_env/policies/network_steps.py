@@ -165,15 +165,15 @@ def choose_outputs(
             softmax, by a number of the robot's own stream; with 0 it is the likeliest.
     """
     for robot in range(outputs.shape[0]):
-        said = logits[robot]
+        robot_logits = logits[robot]
         key = keys[robot]
         number = counts[robot] - 1
         drawn = uniform(pair_key(key, 0), number)
-        direction = choose(said, 0, N_DIRECTIONS, temperature, drawn)
+        direction = choose(robot_logits, 0, N_DIRECTIONS, temperature, drawn)
         drawn = uniform(pair_key(key, 1), number)
-        speed = choose(said, N_DIRECTIONS, N_SPEEDS, temperature, drawn) / (N_SPEEDS - 1)
+        speed = choose(robot_logits, N_DIRECTIONS, N_SPEEDS, temperature, drawn) / (N_SPEEDS - 1)
         drawn = uniform(pair_key(key, 2), number)
-        grip = choose(said, N_DIRECTIONS + N_SPEEDS, N_GRIPS, temperature, drawn)
+        grip = choose(robot_logits, N_DIRECTIONS + N_SPEEDS, N_GRIPS, temperature, drawn)
         outputs[robot, 0] = speed * DIRECTIONS_ALONG[direction]
         outputs[robot, 1] = speed * DIRECTIONS_ASIDE[direction]
         outputs[robot, 2] = grip - 1.0

@@ -183,7 +183,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         if ended.size:
             last = np.stack([infos[row]["terminal_observation"] for row in ended.tolist()])
             # The value network knows of one step before: the next episode has begun already.
-            inputs = np.hstack([self.frame.peek(last, ended), *self._known(ended)])
+            inputs = np.hstack([self.frame.peek(last, ended), *self._columns_behind(ended)])
             for row, terminal_inputs in zip(ended.tolist(), inputs):
                 infos[row]["terminal_observation"] = terminal_inputs
             self.frame.begin_rows(ended, self._keys()[ended], self._bodies()[ended])
@@ -214,14 +214,14 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
             fill_privileged(warehouse.address, turned, to_delivery, self._privileged[rows])
         if self.teacher is not None:
             self.advice = self.teacher.advise(observations, self.frame.turned)
-        return np.hstack([inputs, *self._known(slice(None))])
+        return np.hstack([inputs, *self._columns_behind(slice(None))])
 
-    def _known(self, rows: slice | NDArray[np.int64]) -> list[NDArray[np.float32]]:
+    def _columns_behind(self, rows: slice | NDArray[np.int64]) -> list[NDArray[np.float32]]:
         """Return what stands behind the inputs of these rows."""
-        known = [self._privileged[rows]]
+        columns = [self._privileged[rows]]
         if self._has_labels:
-            known.append(self.labels[rows])
-        return known
+            columns.append(self.labels[rows])
+        return columns
 
     @property
     def labels(self) -> NDArray[np.float32]:

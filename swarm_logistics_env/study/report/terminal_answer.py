@@ -47,12 +47,12 @@ def _in_columns(
     if width is not None:
         rest = sum(widths) + 2 * len(widths)
         first_width = max(_SHORTEST, min(first_width, width - rest))
-    for first, *others in rows:
+    for question, *cells in rows:
         padded = [
             f"{cell:>{w}}" if index == right else f"{cell:{w}}"
-            for index, (cell, w) in enumerate(zip(others, widths), start=1)
+            for index, (cell, w) in enumerate(zip(cells, widths), start=1)
         ]
-        yield "  ".join([f"{_shortened(first, first_width):{first_width}}", *padded]).rstrip()
+        yield "  ".join([f"{_shortened(question, first_width):{first_width}}", *padded]).rstrip()
 
 
 def _shortened(text: str, width: int) -> str:

@@ -82,8 +82,8 @@ def _with_units_in_names(table: Table) -> Table:
 
 
 def _are_numbers(texts: Sequence[str]) -> bool:
-    known = [text for text in texts if not means_no_number(text)]
-    return bool(known) and all(map(like_a_number, known))
+    values = [text for text in texts if not means_no_number(text)]
+    return bool(values) and all(map(like_a_number, values))
 
 
 def _is_unit(text: str) -> bool:
@@ -106,9 +106,9 @@ def _with_percent_in_names(table: Table) -> Table:
     header = [*table.header]
     rows = [*table.cells]
     for number, texts in enumerate(zip(*table.cells)):
-        known = [text for text in texts if not means_no_number(text)]
-        is_percent = bool(known) and all(text.endswith("%") for text in known)
-        if is_percent and all(like_a_number(_without_percent(text)) for text in known):
+        values = [text for text in texts if not means_no_number(text)]
+        is_percent = bool(values) and all(text.endswith("%") for text in values)
+        if is_percent and all(like_a_number(_without_percent(text)) for text in values):
             header[number] += "" if "%" in header[number] else " [%]"
             rows = [
                 [*row[:number], _without_percent(row[number]), *row[number + 1 :]] for row in rows

@@ -55,13 +55,15 @@ def long_of(
     """
     named = {name: MEANING.get(column) for column, name in columns.items()}
     named |= {name: meaning for meaning, name in table.meanings.items()}
-    known = {name: named.get(name) or meaning_of(name) for name in table.header}
-    is_long = any(meaning in MEASURED and name not in ignore for name, meaning in known.items())
+    meanings_of_names = {name: named.get(name) or meaning_of(name) for name in table.header}
+    is_long = any(
+        meaning in MEASURED and name not in ignore for name, meaning in meanings_of_names.items()
+    )
     numbers = [
         number
         for number, name in enumerate(table.header)
         if name not in ("", *ignore, *table.left_out)
-        and not (known[name] or is_robot(name))
+        and not (meanings_of_names[name] or is_robot(name))
         and holds_numbers([row[number] for row in table.cells])
     ]
     if wide is not None:
@@ -199,12 +201,12 @@ def _empty_ends(table: Table, conditions: Mapping[int, Condition]) -> set[tuple[
             if table.cells[row][number]:
                 break
             ends.add((row, number))
-        same = [other for other in conditions if conditions[other] == condition]
-        if len(same) > 1:
+        repetitions = [other for other in conditions if conditions[other] == condition]
+        if len(repetitions) > 1:
             ends |= {
                 (row, number)
                 for row, texts in enumerate(table.cells)
-                if not any(texts[other] for other in same if other >= number)
+                if not any(texts[other] for other in repetitions if other >= number)
             }
     return ends
 
