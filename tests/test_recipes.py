@@ -56,7 +56,7 @@ from .half_speed import HalfSpeed
     "weak": FailureMode("drives slowly and lifts nothing", speed=0.2, lifts=False),
 ### A reward term
 @ environment/reward_terms.py @class Moment(
-PRESENCE = 9
+PRESENCE = 10
 @ environment/reward_terms.py @    elif wanted == OWN_DELIVERY:
     elif wanted == PRESENCE:
         presence(world, payment, earned)

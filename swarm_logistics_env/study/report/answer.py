@@ -315,8 +315,9 @@ def _performance(results: StudyResults, cell: Cell) -> str:
         condition += f", {setting}"
     if task.name != "warehouse" and not results.plan.origin:
         condition += f", task {task.name}"
+    has_interval = _counts_anything(cell) and cell.mean.low is not None
     return templates.PERFORMANCE["count" if counted else "no_count"].format(
-        level=f" [{section.P_LEVEL}]" if cell.mean.low is not None else "",
+        level=f" [{section.P_LEVEL}]" if has_interval else "",
         counted=counted,
         duration=case.scenario.duration,
         condition=condition,
@@ -325,10 +326,15 @@ def _performance(results: StudyResults, cell: Cell) -> str:
     )
 
 
+def _counts_anything(cell: Cell) -> bool:
+    """Return whether something was delivered, or P is another measure, of which 0 tells as much."""
+    return bool(cell.by_seed.any() or cell.arm.case.performance)
+
+
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
     slots: dict[str, Slots] = {}
-    if cell.by_seed.any() or cell.arm.case.performance:
+    if _counts_anything(cell):
         slots["mean"] = {"mean": section.mean_p(cell)}
         if cell.problem:
             slots["problem"] = {"problem": cell.problem}
