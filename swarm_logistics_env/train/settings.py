@@ -140,8 +140,8 @@ class PPOSettings(Part):
         max_grad_norm: the length to which longer gradients are shortened.
         target_kl: an update stops early beyond 1.5 times this divergence; without it, never.
         deviations: standard deviations of the outputs' exploration noise at the start, one for each
-            output; they are learned. Of a network that says classes nothing of
-            this, `least_deviation` and `least_until` may be set.
+            output; they are learned. A network that says classes has no such noise: this,
+            `least_deviation` and `least_until` are refused then.
         least_deviation: the lower limit of deviations at the start and at the end; it changes
             geometrically in between. Without it the noise vanishes long before the policy is good.
         least_until: the share of the training after which the limit stays at its end.

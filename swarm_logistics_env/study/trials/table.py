@@ -226,8 +226,8 @@ def like_a_number(text: str) -> bool:
 
 def holds_numbers(texts: Sequence[str]) -> bool:
     """Return whether most cells with a value are meant as numbers."""
-    known = [text for text in texts if not means_no_number(text)]
-    return 2 * sum(map(like_a_number, known)) > len(known)
+    values = [text for text in texts if not means_no_number(text)]
+    return 2 * sum(map(like_a_number, values)) > len(values)
 
 
 @lru_cache(100_000)  # most cells are some of a few numbers
