@@ -33,9 +33,9 @@ class Circles:
 
     def act(self, observations):
         return np.tile([1.0, 0.0, 0.5, 1.0], (len(observations), 1))
-@ policies/spec.py @from swarm_logistics_env.policies.homing
+@ policies/catalogue.py @from swarm_logistics_env.policies.homing
 from swarm_logistics_env.policies.circles import Circles
-@ policies/spec.py @    "homing":
+@ policies/catalogue.py @    "homing":
     "circles": Circles,
 ### A wrapper NAME=half_speed
 @ wrappers/half_speed.py

@@ -45,6 +45,7 @@ class Watch:
         self._far = np.array([world.scenario.warehouse_width, world.scenario.warehouse_height])
         self._dock = world.scenario.dock_capacity
         self._jammed = np.zeros((0, 0))
+        self._energy_at_start = self._in_batteries_but_for_use()
         self._covered = np.zeros(len(world.state.item_position), np.bool_)
         self._remember()
 
@@ -60,6 +61,7 @@ class Watch:
         self._exercised()
         self._did()
         self._heard()
+        self._energy()
         self._rows()
         self._remember()
 
@@ -299,6 +301,22 @@ class Watch:
         deaf = ~(state.hears & state.robot_present)
         self._demand(np.isinf(heard[deaf]), "a robot that does not hear has heard a timer")
         self._demand(heard >= lowest, "a timer was heard that no robot in range broadcasts")
+
+    def _in_batteries_but_for_use(self) -> NDArray[np.float64]:
+        """Return what each battery would hold had nothing been used or charged [J]."""
+        batteries = self.world.state.batteries
+        return batteries.energy + batteries.used - batteries.charged
+
+    def _energy(self) -> None:
+        state, before, batteries = self.world.state, self._before, self.world.state.batteries
+        self._demand(batteries.energy >= 0.0, "a battery holds less than nothing")
+        balance = self._in_batteries_but_for_use() - self._energy_at_start
+        largest = 1e-9 * (1.0 + batteries.used + batteries.charged)
+        self._demand(np.abs(balance) <= largest, "energy comes from nowhere or goes there")
+        empty = state.robot_present & before.robot_is_empty
+        is_still = state.robot_heading == before.robot_heading
+        self._each(empty, is_still, "robot {} turns with an empty battery")
+        self._each(empty, ~self._took(), "robot {} lifts with an empty battery")
 
     def _rows(self) -> None:
         rows, scenario = self.world.observe(), self.world.scenario

@@ -59,7 +59,7 @@ class Tally:
 CHANGEABLE = ("delivery_width", "max_speed", "view_range", "radio_range", "pickup_range", "relay",
               "timer_limit", "drive", "ranger_noise", "sensor_dropout", "radio_loss",
               "restock", "demand", "request_timeout", "request_delay", "request_loss", "order_rate",
-              "order_due")  # fmt: skip
+              "order_due", "charging_power", "dead_stations")  # fmt: skip
 
 
 def some_scenario(source: random.Random) -> Scenario:
@@ -128,6 +128,11 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "message_size": rarely(source.randint(1, 4), 0),
         "control_period": control_period,
         "physics_period": physics_period,
+        "battery": rarely(number(20.0, 5000.0), None),
+        "idle_power": rarely(number(1.0, 100.0), 5.0),
+        "driving_energy": rarely(number(1.0, 100.0), 10.0),
+        "charging_power": number(10.0, 1000.0),
+        "dead_stations": rarely(1, 0),
         "floor": None,
     }
 
@@ -163,6 +168,8 @@ def random_plan(source: random.Random, n_columns: int, n_rows: int) -> str:
     kinds = np.array([["#="[source.random() < 0.5] if source.random() < share
                        else source.choice(free) for _ in range(n_columns)]
                       for _ in range(n_rows)])  # fmt: skip
+    if source.random() < 0.3:
+        kinds[source.randrange(n_rows), source.randrange(n_columns)] = "*"
     for letter in "ABC"[: source.randint(1, 3)]:
         row, column = source.randrange(n_rows), source.randrange(n_columns)
         kinds[row : row + 2, column : column + 2] = letter
@@ -177,7 +184,10 @@ def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> l
     """Return up to three faults that begin, and some of which end, within `seconds`."""
     faults = []
     for _ in range(source.choice([0, 0, 1, 2, 3])):
-        mode = source.choice(sorted(FAILURE_MODES))
+        modes = sorted(FAILURE_MODES)
+        if scenario.battery is None:
+            modes.remove("cell_fades")
+        mode = source.choice(modes)
         onset = source.choice([0.0, source.uniform(0.0, seconds)])
         passes = mode != "removed" and source.random() < 0.5
         duration = source.uniform(0.1, seconds) if passes else None

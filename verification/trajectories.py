@@ -111,8 +111,9 @@ GOLDEN = {
 for _mode in FAILURE_MODES:
     _passing = None if _mode == "removed" else 6.0
     _size = 2 if _mode.startswith("message_") else 0
-    GOLDEN[f"{_mode} from the start"] = _small(Fault(_mode, 2), message_size=_size)
-    GOLDEN[f"{_mode} for a while"] = _small(Fault(_mode, 3, 5.0, _passing), message_size=_size)
+    _fields = {"message_size": _size, "battery": 300.0 if _mode == "cell_fades" else None}
+    GOLDEN[f"{_mode} from the start"] = _small(Fault(_mode, 2), **_fields)
+    GOLDEN[f"{_mode} for a while"] = _small(Fault(_mode, 3, 5.0, _passing), **_fields)
 GOLDEN |= {
     "several faults at once": _small(
         Fault("FM1", (0, 1)), Fault("motor_slow", (1, 2), 3.0, 5.0, 0.3), Fault("FM4", 2, 8.0)
@@ -122,6 +123,9 @@ GOLDEN |= {
         Fault("FM3", 3, 2.0, 9.0, None, (1.0, 1.0)),
     ),
     "without drift": _small(heading_drift=0.0),
+    "batteries that run empty": _small(
+        battery=200.0, position_noise=0.05, sensor_dropout=0.1, message_size=2, steps=300
+    ),
     "aisles": GoldenTrajectory(Scenario(floor="aisles", n_robots=40, restock=True), steps=300),
     "two docks and obstacles": GoldenTrajectory(
         Scenario(floor="two_docks", n_obstacles=3, ranger_noise=0.02), (Fault("removed", 2, 10.0),)

@@ -9,19 +9,20 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from swarm_logistics_env.policies.catalogue import (
+        NAMES,
+        SUFFIXES,
+        display_name,
+        known_policies,
+        load,
+    )
+    from swarm_logistics_env.policies.charging_robots import charging
     from swarm_logistics_env.policies.files import read_card, write_onnx
     from swarm_logistics_env.policies.learned import PolicyCard
     from swarm_logistics_env.policies.models import of, within
     from swarm_logistics_env.policies.policy import Policy, identity
     from swarm_logistics_env.policies.sb3_files import from_sb3
-    from swarm_logistics_env.policies.spec import (
-        NAMES,
-        SUFFIXES,
-        PolicySpec,
-        display_name,
-        known_policies,
-        load,
-    )
+    from swarm_logistics_env.policies.spec import PolicySpec
     from swarm_logistics_env.policies.swarm_dt import SwarmDT, SwarmDTParameters
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "PolicySpec",
     "SwarmDT",
     "SwarmDTParameters",
+    "charging",
     "display_name",
     "from_sb3",
     "identity",
@@ -45,12 +47,14 @@ __all__ = [
 
 # Imported when first asked for: an environment needs no policy.
 _HOMES = {
+    "catalogue": {"NAMES", "SUFFIXES", "display_name", "known_policies", "load"},
+    "charging_robots": {"charging"},
     "files": {"read_card", "write_onnx"},
     "learned": {"PolicyCard"},
     "models": {"of", "within"},
     "policy": {"Policy", "identity"},
     "sb3_files": {"from_sb3"},
-    "spec": {"NAMES", "SUFFIXES", "PolicySpec", "display_name", "known_policies", "load"},
+    "spec": {"PolicySpec"},
     "swarm_dt": {"SwarmDT", "SwarmDTParameters"},
 }
 

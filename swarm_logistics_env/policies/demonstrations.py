@@ -20,8 +20,8 @@ from swarm_logistics_env.core.progress_bar import ProgressBar
 from swarm_logistics_env.core.records import atomic_write
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import checked_count
+from swarm_logistics_env.policies.catalogue import load
 from swarm_logistics_env.policies.policy import Policy, decide, one_thread, start
-from swarm_logistics_env.policies.spec import load
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.faults import FaultLike
 from swarm_logistics_env.wrappers import MotionFrame

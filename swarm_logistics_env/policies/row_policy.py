@@ -42,7 +42,7 @@ class RowPolicy:
         ignores: the columns of a row that never change a command (`observations.Column.name`).
     """
 
-    stream: ClassVar[str]
+    stream: str
     ignores: ClassVar[frozenset[str]] = frozenset()
 
     def configure(self, scenario: Scenario) -> None:

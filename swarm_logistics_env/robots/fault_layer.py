@@ -17,6 +17,7 @@ from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.commands import GRIPPER, MESSAGE
+from swarm_logistics_env.world.warehouse.failure_modes import failure_mode
 from swarm_logistics_env.world.warehouse.faults import FaultLike, Occurrence, checked_faults
 
 HOLD = 0.0  # the gripper's command that neither lifts nor lets go
@@ -65,11 +66,14 @@ class FaultLayer:
         roles = [fault.role for fault in checked if fault.role is not None]
         if roles:
             raise FaultError(f"role = {roles[0]!r}: should be None, a robot's role is not known")
+        fading = [fault.mode for fault in checked if failure_mode(fault.mode).battery < 1.0]
+        if fading:
+            raise FaultError(f"mode = {fading[0]}: should be another, no layer weakens a battery")
         if not 0 <= number < scenario.n_robots:
             raise FaultError(f"number = {number}: robots are 0 to {scenario.n_robots - 1}")
         self._scenario = scenario
         self._number = number
-        self._occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in checked]
+        self._occurrences = [Occurrence(fault, seed, scenario) for fault in checked]
         self._beams: Row | None = None  # what frozen rangers repeat
         self._message: Numbers | None = None  # what a frozen channel repeats
         latest = max((fault.mode.radio_delay for fault in self._occurrences), default=0.0)
@@ -89,7 +93,7 @@ class FaultLayer:
         """Return the row (D,) that its policy gets of the row that its sensors fill."""
         sensed = np.array(observation, np.float32)
         hears = self._keeps("hears", time)
-        _, view = self._factors(time)
+        view = self._factor("view", time)
         self._forget_unseen(sensed, view * self._scenario.view_range, hears)
         if not hears:
             sensed[row.LOWEST_TIMER : row.CARRYING] = 0.0
@@ -108,8 +112,7 @@ class FaultLayer:
         driven = np.clip(np.asarray(command, np.float64)[:MESSAGE], -1.0, 1.0)
         if not (self._keeps("obeys", time) and self._keeps("present", time)):
             return np.zeros(MESSAGE)
-        speed, _ = self._factors(time)
-        driven[:GRIPPER] *= speed
+        driven[:GRIPPER] *= self._factor("speed", time)
         sensed = np.asarray(observation)
         if not self._keeps("lifts", time) and sensed[row.CARRYING] < 0.5:
             driven[GRIPPER] = min(driven[GRIPPER], HOLD)
@@ -150,23 +153,27 @@ class FaultLayer:
         """Return whether the faults that hold leave it a capability, a field of `FailureMode`."""
         return all(getattr(occurrence.mode, capability) for occurrence in self._active(time))
 
-    def _factors(self, time: float) -> tuple[float, float]:
-        """Return what is left of its speed and of its view, as shares."""
+    def _factor(self, name: str, time: float) -> float:
+        """Return the share that is left of its "speed" or "view"."""
         end = self._scenario.duration
-        left = [fault.remaining_factors(time, end) for fault in self._active(time)]
-        return math.prod(speed for speed, _ in left), math.prod(view for _, view in left)
+        active = self._active(time)
+        return math.prod(fault.remaining_factors(time, end)[name] for fault in active)
 
     def _forget_unseen(self, sensed: Row, view_range: float, hears: bool) -> None:
         """Take out of a row what lies beyond its view [m], but for robots that it hears."""
         self._keep(sensed[row.ITEMS : row.NEIGHBOURS], row.N_ITEMS_IN_VIEW, view_range)
         heard_range = self._scenario.radio_range if hears else 0.0
         neighbours = sensed[row.NEIGHBOURS : row.LOWEST_TIMER]
+        end = row.MESSAGES + row.N_NEIGHBOURS * self._scenario.message_size
+        if self._scenario.battery is not None:
+            first = end + row.BATTERY.stations
+            self._keep(sensed[first:], row.N_STATIONS_IN_VIEW, view_range)
         if not hears:
             neighbours[row.NEIGHBOUR.timer_heard :: row.NEIGHBOUR_WIDTH] = 0.0
             neighbours[row.NEIGHBOUR.timer :: row.NEIGHBOUR_WIDTH] = self._scenario.timer_limit
-            sensed[row.MESSAGES :] = 0.0
+            sensed[row.MESSAGES : end] = 0.0
         order = self._keep(neighbours, row.N_NEIGHBOURS, max(view_range, heard_range))
-        messages = sensed[row.MESSAGES :].reshape(row.N_NEIGHBOURS, -1)
+        messages = sensed[row.MESSAGES : end].reshape(row.N_NEIGHBOURS, -1)
         n_left = len(order)
         messages[:n_left] = messages[order]
         messages[n_left:] = 0.0
@@ -174,7 +181,7 @@ class FaultLayer:
     @staticmethod
     def _keep(columns: Row, count: int, reach: float) -> list[int]:
         """Move up those of `count` entries that lie within `reach` [m]; return which these are."""
-        block = columns.reshape(count, -1)  # an item and a neighbour begin with present, x, y
+        block = columns.reshape(count, -1)  # all of them begin with present, x, y
         is_near = np.hypot(block[:, 1], block[:, 2]) <= reach
         order = np.flatnonzero((block[:, 0] > 0.5) & is_near).tolist()
         block[: len(order)] = block[order]

@@ -16,8 +16,8 @@ from pydantic import Field
 from swarm_logistics_env.core.errors import RobotError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.core.streams import generator
+from swarm_logistics_env.policies.catalogue import load
 from swarm_logistics_env.policies.row_policy import Robot, check_row_policy
-from swarm_logistics_env.policies.spec import load
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.commands import MESSAGE
 

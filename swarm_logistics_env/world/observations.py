@@ -74,9 +74,34 @@ N_COLUMNS = TURN_RATE + 1  # = 141; after them, per neighbour, the message it br
 MESSAGES = N_COLUMNS
 
 
+class BatteryColumns(NamedTuple):
+    """The last columns of a row where robots have batteries, counted from their first one."""
+
+    charge: int
+    charging: int
+    stations: int
+
+
+class StationColumns(NamedTuple):
+    """The columns of a charging station, counted from its first one."""
+
+    present: int
+    x: int
+    y: int
+
+
+BATTERY = BatteryColumns(*range(len(BatteryColumns._fields)))
+STATION_FEATURES = StationColumns._fields
+STATION_WIDTH = len(STATION_FEATURES)
+STATION = StationColumns(*range(STATION_WIDTH))
+N_STATIONS_IN_VIEW = 2
+N_BATTERY_COLUMNS = BATTERY.stations + N_STATIONS_IN_VIEW * STATION_WIDTH
+
+
 def n_columns(scenario: Scenario) -> int:
     """Return the length D of a row in `scenario`."""
-    return N_COLUMNS + N_NEIGHBOURS * scenario.message_size
+    n_of_battery = N_BATTERY_COLUMNS if scenario.battery is not None else 0
+    return N_COLUMNS + N_NEIGHBOURS * scenario.message_size + n_of_battery
 
 
 # What a robot needs to fill a row: by the name of a sensor, what it has to tell.
@@ -93,6 +118,8 @@ SENSORS: Mapping[str, str] = MappingProxyType(
         "odometry": "its velocity",
         "bumper": "whether it touches something",
         "gyro": "how fast its body turns, without the drift that nobody tells it",
+        "battery gauge": "how full its battery is, and whether it charges",
+        "station camera": "range and bearing of charging stations",
     }
 )
 
@@ -160,6 +187,7 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
             "to the left, as its gyro tells: without its drift", "gyro",
         ),
         *_messages(scenario),
+        *_columns_of_battery(scenario),
     )  # fmt: skip
 
 
@@ -201,9 +229,26 @@ def _columns_of_others(scenario: Scenario) -> tuple[Column, ...]:
 def _messages(scenario: Scenario) -> tuple[Column, ...]:
     if scenario.message_size == 0:
         return ()
-    numbers = _run(MESSAGES, n_columns(scenario) - MESSAGES)
+    numbers = _run(MESSAGES, N_NEIGHBOURS * scenario.message_size)
     meaning = "the numbers that each broadcasts"
     return (Column("neighbour_message", "1", numbers, -1, 1, meaning, "radio", 0),)
+
+
+def _columns_of_battery(scenario: Scenario) -> tuple[Column, ...]:
+    if scenario.battery is None:
+        return ()
+    first = n_columns(scenario) - N_BATTERY_COLUMNS
+    view = scenario.view_range
+    stations = _block(first + BATTERY.stations, N_STATIONS_IN_VIEW, STATION_FEATURES)
+    gauge = partial(Column, sensor="battery gauge")
+    station = partial(Column, sensor="station camera", absent=0, flag="station_present")
+    return (
+        gauge("charge", "1", _run(first + BATTERY.charge, 1), 0, 1, "share that is left of it"),
+        gauge("charging", "flag", _run(first + BATTERY.charging, 1), 0, 1, "a station charges it"),
+        station("station_present", "flag", stations["present"], 0, 1, "a station is in view"),
+        station("station_x", "m", stations["x"], -view, view, "its centre, forward"),
+        station("station_y", "m", stations["y"], -view, view, "its centre, left"),
+    )
 
 
 def bounds(scenario: Scenario) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -11,11 +11,12 @@ import pytest
 
 from swarm_logistics_env import Scenario, policies
 from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.policies.catalogue import SCRIPTED
 from swarm_logistics_env.policies.homing import Homing
 from swarm_logistics_env.policies.homing_stock import HomingStock
 from swarm_logistics_env.policies.learned import LearnedPolicy, Network
 from swarm_logistics_env.policies.policy import Scripted, identity
-from swarm_logistics_env.policies.spec import SCRIPTED, PolicySpec
+from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.parallel_policies import RandomActions
 from swarm_logistics_env.world import observations

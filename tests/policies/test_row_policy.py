@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.core.errors import PolicyError
-from swarm_logistics_env.policies import files, load, spec
+from swarm_logistics_env.policies import NAMES, files, load
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.policies.row_policy import Robot, RowPolicy
 from swarm_logistics_env.world import observations
@@ -90,7 +90,7 @@ def test_a_policy_of_which_nobody_knows_what_robots_share_steers_none() -> None:
 
 
 def test_all_shipped_policies_that_decide_from_rows_steer_robots() -> None:
-    for name in spec.NAMES:
+    for name in NAMES:
         policy = load(name)
         assert isinstance(policy, RowPolicy) or getattr(policy, "needs_state", False)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode
-from swarm_logistics_env.policies.spec import WEIGHTS
+from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.train.training import load_training, preset_names
 from swarm_logistics_env.world.warehouse import Fault
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Scenario, Warehouse
 from swarm_logistics_env.core.errors import PolicyError, RobotError
 from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies.catalogue import SCRIPTED
 from swarm_logistics_env.policies.policy import start
-from swarm_logistics_env.policies.spec import SCRIPTED
 from swarm_logistics_env.robots import Contract, check_rows, contract_of
 from swarm_logistics_env.world.observations import unflatten
 

@@ -15,8 +15,8 @@ from hypothesis import settings
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.core.errors import PolicyError, StudyError, TrainingError
+from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.policies.files import read_policy
-from swarm_logistics_env.policies.spec import WEIGHTS
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.views.cli import app

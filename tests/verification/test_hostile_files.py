@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from swarm_logistics_env import policies
 from swarm_logistics_env.core.errors import SwarmLogisticsError
-from swarm_logistics_env.policies.spec import WEIGHTS
+from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.study.runs.notes import NOTE, merge
 from swarm_logistics_env.study.runs.recorded import RecordedStudy
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs, export

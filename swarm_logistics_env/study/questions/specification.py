@@ -26,7 +26,8 @@ from pydantic import (
 
 from swarm_logistics_env.core.errors import StudyError, SwarmLogisticsError, suggest
 from swarm_logistics_env.core.records import FileName, Record, each_of, file_name, read_table
-from swarm_logistics_env.policies.spec import PolicySpec, display_name
+from swarm_logistics_env.policies.catalogue import display_name
+from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.spi.equivalence import MARGIN
 from swarm_logistics_env.study.tasks.performance import Performance

@@ -38,9 +38,10 @@ _MOST_CHANGES = 4  # of a preset that is still named
 EPISODE_CODE = (
     "compiler/*.py", "core/streams.py", "world/**/*.py", "!world/rendering/*.py",
     "world/floor/plans/*.txt", "policies/*.py", "!policies/__init__.py", "!policies/spec.py",
-    "!policies/files.py", "!policies/models.py", "!policies/model_spaces.py",
-    "!policies/networks.py", "!policies/normalizers.py", "!policies/sb3_files.py",
-    "!policies/demonstrations.py", "!policies/testing.py", "!policies/c_*.py",
+    "!policies/catalogue.py", "!policies/files.py", "!policies/models.py",
+    "!policies/model_spaces.py", "!policies/networks.py", "!policies/normalizers.py",
+    "!policies/sb3_files.py", "!policies/demonstrations.py", "!policies/testing.py",
+    "!policies/c_*.py",
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.policies import SUFFIXES
-from swarm_logistics_env.policies.spec import SCRIPTED
+from swarm_logistics_env.policies.catalogue import SCRIPTED
 from swarm_logistics_env.study.trials.readers.folder import TRIAL_SUFFIXES
 
 from .judge_policy import judge_policy_command

@@ -14,8 +14,8 @@ from typer import Option
 from swarm_logistics_env.core.errors import FaultError, ScenarioError
 from swarm_logistics_env.core.records import read_table
 from swarm_logistics_env.policies import PolicySpec, read_card
+from swarm_logistics_env.policies.catalogue import NAMES
 from swarm_logistics_env.policies.files import SUFFIX
-from swarm_logistics_env.policies.spec import NAMES
 from swarm_logistics_env.world.bodies import BODIES
 from swarm_logistics_env.world.scenario import CHIPMUNK, SCENARIO_PRESETS, Scenario
 from swarm_logistics_env.world.warehouse.faults import Fault, fault_of

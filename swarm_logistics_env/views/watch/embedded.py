@@ -9,9 +9,9 @@ from pathlib import Path
 
 from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.core.records import atomic_write
+from swarm_logistics_env.policies.catalogue import load
 from swarm_logistics_env.policies.episode import Play
 from swarm_logistics_env.policies.policy import Policy
-from swarm_logistics_env.policies.spec import load
 from swarm_logistics_env.world.rendering.renderer import FRAME_RATE, load_pygame, write_film
 from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse.faults import FaultLike

@@ -2,7 +2,8 @@
 
     #  wall        :  storage: items start here and come back
     =  rack        +  start: robots start here; without any, in storage and on free floor
-    .  free        A to Z  delivery areas; cells with the same letter are one dock
+    .  free        *  charging station, in the middle of its cell
+                   A to Z  delivery areas; cells with the same letter are one dock
 
 The first line is the side of the highest y. The world's outer walls stand around the plan.
 """
@@ -24,10 +25,12 @@ from swarm_logistics_env.core.errors import suggest
 
 from .benchmark_map import is_benchmark_map, refuse_unknown_signs, rows_of_benchmark_map
 
-WALL, RACK, FREE, STORAGE, START, DOCK = range(6)  # kinds of cells; the first two are solid
+WALL, RACK, FREE, STORAGE, START, DOCK, STATION = range(
+    7
+)  # kinds of cells; the first two are solid
 NO_DOCK = -1
 MOST_CELLS = 1_024  # along a side: the largest maps of MovingAI
-_KINDS = {"#": WALL, "=": RACK, ".": FREE, ":": STORAGE, "+": START}
+_KINDS = {"#": WALL, "=": RACK, ".": FREE, ":": STORAGE, "+": START, "*": STATION}
 _DOCKS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _FOLDER = Path(__file__).parent / "plans"
 _ROW_END = "/"  # of the rows of a plan within a single line
@@ -284,7 +287,8 @@ def _spread(corners: NDArray[np.int32], n_wide: int) -> NDArray[np.int32]:
 
 def _check_reached(kind: Cells, reached: Mask, problem: str) -> None:
     ways = ((DOCK, "this dock", "storage"), (STORAGE, "this storage", "a dock"))
-    for code, origin, goal in (*ways, (START, "this start", "a dock")):
+    others = ((START, "this start", "a dock"), (STATION, "this station", "a dock"))
+    for code, origin, goal in (*ways, *others):
         rows, columns = np.nonzero((kind == code) & ~reached)
         if len(rows):
             first = int(np.lexsort((columns, -rows))[0])  # from the first line on

@@ -9,8 +9,9 @@ from pydantic import model_validator
 from swarm_logistics_env.core.errors import ScenarioError, suggest
 from swarm_logistics_env.world.floor import PLAN_SIZES, floor_title, with_plan_sizes
 
+from .batteries import BatteryFields, check_batteries
 from .checks import check
-from .fields import CHANGES_DURING_RUN, CHIPMUNK, LARGEST, SOURCES, ScenarioFields
+from .fields import CHANGES_DURING_RUN, CHIPMUNK, LARGEST, SOURCES
 from .order_file import orders_text, orders_title
 
 __all__ = [
@@ -23,7 +24,7 @@ __all__ = [
 ]
 
 
-class Scenario(ScenarioFields):
+class Scenario(BatteryFields):
     """Every condition of one run. The defaults are the paper's set-up.
 
     Each default ends with where it comes from. "source": see `SOURCES`; "paper" is Milner,
@@ -61,6 +62,7 @@ class Scenario(ScenarioFields):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         check(self)
+        check_batteries(self)
         return self
 
     @classmethod

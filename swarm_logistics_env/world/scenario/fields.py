@@ -63,6 +63,8 @@ CHANGES_DURING_RUN = frozenset(
         "order_rate",
         "order_cycle",
         "order_due",
+        "charging_power",
+        "dead_stations",
     }
 )
 

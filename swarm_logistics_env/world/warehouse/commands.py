@@ -61,10 +61,17 @@ def refused_command(world: World) -> int:
 
 
 @inlined_kernel
+def acts(world: World, robot: int) -> bool:
+    """Return whether a robot follows its commands: it is there, obeys, and has energy."""
+    robots = world.robots
+    is_able = robots.present[robot] and world.able.obeys[robot]
+    return bool(is_able and not robots.is_empty[robot])
+
+
+@inlined_kernel
 def may_drive(world: World, robot: int) -> bool:
-    """Return whether a robot follows its command: it is there, obeys, and handles no item."""
-    is_driven = world.robots.present[robot] and world.able.obeys[robot]
-    return bool(is_driven and world.robots.handling[robot, KIND] == IDLE)
+    """Return whether a robot drives as commanded: it acts, and handles no item."""
+    return bool(acts(world, robot) and world.robots.handling[robot, KIND] == IDLE)
 
 
 @inlined_kernel

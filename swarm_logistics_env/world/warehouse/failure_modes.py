@@ -32,6 +32,7 @@ class Capabilities(NamedTuple):
     messages_true: Annotated[NDArray[np.bool_], "N"]  # False: it tells the opposite
     ranger_bias: Annotated[NDArray[np.float64], "N"]  # [m] that its rangers read too far
     radio_delay: Annotated[NDArray[np.int64], "N"]  # control steps that its broadcasts lag
+    battery: Annotated[NDArray[np.float64], "N"]  # [J] that its battery holds, if it has any
 
 
 @dataclass(frozen=True)
@@ -43,9 +44,10 @@ class FailureMode:
         mark: what its robots wear in pictures, one or two letters; none: the mode's name.
         speed: factor in [0, 1] on its top speed and turn rate.
         view: factor in [0, 1] on its cameras' range.
-        factor: "speed" or "view": which of the two a fault's own factor replaces; or None.
-        wears: whether the speed falls linearly, from all at the fault's onset to that factor at
-            the end of the episode.
+        battery: factor in [0, 1] on what its battery holds.
+        factor: "speed", "view" or "battery": which of them a fault's own factor replaces; or None.
+        wears: whether the speed, or what the battery holds, falls linearly, from all at the fault's
+            onset to that factor at the end of the episode.
         rangers: False: they report nothing near.
         ranger_bias: what they read too far [m].
         radio_delay: how late its broadcasts come [s].
@@ -58,6 +60,7 @@ class FailureMode:
     mark: str = ""
     speed: float = 1.0
     view: float = 1.0
+    battery: float = 1.0
     factor: str | None = None
     wears: bool = False
     rangers: bool = True
@@ -120,6 +123,13 @@ FAILURE_MODES: dict[str, FailureMode] = {
         wears=True,
     ),
     "motor_dead": FailureMode("stands still", mark="M", speed=0.0),
+    "cell_fades": FailureMode(
+        "its battery holds ever less, half as much or the fault's factor of it in the end",
+        mark="C",
+        battery=0.5,
+        factor="battery",
+        wears=True,
+    ),
     "view_reduced": FailureMode(
         "sees half as far with its cameras, or the fault's factor of it",
         mark="V",

@@ -214,7 +214,7 @@ class Occurrence:
     Args:
         fault: which.
         seed: the episode's seed.
-        n_robots: how many there are.
+        scenario: of the episode.
 
     Attributes:
         mode: the failure mode.
@@ -222,16 +222,20 @@ class Occurrence:
             strikes by role.
 
     Raises:
-        FaultError: as `failed_robots`.
+        FaultError: as `failed_robots`, or it is of a battery and there are none.
     """
 
-    def __init__(self, fault: Fault, seed: int, n_robots: int) -> None:
+    def __init__(self, fault: Fault, seed: int, scenario: Scenario) -> None:
         self.fault = fault
         self.mode = failure_mode(fault.mode)
+        if self.mode.battery < 1.0 and scenario.battery is None:
+            raise FaultError(
+                f"Fault.mode = {fault.mode}: should have robots with batteries, as battery = 5000"
+            )
         self._seed = seed
         # The times at which an intermittent fault begins, ends, begins, ..., by robot.
         self._switches: dict[int, list[float]] = {}
-        affected = failed_robots(fault, seed, n_robots)
+        affected = failed_robots(fault, seed, scenario.n_robots)
         self.robots = affected if fault.role is None else affected[:0]
 
     def choose_by_role(self, state: WarehouseState) -> None:
@@ -268,19 +272,18 @@ class Occurrence:
                 changes.append(self._switches[robot][n_switches])
         return min(changes)
 
-    def remaining_factors(self, time: float, end: float) -> tuple[float, float]:
-        """Return the factors on speed and view at `time` [s] of an episode until `end` [s]."""
+    def remaining_factors(self, time: float, end: float) -> dict[str, float]:
+        """Return the factors on speed, view and battery at `time` [s] of an episode until `end`."""
         mode = self.mode
         fault = self.fault
-        speed = mode.speed
-        view = mode.view
-        if fault.factor is not None:
-            speed = fault.factor if mode.factor == "speed" else speed
-            view = fault.factor if mode.factor == "view" else view
+        factors = {name: getattr(mode, name) for name in ("speed", "view", "battery")}
+        if fault.factor is not None and mode.factor is not None:
+            factors[mode.factor] = fault.factor
         if mode.wears:
             share = (time - fault.onset) / max(end - fault.onset, GRACE)
-            speed = 1.0 - (1.0 - speed) * min(max(share, 0.0), 1.0)
-        return speed, view
+            for name in ("speed", "battery"):
+                factors[name] = 1.0 - (1.0 - factors[name]) * min(max(share, 0.0), 1.0)
+        return factors
 
     def _n_switches(self, robot: int, time: float) -> int:
         """Return how often it has begun or ended for a robot until `time` [s]."""
@@ -337,6 +340,7 @@ def apply_faults(
     able.max_turn_rate[:] = scenario.max_turn_rate * speed
     able.ranger_range[:] = scenario.ranger_range * sensing
     able.view_range[:] = scenario.view_range * sensing
+    able.battery[:] = scenario.battery_energy
     able.ranger_bias[:] = 0.0
     able.radio_delay[:] = 0
     for name in LOST_AS_A_WHOLE:
@@ -346,10 +350,11 @@ def apply_faults(
     for occurrence in occurrences:
         mode = occurrence.mode
         robots = occurrence.holds_for(state.time)
-        speed_left, view_left = occurrence.remaining_factors(state.time, scenario.duration)
-        able.max_speed[robots] *= speed_left
-        able.max_turn_rate[robots] *= speed_left
-        able.view_range[robots] *= view_left
+        left = occurrence.remaining_factors(state.time, scenario.duration)
+        able.max_speed[robots] *= left["speed"]
+        able.max_turn_rate[robots] *= left["speed"]
+        able.view_range[robots] *= left["view"]
+        able.battery[robots] *= left["battery"]
         able.ranger_range[robots] *= mode.rangers
         able.ranger_bias[robots] += mode.ranger_bias
         delay = round(mode.radio_delay / scenario.control_period)

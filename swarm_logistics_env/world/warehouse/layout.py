@@ -59,6 +59,11 @@ def lay_out(state: WarehouseState, scenario: Scenario, seed: int) -> None:
         scenario, seed, state.obstacle_position
     )
     state.robot_heading_drift = heading_drifts(scenario, seed)
+    if scenario.battery is not None:
+        state.batteries.energy[:] = start_energies(scenario, seed)
+    state.batteries.station_position[:] = scenario.stations
+    stations = row_keys(seed, "stations", len(scenario.stations))
+    state.batteries.station_rank[:] = np.argsort(np.argsort(stations, kind="stable"))
     state.robots.sensor_key[:] = row_keys(seed, "sensors", scenario.n_robots)
     state.robots.hearing_key[:] = row_keys(seed, "requests told", scenario.n_robots)
     items = state.items
@@ -93,9 +98,8 @@ def place_obstacles(scenario: Scenario, seed: int) -> Numbers:
     gap = 2.0 * scenario.robot_radius + _GAP if floor.n_columns else 0.0
     n = scenario.n_obstacles
     radius = scenario.obstacle_radius
-    return _draw_centres(
-        scenario, seed, Discs("obstacles", n, radius, floor.start, gap, gap), _NO_DISCS
-    )
+    discs = Discs("obstacles", n, radius, floor.start, gap, gap)
+    return _draw_centres(scenario, seed, discs, scenario.stations)
 
 
 def place_items(scenario: Scenario, seed: int, obstacles: Numbers) -> Numbers:
@@ -119,6 +123,15 @@ def heading_drifts(scenario: Scenario, seed: int) -> Numbers:
     """Return at which rate each robot's body turns unasked [rad/s], shape (N,)."""
     keys = row_keys(seed, "drift", scenario.n_robots)
     return scenario.heading_drift * np.array([gaussian(key, 0) for key in keys])
+
+
+def start_energies(scenario: Scenario, seed: int) -> Numbers:
+    """Return what is in each robot's battery [J], (N,): half of it to all, drawn evenly.
+
+    So not all robots need a station at once.
+    """
+    keys = row_keys(seed, "start energy", scenario.n_robots)
+    return scenario.battery_energy * np.array([0.5 + 0.5 * uniform(key, 0) for key in keys])
 
 
 @kernel

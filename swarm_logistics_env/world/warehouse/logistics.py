@@ -21,7 +21,18 @@ import math
 
 from swarm_logistics_env.compiler.kernels import engine_kernel, inlined_kernel, kernel
 
-from .commands import DELIVERING, GRIPPER, IDLE, ITEM, KIND, LAST_STEP, LIFTING, PUTTING_DOWN
+from .batteries import use
+from .commands import (
+    DELIVERING,
+    GRIPPER,
+    IDLE,
+    ITEM,
+    KIND,
+    LAST_STEP,
+    LIFTING,
+    PUTTING_DOWN,
+    acts,
+)
 from .demand import ask, close_request, is_known_request, is_requested, takes
 from .floor_cells import dock_at, is_in_sight
 from .grid import look_around
@@ -186,9 +197,8 @@ def open_grippers(world: World) -> None:
     commands = world.commands.now
     for robot in range(len(commands)):
         item = robots.item[robot]
-        is_able = robots.present[robot] and able.obeys[robot]
         command = gripper_of(world, robot, commands[robot, GRIPPER])
-        if item == NOBODY or not is_able or command >= _OPEN:
+        if item == NOBODY or not acts(world, robot) or command >= _OPEN:
             continue
         may_release = able.releases_inside[robot] and is_requested(world, item)
         if robots.in_delivery[robot] and not may_release:
@@ -301,7 +311,7 @@ def close_grippers(world: World) -> None:
     while True:
         is_settled = True
         for robot in range(len(commands)):
-            is_able = robots.present[robot] and able.obeys[robot] and able.lifts[robot]
+            is_able = acts(world, robot) and able.lifts[robot]
             is_free = robots.item[robot] == NOBODY
             command = gripper_of(world, robot, commands[robot, GRIPPER])
             if not is_free or not is_able or command <= _HOLD:
@@ -318,6 +328,7 @@ def close_grippers(world: World) -> None:
             is_settled = False
             if not is_done(world, robot, LIFTING, item):
                 continue
+            use(world, robot, world.parameters.lifting_energy)
             robots.item[robot] = item
             items.status[item] = CARRIED
             items.carrier[item] = robot

@@ -6,7 +6,7 @@ import math
 
 from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel, pair_key, uniform
 
-from .commands import MESSAGE
+from .commands import MESSAGE, acts
 from .sensor_errors import RADIO, is_missed
 from .structs import NOBODY, World
 
@@ -26,7 +26,7 @@ def send_messages(world: World) -> None:
     n = len(message)
     n_kept = len(robots.told_before)
     for robot in range(n):
-        sends = robots.present[robot] and able.obeys[robot]
+        sends = acts(world, robot)
         for part in range(message.shape[1]):
             number = world.commands.now[robot, MESSAGE + part] if sends else 0.0
             number = min(max(number, -1.0), 1.0)
@@ -102,6 +102,7 @@ def listen(me: int, world: World, n_found: int) -> tuple[int, float]:
         other = world.robot_grid.members[nearby.slot[index]]
         square = nearby.square[index]
         is_heard = (square <= limit) & able.sends[other] & able.hears[me]
+        is_heard &= not robots.is_empty[other]
         if loss > 0.0 and is_heard:
             step = world.progress.step[0]
             is_heard = not is_missed(robots.sensor_key[me], other, step, RADIO, loss)

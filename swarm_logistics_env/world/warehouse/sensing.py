@@ -12,6 +12,7 @@ import math
 from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel
 from swarm_logistics_env.world import observations as row
 
+from .batteries import sense_battery
 from .cameras import choose, describe_items, describe_neighbours
 from .demand import is_known_request
 from .grid import look_around
@@ -53,6 +54,7 @@ def sense(world: World, rows: Sensed) -> int:
             hide_behind_solids(scans, full_range(world, me))
         robots.contact[me] |= touches_solid(pose, world)
         feel_itself(me, pose, world, rows[me])
+        sense_battery(me, pose, world, rows[me])
         disturb(me, world, rows[me])
         fail_rangers(me, world, rows[me])
     return n_anchored

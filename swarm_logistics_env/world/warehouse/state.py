@@ -19,6 +19,7 @@ from .structs import (
     DUE,
     NOBODY,
     STORED,
+    Batteries,
     Claims,
     ContactCounts,
     Flags,
@@ -56,6 +57,7 @@ class WarehouseState:
     robot_told: Numbers
     robot_heard: Numbers
     robot_message: Numbers
+    robot_is_empty: Flags
     last_in_delivery: Integers
     failed: Flags
 
@@ -82,6 +84,7 @@ class WarehouseState:
         lengths = lengths_of(scenario)
         self.robots = robots = blank(Robots, lengths)
         self.able = blank(Capabilities, lengths)
+        self.batteries = blank(Batteries, lengths)
         self.items = blank(Items, lengths)
         self.progress = blank(Progress, lengths)
         self.orders = blank(Orders, lengths)
@@ -92,6 +95,7 @@ class WarehouseState:
         for silent in (robots.timer, robots.told, robots.heard, robots.told_before):
             silent[...] = np.nan
         robots.frozen_beams[...] = np.nan
+        self.batteries.station[:] = NOBODY
         self.progress.asked_last[0] = NOBODY
         self.orders.shape[:] = scenario.order_shape
         self.orders.open[:, DUE] = np.inf
@@ -185,6 +189,14 @@ class WarehouseState:
     def order_measures(self) -> OrderMeasures:
         """How the orders were served so far."""
         return order_measures(self.orders, self.time, self.delivery_times, self.delivered_due)
+
+    @property
+    def robot_charge(self) -> Numbers:
+        """Share of what each battery holds now that is left in it (N,); 1: no robot has one."""
+        if not len(self.batteries.energy):
+            return np.ones(self.n_robots)
+        holds = np.maximum(self.able.battery, np.finfo(np.float64).tiny)
+        return np.minimum(self.batteries.energy / holds, 1.0)
 
     @property
     def n_robots(self) -> int:

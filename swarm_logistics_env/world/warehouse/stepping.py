@@ -5,6 +5,7 @@ from __future__ import annotations
 from swarm_logistics_env.compiler.addresses import unpacked_at
 from swarm_logistics_env.compiler.kernels import engine_kernel, kernel
 
+from .batteries import run_batteries
 from .commands import drive, list_motions, refused_command
 from .contacts import count_motion, count_step
 from .demand import ask
@@ -123,6 +124,7 @@ def end_step(address: int, world: World, rows: Sensed) -> bool:
     take_motion(world)
     send_messages(world)
     n_delivered, is_room = handle_items(world)
+    run_batteries(world)
     is_paused = progress.step[0] == progress.pause_step[0]
     if not is_paused:
         perceive(address, rows)

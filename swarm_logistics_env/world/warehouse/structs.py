@@ -76,6 +76,12 @@ class Parameters(NamedTuple):
     restock: bool
     is_gossip: bool
     is_holonomic: bool
+    battery_energy: float
+    idle_power: float
+    driving_energy: float
+    lifting_energy: float
+    charging_power: float
+    dead_stations: int
 
 
 class Robots(NamedTuple):
@@ -103,6 +109,18 @@ class Robots(NamedTuple):
     frozen_beams: Annotated[Numbers, "N", "beams"]  # [m] that frozen rangers repeat, or NaN
     sensor_key: Annotated[Keys, "N"]  # of the streams of its sensors' noise
     hearing_key: Annotated[Keys, "N"]  # of the streams of the requests that it is not told of
+    is_empty: Annotated[Flags, "N"]  # its battery is, so that it stands and ignores its commands
+
+
+class Batteries(NamedTuple):
+    """Batteries and charging stations; arrays of length 0 where robots have no batteries."""
+
+    energy: Annotated[Numbers, "N with batteries"]  # [J]
+    used: Annotated[Numbers, "N with batteries"]  # [J] since the start, and what a cell lost
+    charged: Annotated[Numbers, "N with batteries"]  # [J] since the start
+    station: Annotated[Integers, "N with batteries"]  # that charges it now, or NOBODY
+    station_position: Annotated[Numbers, "stations", 2]  # [m]
+    station_rank: Annotated[Integers, "stations"]  # those of the lowest ranks are dead first
 
 
 class Items(NamedTuple):
@@ -322,6 +340,7 @@ class World(NamedTuple):
     commands: Commands
     robots: Robots
     able: Capabilities
+    batteries: Batteries
     items: Items
     obstacles: Annotated[Numbers, "n_obstacles", 2]  # [m]
     floor: Floor
@@ -345,6 +364,8 @@ def lengths_of(scenario: Scenario) -> dict[str, int]:
     return {
         "N": n,
         "I": n_items,
+        "N with batteries": 0 if scenario.battery is None else n,
+        "stations": len(scenario.stations),
         "accelerations": N_ACCELERATIONS,
         "K": n_kept,
         "K N": n_kept * n,

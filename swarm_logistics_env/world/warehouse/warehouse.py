@@ -86,7 +86,7 @@ class Warehouse:
         """
         scenario = _scenario(scenario, self.scenario)
         bodies = load_bodies(scenario.bodies)
-        occurrences = _occurrences(faults, seed, scenario.n_robots)
+        occurrences = _occurrences(faults, seed, scenario)
         state = WarehouseState(scenario)
         lay_out(state, scenario, seed)
         self.scenario = scenario
@@ -206,7 +206,7 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         seed = self._seed_of_episode("set_faults")
-        self._occurrences = _occurrences(faults, seed, self.state.n_robots)
+        self._occurrences = _occurrences(faults, seed, self.scenario)
         self._apply_faults()
         self._remember()
 
@@ -310,6 +310,7 @@ class Warehouse:
             ),
             robots=state.robots,
             able=state.able,
+            batteries=state.batteries,
             items=state.items,
             obstacles=state.obstacle_position,
             floor=floor,
@@ -389,8 +390,8 @@ class Warehouse:
             stepping.remove(self._address, robot)
 
 
-def _occurrences(faults: Sequence[FaultLike], seed: int, n_robots: int) -> list[Occurrence]:
-    return [Occurrence(fault, seed, n_robots) for fault in checked_faults("faults", faults)]
+def _occurrences(faults: Sequence[FaultLike], seed: int, scenario: Scenario) -> list[Occurrence]:
+    return [Occurrence(fault, seed, scenario) for fault in checked_faults("faults", faults)]
 
 
 def _scenario(scenario: Scenario | None, otherwise: Scenario) -> Scenario:

@@ -12,7 +12,7 @@ import pytest
 
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.policies import PolicySpec
-from swarm_logistics_env.policies.spec import TRAINED
+from swarm_logistics_env.policies.catalogue import TRAINED
 from swarm_logistics_env.study.questions import benchmark_cells
 from swarm_logistics_env.study.questions.benchmark_cells import (
     BASE,

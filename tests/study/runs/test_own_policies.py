@@ -14,7 +14,7 @@ import pytest
 
 from swarm_logistics_env.core.errors import PolicyError, StudyError
 from swarm_logistics_env.policies import PolicySpec
-from swarm_logistics_env.policies.spec import WEIGHTS
+from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.study.studies import Study
 
 SCALED = """\

@@ -9,7 +9,7 @@ import pytest
 
 from swarm_logistics_env import Scenario, policies, run_episode, spi
 from swarm_logistics_env.core.errors import PolicyError, StudyError
-from swarm_logistics_env.policies.spec import WEIGHTS, trainings_of
+from swarm_logistics_env.policies.catalogue import WEIGHTS, trainings_of
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.gate import Gate, answers
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge

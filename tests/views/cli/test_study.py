@@ -18,7 +18,7 @@ import pytest
 
 from swarm_logistics_env.compiler.numba_fence import QUIET
 from swarm_logistics_env.policies import read_card
-from swarm_logistics_env.policies.spec import WEIGHTS
+from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs
 from swarm_logistics_env.study.studies import Study

@@ -66,7 +66,7 @@ def test_sizes_follow_from_the_plan_and_are_refused_otherwise() -> None:
             "aisels",
             "should be a shipped plan, a file, or rows of a plan; did you mean 'aisles'?",
         ),
-        ("A::\n:?:", "line 2, column 2: '?' is no cell: should be one of # = . : + or a letter"),
+        ("A::\n:?:", "line 2, column 2: '?' is no cell: should be one of # = . : + * or a letter"),
         ("A::\n::", "line 2 has 2 cells: should have as many as line 1, 3"),
         (":::\n:::", "the plan has no dock (a letter from A to Z)"),
         ("A..\n...", 'the plan has no storage (":")'),

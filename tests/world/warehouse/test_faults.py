@@ -209,7 +209,7 @@ def test_roles_are_those_about_every_item_that_is_asked_for() -> None:
 
 
 def test_an_intermittent_fault_never_has_the_same_breaks_again() -> None:
-    occurrence = Occurrence(Fault("FM2", (0,), intermittent=(5.0, 5.0)), 0, 1)
+    occurrence = Occurrence(Fault("FM2", (0,), intermittent=(5.0, 5.0)), 0, Scenario(n_robots=1))
     times = [0.0]
     while len(times) < 130:
         times.append(occurrence.next_change(times[-1], math.inf))
@@ -240,7 +240,7 @@ def test_robots_keep_their_speeds_and_senses_when_another_is_removed(build: Buil
 
 def test_an_intermittent_fault_ends_with_its_duration_whatever_holds_then() -> None:
     fault = Fault("FM2", (0,), onset=1.0, duration=2.0, intermittent=(1000.0, 1000.0))
-    occurrence = Occurrence(fault, 0, 1)
+    occurrence = Occurrence(fault, 0, Scenario(n_robots=1))
     assert occurrence.next_change(0.0, math.inf) == 1.0
     assert occurrence.holds_for(1.0).tolist() == [0]
     assert occurrence.next_change(1.0, math.inf) == 3.0

@@ -1,0 +1,224 @@
+"""A policy whose robots go to charge before their batteries are empty, and then go on."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_logistics_env.compiler.kernels import kernel
+from swarm_logistics_env.core.errors import PolicyError
+from swarm_logistics_env.core.fingerprint import joined
+from swarm_logistics_env.policies.driving import HOLD, LET_GO, away_from_neighbours
+from swarm_logistics_env.policies.policy import Holding, Policy, check_policy, identity_parts
+from swarm_logistics_env.policies.row_policy import RowPolicy, check_row_policy
+from swarm_logistics_env.world import observations as row
+from swarm_logistics_env.world.motion.memory import BODY, MEMORY, N_COLUMNS, body_of, length_of
+from swarm_logistics_env.world.motion.steering import set_velocity, steer
+from swarm_logistics_env.world.scenario import Scenario
+
+SUFFIX = "+charging"  # of a policy's name
+AT = 0.3
+UNTIL = 0.95
+
+_WALL_DISTANCE = 0.6  # [m] at which it follows a wall in search of a station
+_WALL_GAIN = 1.5  # turn towards that distance, in units of the way along the wall, per m
+_AVOID_RANGE = 0.5  # [m] between centres
+_AVOID_GAIN = 2.0
+
+
+@kernel
+def drive_to_charge(
+    rows: NDArray[np.float32],
+    needs_charge: NDArray[np.bool_],
+    side: NDArray[np.float64],
+    body: NDArray[np.float64],
+    diameter: float,
+    period: float,
+    commands: NDArray[np.float64],
+) -> None:
+    """Replace the commands (N, 4) of robots that need charge and know where to drive.
+
+    They drive to the nearest free station in view and stand on it. Inside a delivery area without
+    one in view they follow the nearest wall, to the left or to the right of it as `side` (N,) says.
+    All others are on their way home, and only let go of what nobody asks for.
+
+    Args:
+        body: memory (N_COLUMNS,) of a robot, of which the body is read.
+        diameter: of a robot [m].
+    """
+    for robot in range(len(rows)):
+        if not needs_charge[robot]:
+            continue
+        sensed = rows[robot]
+        command = commands[robot]
+        is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
+        is_useless = sensed[row.CARRYING] > 0.5 and sensed[row.CARRYING_REQUESTED] < 0.5
+        gripper = LET_GO if is_useless and not is_inside else HOLD
+        command[3] = gripper
+        battery = len(sensed) - row.N_BATTERY_COLUMNS
+        if sensed[battery + row.BATTERY.charging] > 0.5:
+            set_velocity(0.0, 0.0, 0.0, gripper, command)
+            continue
+        station = free_station(sensed, battery + row.BATTERY.stations, diameter)
+        if station >= 0:
+            x = np.float64(sensed[station + row.STATION.x])
+            y = np.float64(sensed[station + row.STATION.y])
+            way = length_of(x, y)
+            share = way / (2.0 * period * float(body[MEMORY.top_speed]))
+            set_velocity(x, y, min(1.0, share), gripper, command)
+            steer(body, command)
+        elif is_inside:
+            x, y = along_the_wall(sensed, side[robot])
+            push_x, push_y = away_from_neighbours(sensed, _AVOID_RANGE, _AVOID_GAIN)
+            set_velocity(x + push_x, y + push_y, 1.0, gripper, command)
+            steer(body, command)
+
+
+@kernel
+def free_station(sensed: NDArray[np.float32], first: int, diameter: float) -> int:
+    """Return the column of the nearest station in view on which no robot is seen; -1: none."""
+    for rank in range(row.N_STATIONS_IN_VIEW):
+        station = first + rank * row.STATION_WIDTH
+        if sensed[station + row.STATION.present] < 0.5:
+            return -1
+        is_free = True
+        for neighbour in range(row.N_NEIGHBOURS):
+            start = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * neighbour
+            x = sensed[start + row.NEIGHBOUR.x] - sensed[station + row.STATION.x]
+            y = sensed[start + row.NEIGHBOUR.y] - sensed[station + row.STATION.y]
+            is_there = sensed[start + row.NEIGHBOUR.present] > 0.5
+            is_free &= not (is_there and length_of(x, y) < 0.5 * diameter)
+        if is_free:
+            return station
+    return -1
+
+
+@kernel
+def along_the_wall(sensed: NDArray[np.float32], side: float) -> tuple[float, float]:
+    """Return the direction along the nearest wall, at a distance from it, in a robot's frame."""
+    walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
+    nearest = int(np.argmin(walls))
+    angle = 2.0 * np.pi * nearest / row.N_BEAMS
+    towards = _WALL_GAIN * (walls[nearest] - _WALL_DISTANCE)
+    x = towards * np.cos(angle) - side * np.sin(angle)
+    y = towards * np.sin(angle) + side * np.cos(angle)
+    return x, y
+
+
+class Charging(RowPolicy, Holding):
+    """Another policy, whose robots go to charge while their batteries are nearly empty.
+
+    A robot with little charge goes home by the policy's own skill, as its row then says that it
+    carries a requested item; near the delivery area it looks for a station along the walls. Where
+    robots have no batteries, it is the policy itself.
+
+    Args:
+        policy: a script or a network that decides from rows, or whatever has `act(observations)`.
+        at: the charge, a share, below which a robot goes to charge.
+        until: the charge at which it goes on.
+
+    Raises:
+        PolicyError: `policy` is none or needs the state, or the shares cannot be.
+    """
+
+    def __init__(self, policy: Policy, at: float = AT, until: float = UNTIL) -> None:
+        check_policy(policy)
+        if getattr(policy, "needs_state", False):
+            raise PolicyError(
+                f"policy = {type(policy).__name__}: should decide from rows alone, as a central "
+                "controller has to send its robots to charge itself"
+            )
+        if not 0.0 < at < until <= 1.0:
+            raise PolicyError(f"at = {at}, until = {until}: should be 0 < at < until <= 1")
+        self.policy = policy
+        self.at = at
+        self.until = until
+        self.stream = getattr(policy, "stream", "charging")
+        self._has_battery = False
+        self._set_robots(0)
+
+    def __repr__(self) -> str:
+        return f"Charging({self.policy!r}, at={self.at}, until={self.until})"
+
+    def __copy__(self) -> Charging:
+        return type(self)(copy.copy(self.policy), self.at, self.until)
+
+    def identity_parts(self) -> dict[str, Any]:
+        """Return the policy's parts, and the shares."""
+        inner = identity_parts(self.policy)
+        prints = joined([inner]) if "value" in inner else {}
+        policy = {name: part for name, part in inner.items() if name not in prints}
+        shares = {"at": self.at, "until": self.until}
+        return {"class": "Charging", **shares, "policy": policy, **prints}
+
+    def configure(self, scenario: Scenario) -> None:
+        """Take what the policy takes, the body, and whether there are batteries."""
+        configure = getattr(self.policy, "configure", None)
+        if configure is not None:
+            configure(scenario)
+        self._has_battery = scenario.battery is not None
+        self._period = scenario.control_period
+        self._diameter = 2.0 * scenario.robot_radius
+        self._body = np.zeros(N_COLUMNS)
+        self._body[BODY] = body_of(scenario)
+
+    def begin(self, keys: NDArray[np.uint64]) -> None:
+        """Begin an episode of robots whose streams have these keys (N,)."""
+        check_row_policy(self.policy).begin(keys)
+        self._set_robots(len(keys))
+
+    def reset(self, n_robots: int, seed: int) -> None:
+        """Begin an episode of `n_robots` rows."""
+        self.policy.reset(n_robots, seed)
+        self._set_robots(n_robots)
+
+    def _set_robots(self, n_robots: int) -> None:
+        self._needs_charge = np.zeros(n_robots, np.bool_)
+        self._was_inside = np.zeros(n_robots, np.bool_)
+        self._side = np.ones(n_robots)
+
+    def memories(self) -> dict[str, NDArray[Any]]:
+        """Return all that robots remember, the policy's memories among it."""
+        of_policy = check_row_policy(self.policy).memories()
+        return of_policy | {
+            "needs_charge": self._needs_charge,
+            "was_inside": self._was_inside,
+            "side": self._side,
+        }
+
+    def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Return commands (N, 4 or more) for observation rows (N, D)."""
+        if not self._has_battery:
+            return self.policy.act(observations)
+        charge = observations[:, observations.shape[1] - row.N_BATTERY_COLUMNS]
+        self._needs_charge |= charge < self.at
+        self._needs_charge &= charge < self.until
+        is_inside = observations[:, row.IN_DELIVERY_AREA] > 0.5
+        self._side[self._was_inside & ~is_inside] *= -1.0  # next time it goes the other way round
+        self._was_inside = is_inside
+        rows = observations
+        goes_home = self._needs_charge & ~is_inside
+        if goes_home.any():
+            rows = observations.copy()
+            rows[goes_home, row.CARRYING] = 1.0
+            rows[goes_home, row.CARRYING_REQUESTED] = 1.0
+        commands = np.array(self.policy.act(rows), np.float64)
+        drive_to_charge(
+            observations, self._needs_charge, self._side, self._body, self._diameter, self._period,
+            commands,
+        )  # fmt: skip
+        return commands
+
+
+def charging(policy: Policy, at: float = AT, until: float = UNTIL) -> Charging:
+    """Return the policy with robots that go to charge; see `Charging`.
+
+    Example:
+        >>> from swarm_logistics_env import policies
+        >>> charging(policies.load("homing"), at=0.3)
+        Charging(Homing(), at=0.3, until=0.95)
+    """
+    return Charging(policy, at, until)
