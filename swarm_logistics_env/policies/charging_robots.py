@@ -27,6 +27,8 @@ _WALL_DISTANCE = 0.6  # [m] at which it follows a wall in search of a station
 _WALL_GAIN = 1.5  # turn towards that distance, in units of the way along the wall, per m
 _AVOID_RANGE = 0.5  # [m] between centres
 _AVOID_GAIN = 2.0
+_PATIENCE = 1.0  # [s] on a station that does not charge it, after which it takes that for dead
+_TURNED_AWAY = 20.0  # [s] for which it then looks for another one
 
 
 @kernel
@@ -34,6 +36,7 @@ def drive_to_charge(
     rows: NDArray[np.float32],
     needs_charge: NDArray[np.bool_],
     side: NDArray[np.float64],
+    in_vain: NDArray[np.float64],
     body: NDArray[np.float64],
     diameter: float,
     period: float,
@@ -46,6 +49,8 @@ def drive_to_charge(
     All others are on their way home, and only let go of what nobody asks for.
 
     Args:
+        in_vain: for how long each stood on a station that did not charge it [s], (N,); below 0: it
+            looks for another one for so long.
         body: memory (N_COLUMNS,) of a robot, of which the body is read.
         diameter: of a robot [m].
     """
@@ -60,16 +65,23 @@ def drive_to_charge(
         command[3] = gripper
         battery = len(sensed) - row.N_BATTERY_COLUMNS
         if sensed[battery + row.BATTERY.charging] > 0.5:
+            in_vain[robot] = 0.0
             set_velocity(0.0, 0.0, 0.0, gripper, command)
             continue
         station = free_station(sensed, battery + row.BATTERY.stations, diameter)
+        if in_vain[robot] < 0.0:
+            in_vain[robot] += period
+            station = -1
         if station >= 0:
-            x = np.float64(sensed[station + row.STATION.x])
-            y = np.float64(sensed[station + row.STATION.y])
-            way = length_of(x, y)
-            share = way / (2.0 * period * float(body[MEMORY.top_speed]))
-            set_velocity(x, y, min(1.0, share), gripper, command)
+            x = float(sensed[station + row.STATION.x])
+            y = float(sensed[station + row.STATION.y])
+            way = float(length_of(x, y))
+            top_speed = float(body[MEMORY.top_speed])
+            set_velocity(x, y, min(1.0, way / (2.0 * period * top_speed)), gripper, command)
             steer(body, command)
+            in_vain[robot] += period if way < 0.5 * diameter else 0.0
+            if in_vain[robot] > _PATIENCE:
+                in_vain[robot] = -_TURNED_AWAY
         elif is_inside:
             x, y = along_the_wall(sensed, side[robot])
             push_x, push_y = away_from_neighbours(sensed, _AVOID_RANGE, _AVOID_GAIN)
@@ -179,6 +191,7 @@ class Charging(RowPolicy, Holding):
         self._needs_charge = np.zeros(n_robots, np.bool_)
         self._was_inside = np.zeros(n_robots, np.bool_)
         self._side = np.ones(n_robots)
+        self._in_vain = np.zeros(n_robots)
 
     def memories(self) -> dict[str, NDArray[Any]]:
         """Return all that robots remember, the policy's memories among it."""
@@ -187,6 +200,7 @@ class Charging(RowPolicy, Holding):
             "needs_charge": self._needs_charge,
             "was_inside": self._was_inside,
             "side": self._side,
+            "in_vain": self._in_vain,
         }
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -207,8 +221,8 @@ class Charging(RowPolicy, Holding):
             rows[goes_home, row.CARRYING_REQUESTED] = 1.0
         commands = np.array(self.policy.act(rows), np.float64)
         drive_to_charge(
-            observations, self._needs_charge, self._side, self._body, self._diameter, self._period,
-            commands,
+            observations, self._needs_charge, self._side, self._in_vain, self._body, self._diameter,
+            self._period, commands,
         )  # fmt: skip
         return commands
 

@@ -75,3 +75,17 @@ def test_a_robot_that_needs_charge_lets_go_of_what_nobody_asks_for() -> None:
     rows[1, row.CARRYING_REQUESTED] = 1.0
     rows[:, len(rows[0]) - row.N_BATTERY_COLUMNS] = 0.1
     assert policy.act(rows)[:, 3].tolist() == [-1.0, 0.0]
+
+
+def test_a_robot_leaves_a_station_that_does_not_charge_it() -> None:
+    scenario = Scenario(battery=3000.0, n_robots=1, n_items=1, n_stations=2, dead_stations=2)
+    policy = policies.load("homing+charging")
+    start(policy, scenario, 0)
+    rows = np.zeros((1, row.n_columns(scenario)), np.float32)
+    rows[:, row.IN_DELIVERY_AREA] = 1.0
+    battery = rows[:, -row.N_BATTERY_COLUMNS :]
+    battery[:, row.BATTERY.charge] = 0.1
+    battery[:, row.BATTERY.stations : row.BATTERY.stations + row.STATION_WIDTH] = (1.0, 0.01, 0.0)
+    speeds = [float(np.hypot(*policy.act(rows)[0, :2])) for _ in range(15)]
+    assert max(speeds[:10]) < 0.1
+    assert speeds[-1] == pytest.approx(1.0)

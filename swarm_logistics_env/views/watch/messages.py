@@ -91,7 +91,8 @@ def frame_message(session: Session) -> Message:
     of the limit or None, mark, robot it follows] of each), `items` (x, y of each that is stored),
     `requested` ([x, y, carrier] of each that is asked for; where it names its dock, also the dock's
     letter and the name of its colour), `late` (indices of those that are overdue), `waiting` (how
-    many orders wait) and `deliveries` (their times).
+    many orders wait), `deliveries` (their times), `charge` (of each robot's battery in percent, if
+    there are any) and `stations` ([x, y, whether it works]).
     """
     message: Message = {
         "fixed": fixed_data(session),
@@ -212,6 +213,13 @@ def _arena(play: Play) -> Message:
         "late": np.flatnonzero(state.item_late[requested]).tolist(),
         "waiting": state.n_waiting,
         "deliveries": [round(time, 1) for time in state.delivery_times],
+        "charge": _percent(state.robot_charge) if scenario.battery is not None else [],
+        "stations": [
+            [*position, bool(works)]
+            for position, works in zip(
+                _millimetres(state.batteries.station_position), state.stations_working, strict=True
+            )
+        ],
     }
 
 
@@ -248,6 +256,11 @@ def _selected(session: Session) -> Message | None:
 def _millimetres(positions: NDArray[np.float64]) -> list[list[int]]:
     rounded: list[list[int]] = np.rint(1000.0 * positions).astype(int).tolist()
     return rounded
+
+
+def _percent(shares: NDArray[np.float64]) -> list[int]:
+    percent: list[int] = np.rint(100.0 * shares).astype(int).tolist()
+    return percent
 
 
 _SPACING = 0.5  # [s] between frames; the page draws what lies between

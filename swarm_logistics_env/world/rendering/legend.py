@@ -29,6 +29,7 @@ def legend(scenario: Scenario, height: int) -> dict[str, Surface]:
         "item": sprites.item(0.7 * radius, False),
         "requested item": _above(sprites.target(0.8 * radius), sprites.item(0.4 * radius, True)),
         **_late_mark(scenario, height),
+        **_battery_marks(scenario, height),
         **_plan_marks(scenario, height),
         OBSTACLE: sprites.obstacle(1.1 * radius),
     }
@@ -38,6 +39,18 @@ def _late_mark(scenario: Scenario, height: int) -> dict[str, Surface]:
     if not scenario.has_due_times:
         return {}
     return {"late": sprites.badge(LATE, round(0.9 * height))}
+
+
+def _battery_marks(scenario: Scenario, height: int) -> dict[str, Surface]:
+    if scenario.battery is None:
+        return {}
+    radius = 0.5 * height
+    bar = Surface((height, height), SRCALPHA, 32)
+    sprites.charge_bar(bar, (height // 2, round(-0.4 * height)), radius, 0.6)
+    marks = {"charge": bar}
+    if len(scenario.stations):
+        marks["station"] = sprites.station(radius, works=True)
+    return marks
 
 
 def _above(lower: Surface, upper: Surface) -> Surface:

@@ -67,6 +67,8 @@ DARK_COLOURS: dict[str, RGB] = {
 # Curves of runs side by side, and how thick they are [px].
 RUN_NAMES = (("REQUESTED", 3.0), ("SHUFFLING", 1.5))
 
+LOW_CHARGE = 0.3  # of a battery, below which it is drawn in another colour
+
 # The mark on a robot that fails in a mode. A removed robot is not drawn, so it has none.
 MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}
 

@@ -56,6 +56,7 @@ class Picture:
         self._canvas.set_clip(self.floor)
         for at in self._pixels(state.obstacle_position):
             self._stamp(sprites.obstacle(self._obstacle_radius), at)
+        self._draw_stations(state)
         self._draw_halos(state, robots)
         for number in np.flatnonzero(state.item_status == STORED).tolist():
             self._stamp(sprites.item(self._item_half, False), items[number])
@@ -70,6 +71,7 @@ class Picture:
             self._stamp(sprites.target(1.9 * self._robot_radius + 1.0), items[number])
         self._draw_named_docks(state, items)
         self._draw_late(state, items)
+        self._draw_charges(state, robots)
         self._draw_badges(state, robots)
         self._write_caption(state)
         return self._canvas
@@ -183,6 +185,19 @@ class Picture:
             is_faulty = bool(state.failed[robot])
             sprite = sprites.robot(self._robot_radius, activity, headings[robot], is_faulty)
             self._stamp(sprite, robots[robot])
+
+    def _draw_stations(self, state: WarehouseState) -> None:
+        half = max(5.0, 1.3 * self._robot_radius)
+        works = state.stations_working
+        for number, at in enumerate(self._pixels(state.batteries.station_position)):
+            self._stamp(sprites.station(half, bool(works[number])), at)
+
+    def _draw_charges(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
+        if self._scenario.battery is None:
+            return
+        charge = state.robot_charge.tolist()
+        for robot in np.flatnonzero(state.robot_present).tolist():
+            sprites.charge_bar(self._canvas, robots[robot], self._robot_radius, charge[robot])
 
     def _draw_badges(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
         height = max(11, round(1.2 * self._robot_radius))

@@ -15,7 +15,20 @@ import pygame
 from numpy.typing import NDArray
 from pygame import Rect, Surface, Vector2
 
-from .palette import ACTIVITIES, FLOOR, INK, ITEM, ITEM_EDGE, LINK, OBSTACLE, REQUESTED, RGB, TIMER
+from .palette import (
+    ACTIVITIES,
+    BEAM,
+    FLOOR,
+    INK,
+    ITEM,
+    ITEM_EDGE,
+    LINK,
+    LOW_CHARGE,
+    OBSTACLE,
+    REQUESTED,
+    RGB,
+    TIMER,
+)
 
 Pixels = NDArray[np.uint8]  # (H, W, 3), red, green, blue
 
@@ -138,6 +151,35 @@ def obstacle(radius: float) -> Surface:
         ends = middle + arm.rotate(angle), middle - arm.rotate(angle)
         pygame.draw.line(sheet, INK, *ends, round(1.5 * _LARGER))
     return _shrink(sheet)
+
+
+@lru_cache(maxsize=16)
+def station(half: float, works: bool) -> Surface:
+    """Return a charging station: a plate with a bolt, of half that side [px]; dead: crossed out."""
+    sheet = _sheet(half, INK)
+    plate = sheet.get_rect().inflate(-2 * _LARGER, -2 * _LARGER)
+    pygame.draw.rect(sheet, INK, plate, border_radius=round(0.4 * half * _LARGER))
+    inner = plate.inflate(-2.5 * _LARGER, -2.5 * _LARGER)
+    pygame.draw.rect(sheet, FLOOR, inner, border_radius=round(0.3 * half * _LARGER))
+    bolt = ((0.2, -0.75), (-0.5, 0.15), (-0.05, 0.15), (-0.2, 0.75), (0.5, -0.15), (0.05, -0.15))
+    middle = Vector2(plate.center)
+    corners = [middle + half * _LARGER * Vector2(corner) for corner in bolt]
+    pygame.draw.polygon(sheet, BEAM if works else ITEM_EDGE, corners)
+    if not works:
+        ends = inner.topleft, inner.bottomright
+        pygame.draw.line(sheet, INK, *ends, round(1.5 * _LARGER))
+    return _shrink(sheet)
+
+
+def charge_bar(canvas: Surface, at: Sequence[int], radius: float, charge: float) -> None:
+    """Draw how full a robot's battery is, below it; little is told by its colour, too."""
+    bar = Rect(0, 0, max(8, round(2.0 * radius)), max(4, round(0.45 * radius)))
+    bar.midtop = (at[0], at[1] + round(1.25 * radius))
+    pygame.draw.rect(canvas, INK, bar)
+    inner = bar.inflate(-2, -2)
+    pygame.draw.rect(canvas, FLOOR, inner)
+    inner.width = round(charge * inner.width)
+    pygame.draw.rect(canvas, TIMER if charge >= LOW_CHARGE else REQUESTED, inner)
 
 
 def arrow(canvas: Surface, start: Sequence[int], end: Sequence[int], radius: float) -> None:

@@ -69,7 +69,7 @@ def charge(world: World, robot: int) -> None:
     x = world.robots.position[robot, 0]
     y = world.robots.position[robot, 1]
     for station in range(len(batteries.station_rank)):
-        if batteries.station_rank[station] < parameters.dead_stations:
+        if batteries.station_rank[station] < batteries.n_dead[0]:
             continue
         dx = batteries.station_position[station, 0] - x
         dy = batteries.station_position[station, 1] - y

@@ -199,6 +199,12 @@ class WarehouseState:
         return np.minimum(self.batteries.energy / holds, 1.0)
 
     @property
+    def stations_working(self) -> Flags:
+        """Which charging stations are not dead (S,)."""
+        works: Flags = self.batteries.station_rank >= self.batteries.n_dead[0]
+        return works
+
+    @property
     def n_robots(self) -> int:
         """Rows of robots, absent ones included."""
         return len(self.robots.position)

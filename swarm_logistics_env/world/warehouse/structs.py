@@ -81,7 +81,6 @@ class Parameters(NamedTuple):
     driving_energy: float
     lifting_energy: float
     charging_power: float
-    dead_stations: int
 
 
 class Robots(NamedTuple):
@@ -121,6 +120,7 @@ class Batteries(NamedTuple):
     station: Annotated[Integers, "N with batteries"]  # that charges it now, or NOBODY
     station_position: Annotated[Numbers, "stations", 2]  # [m]
     station_rank: Annotated[Integers, "stations"]  # those of the lowest ranks are dead first
+    n_dead: Annotated[Integers, 1]  # stations
 
 
 class Items(NamedTuple):

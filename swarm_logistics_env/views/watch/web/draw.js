@@ -3,7 +3,7 @@
 // Draws an arena: what stands still on a sheet of its own, robots from pictures made once.
 
 const ACTIVITIES = { searching: "SEARCHING", shuffling: "SHUFFLING", delivering: "DELIVERING" };
-const TIMER_STEPS = 8, NOBODY = -1, MARGIN = 4, LATE = "!";
+const TIMER_STEPS = 8, NOBODY = -1, MARGIN = 4, LATE = "!", LOW_CHARGE = 30;
 const sheets = new Map();
 let colours = {}, sprites = new Map();
 
@@ -94,6 +94,34 @@ function badge(pen, x, y, height, text) {
   pen.textAlign = "center";
   pen.textBaseline = "middle";
   pen.fillText(text, x, y + 0.05 * height);
+}
+
+// A plate with a bolt; crossed out where it charges nobody.
+function station(pen, x, y, half, works) {
+  pen.fillStyle = colours.INK;
+  pen.beginPath();
+  pen.roundRect(x - half, y - half, 2 * half, 2 * half, 0.4 * half);
+  pen.fill();
+  pen.fillStyle = colours.FLOOR;
+  pen.beginPath();
+  pen.roundRect(x - half + 1.5, y - half + 1.5, 2 * half - 3, 2 * half - 3, 0.3 * half);
+  pen.fill();
+  pen.fillStyle = works ? colours.BEAM : colours.ITEM_EDGE;
+  pen.beginPath();
+  for (const [across, down] of [[0.2, -0.75], [-0.5, 0.15], [-0.05, 0.15], [-0.2, 0.75], [0.5, -0.15], [0.05, -0.15]]) pen.lineTo(x + half * across, y + half * down);
+  pen.fill();
+  if (!works) line(pen, [[x - half + 2, y - half + 2], [x + half - 2, y + half - 2]], 1.5, colours.INK);
+}
+
+// How full a battery is, in percent; little has a colour of its own.
+function chargeBar(pen, x, y, radius, percent) {
+  const wide = Math.max(8, 2 * radius), high = Math.max(4, 0.45 * radius), top = y + 1.25 * radius;
+  pen.fillStyle = colours.INK;
+  pen.fillRect(x - wide / 2, top, wide, high);
+  pen.fillStyle = colours.FLOOR;
+  pen.fillRect(x - wide / 2 + 1, top + 1, wide - 2, high - 2);
+  pen.fillStyle = percent >= LOW_CHARGE ? colours.TIMER : colours.REQUESTED;
+  pen.fillRect(x - wide / 2 + 1, top + 1, ((wide - 2) * percent) / 100, high - 2);
 }
 
 function arrow(pen, [x0, y0], [x1, y1], radius, width, colour) {
@@ -215,6 +243,7 @@ function drawArena(canvas, number, now, next, share, options) {
     pen.drawImage(picture, x - size, y - size, picture.width / ratio, picture.height / ratio);
   };
   pen.drawImage(floorOf(canvas, now, number, ratio), 0, 0, width, height);
+  for (const [x, y, works] of now[`stations${number}`] ?? []) station(pen, ...at([x, y]), Math.max(5, 1.3 * radius), works);
   for (const trail of options.trails) {
     for (let nth = 1; nth < trail.length; nth++) {
       pen.globalAlpha = nth / trail.length;
@@ -258,6 +287,10 @@ function drawArena(canvas, number, now, next, share, options) {
     if (late.has(index)) badge(pen, Math.max(x - away, high / 2), Math.max(y - away, high / 2), high, LATE);
     if (letter) dockBadge(pen, Math.min(x + away, width - high / 2), Math.min(y + away, height - high / 2), high, letter, hue);
   }
+  const charge = now[`charge${number}`] ?? [];  // as of `late`
+  poses.forEach((pose, robot) => {
+    if (pose && charge.length) chargeBar(pen, ...at(pose), radius, charge[robot]);
+  });
   const tall = Math.max(13, 1.2 * radius);
   poses.forEach((pose, robot) => {
     const mark = pose && robots[robot] ? robots[robot][2] : "";

@@ -29,7 +29,8 @@ function planEntries(plan) {
 }
 
 // Name, explanation and picture of each mark that this warehouse may show.
-function legendEntries({ modes, plan }, { obstacles, scenario }) {
+function legendEntries({ modes, plan }, now) {
+  const { obstacles, scenario } = now;
   const robot = (name, load) => (pen) => {
     body(pen, 10, MID, 7, colours[name], false);
     if (load) item(pen, 10, MID, 3.2, name === "DELIVERING");
@@ -49,6 +50,8 @@ function legendEntries({ modes, plan }, { obstacles, scenario }) {
     ["requested item", "An item that has to be brought to the delivery area. The sight about it goes with it.", (pen) => { target(pen, MID, MID, 6.5); item(pen, MID, MID, 3.5, true); }],
   ];
   if (scenario.has_due_times) entries.push(["late", "What is asked for and overdue.", (pen) => badge(pen, MID, MID, 15, LATE)]);
+  if (now.charge0?.length) entries.push(["charge", `How full a robot's battery is; orange below ${LOW_CHARGE} %. An empty robot stands.`, (pen) => chargeBar(pen, MID, -4, 9, 60)]);
+  if (now.stations0?.length) entries.push(["station", "Charges a robot that stands on it. Crossed out: it charges nobody.", (pen) => station(pen, MID, MID, 8, true)]);
   if (obstacles.length) entries.push(["obstacle", "Nothing passes it.", (pen) => obstacle(pen, MID, MID, 8)]);
   if (plan) return [...entries, ...planEntries(plan)];
   return [...entries, ["delivery area", "A requested item that is brought here is delivered.", (pen) => deliveryArea(pen, 3, 3, 19, 19)]];

@@ -37,6 +37,7 @@ function sees(row, reach) {
     [`requested items: ${items(row.item_requested)}`, "item_requested, item_x, item_y"],
     [`items put down lately: ${items(row.item_recently_held)}`, "item_recently_held, item_x, item_y"],
     [`robots: ${things(row.neighbour_present, row.neighbour_x, row.neighbour_y)}`, "neighbour_present, neighbour_x, neighbour_y"],
+    ...(row.charge ? [[`stations: ${things(row.station_present, row.station_x, row.station_y)}`, "station_present, station_x, station_y"]] : []),
   ];
 }
 
@@ -64,6 +65,7 @@ function does(row) {
     [Math.hypot(forward, left) < 0.05 ? "stands" : `drives ${whereabouts(forward, left, "m/s")}`, "velocity"],
     [turn ? `turns ${Math.abs(turn)}°/s ${turn > 0 ? "left" : "right"}` : "does not turn", "turn_rate"],
     [row.contact[0] > 0.5 ? "touches something" : "touches nothing", "contact"],
+    ...(row.charge ? [[`has ${Math.round(100 * row.charge[0])} % of its battery${row.charging[0] > 0.5 ? ", and charges" : ""}`, "charge, charging"]] : []),
     [row.in_delivery_area[0] > 0.5 ? "is in the delivery area" : away, "in_delivery_area, timer_runs, timer"],
   ];
 }
