@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .cell_checks import check_cells
-from .column_checks import check_columns
+from .checks import check_cells, check_columns
 from .complaints import Complaints
 from .fault_names import FaultNames, notes_on_words
 from .finished import finished_words
