@@ -206,15 +206,11 @@ def _lines(results: StudyResults) -> Iterator[Line]:
     )
     for line in lines:
         if counts[line.subject, line.question] > 1:
-            condition = _part_of_title(line.verdict.compared.table)
+            # What stands in brackets at the end of the table's title, or else the title.
+            condition = line.verdict.compared.table.rstrip(")").rpartition(" (")[2]
             yield line._replace(question=f"{line.question}, {condition}")
         else:
             yield line
-
-
-def _part_of_title(table: str) -> str:
-    """Return what stands in brackets at the end of a table's title, or else the title."""
-    return table.rstrip(")").rpartition(" (")[2]
 
 
 def _sentences(lines: Sequence[Line]) -> Iterator[str]:

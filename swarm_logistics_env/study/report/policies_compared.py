@@ -86,7 +86,10 @@ class _Compared(NamedTuple):
         }
         as_it_is = [v for v in sound if v.compared.original.case.scenario == base]
         usual = [v for v in sound if v.compared.original.case.key in references]
-        main = max(as_it_is or usual or sound or verdicts, key=_n_seeds)
+        main = max(
+            as_it_is or usual or sound or verdicts,
+            key=lambda v: v.estimate.n_seeds if v.estimate else 0,
+        )
         return cls(main, [verdict for verdict in verdicts if verdict is not main])
 
     @property
@@ -133,10 +136,6 @@ class _Compared(NamedTuple):
         word = self.main.on_threshold.adjusted
         name = f"to that of {self.main.compared.policy}"
         return name, times, words.get(word, word), ", ".join(others)
-
-
-def _n_seeds(verdict: Verdict) -> int:
-    return verdict.estimate.n_seeds if verdict.estimate else 0
 
 
 def _factor(change: Interval, *, inverted: bool) -> Interval:
