@@ -71,7 +71,10 @@ def read_trials(
         IndicatorError: the file cannot be read, or a line of it; names line, column and value.
     """
     mapped = dict(columns or {})
-    table = _table_of(source, mapped, ignore, values, sum_over, wide)
+    table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide)
+    table = with_values(with_constants(table, mapped), mapped, values)
+    if sum_over is not None:
+        table = summed_over(table, sum_over, mapped)
     table_columns, complaints = _columns_of(
         table, mapped, ignore, decimal, thousands, skip_missing=skip_missing
     )
@@ -106,20 +109,6 @@ def read_trials(
         references,
         tuple(blocks),
     )
-
-
-def _table_of(
-    source: str | Path | pd.DataFrame,
-    mapped: dict[str, str],
-    ignore: Sequence[str],
-    values: Sequence[str],
-    sum_over: str | None,
-    wide: str | None,
-) -> Table:
-    """Return a table with a row for each trial or delivery, and cells as somebody says."""
-    table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide)
-    table = with_values(with_constants(table, mapped), mapped, values)
-    return table if sum_over is None else summed_over(table, sum_over, mapped)
 
 
 def _columns_of(
