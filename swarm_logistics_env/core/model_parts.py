@@ -12,6 +12,7 @@ import pickletools
 import re
 import zipfile
 from collections.abc import Callable, Set
+from functools import partial
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -83,11 +84,6 @@ def _hooks_of(module: Any) -> list[Parts]:
     ]
 
 
-def _network_parts(network: Any) -> Parts:
-    """Return the parts of a network of stable-baselines3, which are a torch module's."""
-    return _module_parts(network, _NOT_PREDICTED_WITH)
-
-
 def _model_parts(model: Any) -> Parts | None:
     """Return the network that a model of stable-baselines3 predicts with."""
     return (model.policy,) if _is_installed(model) else None
@@ -127,11 +123,6 @@ def _backend_of(callback: Any) -> Any:
         backend = inner
         inner = getattr(backend, "_torchdynamo_orig_backend", getattr(backend, "compiler_fn", None))
     return backend if isinstance(backend, FunctionType) else type(backend)
-
-
-def _graph_parts(module: Any) -> Parts:
-    """Return the parts of a module of torch.fx, whose class has the code of its graph."""
-    return _module_parts(module, _NOT_OF_GRAPH)
 
 
 def _storage_parts(storage: Any) -> Parts:
@@ -213,11 +204,14 @@ _SESSION = "onnxruntime.capi.onnxruntime_inference_collection.InferenceSession"
 _TENSOR = "torch.Tensor"
 # By name, as none of these libraries need be installed. The first base of a class counts.
 _KINDS: dict[str, Callable[[Any], Parts | None]] = {
-    "stable_baselines3.common.policies.BaseModel": _network_parts,
+    "stable_baselines3.common.policies.BaseModel": partial(
+        _module_parts, left_out=_NOT_PREDICTED_WITH
+    ),
     "builtins.function": _function_parts,
     "torch._dynamo.eval_frame.OptimizedModule": _compiled_module_parts,
     "torch.export._unlift.GuardsFn": lambda _: (),  # checks the shapes of what is given
-    "torch.fx.graph_module.GraphModule": _graph_parts,
+    # Its class has the code of its graph.
+    "torch.fx.graph_module.GraphModule": partial(_module_parts, left_out=_NOT_OF_GRAPH),
     "torch.jit.torch.jit.ScriptFunction": _script_parts,
     "torch.jit._script.ScriptModule": _script_parts,
     "torch.nn.modules.module.Module": _module_parts,

@@ -22,11 +22,10 @@ from swarm_logistics_env.study.verdicts.verdict import (
     Verdict,
 )
 
-from . import section, templates
+from . import section
 from .answer_notes import notes
 from .policies_compared import between_policies, comparison_in_words, comparison_table
 from .section import Section
-from .templates import Slots, fill
 
 
 class Line(NamedTuple):
@@ -168,7 +167,7 @@ def answer(results: StudyResults) -> Answer:
         )
     if not subjects:
         policies = section.join_names(results.policies)
-        subjects = [SubjectAnswer(policies, templates.PERFORMANCE["nothing"], ())]
+        subjects = [SubjectAnswer(policies, "P: no run has succeeded", ())]
     return Answer(
         comparison_in_words(results),
         comparison_table(results),
@@ -207,15 +206,11 @@ def _lines(results: StudyResults) -> Iterator[Line]:
     )
     for line in lines:
         if counts[line.subject, line.question] > 1:
-            condition = _part_of_title(line.verdict.compared.table)
+            # What stands in brackets at the end of the table's title, or else the title.
+            condition = line.verdict.compared.table.rstrip(")").rpartition(" (")[2]
             yield line._replace(question=f"{line.question}, {condition}")
         else:
             yield line
-
-
-def _part_of_title(table: str) -> str:
-    """Return what stands in brackets at the end of a table's title, or else the title."""
-    return table.rstrip(")").rpartition(" (")[2]
 
 
 def _sentences(lines: Sequence[Line]) -> Iterator[str]:
@@ -235,22 +230,22 @@ def _sentence(heading: str, lines: Sequence[Line]) -> str:
     counts = section.count_words(
         section.word_to_count(line.verdict, line.verdict.on_property.adjusted) for line in lines
     )
-    slots: dict[str, object] = {"indicator": f"{heading[0].upper()}{heading[1:]}", "counts": counts}
+    indicator = f"{heading[0].upper()}{heading[1:]}"
     tested = [line for line in lines if line.interval and line.verdict.conclusion != UNTESTABLE]
     with_value = [line for line in lines if line.verdict.value is not None]
     candidates = tested or with_value
     if not candidates:
-        return templates.SENTENCE["counts"].format(**slots)
+        return f"{indicator}: {counts}."
     worst = min(candidates, key=lambda line: line.verdict.value or 0.0)
-    is_usual = worst.level in ("", section.P_LEVEL)
-    slots["question"] = worst.question.partition(" ")[2]
-    slots["value"] = f"{worst.value} {worst.interval}".rstrip()
-    slots["level"] = "" if is_usual else f" at {worst.level}"
-    slots["word"] = worst.verdict.in_words
+    value = f"{worst.value} {worst.interval}".rstrip()
+    if worst.level not in ("", section.P_LEVEL):
+        value += f" at {worst.level}"
+    result = f"{worst.question.partition(' ')[2]}: {value}, {worst.verdict.in_words}"
+    if len(lines) == 1:
+        return f"{indicator}, {result}."
     is_change = worst.verdict.compared.definition.compares == "policy"
-    slots["extreme"] = "lowest" if is_change else "worst"
-    case = "one" if len(lines) == 1 else "several"
-    return templates.SENTENCE[case].format(**slots)
+    extreme = "lowest" if is_change else "worst"
+    return f"{indicator}: {counts} ({extreme} {result})."
 
 
 def _scope(results: StudyResults) -> str:
@@ -259,13 +254,11 @@ def _scope(results: StudyResults) -> str:
     policies_text = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
     if origin and policies == (results.plan.specification.name,):  # nobody named it
         policies_text = f"trials of {origin.file}"
-    case = "incomplete" if any(cell.problem for cell in results.cells) else "complete"
-    return templates.SCOPE[case].format(
-        study=results.plan.specification.name,
-        questions=section.plural(len(results.verdicts), "question"),
-        policies=policies_text,
-        seeds=results.seeds_text.split(" (")[0],
-    )
+    seeds = results.seeds_text.split(" (")[0]
+    if any(cell.problem for cell in results.cells):
+        seeds = f"up to {seeds}"
+    questions = section.plural(len(results.verdicts), "question")
+    return f"{results.plan.specification.name}: {questions}, {policies_text}, {seeds}."
 
 
 def _sound_cells(results: StudyResults) -> dict[str, Cell]:
@@ -306,7 +299,6 @@ def _performance(results: StudyResults, cell: Cell) -> str:
     """Return P of a policy in words, e.g. "P [95 %] = 40.0 [39.5, 40.5] items in 500 s, N = 25"."""
     case = cell.arm.case
     setting = cell.arm.setting
-    counted = counted_in(case)
     task = results.plan.specification.played
     condition = f"N = {case.scenario.n_robots}"
     if setting.kind == "policy":
@@ -316,14 +308,11 @@ def _performance(results: StudyResults, cell: Cell) -> str:
     if task.name != "warehouse" and not results.plan.origin:
         condition += f", task {task.name}"
     has_interval = _counts_anything(cell) and cell.mean.low is not None
-    return templates.PERFORMANCE["count" if counted else "no_count"].format(
-        level=f" [{section.P_LEVEL}]" if has_interval else "",
-        counted=counted,
-        duration=case.scenario.duration,
-        condition=condition,
-        mean=_mean(cell),
-        p=results.plan.name_of_p,
-    )
+    level = f" [{section.P_LEVEL}]" if has_interval else ""
+    performance = f"{results.plan.name_of_p}{level} = {_mean(cell)}"
+    if counted := counted_in(case):
+        performance += f" {counted} in {case.scenario.duration:g} s"
+    return f"{performance}, {condition}"
 
 
 def _counts_anything(cell: Cell) -> bool:
@@ -333,18 +322,15 @@ def _counts_anything(cell: Cell) -> bool:
 
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
-    slots: dict[str, Slots] = {}
-    if _counts_anything(cell):
-        slots["mean"] = {"mean": section.mean_p(cell)}
+    if not _counts_anything(cell):
+        most = -math.log(1.0 - CONFIDENCE) / cell.n_seeds
+        reason = f"as none of {cell.n_seeds} runs delivered anything"
         if cell.problem:
-            slots["problem"] = {"problem": cell.problem}
-        if any(outcome.all_delivered for outcome in cell.outcomes):
-            slots["all_delivered"] = {"time": section.time_to_clear(cell)}
-    else:
-        slots["nothing_and_problem" if cell.problem else "nothing"] = {
-            "most": -math.log(1.0 - CONFIDENCE) / cell.n_seeds,
-            "level": section.P_LEVEL,
-            "n_runs": cell.n_seeds,
-            "problem": cell.problem,
-        }
-    return "".join(fill(templates.MEAN, slots))
+            reason += f"; {cell.problem}"
+        return f"0 (at most {most:.2f} at {section.P_LEVEL}, {reason})"
+    mean = section.mean_p(cell)
+    if cell.problem:
+        mean += f" ({cell.problem} and do not count)"
+    if any(outcome.all_delivered for outcome in cell.outcomes):
+        mean += f", all items after {section.time_to_clear(cell)} s"
+    return mean

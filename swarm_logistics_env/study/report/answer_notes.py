@@ -13,88 +13,109 @@ from swarm_logistics_env.study.verdicts.collapses import Collapse
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import UNDEFINED, UNTESTABLE, Verdict
 
-from . import section, templates
+from . import section
 from .more_seeds import more_seeds
-from .templates import Slots, fill
 
 _FEW_ITEMS = 1.0  # in a run, of which shares say little
 _MOST_CONDITIONS = 2  # that a note of the answer names
+# What the words of verdicts mean: those that stand in an answer, in this order.
+_MEANINGS = {
+    "decided": "supported: above 0 (good), refuted: below",
+    "open": "open: undecided",
+    "margin": "< {margin}: P changes by less than that, or P_F and P_S of FT differ by less",
+    "stalls": "stalls: so few runs may hide stalled ones",
+    "trainings": "trainings: so few may hide collapses",
+    "Holm": "Holm: decided alone, not among all questions on the indicator",
+    "provisional": f"n < {SEEDS_OF_HEADLINE}: provisional",
+    "unaffected": "unaffected: the same runs",
+    "cannot_fail": "untestable, never < 0: as P cannot be",
+    "few_pairs_differ": "untestable, equal P: nearly all pairs of runs have the same P",
+    "reference_near_0": "untestable, P_o near 0: a change relative to it says nothing",
+}
 
 
 def notes(results: StudyResults) -> str:
     """Return the notes on the answer of a study, in one line."""
-    line = "; ".join(fill(templates.NOTES, dict(_notes_that_apply(results))))
+    line = "; ".join(_notes_that_apply(results))
     return f"{line[:1].upper()}{line[1:]}."
 
 
 def meanings(verdicts: Iterable[Verdict]) -> str:
     """Return what the words mean that `Verdict.in_words` has for these verdicts."""
-    slots_by_case: dict[str, Slots] = {}
+    words: set[str] = set()
+    margin = ""
     for verdict in verdicts:
         word = verdict.on_property.adjusted
         if word in ("supported", "refuted"):
-            slots_by_case["decided"] = {}
+            words.add("decided")
             if "assumes_normal" in verdict.flags:
-                slots_by_case["provisional"] = {"n_seeds": SEEDS_OF_HEADLINE}
+                words.add("provisional")
         elif word == UNTESTABLE:
-            slots_by_case[verdict.flags[0]] = {}
-        elif word in templates.MEANINGS:
-            slots_by_case[word] = {}
+            words.add(verdict.flags[0])
+        else:
+            words.add(word)
             if verdict.conclusion == "equivalent":
-                slots_by_case["margin"] = {"margin": f"{100 * verdict.margin:.3g} %"}
-            elif verdict.reason:
-                slots_by_case[verdict.reason] = {}
-    return "; ".join(fill(templates.MEANINGS, slots_by_case))
+                words.add("margin")
+                margin = f"{100 * verdict.margin:.3g} %"
+            else:
+                words.add(verdict.reason)
+    return "; ".join(
+        meaning.format(margin=margin) for word, meaning in _MEANINGS.items() if word in words
+    )
 
 
-def _notes_that_apply(results: StudyResults) -> Iterator[tuple[str, Slots]]:
-    """Yield the notes on an answer that apply, each with its slots; `NOTES` has their order."""
+def _notes_that_apply(results: StudyResults) -> Iterator[str]:
+    """Yield how to read the answer of a study, and what limits it."""
     verdicts = results.verdicts
     if words := meanings(verdicts):
-        yield "words", {"words": words}
-        yield "adjusted", {}
+        yield words
+        yield "by Holm's method over all questions on an indicator of one policy"
     problems = {
         verdict.problem or "other questions on the indicator lack runs": None
         for verdict in verdicts
         if verdict.conclusion == UNDEFINED and verdict.in_words == UNDEFINED
     }
     if problems:
-        yield "undefined", {"problems": ", ".join(problems)}
+        yield f"undefined: {', '.join(problems)}"
     flags = {flag for verdict in verdicts for flag in verdict.flags}
-    for flag in ("too_few_seeds", "unbounded"):
-        if flag in flags:
-            yield flag, {}
+    if "too_few_seeds" in flags:
+        yield "two seeds give no verdict"
+    if "unbounded" in flags:
+        yield "without limits: P_o is too near 0 for an interval"
     if _delivers_little(results):
-        yield "few_items", {}
+        yield "P is small: a longer duration tells more"
     if results.damage:
-        yield "damage", {"damage": results.damage}
+        yield results.damage
     if results.exploratory:
-        yield "exploratory", {}
+        yield "exploratory: other seeds or P than were declared, whose report this replaces"
     if results.late_margin:
-        yield "late_margin", {}
+        yield "equivalence is exploratory: another margin was declared"
     trainings = [v.estimate.collapsed for v in verdicts if v.estimate and v.estimate.collapsed]
     if trainings:
-        yield "collapsed", {"collapsed": max(trainings, key=lambda collapsed: collapsed.number)}
+        worst = max(trainings, key=lambda collapsed: collapsed.number)
+        yield f"of the trainings at worst {worst}"
     if any(verdict.saturated for verdict in verdicts):
-        case = "capped_measure" if results.plan.specification.performance else "capped"
-        yield case, {"mark": section.SATURATED}
+        hint = "--clearing or --restock has no cap"
+        if results.plan.specification.performance:
+            hint = "no run can have more of this measure"
+        yield f"{section.SATURATED} P is capped: {hint}"
     if results.collapses:
         words = collapsed_in_words(results.collapses, names_policies=len(results.policies) > 1)
-        yield "collapsed_runs", {"conditions": words}
+        yield f"runs collapse {words}"
     if results.untestable:
         words = untestable_in_words(results.untestable, names_policies=len(results.policies) > 1)
-        yield "phases_untestable", {"conditions": words}
+        yield f"two phases untestable: {words}"
     if needs := more_seeds(results).words:
-        yield "open", {"needs": needs}
+        yield needs
     claims_of_text = results.reference.claims if results.reference else {}
     claims = [verdict for verdict in verdicts if verdict.on_claim is not None]
     in_text = [verdict for verdict in claims if verdict.compared.question in claims_of_text]
     not_in_text = [verdict for verdict in claims if verdict not in in_text]
-    case_of_others = "claims_beside_the_text" if claims_of_text else "claims_without_text"
-    for case, judged in (("claims_of_the_text", in_text), (case_of_others, not_in_text)):
+    beside = " beside it" if claims_of_text else ""
+    for where, judged in ((" in the paper's text", in_text), (beside, not_in_text)):
         counts = section.count_words(v.on_claim.adjusted for v in judged if v.on_claim)
         if judged:
-            yield case, {"claims": section.plural(len(judged), "claim"), "counts": counts}
+            yield f"of {section.plural(len(judged), 'claim')}{where} {counts}"
 
 
 def _delivers_little(results: StudyResults) -> bool:

@@ -87,26 +87,18 @@ class Document(NamedTuple):
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
-    text = tuple(_text(results))
-    title = _title(results)
     study_answer = answer(results)
     lines = tuple(warnings(results))
     sentences = [sentence(results, verdict) for verdict in results.verdicts]
-    in_words = tuple(verdict_sections(results.verdicts, sentences))
-    trade_offs = tuple(trade_off_figure(results))
     points = forest_points(results, study_answer)
     figures = (
         *policies_figure(results),
         forest_figure(results, study_answer, points),
         *indicator_figures(results),
     )
-    measures = tuple(resiliences(results))
-    of_faults = tuple(fault_sections(measures, results.seeds_text))
-    cell_sections = tuple(cell_tables(results))
+    of_faults = tuple(fault_sections(tuple(resiliences(results)), results.seeds_text))
     paper_sections = tuple(cell_tables(results, for_paper=True))
     further = tuple(further_tables(results))
-    method = methods(plan, results.looks)
-    setup = setup_sheet(plan)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
         Chapter(
@@ -118,26 +110,26 @@ def document(results: StudyResults) -> Document:
             "Verdicts",
             "One sentence per question. Verdicts are Holm-adjusted; the family is all comparisons "
             "of one indicator for one policy.",
-            in_words,
+            tuple(verdict_sections(results.verdicts, sentences)),
         ),
         Chapter(
             "Results",
             f"P is {plan.what_p_is}. Square brackets hold intervals at the "
             "level that the heading gives, or at that behind them; "
             '"one run" is where a single further run falls.',
-            (*cell_sections, *further),
+            (*cell_tables(results), *further),
         ),
         Chapter(
             "Beyond the paper",
             "Measures that the paper does not define; none of them enters a verdict above.",
-            (*(Section("", figures=(figure,)) for figure in trade_offs), *of_faults),
+            (*(Section("", figures=(f,)) for f in trade_off_figure(results)), *of_faults),
         ),
-        Chapter("Set-up", "", setup),
-        Chapter("Methods", "", (Section("", lines=(method,)),)),
+        Chapter("Set-up", "", setup_sheet(plan)),
+        Chapter("Methods", "", (Section("", lines=(methods(plan, results.looks),)),)),
     ]
     report = Document(
-        title,
-        text,
+        _title(results),
+        tuple(_text(results)),
         study_answer,
         points,
         tuple(chapter for chapter in chapters if chapter.sections),

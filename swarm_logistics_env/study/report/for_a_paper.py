@@ -13,14 +13,22 @@ from swarm_logistics_env.study.tasks.task_world import world_of
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.until_clear import HARDLY
 
-from . import section, templates
+from . import section
 from .answer import Answer
 from .answer_notes import meanings
 from .figures import parameter_label
 from .section import Section
 from .sentences import stop_of
-from .templates import Slots, fill
 
+_EXPLORATORY = "exploratory: over other seeds or P than were declared before the first run"
+# Why questions of a study that runs until it is clear were played no further, by `stop_of`.
+_STOPS = {
+    "clear": "{count} stopped where clear",
+    "hardly": "{count} as the rest of {most} seeds would decide them with a chance below {chance}",
+    "margin": "{count} as P changes by less than {margin} of P_o",
+    "untestable": "{count} as they cannot be tested",
+    "most": "{count} after all {most} seeds",
+}
 HOLM = "Verdicts are adjusted by Holm's method over all questions on an indicator of one policy."
 
 
@@ -42,7 +50,7 @@ def paper_tables(results: StudyResults, answer: Answer, sections: Iterable[Secti
     """Return the tables of a study for a paper: the answer, then those of these sections."""
     about = f"P is {results.plan.what_p_is}. {_world(results.plan)}; {results.seeds_text}."
     if results.exploratory:
-        about += f" {templates.EXPLORATORY[0].upper()}{templates.EXPLORATORY[1:]}."
+        about += f" {_EXPLORATORY[0].upper()}{_EXPLORATORY[1:]}."
     labels = {
         verdict.after.name: parameter_label(verdict)
         for verdict in results.verdicts
@@ -82,29 +90,25 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
     That is: policies, world, seeds, P and each indicator with its worst value, by policy and task,
     how verdicts were reached, and why questions were played no further.
     """
-    world = world_in_words(results.plan)
-    slots: dict[str, Slots] = {
-        "conditions": {
-            "policies": section.join_names(results.policies),
-            "world": f", {world}" if results.plan.origin else f" in {world}",
-            "how": _preset_and_engine(results.plan),
-            "seeds": results.seeds_text,
-        },
-        "subjects": {"sentences": _subjects(answer)},
-        "method": {"error": section.percent(1.0 - CONFIDENCE)},
-        "end": {},
-    }
+    place = "," if results.plan.origin else " in"
+    world = f"{world_in_words(results.plan)}{_preset_and_engine(results.plan)}"
+    sentences = [
+        f"{section.join_names(results.policies)}{place} {world}, {results.seeds_text}",
+    ]
     if answer.comparison:
-        slots["comparison"] = {"comparison": answer.comparison[:-1]}
+        sentences.append(answer.comparison[:-1])
+    sentences.append(_subjects(answer))
+    method = (
+        "Verdicts by Holm's method over all questions on an indicator of one policy, "
+        f"{section.percent(1.0 - CONFIDENCE)} error"
+    )
     if results.looks:
-        slots["looks"] = {
-            "looks": section.join_names([*map(str, results.looks)]),
-            "questions": section.plural(len(results.verdicts), "question"),
-            "stops": _stops(results),
-        }
+        looks = section.join_names([*map(str, results.looks)])
+        questions = section.plural(len(results.verdicts), "question")
+        method += f"; looked at after {looks} seeds: of {questions} {_stops(results)}"
     if results.exploratory:
-        slots["exploratory"] = {"exploratory": templates.EXPLORATORY}
-    return "".join(fill(templates.FOR_A_PAPER, slots))
+        method += f"; {_EXPLORATORY}"
+    return f"{'. '.join([*sentences, method])}."
 
 
 def _subjects(answer: Answer) -> str:
@@ -130,23 +134,23 @@ def _preset_and_engine(plan: Plan) -> str:
 def _stops(results: StudyResults) -> str:
     """Return why the questions of a study that runs until it is clear were played no further."""
     counts = Counter(stop_of(verdict) for verdict in results.verdicts)
-    slots: dict[str, Slots] = {
-        stop: {
-            "count": count,
-            "most": results.looks[-1],
-            "chance": section.percent(HARDLY),
-            "margin": section.percent(results.plan.specification.margin),
-        }
-        for stop, count in counts.items()
+    slots = {
+        "most": results.looks[-1],
+        "chance": section.percent(HARDLY),
+        "margin": section.percent(results.plan.specification.margin),
     }
-    return ", ".join(fill(templates.STOPS, slots))
+    return ", ".join(
+        template.format(count=counts[stop], **slots)
+        for stop, template in _STOPS.items()
+        if stop in counts
+    )
 
 
 def world_in_words(plan: Plan) -> str:
     """Return in words where a study was played, e.g. "a warehouse of 6 m x 5 m with .."."""
     if plan.origin is not None:
         stated = "".join(f", {name} {value}" for name, value in plan.origin.setup)
-        return templates.WORLD["trials"].format(file=plan.origin.file, setup=stated)
+        return f"trials of {plan.origin.file}{stated}"
     task = plan.specification.played
     words = world_of(task).world_in_words(plan.specification.scenario)
-    return words or templates.WORLD["task"].format(task=task.name)
+    return words or f"the task {task.name}"

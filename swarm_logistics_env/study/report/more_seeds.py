@@ -11,11 +11,17 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 from swarm_logistics_env.study.verdicts.verdict import POWER, Verdict
 
-from . import section, templates
-from .templates import Slots, fill
+from . import section
 
 EFFECT = 0.1  # the smallest for which more seeds are worth while
 _MOST_NAMED = 3  # questions
+# What questions need, by the case that applies to them.
+_NEEDS = {
+    "within_reach": "{count} open may be decided by {n_seeds} {runs} or more",
+    "beyond": "{count} open need more than {reach} {runs} ({named})",
+    "none": "{count} open: no number in reach will do ({named})",
+    "small": f"{{count}} open of an effect below {EFFECT:g}, for which more are not worth while",
+}
 
 
 class MoreSeeds(NamedTuple):
@@ -45,25 +51,20 @@ def more_seeds(results: StudyResults) -> MoreSeeds:
             case, n_seeds = _need(verdict, reach)
             needs.setdefault(case, []).append((verdict, n_seeds))
     runs = "trials a condition" if results.plan.origin else "seeds"
-    slots_by_case: dict[str, Slots] = {}
-    n_seeds_within = None
-    for case, questions in needs.items():
-        slots: dict[str, object] = {
-            "count": len(questions),
-            "runs": runs,
-            "reach": reach,
-            "effect": EFFECT,
-            "named": _named(questions),
-        }
-        if case == "within_reach":
-            n_seeds_within = max(n_seeds or 0 for _, n_seeds in questions)
-            slots["n_seeds"] = n_seeds_within
-        slots_by_case[case] = slots
-    return MoreSeeds(n_seeds_within, ", ".join(fill(templates.MORE_SEEDS, slots_by_case)))
+    within_reach = [n_seeds or 0 for _, n_seeds in needs.get("within_reach", ())]
+    most = max(within_reach, default=None)
+    words = [
+        template.format(
+            count=len(needs[case]), n_seeds=most, runs=runs, reach=reach, named=_named(needs[case])
+        )
+        for case, template in _NEEDS.items()
+        if case in needs
+    ]
+    return MoreSeeds(most, ", ".join(words))
 
 
 def _need(verdict: Verdict, reach: int) -> tuple[str, int | None]:
-    """Return which template of `MORE_SEEDS` applies to an open verdict, and the seeds it needs."""
+    """Return which case of `_NEEDS` applies to an open verdict, and the seeds it needs."""
     estimate = verdict.estimate
     assert estimate is not None
     if verdict.conclusion == "equivalent":

@@ -7,17 +7,20 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from swarm_logistics_env.spi import Interval
+from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 from . import drawing
+from .answer import Answer
 from .document import Document
-from .drawing import Panel
+from .drawing import Panel, Point
+from .figures import forest_label
 from .inline_svg import inline
-from .page_forest import forest
-from .section import P_LEVEL, bracketed, digits_of, width_of
+from .section import P_LEVEL, bracketed, digits_of, ratio, width_of
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
 # Name, drawing, what it shows, and what its marks mean.
 Chart: TypeAlias = tuple[str, str, Sequence[Panel], tuple[str, ...]]
 _HEIGHT = 2.9  # inch, of a drawing of P
+_ROW_HEIGHT = 20.0  # px, of the drawing of a line of the answer
 # Of decisions, on light and on dark paper, after Okabe and Ito.
 _COLOURS = {
     "supported": ("#006b4c", "#3fc79a"),
@@ -69,7 +73,7 @@ def html(document: Document, drawings: Mapping[str, str], latex: str) -> str:
         lstrip_blocks=True,
     )
     views = list(_views(document, drawings))
-    rows, axis = forest(document.answer, document.points)
+    rows, axis = _forest(document.answer, document.points)
     environment.filters["marked_up"] = marked_up
     return environment.get_template("page.html.jinja").render(
         document=document,
@@ -90,9 +94,10 @@ def html(document: Document, drawings: Mapping[str, str], latex: str) -> str:
 
 def marked_up(text: str) -> Markup:
     """Return a text as HTML: counted verdicts have their colours, and no line ends in an option."""
-    from markupsafe import Markup, escape
+    from markupsafe import Markup
+    from markupsafe import escape as escaped
 
-    html = re.sub(r"--[a-z][\w-]*", r'<span class="option">\g<0></span>', str(escape(text)))
+    html = re.sub(r"--[a-z][\w-]*", r'<span class="option">\g<0></span>', str(escaped(text)))
     counted = rf"\d+ ({'|'.join(_COLOURS)})\b"
     return Markup(re.sub(counted, r'<span class="word \1">\g<0></span>', html))
 
@@ -128,3 +133,70 @@ def _titles(panels: Sequence[Panel]) -> dict[str, str]:
             if point.published is not None:
                 titles[f"published-{point.link}"] = f"published: {point.published:g}"
     return titles
+
+
+class _Axis(NamedTuple):
+    """The axis of the values, from `low` to `high`."""
+
+    low: float
+    high: float
+
+    @property
+    def ticks(self) -> list[float]:
+        from matplotlib.ticker import MaxNLocator
+
+        ticks = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(self.low, self.high)
+        return [float(tick) for tick in ticks if self.low <= tick <= self.high]
+
+    def place(self, value: float) -> str:
+        inside = min(max(value, self.low), self.high)
+        return f"{100 * (inside - self.low) / (self.high - self.low):.2f}%"
+
+    def upright(self, value: float, top: float, bottom: float, css_class: str) -> str:
+        x = self.place(value)
+        return f'<line class="{css_class}" x1="{x}" x2="{x}" y1="{top:g}" y2="{bottom:g}"/>'
+
+
+def _forest(answer: Answer, points: Sequence[Point]) -> tuple[list[str], str]:
+    """Return a drawing of each line of the answer, and their axis with its numbers and title.
+
+    Places along the axis are in percent: a drawing fits any width, and its marks keep their shape.
+
+    Args:
+        points: the value of each line.
+    """
+    axis = _Axis(*drawing.limits(points))
+    drawn = [_row(axis, point, line.verdict) for point, line in zip(points, answer.lines)]
+    numbers = "".join(
+        f'{axis.upright(tick, 0, 4, "axis")}<text x="{axis.place(tick)}" y="15">{tick:g}</text>'
+        for tick in axis.ticks
+    ).replace(">-", ">\N{MINUS SIGN}")
+    numbers += f'<text x="50%" y="30">{escape(forest_label(answer))}</text>'
+    line = '<line class="axis" x1="0" x2="100%" y1="0.5" y2="0.5"/>'
+    return drawn, f'<svg height="34">{line}{numbers}</svg>'
+
+
+def _row(axis: _Axis, point: Point, verdict: Verdict) -> str:
+    grid = "".join(axis.upright(tick, 0, _ROW_HEIGHT, "grid") for tick in axis.ticks)
+    zero = axis.upright(0.0, 0, _ROW_HEIGHT, "threshold")
+    marks = "".join(_mark(axis, _ROW_HEIGHT / 2, point, verdict))
+    return f'<svg height="{_ROW_HEIGHT:g}" aria-hidden="true">{grid}{zero}{marks}</svg>'
+
+
+def _mark(axis: _Axis, y: float, point: Point, verdict: Verdict) -> Iterator[str]:
+    """Yield the parts of a value with its interval, in the colour of its verdict."""
+    if point.value is None:
+        return
+    title = f"{verdict.compared.label}: {ratio(verdict)}, {verdict.in_words}"
+    number = point.link.rpartition("-")[2]
+    yield f'<g class="{verdict.conclusion}" data-question="{number}"><title>{escape(title)}</title>'
+    if point.low is not None and point.high is not None:
+        ends = axis.place(point.low), axis.place(point.high)
+        yield f'<line x1="{ends[0]}" x2="{ends[1]}" y1="{y:g}" y2="{y:g}"/>'
+        for end in (point.low, point.high):
+            if axis.low < end < axis.high:  # without an end where it leaves the axis
+                yield axis.upright(end, y - 2.5, y + 2.5, "end")
+    if point.published:
+        yield axis.upright(point.published, y - 4.5, y + 4.5, "threshold")
+    hollow = "" if point.decided else ' class="hollow"'
+    yield f'<use href="#mark-o"{hollow} x="{axis.place(point.value)}" y="{y:g}"/></g>'

@@ -13,7 +13,7 @@ from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
-from . import section, templates
+from . import section
 from .section import Section
 
 
@@ -86,7 +86,10 @@ class _Compared(NamedTuple):
         }
         as_it_is = [v for v in sound if v.compared.original.case.scenario == base]
         usual = [v for v in sound if v.compared.original.case.key in references]
-        main = max(as_it_is or usual or sound or verdicts, key=_n_seeds)
+        main = max(
+            as_it_is or usual or sound or verdicts,
+            key=lambda v: v.estimate.n_seeds if v.estimate else 0,
+        )
         return cls(main, [verdict for verdict in verdicts if verdict is not main])
 
     @property
@@ -105,20 +108,21 @@ class _Compared(NamedTuple):
         first = self.main.after.name
         second = self.main.compared.policy
         if self.main.interval is None:
-            return templates.POLICIES["undefined"].format(
-                first=first, second=second, condition=self.condition, problem=self.main.problem
+            return (
+                f"P of {first} and of {second} cannot be compared: {self.main.problem} "
+                f"({self.condition})"
             )
         if not self.is_ahead:
             first, second = second, first
         factor = _factor(self.main.interval, inverted=not self.is_ahead)
-        is_decided = self.main.on_threshold.adjusted in ("supported", "refuted")
-        text = templates.POLICIES["decided" if is_decided else "open"].format(
-            first=first,
-            second=second,
-            times=section.bracketed(factor, 2, [1.0]),
-            condition=self.condition,
-        )
-        return text + (_elsewhere(self.elsewhere, self.is_ahead) if self.elsewhere else ".")
+        times = f"{section.bracketed(factor, 2, [1.0])} times"
+        if self.main.on_threshold.adjusted in ("supported", "refuted"):
+            text = f"P of {first} is {times} that of {second} ({self.condition})"
+        else:
+            text = (
+                f"Whether P of {first} or of {second} is larger is open: {times} ({self.condition})"
+            )
+        return f"{text}{_elsewhere(self.elsewhere, self.is_ahead)}."
 
     @property
     def row(self) -> tuple[str, ...]:
@@ -134,10 +138,6 @@ class _Compared(NamedTuple):
         return name, times, words.get(word, word), ", ".join(others)
 
 
-def _n_seeds(verdict: Verdict) -> int:
-    return verdict.estimate.n_seeds if verdict.estimate else 0
-
-
 def _factor(change: Interval, *, inverted: bool) -> Interval:
     """Return a relative change as a factor of P, or as that of the other policy."""
     value, low, high = (None if end is None else 1.0 + end for end in change)
@@ -149,7 +149,10 @@ def _factor(change: Interval, *, inverted: bool) -> Interval:
 
 
 def _elsewhere(verdicts: Sequence[Verdict], is_ahead: bool) -> str:
-    """Return in how many other conditions the order is the same, and where it is not."""
+    """Return in how many other conditions the order is the same, and where it is not.
+
+    Empty: there are no others.
+    """
     alike = "supported" if is_ahead else "refuted"
     turned = "refuted" if is_ahead else "supported"
     by_word: dict[str, list[str]] = map_reduce(
@@ -158,13 +161,12 @@ def _elsewhere(verdicts: Sequence[Verdict], is_ahead: bool) -> str:
         # Without commas: they stand between conditions.
         lambda v: condition_of(v).replace(",", ""),
     )
-    clauses = []
+    text = ""
     if n_same := len(by_word.pop(alike, ())):
-        clauses.append(templates.POLICIES["same"].format(n_same=n_same, n_others=len(verdicts)))
+        text += f"; so in {n_same} of {len(verdicts)} other conditions"
     if turned in by_word:
-        conditions = ", ".join(by_word.pop(turned))
-        clauses.append(templates.POLICIES["turned"].format(conditions=conditions))
+        text += f"; the other way round: {', '.join(by_word.pop(turned))}"
     undecided = [condition for conditions in by_word.values() for condition in conditions]
     if undecided:
-        clauses.append(templates.POLICIES["undecided"].format(conditions=", ".join(undecided)))
-    return "".join(clauses) + "."
+        text += f"; open: {', '.join(undecided)}"
+    return text

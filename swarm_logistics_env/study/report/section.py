@@ -17,8 +17,6 @@ from swarm_logistics_env.study.questions.comparison import CONFIDENCE
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 
-from . import templates
-
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -212,20 +210,20 @@ def ratio(verdict: Verdict, *, names_level: bool = True) -> str:
 def question_of(verdict: Verdict) -> str:
     """Return what a verdict answers, e.g. "R FM4, 1 of 25"."""
     comparison = verdict.compared
-    before = comparison.original.setting
     after = verdict.after
-    usual_property = comparison.definition.adjectives.get(0.0)
-    slots: dict[str, object] = {
-        "name": after.name,
-        "before": before.value,
-        "value": after.value,
-        "property": "" if verdict.property_name == usual_property else f", {verdict.property_name}",
-        "start": f" from {after.onset:g} s" if after.onset else "",
-        "n_robots": comparison.n_robots,
-        "condition": after.condition,
-    }
-    case = "policies" if after.condition else after.kind
-    return f"{comparison.indicator} {templates.QUESTION[case].format(**slots)}"
+    if after.condition:
+        return f"{comparison.indicator} to {after.name}, {after.condition}"
+    if after.kind == "fault":
+        start = f" from {after.onset:g} s" if after.onset else ""
+        change = f"{after.name}{start}, {after.value:g} of {comparison.n_robots}"
+    elif after.kind == "policy":
+        change = f"with {after.name}"
+    else:
+        name = "N" if after.kind == "size" else after.name
+        change = f"{name} {comparison.original.setting.value:g}→{after.value:g}"
+    if verdict.property_name != comparison.definition.adjectives.get(0.0):
+        change += f", {verdict.property_name}"
+    return f"{comparison.indicator} {change}"
 
 
 def word_to_count(verdict: Verdict, word: str) -> str:

@@ -13,9 +13,37 @@ from swarm_logistics_env.study.questions.comparison import Family
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
-from . import templates
 from .section import SATURATED, Section, Sentence, bracketed, fixed, limits, percent
-from .templates import Slots, fill
+
+# What limits a verdict, by the flag of its estimate.
+_FLAGS = {
+    "single_seed": "One seed gives a value, but no interval and no verdict.",
+    "too_few_seeds": "Two seeds give no verdict, because whole numbers agree by chance.",
+    "degenerate": "The seeds show no spread, so there is no interval and no verdict.",
+    "cannot_fail": "As no P is below 0, it cannot lie below the threshold, so it is not tested and "
+    "has no verdict.",
+    "few_pairs_differ": "Nearly all pairs of runs have equal P, so that a handful of deliveries "
+    "would decide: it is not tested and has no verdict.",
+    "reference_near_0": "The interval of P_o reaches 0, so that a change relative to it says "
+    "nothing: it is not tested and has no verdict.",
+    "capped": "P is capped on the side that the verdict leans to, so the verdict is open.",
+    "hidden_stalls": "These runs are too few to exclude stalled ones that would turn the verdict, "
+    "so it is open.",
+    "unbounded": "Mean P_o cannot be told from 0 at so few seeds, so the interval is infinite, and "
+    "the verdict comes from the test.",
+    "hidden_collapses": "These trainings are too few to exclude collapses that would turn the "
+    "verdict, so it is open.",
+    "assumes_normal": "The verdict is provisional, because fewer than ten seeds show too little of "
+    "how they scatter.",
+    "few_trainings": "Fewer than five trainings give no verdict.",
+}
+# What became of a question of a study that runs until it is clear, and why, by `stop_of`.
+_STOPS = {
+    "clear": ("Clear at", ""),
+    "hardly": ("Open after", ": the others would hardly decide it"),
+    "margin": ("Open after", ": P changes by less than the margin"),
+    "most": ("Open after", ""),
+}
 
 
 def verdict_sections(
@@ -36,83 +64,71 @@ def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
     if comparison.original.setting.kind in ("size", "policy"):
         swarm = ""
     head = f"{comparison.policy}, {verdict.property_name}? {comparison.label}{swarm}."
-    slots_by_case = dict(_parts(results, verdict))
-    text = " ".join(fill(templates.VERDICT, slots_by_case))
+    text = " ".join(_parts(results, verdict))
     return Sentence(head, text, verdict.conclusion, verdict.in_words)
 
 
-def _parts(results: StudyResults, verdict: Verdict) -> Iterator[tuple[str, Slots]]:
-    """Yield what is known of a verdict: the templates that apply, each with its slots."""
+def _parts(results: StudyResults, verdict: Verdict) -> Iterator[str]:
+    """Yield what is known of a verdict, a sentence each."""
     estimate = verdict.estimate
     indicator = verdict.compared.indicator
     if estimate is None:
-        yield "undefined", {"problem": verdict.problem}
+        yield f"Undefined: {verdict.problem}."
         return
     seeds = _seeds_of(results, estimate)
     if estimate.identical:
-        yield "unaffected", {"indicator": indicator, "value": estimate.value, "seeds": seeds}
+        yield (
+            f"{indicator} = {estimate.value:.3f} exactly, over {seeds}: unaffected. Both "
+            "conditions gave the same runs, so there is nothing to test."
+        )
         return
-    interval = limits(estimate, 3)
-    yield (
-        "interval" if interval else "no_interval",
-        {
-            "indicator": indicator,
-            "mark": SATURATED if verdict.saturated else "",
-            "value": fixed(estimate.value, 3, [estimate.threshold]),
-            "level": percent(estimate.confidence),
-            "limits": interval,
-            "seeds": seeds,
-        },
-    )
+    mark = SATURATED if verdict.saturated else ""
+    value = f"{indicator}{mark} = {fixed(estimate.value, 3, [estimate.threshold])}"
+    if interval := limits(estimate, 3):
+        yield f"{value}, {percent(estimate.confidence)} interval {interval} over {seeds}."
+    else:
+        yield f"{value} (no interval) over {seeds}."
     if not estimate.untestable:
         plain, adjusted = verdict.on_property
+        # One seed gives no p, and Holm's placeholder of 1 says nothing.
+        p_adjusted = None if estimate.p_value is None else verdict.p_adjusted
         yield (
-            "decision",
-            {
-                "plain": plain,
-                "p": _p(estimate.p_seen),
-                "adjusted": adjusted,
-                # One seed gives no p, and Holm's placeholder of 1 says nothing.
-                "adjusted_p": _p(None if estimate.p_value is None else verdict.p_adjusted),
-            },
+            f"Unadjusted: {plain}{_p(estimate.p_seen)}; Holm-adjusted: {adjusted}{_p(p_adjusted)}."
         )
     if verdict.on_claim is not None:
         plain, adjusted = verdict.on_claim
         words = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
-        yield "claim", {"claim": verdict.claim, "words": words}
+        yield f'Claim "{verdict.claim}": {words}.'
     if verdict.equivalence is not None and verdict.on_equivalence is not None:
         plain, adjusted = verdict.on_equivalence
         words = plain if plain == adjusted else f"{plain} ({adjusted} under Holm)"
-        yield (
-            "equivalence",
-            {
-                "question": verdict.equivalence_name,
-                "change": _change(verdict.equivalence.change, verdict.margin),
-                "words": words,
-            },
-        )
-    if verdict.flags:
-        yield "flags", {"flags": " ".join(templates.FLAGS[flag] for flag in verdict.flags)}
+        change = _change(verdict.equivalence.change, verdict.margin)
+        yield f"{verdict.equivalence_name}? Change {change}: {words}."
+    yield from (_FLAGS[flag] for flag in verdict.flags)
+    if estimate.collapsed is not None:
+        yield f"Trainings: {estimate.collapsed}."
     if "hidden_stalls" in verdict.flags:
         runs = "seeds" if results.plan.paired else "trials a condition"
-        n_runs = spi.seeds_against_stalls(estimate)
-        yield "hidden_stalls", {"p": estimate.p_value, "n_runs": n_runs, "runs": runs}
-    if estimate.collapsed is not None:
-        yield "collapsed", {"collapsed": estimate.collapsed}
+        yield (
+            f"With stalls that may be hidden p is {estimate.p_value:.2g}: it needs at least "
+            f"{spi.seeds_against_stalls(estimate)} {runs}."
+        )
     if "hidden_collapses" in verdict.flags:
-        n_trainings = spi.trainings_against_collapses(estimate)
-        yield "hidden_collapses", {"p": estimate.p_value, "n_trainings": n_trainings}
+        yield (
+            f"With collapses that may be hidden p is {estimate.p_value:.2g}: it needs at least "
+            f"{spi.trainings_against_collapses(estimate)} trainings."
+        )
     if results.plan.specification.until_clear and not estimate.untestable:
-        case = stop_of(verdict)
-        yield case, {"n_seeds": estimate.n_seeds, "most": results.looks[-1]}
+        stop, reason = _STOPS[stop_of(verdict)]
+        yield f"{stop} {estimate.n_seeds} of at most {results.looks[-1]} seeds{reason}."
     if results.exploratory:
-        yield "exploratory", {}
+        yield "Exploratory."
 
 
 def stop_of(verdict: Verdict) -> str:
     """Return why a question of a study that runs until it is clear was played no further.
 
-    A key of `templates.STOPS`; "most": as all seeds were played, or nothing decides yet.
+    "clear", a name in `WHY_GIVEN_UP`, or "most": all seeds were played, or nothing decides yet.
     """
     return "clear" if verdict.stopped_at is not None else verdict.given_up or "most"
 

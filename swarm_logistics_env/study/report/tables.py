@@ -98,7 +98,7 @@ def _layouts(
 
 def _performance_columns(*, published: bool, looks: bool) -> Iterator[CellColumn]:
     if published:
-        yield "P paper", _published_text
+        yield "P paper", lambda cell: NOTHING if cell.published is None else f"{cell.published:g}"
     heading = "P ours" if published else "P"
     yield f"{heading} [{section.P_LEVEL}]", section.mean_p
     if looks:  # conditions have seeds as many as were needed
@@ -142,10 +142,6 @@ _COUNTED: tuple[tuple[str, str, Callable[[Cell], str]], ...] = (
 )
 
 
-def _published_text(cell: Cell) -> str:
-    return NOTHING if cell.published is None else f"{cell.published:g}"
-
-
 def _one_run(cell: Cell) -> str:
     return section.limits(cell.one_run, section.digits_of(cell.mean.value)) or NOTHING
 
@@ -166,12 +162,14 @@ def _answers(
     levels = {verdict.level for verdict in verdicts} - {None}
     if len(levels) > 1:
         yield _column(f"{indicator} [interval]", verdicts, ratio)
-        yield _column("level", verdicts, _level)
+        yield _column("level", verdicts, lambda v: section.percent(v.level) if v.level else NOTHING)
     else:
         heading = f"{indicator} [{section.percent(level_of(verdicts))}]"
         yield _column(heading, verdicts, ratio)
     if looks:
-        yield _column("seeds", verdicts, _number_of_seeds)
+        yield _column(
+            "seeds", verdicts, lambda v: str(v.estimate.n_seeds) if v.estimate else NOTHING
+        )
     if published:
         yield _column(f"{indicator} paper", verdicts, lambda v: section.number(v.published))
     by_property: dict[str, list[Verdict]] = map_reduce(verdicts, lambda v: v.property_name)
@@ -186,14 +184,6 @@ def _column(
 ) -> CellColumn:
     verdict_of = {verdict.compared.changed: verdict for verdict in verdicts}
     return heading, lambda cell: text(verdict_of[cell.arm]) if cell.arm in verdict_of else NOTHING
-
-
-def _level(verdict: Verdict) -> str:
-    return section.percent(verdict.level) if verdict.level else NOTHING
-
-
-def _number_of_seeds(verdict: Verdict) -> str:
-    return str(verdict.estimate.n_seeds) if verdict.estimate else NOTHING
 
 
 def _claim_text(verdict: Verdict) -> str:

@@ -25,11 +25,6 @@ from swarm_logistics_env.world.warehouse.faults import text_of
 from .task import Case, Fields, Outcome, TaskScenario
 from .task_world import TaskWorld
 
-_WORLD = (
-    "a warehouse of {width:g} m x {height:g} m{floor} with {n_items} items{restock}, robots of "
-    "{speed:g} m/s{drive}{handling}"
-)
-
 _MOST_CHANGES = 4  # of a preset that is still named
 
 # What decides an episode. The other files hold messages, validation, statistics and pictures, and
@@ -117,15 +112,12 @@ class WarehouseTask(TaskWorld):
         assert isinstance(scenario, Scenario)
         drive = "" if scenario.drive == "holonomic" else f" and {scenario.drive} drive"
         handling = f" that lift in {scenario.handling_time:g} s" if scenario.handling_time else ""
-        return _WORLD.format(
-            width=scenario.warehouse_width,
-            height=scenario.warehouse_height,
-            floor=f" (floor {scenario.floor})" if scenario.floor else "",
-            n_items=scenario.n_items,
-            restock=" that come back" if scenario.restock else "",
-            speed=scenario.max_speed,
-            drive=drive,
-            handling=handling,
+        floor = f" (floor {scenario.floor})" if scenario.floor else ""
+        restock = " that come back" if scenario.restock else ""
+        return (
+            f"a warehouse of {scenario.warehouse_width:g} m x {scenario.warehouse_height:g} m"
+            f"{floor} with {scenario.n_items} items{restock}, robots of {scenario.max_speed:g} m/s"
+            f"{drive}{handling}"
         )
 
     def preset_in_words(self, scenario: TaskScenario) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from shlex import quote
 
@@ -41,7 +41,7 @@ class FaultNames:
             self._names[name] = usual_fault(name) or spelled[name.casefold()]
             if name.casefold() in NOT_KNOWN:
                 with complaints.noted():
-                    _refuse_unnamed(fault, robots, name)
+                    _refuse_unnamed(fault, name, complaints)
                 self._names[name] = NO_FAULT_WORD
                 shown = repr(name) if name else "An empty cell"
                 self.notes.append(f"{shown} in {fault.name!r} is taken for no fault.")
@@ -97,12 +97,10 @@ def notes_on_words(columns: Columns, mapped: Mapping[str, str]) -> Iterator[str]
         yield f"Words taken for ours: {pairs}."
 
 
-def _refuse_unnamed(fault: Cells, robots: Sequence[str], name: str) -> None:
+def _refuse_unnamed(fault: Cells, name: str, complaints: Complaints) -> None:
     """Refuse a row that names no fault where others do, unless it says that no robot failed."""
-    if all(text.casefold() in NOT_KNOWN for text in fault.texts):
-        return
-    for row, text in enumerate(fault.texts):
-        if text == name and robots[row] not in ZERO:
+    for row in complaints.missing.get(fault.name, ()):
+        if fault.texts[row] == name:
             replacement = quote(f"{fault.name}:{name}={NO_FAULT_WORD}")
             raise fault.error(
                 row,

@@ -9,7 +9,7 @@ from swarm_logistics_env.spi.inputs import IndicatorError
 
 from .complaints import Complaints
 from .fault_names import ZERO, usual_fault
-from .table import Cells, Columns, Table
+from .table import Cells, Columns, Table, are_numbers
 from .trial import NO_FAULT_WORD
 from .words import NOT_KNOWN, means_no_number
 
@@ -31,12 +31,12 @@ def missing_rows(columns: Columns) -> dict[str, list[int]]:
     for meaning, cells in meanings.items():
         if meaning in _NAMES:
             rows[cells.name] = _empty_among_others(cells)
-        elif meaning in needed and _are_numbers(cells):
+        elif meaning in needed and are_numbers(cells.texts):
             rows[cells.name] = _without_number(cells)
         elif meaning in _MAY_BE_EMPTY:
             rows[cells.name] = [row for row in _without_number(cells) if cells.texts[row]]
     for cells in (*columns.parameters, *columns.blocks):
-        if _are_numbers(cells):
+        if are_numbers(cells.texts):
             rows[cells.name] = _without_number(cells)
         elif cells in columns.blocks:
             rows[cells.name] = _empty_among_others(cells)
@@ -67,12 +67,6 @@ def without_rows(table: Table, complaints: Complaints) -> Table:
         origins=[table.origins[row] for row in complete] if table.origins else (),
         notes=(*table.notes, f"{words}: {complaints.counts}."),
     )
-
-
-def _are_numbers(cells: Cells) -> bool:
-    """Return whether the cells with a value are meant as numbers, and there is one."""
-    texts = [text for text in cells.texts if not means_no_number(text)]
-    return bool(texts) and replace(cells, texts=texts).are_like_numbers()
 
 
 def _without_number(cells: Cells) -> list[int]:

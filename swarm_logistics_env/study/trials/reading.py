@@ -7,8 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .cell_checks import check_cells
-from .column_checks import check_columns
 from .complaints import Complaints
 from .fault_names import FaultNames, notes_on_words
 from .finished import finished_words
@@ -17,6 +15,7 @@ from .pairing import paired_by_blocks
 from .readers import read_table
 from .references import notes_on_references, references_of
 from .table import Cells, Columns, Table
+from .table_checks import check_cells, check_columns
 from .trial import Column, Trial, Trials
 from .trial_columns import columns_of
 from .trial_rows import numbered_blocks, trials_of
@@ -72,11 +71,12 @@ def read_trials(
         IndicatorError: the file cannot be read, or a line of it; names line, column and value.
     """
     mapped = dict(columns or {})
-    table = _table_of(source, mapped, ignore, values, sum_over, wide)
+    table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide)
+    table = with_values(with_constants(table, mapped), mapped, values)
+    table = summed_over(table, sum_over, mapped)
     table_columns, complaints = _columns_of(
         table, mapped, ignore, decimal, thousands, skip_missing=skip_missing
     )
-    table = table_columns.table
     finished = finished_words(table_columns, complaints)
     check_cells(table_columns, complaints, is_summed=sum_over is not None)
     faults = FaultNames(table_columns, complaints)
@@ -85,10 +85,9 @@ def read_trials(
     blocks = numbered_blocks(table_columns)
     trials, conditions = trials_of(table_columns, faults, finished, blocks, duration, complaints)
     means, notes_on_pairs = paired_by_blocks(table_columns, trials)
-    names = [cells.name for cells in table_columns.parameters]
-    references = tuple(references_of(table.source, means, names, reference or {}))
+    references = tuple(references_of(table_columns, means, reference or {}))
     notes = [
-        *table.notes,
+        *table_columns.table.notes,
         *table_columns.notes,
         *notes_on_words(table_columns, mapped),
         *faults.notes,
@@ -107,20 +106,6 @@ def read_trials(
         references,
         tuple(blocks),
     )
-
-
-def _table_of(
-    source: str | Path | pd.DataFrame,
-    mapped: dict[str, str],
-    ignore: Sequence[str],
-    values: Sequence[str],
-    sum_over: str | None,
-    wide: str | None,
-) -> Table:
-    """Return a table with a row for each trial or delivery, and cells as somebody says."""
-    table = long_of(read_table(source, mapped, ignore), mapped, ignore, wide)
-    table = with_values(with_constants(table, mapped), mapped, values)
-    return table if sum_over is None else summed_over(table, sum_over, mapped)
 
 
 def _columns_of(

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from swarm_logistics_env.spi.inputs import IndicatorError
 
+from .table import Columns
 from .trial import NO_FAULT_WORD, Trial
 
 
 def references_of(
-    source: str, trials: Sequence[Trial], varying: Sequence[str], named: Mapping[str, float]
+    columns: Columns, trials: Sequence[Trial], named: Mapping[str, float]
 ) -> Iterator[tuple[str, str, float]]:
     """Yield table, parameter and the value that A is relative to, where it is settled.
 
@@ -19,19 +20,19 @@ def references_of(
     over all policies. Where several conditions have as many and differ in it, nothing settles it.
 
     Args:
-        source: what messages call the file.
-        varying: names of the parameters.
+        columns: that the trials were read from.
         named: the parameters whose reference somebody names.
 
     Raises:
         IndicatorError: something named is no parameter, or no trial without a fault has the value.
     """
+    varying = [cells.name for cells in columns.parameters]
     plain = [trial for trial in trials if trial.fault == NO_FAULT_WORD]
     for name, value in named.items():
         if name not in varying:
             raise IndicatorError(
-                f"--reference {name}={value:g}: {source} has no parameter {name!r} that varies, "
-                f"but {', '.join(map(repr, varying)) or 'none'}"
+                f"--reference {name}={value:g}: {columns.table.source} has no parameter {name!r} "
+                f"that varies, but {', '.join(map(repr, varying)) or 'none'}"
             )
         values = sorted({dict(trial.parameters)[name] for trial in plain})
         if value not in values:

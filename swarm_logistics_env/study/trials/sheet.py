@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from .table import Formula, Table, like_a_number
+from .table import Formula, Table, are_numbers, like_a_number
 from .units import UNIT_OF
 from .words import REPETITIONS, TOTALS, means_no_number, plain
 
@@ -61,7 +61,7 @@ def _with_units_in_names(table: Table) -> Table:
     """Return a table whose first row, if it is one of units or repetitions, is in the names."""
     first, *trials = table.cells or [()]
     columns = [*zip(*trials)]
-    numbered = [number for number, texts in enumerate(columns) if _are_numbers(texts)]
+    numbered = [number for number, texts in enumerate(columns) if are_numbers(texts)]
     units = [first[number] for number in numbered]
     line = table.lines[0] if table.lines else 0
     where = f"{table.line_word} {line}"
@@ -79,11 +79,6 @@ def _with_units_in_names(table: Table) -> Table:
         return table
     notes = (*table.notes, f"{note[0].upper()}{note[1:]}")
     return replace(table, header=header, cells=trials, lines=table.lines[1:], notes=notes)
-
-
-def _are_numbers(texts: Sequence[str]) -> bool:
-    values = [text for text in texts if not means_no_number(text)]
-    return bool(values) and all(map(like_a_number, values))
 
 
 def _is_unit(text: str) -> bool:

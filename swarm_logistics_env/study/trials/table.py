@@ -224,6 +224,12 @@ def like_a_number(text: str) -> bool:
     return bool(_LIKE_A_NUMBER.fullmatch(text) or _GROUPED.fullmatch(text))
 
 
+def are_numbers(texts: Sequence[str]) -> bool:
+    """Return whether all cells with a value are meant as numbers, and there is one."""
+    values = [text for text in texts if not means_no_number(text)]
+    return bool(values) and all(map(like_a_number, values))
+
+
 def holds_numbers(texts: Sequence[str]) -> bool:
     """Return whether most cells with a value are meant as numbers."""
     values = [text for text in texts if not means_no_number(text)]

@@ -194,8 +194,13 @@ def _rate(row: Row, finished: bool | None, limit: float | None) -> tuple[float, 
     work = row.number("work", 0.0) if "work" in row.columns.by_meaning else 1.0
     if finished:
         time = _time(row, "time_to_finish")
-        if "work" in row.columns.by_meaning and row.text("performance"):
-            _check_all_is_done(row, work)
+        done = row.number_or_none("performance")
+        if "work" in row.columns.by_meaning and done is not None and done < work:
+            raise row.error(
+                "performance",
+                f"should be its work of {work:g}, as the trial counts as finished; a column "
+                "'finished' says which did not",
+            )
         return work / time, None
     if row.text("duration"):
         lasted = _time(row, "duration")
@@ -212,15 +217,6 @@ def _rate(row: Row, finished: bool | None, limit: float | None) -> tuple[float, 
     if is_counted:
         return row.number("performance", 0.0) / lasted, None
     return work / lasted, 0.0
-
-
-def _check_all_is_done(row: Row, work: float) -> None:
-    if row.number("performance") < work:
-        raise row.error(
-            "performance",
-            f"should be its work of {work:g}, as the trial counts as finished; a column "
-            "'finished' says which did not",
-        )
 
 
 def _time(row: Row, column: str) -> float:

@@ -87,20 +87,22 @@ def _column_number(table: Table, columns: Mapping[str, str], column: str, option
     return table.index[name]
 
 
-def summed_over(table: Table, robots: str, columns: Mapping[str, str]) -> Table:
+def summed_over(table: Table, robots: str | None, columns: Mapping[str, str]) -> Table:
     """Return a table with a row for each trial, of one with a row for each of its robots.
 
     Rows that are equal but for what was delivered and the robot are of one trial. It stands where
     the first of them stood.
 
     Args:
-        robots: the column that tells a trial's robots apart.
+        robots: the column that tells a trial's robots apart; None: rows are of no robots.
         columns: what a column is to its name in the table, as somebody says.
 
     Raises:
         IndicatorError: there is no such column, none holds what was delivered, or a robot is in a
             trial twice.
     """
+    if robots is None:
+        return table
     if robots not in table.index:
         raise IndicatorError(
             f"--sum-over {robots}: {table.source} has no such column, but "

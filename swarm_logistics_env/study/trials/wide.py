@@ -144,8 +144,6 @@ def _as_said(table: Table, number: int, wide: str) -> Condition:
 
 def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[str, str]) -> Table:
     """Return a table with a row for each cell of the columns of conditions, but for their ends."""
-    import pandas as pd
-
     sizes = {condition["robots"] for condition in conditions.values() if "robots" in condition}
     if len(sizes) == 1:  # "none" beside "wheel 1 of 8"
         conditions = {n: {**condition, "robots": min(sizes)} for n, condition in conditions.items()}
@@ -160,17 +158,15 @@ def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[
             )
     # By their numbers, as several columns of one condition may have one name.
     labels = [number for number in range(len(table.header)) if number not in conditions]
-    frame = pd.DataFrame([*table.cells], dtype=object).assign(row=range(len(table.cells)))
-    long = frame.melt([*labels, "row"], [*conditions], "condition", CELLS)
     ends = _empty_ends(table, conditions)
-    trials = [
-        trial for trial in long.to_dict("records") if (trial["row"], trial["condition"]) not in ends
-    ]
     cells = []
-    for trial in trials:
-        condition = conditions[trial["condition"]]
+    rows = []
+    for number, condition in conditions.items():
         of_condition = [condition.get(name, "") for name in new]
-        cells.append([*(trial[label] for label in labels), *of_condition, trial[CELLS]])
+        for row, texts in enumerate(table.cells):
+            if (row, number) not in ends:
+                cells.append([*(texts[label] for label in labels), *of_condition, texts[number]])
+                rows.append(row)
     note = _note([table.header[n] for n in conditions], [*conditions.values()])
     if measured not in columns.values():
         note += " Their cells are read as P, of which more is better; where they are times until "
@@ -183,8 +179,8 @@ def _melted(table: Table, conditions: Mapping[int, Condition], columns: Mapping[
         meanings={**table.meanings, **meanings},
         header=[*(table.header[label] for label in labels), *new, measured],
         cells=cells,
-        lines=[table.lines[trial["row"]] for trial in trials],
-        origins=[table.origins[trial["row"]] for trial in trials] if table.origins else (),
+        lines=[table.lines[row] for row in rows],
+        origins=[table.origins[row] for row in rows] if table.origins else (),
         notes=(*table.notes, note),
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from typer import Argument, Option, echo
 
@@ -20,18 +20,6 @@ from .policy_choice import TrustOption, policies_of
 from .world_choice import PresetOption, ScenarioOption, SetOption, scenario_of
 
 
-class Format(NamedTuple):
-    """A format of files.
-
-    Attributes:
-        suffix: of the file's name.
-        write: writes the file at a path, for the robots of a scenario; returns what to say of it.
-    """
-
-    suffix: str
-    write: Callable[[Policy, Scenario, Path], object]
-
-
 def _write_contract(policy: Policy, scenario: Scenario, path: Path) -> Path:
     text = contract_of(policy, scenario).to_yaml()
     with atomic_write(path, RobotError) as part:
@@ -44,10 +32,11 @@ def _write_onnx(policy: Policy, _: Scenario, path: Path) -> Path:
     return path
 
 
-FORMATS = {
-    "c": Format(".c", write_c),
-    "contract": Format(".yaml", _write_contract),
-    "onnx": Format(".onnx", _write_onnx),
+# The end of a file's name, and what writes it for the robots of a scenario and returns what to say.
+FORMATS: dict[str, tuple[str, Callable[[Policy, Scenario, Path], object]]] = {
+    "c": (".c", write_c),
+    "contract": (".yaml", _write_contract),
+    "onnx": (".onnx", _write_onnx),
 }
 
 
@@ -69,7 +58,7 @@ def export_command(
         raise RobotError(f"--to {to}: no such format{suggest(to, FORMATS)}")
     (spec,) = policies_of([policy], trust_code)
     scenario = scenario_of(preset, scenario_file, changes, policies=[spec])
-    form = FORMATS[to]
-    path = out or Path(f"{slug(spec.title)}{form.suffix}")
-    written = form.write(spec.load(), scenario, path)
+    suffix, write = FORMATS[to]
+    path = out or Path(f"{slug(spec.title)}{suffix}")
+    written = write(spec.load(), scenario, path)
     echo(f"Written: {written}")

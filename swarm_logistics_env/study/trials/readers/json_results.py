@@ -11,6 +11,8 @@ from typing import Any
 from swarm_logistics_env.spi.inputs import IndicatorError
 from swarm_logistics_env.study.trials.table import NoTrialsError, Table
 
+from .data_frame import cell_text
+
 # What POGEMA measures, the first that is there is taken for performance.
 _POGEMA_METRICS = ("avg_throughput", "ISR", "CSR")
 _LEVELS = ("environment", "task", "algorithm", "run")  # of marl-eval
@@ -171,7 +173,7 @@ def _table(
     """Return the table of records, of whose metrics one is performance."""
     header = [*dict.fromkeys(name for record in records for name in record)]
     performance = next((name for name in preferred if name in metrics), metrics[0])
-    cells = [[_text(record.get(name)) for name in header] for record in records]
+    cells = [[cell_text(record.get(name)) for name in header] for record in records]
     other_metrics = [name for name in metrics if name != performance]
     note = f"These are {kind}: P is {performance}"
     note += "; --column performance=NAME takes another metric." if other_metrics else "."
@@ -179,9 +181,3 @@ def _table(
         str(path), digest, header, cells, range(1, len(cells) + 1), "record", kind,
         {"performance": performance}, frozenset(other_metrics), ".", (note,),
     )  # fmt: skip
-
-
-def _text(value: Any) -> str:
-    if value is None:
-        return ""
-    return repr(value) if isinstance(value, float) else str(value)
