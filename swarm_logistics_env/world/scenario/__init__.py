@@ -9,7 +9,7 @@ from pydantic import model_validator
 from swarm_logistics_env.core.errors import ScenarioError, suggest
 from swarm_logistics_env.world.floor import PLAN_SIZES, floor_title, with_plan_sizes
 
-from .batteries import BatteryFields, check_batteries
+from .battery_fields import BatteryFields, check_batteries
 from .checks import check
 from .fields import CHANGES_DURING_RUN, CHIPMUNK, LARGEST, SOURCES
 from .order_file import orders_text, orders_title
