@@ -111,7 +111,8 @@ GOLDEN = {
 for _mode in FAILURE_MODES:
     _passing = None if _mode == "removed" else 6.0
     _size = 2 if _mode.startswith("message_") else 0
-    GOLDEN[f"{_mode} from the start"] = _small(Fault(_mode, 2), message_size=_size)
+    _first = Fault(_mode, 2, duration=8.0 if _mode == "away" else None)
+    GOLDEN[f"{_mode} from the start"] = _small(_first, message_size=_size)
     GOLDEN[f"{_mode} for a while"] = _small(Fault(_mode, 3, 5.0, _passing), message_size=_size)
 GOLDEN |= {
     "several faults at once": _small(

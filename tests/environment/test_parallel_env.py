@@ -268,8 +268,8 @@ def test_infos_tell_failures_while_they_hold_and_observations_do_not() -> None:
         seen, _, _, _, infos = failing.step(still(failing))
         assert data_equivalence(seen, healthy.step(still(healthy))[0])
         modes.append(failing.warehouse.state.failure_modes[1])
-        assert infos["robot_0"] == {"failed": 0, "delivered": 0}
-        assert infos["robot_1"] == {"failed": int(bool(modes[-1])), "delivered": 0}
+        assert infos["robot_0"] == {"failed": 0, "away": 0, "delivered": 0}
+        assert infos["robot_1"] == {"failed": int(bool(modes[-1])), "away": 0, "delivered": 0}
     assert modes == [(), ("FM2",), ("FM2", "FM4"), ("FM4",), ("FM4",)]
 
 

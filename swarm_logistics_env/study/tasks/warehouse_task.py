@@ -90,7 +90,7 @@ class WarehouseTask(TaskWorld):
         self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
     ) -> Fault:
         """Return the fault of some robots from `onset` on; `manner` is its further fields."""
-        return Fault(mode, robots, onset=onset, duration=duration).replace(**manner)
+        return Fault(mode, robots, onset, duration, **manner)
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one episode; see `Task.play`."""
