@@ -90,7 +90,8 @@ class Faults:
                     self._take(fault, left[robot], now.step)
         for robot, able in enumerate(left):
             is_there = able.pop("there")
-            self.gone[robot] |= not (is_there or able.pop("returns"))
+            returns = able.pop("returns")
+            self.gone[robot] |= not (is_there or returns)
             able["present"] = is_there and not self.gone[robot]
         return left
 
