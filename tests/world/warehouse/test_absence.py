@@ -150,7 +150,7 @@ def test_bodies_of_others_that_cannot_put_it_back_refuse_before_anything_is_play
     world.reset(0)
     before = world.observe()
     other = Scenario(n_robots=3, n_items=2, bodies="mujoco")
-    with pytest.raises(BodiesError, match='away: bodies = mujoco cannot .* should be "dead"'):
+    with pytest.raises(BodiesError, match=r'away: bodies = mujoco cannot .* should be "dead"'):
         world.reset(0, ["away:1@5+5"], other)
     assert world.observe() is before
     assert world.scenario.bodies == "chipmunk"
