@@ -245,7 +245,7 @@ class SwarmLogisticsEnv(DictView):
         rewards = self._rewards.pay(world)
         if not self._present.all():
             rewards *= self._present
-        is_cut = self.max_cycles is not None and state.step >= self.max_cycles
+        is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
         is_over_time = is_cut or world.is_over_time
         self._present = state.robot_present.copy()
         self._in_episode = state.in_episode

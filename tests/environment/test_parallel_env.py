@@ -269,8 +269,9 @@ def test_a_robot_that_is_away_stays_an_agent_in_dicts_and_arrays_alike() -> None
         observations, paid, terminated, truncated, infos = env.step(still(env))
         arrays = rows.step_arrays(np.zeros((2, 4)))
         for robot, agent in enumerate(("robot_0", "robot_1")):
-            parts = observations[agent], paid[agent], terminated[agent], truncated[agent]
-            assert data_equivalence(parts, tuple(part[robot] for part in arrays), exact=True)
+            np.testing.assert_array_equal(observations[agent], arrays[0][robot])
+            parts = [paid[agent], terminated[agent], truncated[agent]]
+            assert parts == [part[robot] for part in arrays[1:]]
             assert observations[agent].any() != bool(infos[agent]["away"])
         away.append([info["away"] for info in infos.values()])
         assert not any(terminated.values())
