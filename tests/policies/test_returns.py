@@ -30,7 +30,8 @@ def test_a_swarm_that_comes_back_delivers_as_much_as_before(name: str, mode: str
 
 @pytest.mark.parametrize("name", ["homing", "site-fidelity", "ppo-robust"])
 def test_robots_that_are_out_forget_ways_sites_and_what_they_take_for_broken(name: str) -> None:
-    policy: RowPolicy = policies.load(name)
+    policy = policies.load(name)
+    assert isinstance(policy, RowPolicy)
     policy.configure(SMALL)
     policy.begin(np.arange(2, dtype=np.uint64))
     source = np.random.default_rng(1)

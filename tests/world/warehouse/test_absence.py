@@ -102,7 +102,9 @@ def test_where_there_is_no_room_it_waits_and_a_copy_waits_alike(build: Build) ->
 
 @pytest.mark.parametrize("floor", [None, "aisles"])
 def test_crowds_that_come_and_go_stand_in_nobodys_way(floor: str | None) -> None:
-    size = {"warehouse_width": 4.0, "warehouse_height": 2.0} if floor is None else {}
+    size: dict[str, Any] = {}
+    if floor is None:
+        size = {"warehouse_width": 4.0, "warehouse_height": 2.0}
     scenario = Scenario(
         n_robots=14, n_items=6, n_obstacles=2, obstacle_radius=0.2, restock=True, floor=floor,
         pickup_range=0.6, **size,
