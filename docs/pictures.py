@@ -74,8 +74,9 @@ def films() -> None:
     write_film(MEDIA / "fm4.gif", film.frames(), 12.5)
     # Scripts send no messages, so that a spoilt one changes nothing.
     for mode in (mode for mode in FAILURE_MODES if not mode.startswith("message_")):
-        # Who is late begins when the fault ends; all others fail for good.
-        onset, duration = (0.0, 12.0) if mode == "late" else (3.0, None)
+        # Who is late begins when the fault ends, and who is away comes back; others fail for good.
+        onset = 0.0 if mode == "late" else 3.0
+        duration = 12.0 if mode in ("late", "away") else None
         failed = [Fault(mode, 2, onset=onset, duration=duration)]
         take = Take(f"{mode}, 2 of 8", run("homing", TINY, 2, failed))
         film = Film([take], 30.0, speed=8.0, frame_rate=8.0, size=400)

@@ -283,7 +283,8 @@ class Watch:
         is_still = state.robot_heading == before.robot_heading
         self._each(_lack(modes, "lifts"), ~self._took(), "robot {} lifts items, and cannot")
         self._each(_lack(modes, "delivers"), ~delivered, "robot {} delivers, and cannot")
-        self._each(present & _lack(modes, "speed"), is_still, "robot {} turns, and cannot")
+        stayed = present & before.robot_present
+        self._each(stayed & _lack(modes, "speed"), is_still, "robot {} turns, and cannot")
         jammed = present & state.robot_in_delivery & _lack(modes, "releases_inside")
         self._each(jammed, keeps_item, "robot {}, jammed inside, lets its item go")
         # What cannot move may be above the delivery area's border when its item is asked for.

@@ -89,8 +89,10 @@ class Faults:
                 if fault.breaks is None or self._is_broken(fault, robot, now.step):
                     self._take(fault, left[robot], now.step)
         for robot, able in enumerate(left):
-            self.gone[robot] |= not able.pop("there")
-            able["present"] = not self.gone[robot]
+            is_there = able.pop("there")
+            returns = able.pop("returns")
+            self.gone[robot] |= not (is_there or returns)
+            able["present"] = is_there and not self.gone[robot]
         return left
 
     def _sound(self, robot: int) -> Able:
@@ -107,6 +109,7 @@ class Faults:
             **dict.fromkeys(LOST_AS_A_WHOLE, True),
             "modes": (),
             "there": True,
+            "returns": True,
         }
 
     def _take(self, fault: Planned, able: Able, step: int) -> None:
@@ -130,6 +133,7 @@ class Faults:
             able[name] = able[name] and getattr(lost, name)
         able["modes"] = (*able["modes"], fault.mode)
         able["there"] = able["there"] and lost.present
+        able["returns"] = able["returns"] and (lost.present or lost.returns)
 
     def _is_broken(self, fault: Planned, robot: int, step: int) -> bool:
         """Return whether an intermittent fault holds, by the robot's own stream of both times."""
@@ -190,6 +194,8 @@ class Radio:
         self._own.append(own_timers)
         limit, period = s.timer_limit - 1e-9, s.control_period
         for robot, can in enumerate(able):
+            if can["present"] and not before.robot_present[robot]:
+                self._last_inside.pop(robot, None)  # who comes back begins anew
             if now.robot_in_delivery[robot]:
                 self._last_inside[robot] = now.step
             timer = math.nan
@@ -309,7 +315,7 @@ def _asked(moment: State) -> set[int]:
 def ends(before: State, now: State, last_step: int) -> tuple[list[bool], list[bool]]:
     """Return which robots terminate and which are truncated; none does both."""
     is_all, is_late = now.requested == NOBODY, now.step >= last_step
-    were, are = before.robot_present.tolist(), now.robot_present.tolist()
+    were, are = before.in_episode.tolist(), now.in_episode.tolist()
     terminated = [was and (is_all or not is_) for was, is_ in zip(were, are)]
     truncated = [is_late and was and not t for was, t in zip(were, terminated)]
     return terminated, truncated

@@ -189,7 +189,7 @@ def drawn_faults(source: random.Random, scenario: Scenario, seconds: float) -> l
             modes.remove("cell_fades")
         mode = source.choice(modes)
         onset = source.choice([0.0, source.uniform(0.0, seconds)])
-        passes = mode != "removed" and source.random() < 0.5
+        passes = mode == "away" or (mode != "removed" and source.random() < 0.5)
         duration = source.uniform(0.1, seconds) if passes else None
         robots = source.randint(1, scenario.n_robots)
         breaks = (source.uniform(0.05, 2.0), source.uniform(0.05, 2.0))

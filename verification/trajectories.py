@@ -112,7 +112,8 @@ for _mode in FAILURE_MODES:
     _passing = None if _mode == "removed" else 6.0
     _size = 2 if _mode.startswith("message_") else 0
     _fields = {"message_size": _size, "battery": 300.0 if _mode == "cell_fades" else None}
-    GOLDEN[f"{_mode} from the start"] = _small(Fault(_mode, 2), **_fields)
+    _first = Fault(_mode, 2, duration=8.0 if _mode == "away" else None)
+    GOLDEN[f"{_mode} from the start"] = _small(_first, **_fields)
     GOLDEN[f"{_mode} for a while"] = _small(Fault(_mode, 3, 5.0, _passing), **_fields)
 GOLDEN |= {
     "several faults at once": _small(

@@ -30,8 +30,8 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     `mask_unreachable_commands`.
 
     Infos are numbers, with the same keys at every step: "failed" (N,) is 1 for each robot in
-    which any failure mode holds, else 0; "delivered" is the number of items so far; wrappers add
-    their own.
+    which any failure mode holds, else 0; "away" (N,) is 1 for each that left the arena and comes
+    back; "delivered" is the number of items so far; wrappers add their own.
 
     `np_random_seed` is the seed of the current episode, also after a reset that was given none:
     `reset(seed=env.np_random_seed)` plays it again.
@@ -149,7 +149,8 @@ class CentralEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return observations.reshape(self.observation_space.shape)
 
     def _info(self) -> dict[str, Any]:
-        failed = np.zeros(self._rows.n_rows, np.int8)
+        failed, away = np.zeros((2, self._rows.n_rows), np.int8)
         state = self.env.warehouse.state
         failed[: state.n_robots] = state.failed
-        return {"failed": failed, **self.env.episode_info}
+        away[: state.n_robots] = state.robot_away
+        return {"failed": failed, "away": away, **self.env.episode_info}

@@ -47,8 +47,9 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
       of which nothing reaches the next one. `present` tells padding from robots.
 
     The info of a row is a dict of its own of numbers: `TimeLimit.truncated`, `padding`, `failed`
-    (1 while any failure mode holds for the row's robot, else 0), `world`, `n_robots`, `delivered`
-    (the paper's P, so far), and what wrappers add (see `wrappers.IndicatorReward`). A done row's
+    (1 while any failure mode holds for the row's robot, else 0), `away` (1 until a robot that left
+    the arena is back; its row is zeros, and no padding), `world`, `n_robots`, `delivered` (the
+    paper's P, so far), and what wrappers add (see `wrappers.IndicatorReward`). A done row's
     has `terminal_observation` besides, as stable-baselines3 expects, and, where it was a robot's,
     `episode`: its return "r", length "l" [steps] and the world's "delivered". So learners log
     `rollout/ep_rew_mean` and `ep_len_mean` by themselves, and `evaluate_policy` and `EvalCallback`
@@ -300,6 +301,7 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
             "TimeLimit.truncated": False,
             "padding": False,
             "failed": 0,
+            "away": 0,
             "world": world,
             "n_robots": state.n_robots,
             **env.episode_info,
@@ -307,6 +309,8 @@ class SwarmVecEnv(VecEnv):  # type: ignore[misc]  # not in the environment of th
         infos: Infos = [info] * (rows.stop - rows.start)
         for robot in np.flatnonzero(state.failed).tolist():
             infos[robot] = {**info, "failed": 1}
+        for robot in np.flatnonzero(state.robot_away).tolist():
+            infos[robot] = {**infos[robot], "away": 1}
         for row in np.flatnonzero(~self._worlds.present[rows]).tolist():
             infos[row] = {**infos[row], "padding": True}
         self._abouts[rows] = infos

@@ -40,7 +40,8 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
       a world that is over. A row of a world that goes on is no reason to begin it anew.
 
     Infos are arrays by row, each with its mask `_name`: `delivered` (the paper's P, so far),
-    `failed`, `padding`, `world`, `n_robots`, and what wrappers add, such as `action_mask`.
+    `failed`, `away`, `padding`, `world`, `n_robots`, and what wrappers add, such as `action_mask`.
+    The row of a robot that is away is no padding: it goes on, with zeros until the robot is back.
 
     Args:
         num_envs: how many worlds run side by side.
@@ -228,6 +229,7 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
     def _infos(self) -> dict[str, Any]:
         columns: dict[str, NDArray[Any]] = {
             "failed": np.zeros(self.num_envs, np.int64),
+            "away": np.zeros(self.num_envs, np.int64),
             "padding": ~self._worlds.present,
             "world": self._worlds.world_of.copy(),
             "n_robots": np.zeros(self.num_envs, np.int64),
@@ -235,6 +237,7 @@ class SwarmRows(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         for env, rows in zip(self.worlds, self._worlds.rows):
             state = env.warehouse.state
             columns["failed"][rows.start : rows.start + state.n_robots] = state.failed
+            columns["away"][rows.start : rows.start + state.n_robots] = state.robot_away
             columns["n_robots"][rows] = state.n_robots
             for name, value in env.episode_info.items():
                 columns.setdefault(name, np.full(self.num_envs, np.nan))[rows] = value

@@ -36,8 +36,8 @@ class RowsStep(NamedTuple):
 class Worlds:
     """Worlds whose robots are R rows: world 0's possible agents first, then world 1's, ...
 
-    Rows without a robot are zeros. The caller begins the next episode of a world that is over, so
-    that one thread alone touches what worlds share.
+    Rows without a robot are zeros, and those of a robot that is away. The caller begins the next
+    episode of a world that is over, so that one thread alone touches what worlds share.
 
     Args:
         make_env: world number -> environment.
@@ -49,7 +49,7 @@ class Worlds:
         rows: of each world, the slice of its rows.
         world_of: (R,) the world of each row.
         is_over: of each world, whether its episode is.
-        present: (R,) which rows of the latest observations are a robot's.
+        present: (R,) which rows of the latest observations are a robot's, maybe one that is away.
         reported: the worlds whose latest step had more to tell than observations and rewards; ends
             of all others are zeros.
         observation_space, command_space: of every row.
@@ -110,11 +110,11 @@ class Worlds:
         self.note_present(world)
 
     def note_present(self, world: int) -> None:
-        """Update which rows of a world are robots that are there."""
-        is_present = self.envs[world].warehouse.state.robot_present
+        """Update which rows of a world are robots that take part."""
+        in_episode = self.envs[world].warehouse.state.in_episode
         rows = self.rows[world]
         self.present[rows] = False
-        self.present[rows.start : rows.start + len(is_present)] = is_present
+        self.present[rows.start : rows.start + len(in_episode)] = in_episode
 
     def give(self, commands: ArrayLike) -> None:
         """Take the commands (R, 4) of the next step.

@@ -150,8 +150,8 @@ class SwarmLogisticsEnv(DictView):
         self._rewards.begin(self.warehouse)
         self.is_begun = True
         self._present = self.warehouse.state.robot_present.copy()
-        self._n_removed = self.warehouse.n_removed
-        self.agents = agent_names(np.flatnonzero(self._present).tolist())
+        self._in_episode = self.warehouse.state.in_episode
+        self.agents = agent_names(np.flatnonzero(self._in_episode).tolist())
         return observations
 
     def scenario_of(self, seed: int, options: Mapping[str, Any]) -> Scenario:
@@ -193,7 +193,8 @@ class SwarmLogisticsEnv(DictView):
         Returns:
             Observations (N, D), rewards (N,), terminations (N,) and truncations (N,). A robot
             terminates when it is removed; all terminate when everything is delivered, and all are
-            truncated when the time is up. `agents` are those that go on.
+            truncated when the time is up. `agents` are those that go on. One that is away goes on:
+            until it is back its observation is zeros, its reward 0, and its command is ignored.
 
         Raises:
             CommandError: the commands have the wrong shape, cannot be read or are not finite; the
@@ -234,24 +235,26 @@ class SwarmLogisticsEnv(DictView):
     def outcome(self, observations: NDArray[np.float32]) -> ArrayStep:
         """Return the result of `step_arrays` for the step that the warehouse has just taken."""
         world = self.warehouse
-        was_present = self._present
-        n = len(was_present)
+        state = world.state
+        was_in_episode = self._in_episode
+        n = len(was_in_episode)
         terminations = np.zeros(n, np.bool_)
         truncations = np.zeros(n, np.bool_)
         if not (world.is_eventful or self.is_watched or self._rewards.pays_steadily):
             return observations, np.zeros(n), terminations, truncations
         rewards = self._rewards.pay(world)
-        if len(self.agents) < n:
-            rewards *= was_present
+        if not self._present.all():
+            rewards *= self._present
         is_cut = self.max_cycles is not None and world.state.step >= self.max_cycles
         is_over_time = is_cut or world.is_over_time
-        if is_over_time or world.all_delivered or world.n_removed != self._n_removed:
-            self._n_removed = world.n_removed
-            self._present = world.state.robot_present.copy()
-            terminations |= was_present & (~self._present | world.all_delivered)
+        self._present = state.robot_present.copy()
+        self._in_episode = state.in_episode
+        is_changed = np.count_nonzero(self._in_episode) != len(self.agents)
+        if is_over_time or world.all_delivered or is_changed:
+            terminations |= was_in_episode & (~self._in_episode | world.all_delivered)
             if is_over_time:
-                truncations |= was_present & ~terminations
-            is_left = was_present & ~(terminations | truncations)
+                truncations |= was_in_episode & ~terminations
+            is_left = was_in_episode & ~(terminations | truncations)
             self.agents = agent_names(np.flatnonzero(is_left).tolist())
         return observations, rewards, terminations, truncations
 

@@ -168,7 +168,8 @@ def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -
     """
     removed = set[int]()
     for fault in faults:
-        if fault.onset <= GRACE and not failure_mode(fault.mode).present:
+        mode = failure_mode(fault.mode)
+        if fault.onset <= GRACE and not (mode.present or mode.returns):
             removed.update(failed_robots(fault, seed, n_robots).tolist())
     if len(removed) == n_robots:
         raise SetupError(

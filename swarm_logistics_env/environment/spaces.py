@@ -280,9 +280,9 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
         """Begin an episode; see `reset_arrays`. Returns observations and infos by agent.
 
         Each agent has a dict of infos of its own. It contains numbers, with the same keys at
-        every step: "failed" is 1 while any failure mode holds for the robot, else 0; "delivered"
-        is the number of items that the whole swarm has delivered; wrappers add `episode_info`, and
-        arrays of `robot_info`.
+        every step: "failed" is 1 while any failure mode holds for the robot, else 0; "away" is 1
+        until a robot that left the arena is back, else 0; "delivered" is the number of items that
+        the whole swarm has delivered; wrappers add `episode_info`, and arrays of `robot_info`.
         """
         observations = self.reset_arrays(seed, options)
         agents = self.agents
@@ -335,11 +335,13 @@ class DictView(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # t
 
     def _infos(self, agents: list[str]) -> InfosByRobot:
         # Robots do not sense who failed; infos are for those who train or evaluate them.
-        sound = {"failed": 0, **self.episode_info}
+        state = self.warehouse.state
+        sound = {"failed": 0, "away": 0, **self.episode_info}
         infos = {agent: sound.copy() for agent in agents}
-        for agent in agent_names(np.flatnonzero(self.warehouse.state.failed).tolist()):
-            if agent in infos:
-                infos[agent]["failed"] = 1
+        for name, is_so in (("failed", state.failed), ("away", state.robot_away)):
+            for agent in agent_names(np.flatnonzero(is_so).tolist()):
+                if agent in infos:
+                    infos[agent][name] = 1
         for name, rows in self.robot_info.items():
             for agent in agents:
                 infos[agent][name] = rows[_row(agent)]

@@ -37,7 +37,7 @@ from swarm_logistics_env.policies.driving import (
 from swarm_logistics_env.policies.homing import Homing, HomingParameters, decide_homing
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import command_own_frames
-from swarm_logistics_env.world.motion.memory import MEMORY, length_of, to_frame
+from swarm_logistics_env.world.motion.memory import MEMORY, is_out, length_of, to_frame
 from swarm_logistics_env.world.motion.network_inputs import turn_frames
 from swarm_logistics_env.world.motion.steering import set_velocity
 from swarm_logistics_env.world.scenario import Scenario
@@ -181,6 +181,8 @@ def act_site_fidelity(
         memory = memories[robot]
         key = pair_key(keys[robot], SEARCH_STREAM)
         is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
+        if is_out(observation):
+            trips[robot, :] = 0.0
         go_on(observation, memory, period, n_steps, key, counts[robot], trips[robot], parameters)
         carries = observation[row.CARRYING] > 0.5
         delivers = observation[row.CARRYING_REQUESTED] > 0.5

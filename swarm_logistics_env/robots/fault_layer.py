@@ -92,6 +92,8 @@ class FaultLayer:
     def sensed(self, observation: ArrayLike, time: float) -> Row:
         """Return the row (D,) that its policy gets of the row that its sensors fill."""
         sensed = np.array(observation, np.float32)
+        if not self._keeps("present", time):
+            return np.zeros_like(sensed)
         hears = self._keeps("hears", time)
         view = self._factor("view", time)
         self._forget_unseen(sensed, view * self._scenario.view_range, hears)
@@ -139,7 +141,7 @@ class FaultLayer:
         self._sent.append(Broadcast(timer, words))
         delays = [occurrence.mode.radio_delay for occurrence in self._active(time)]
         n_periods = round(max(delays, default=0.0) / self._scenario.control_period)
-        if not self._keeps("sends", time):
+        if not (self._keeps("sends", time) and self._keeps("present", time)):
             return None
         sent = Broadcast(math.nan, np.zeros_like(words))  # of a time before the trial
         if len(self._sent) > n_periods:

@@ -76,7 +76,7 @@ class IndicatorReward(Wrapper):
         credit: the robots that get the share of a delivery. "team": each robot present gets all
             of it, so that the return of each is the indicator. "deliverer": the robot that
             delivers; the constant is divided among all robots present, so that the sum of all
-            returns is the indicator.
+            returns is the indicator. Robots that are away count as present.
         constant: whether to pay the constant.
         own_reward: weight of the wrapped environment's own reward, which is added, for shaping.
 
@@ -210,22 +210,22 @@ class IndicatorReward(Wrapper):
         if world.is_eventful and condition_of(world, self._base) != self.condition:
             self._take_condition()
         if self._paid is not self._due or deliverers:
-            self._pay(rewards, deliverers, state.robot_present | terminations)
+            self._pay(rewards, deliverers, state.in_episode | terminations)
         self._delivered = state.delivered
         self._is_over = not self.env.agents
         return observations, rewards, terminations, truncations
 
     def _pay(
-        self, rewards: NDArray[np.float64], deliverers: list[int], present: NDArray[np.bool_]
+        self, rewards: NDArray[np.float64], deliverers: list[int], in_episode: NDArray[np.bool_]
     ) -> None:
         lump_sum = self._due.constant - self._paid.constant
         # Items that were delivered before a change in mid-run were paid another share.
         lump_sum += (self._due.share - self._paid.share) * self._delivered
         self._paid = self._due
         if self.credit == "team":
-            rewards[present] += lump_sum + self._due.share * len(deliverers)
+            rewards[in_episode] += lump_sum + self._due.share * len(deliverers)
             return
-        rewards[present] += lump_sum / max(int(np.count_nonzero(present)), 1)
+        rewards[in_episode] += lump_sum / max(int(np.count_nonzero(in_episode)), 1)
         for robot in deliverers:
             rewards[robot] += self._due.share
 

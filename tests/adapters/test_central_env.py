@@ -60,7 +60,7 @@ def test_it_is_the_parallel_environment_in_one_piece() -> None:
             rows, rewards, _, _ = inner.step_arrays(action[: len(rows)])
             assert reward == rewards.mean()
         assert (ended, cut) == (False, True)
-        assert info.keys() == {"delivered", "failed"}
+        assert info.keys() == {"delivered", "failed", "away"}
         assert info["delivered"] == inner.warehouse.state.delivered
         assert not inner.agents
 

@@ -79,7 +79,7 @@ def test_rows_are_the_worlds_own_over_several_episodes_and_padding_is_zeros() ->
                 assert info == {
                     "TimeLimit.truncated": is_robot and done and bool(cut[robot]),
                     "padding": not before[part][robot], "world": number, "n_robots": n,
-                    "failed": int(is_robot and failed[robot]), **episode_info,
+                    "failed": int(is_robot and failed[robot]), "away": 0, **episode_info,
                 }  # fmt: skip
             if is_over:
                 rows = world.reset_arrays()

@@ -259,6 +259,38 @@ def test_a_removed_robot_terminates_once_and_leaves() -> None:
     assert list(observations) == ["robot_0", "robot_2"]
 
 
+def test_a_robot_that_is_away_stays_an_agent_in_dicts_and_arrays_alike() -> None:
+    faults = [Fault("away", (1,), onset=0.2, duration=0.3), Fault("away", (0,), 0.1, 9.0)]
+    env, rows = (parallel_env(REACHABLE, faults=faults, duration=1.0) for _ in range(2))
+    env.reset(seed=0)
+    rows.reset_arrays(seed=0)
+    away = []
+    while env.agents:
+        observations, paid, terminated, truncated, infos = env.step(still(env))
+        arrays = rows.step_arrays(np.zeros((2, 4)))
+        for robot, agent in enumerate(("robot_0", "robot_1")):
+            np.testing.assert_array_equal(observations[agent], arrays[0][robot])
+            parts = [paid[agent], terminated[agent], truncated[agent]]
+            assert parts == [part[robot] for part in arrays[1:]]
+            assert observations[agent].any() != bool(infos[agent]["away"])
+        away.append([info["away"] for info in infos.values()])
+        assert not any(terminated.values())
+        assert all(truncated.values()) == (len(away) == 10)
+    assert away == [[1, 0], *[[1, 1]] * 3, *[[1, 0]] * 6]
+
+
+def test_a_robot_that_is_away_earns_nothing_and_ends_if_it_is_removed_meanwhile() -> None:
+    faults = [Fault("away", (1,), onset=0.1, duration=9.0), Fault("removed", (1,), onset=0.3)]
+    env = parallel_env(REACHABLE, n_items=2, faults=faults)
+    env.reset(seed=0)
+    env.step(east(env))
+    for is_over in (False, True):
+        _, paid, terminated, _, infos = env.step(east(env))
+        assert (paid["robot_1"], terminated["robot_1"]) == (0.0, is_over)
+        assert infos["robot_1"]["away"] == int(not is_over)
+    assert env.agents == ["robot_0"]
+
+
 def test_infos_tell_failures_while_they_hold_and_observations_do_not() -> None:
     faults = [Fault("FM2", (1,), onset=0.2, duration=0.2), Fault("FM4", (1,), onset=0.3)]
     failing, healthy = parallel_env(n_robots=2, faults=faults), parallel_env(n_robots=2)
@@ -268,8 +300,8 @@ def test_infos_tell_failures_while_they_hold_and_observations_do_not() -> None:
         seen, _, _, _, infos = failing.step(still(failing))
         assert data_equivalence(seen, healthy.step(still(healthy))[0])
         modes.append(failing.warehouse.state.failure_modes[1])
-        assert infos["robot_0"] == {"failed": 0, "delivered": 0}
-        assert infos["robot_1"] == {"failed": int(bool(modes[-1])), "delivered": 0}
+        assert infos["robot_0"] == {"failed": 0, "away": 0, "delivered": 0}
+        assert infos["robot_1"] == {"failed": int(bool(modes[-1])), "away": 0, "delivered": 0}
     assert modes == [(), ("FM2",), ("FM2", "FM4"), ("FM4",), ("FM4",)]
 
 

@@ -70,6 +70,15 @@ def test_a_dead_robot_stands_and_sends_nothing() -> None:
     assert layer.broadcast(3.0, [], 10.0) is None
 
 
+def test_a_robot_that_is_away_senses_and_does_nothing_until_it_is_back() -> None:
+    layer = layer_of("away:1@10+5")
+    sensed = np.ones(row.N_COLUMNS)
+    for time, is_there in ((9.9, True), (10.0, False), (14.9, False), (15.0, True)):
+        assert layer.sensed(sensed, time).any() == is_there
+        assert layer.driven([1.0, 0.0, 0.0, 1.0], sensed, time).any() == is_there
+        assert (layer.broadcast(3.0, [], time) is not None) == is_there
+
+
 def test_grippers_fail_by_what_they_hold_and_where() -> None:
     outside = np.zeros(row.N_COLUMNS)
     inside = outside.copy()

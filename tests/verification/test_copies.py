@@ -57,9 +57,10 @@ def scenarios(draw: st.DrawFn) -> Scenario:
 def fault_lists(draw: st.DrawFn, n_robots: int) -> list[Fault]:
     faults = []
     for _ in range(draw(st.integers(0, 3))):
-        mode = draw(st.sampled_from(["removed", *FAILURE_MODES]))  # half of them are removed
+        mode = draw(st.sampled_from(["removed", "away", *FAILURE_MODES]))
         onset = draw(st.sampled_from([0.0, 0.1, 0.1, 20.0, 60.0]) | st.floats(0.0, 100.0))
-        lasts = None if mode == "removed" else draw(st.sampled_from([None, 5.0, 30.0]))
+        times = [5.0, 30.0] if mode == "away" else [None, 5.0, 30.0]
+        lasts = None if mode == "removed" else draw(st.sampled_from(times))
         role = draw(st.sampled_from([None, *ROLES]))
         faults.append(Fault(mode, draw(st.integers(1, n_robots)), onset, lasts, role=role))
     return faults

@@ -39,6 +39,7 @@ def in_all(env: Any) -> Any:
     n = env.unwrapped.scenario.n_robots
     env = ParameterChange(ParameterChange(env, "n_items", [10, 20]), "radio_range", 6.0, at=1.0)
     env = SwarmSize(env, [n, 2 * n], leave=[(1, 1.5)] if n > 1 else ())
+    env = FaultInjection(env, "away", onset=0.5, duration=0.7)
     return FaultInjection(FaultInjection(env, "FM3", onset=onsets), "motor_slow", onset=[0.0, 1.0])
 
 

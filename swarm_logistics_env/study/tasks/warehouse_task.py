@@ -12,6 +12,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from types import MappingProxyType
+from typing import Any
 
 from swarm_logistics_env.core.errors import ScenarioError, StudyError
 from swarm_logistics_env.core.fingerprint import package_code
@@ -86,7 +87,8 @@ class WarehouseTask(TaskWorld):
         self, mode: str, robots: int, onset: float, duration: float | None, manner: Fields
     ) -> Fault:
         """Return the fault of some robots from `onset` on; `manner` is its further fields."""
-        return Fault(mode, robots, onset=onset, duration=duration).replace(**manner)
+        further: dict[str, Any] = dict(manner)
+        return Fault(mode, robots, onset, duration, **further)
 
     def play(self, case: Case, seed: int, policy_seed: int) -> Outcome:
         """Play one episode; see `Task.play`."""

@@ -169,12 +169,13 @@ def rehearse(session: Session) -> None:
         copy = Session(
             session.scenario, session.policy, session.against, session.seed, load=session.load
         )
-        for mode in ("FM4", "removed"):
+        for mode in ("FM4", "away", "removed"):
             copy.choose_mode(mode)
             copy.select(0)
             copy.break_robot()
             copy.step()
             frame_message(copy)
+            copy.run.world.set_faults(())  # who is away comes back
         copy.show_fault()
         copy.step()
 

@@ -29,6 +29,7 @@ _SHOWN_POLICY = "ppo-delivery"
 _SHOWN_FAULT = "FM4:2"
 _SHOWN_SEED = 2
 _SHOWN_SPEED = 32.0
+_ABSENCE = 30.0  # [s] of a robot that is away, as nobody can click it to repair it
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)  # times real time
 
 
@@ -198,7 +199,8 @@ class Session:
             self.note = f"robot {robot} already fails in mode {self.mode}"
             return
         now = round(self.state.time, 9)
-        fault = Fault(self.mode, [robot], onset=now)
+        duration = _ABSENCE if failure_mode(self.mode).returns else None
+        fault = Fault(self.mode, [robot], now, duration)
         self._change_faults(lambda faults: [*faults, fault])
         self._deselect_absent_robot()
         self._add_event(Event(self.state.time, robot, self.mode))

@@ -166,13 +166,19 @@ def remember_row(
     fades: tuple[float, float],
     memory: NDArray[np.float64],
 ) -> tuple[float, float, float]:
-    """Take what one row (D,) tells into a memory, and return its `kept_home`."""
+    """Take what one row (D,) tells into a memory, and return its `kept_home`.
+
+    A robot that is out of the arena forgets all but its heading and its body.
+    """
     x = np.float64(sensed[row.VELOCITY_X])
     y = np.float64(sensed[row.VELOCITY_Y])
     speed = np.float64(length_of(sensed[row.VELOCITY_X], sensed[row.VELOCITY_Y]))
     is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
     delivers = sensed[row.CARRYING_REQUESTED] > 0.5
 
+    if is_out(sensed):
+        # Its gyro tells nothing of how it is turned there, so no direction would hold afterwards.
+        memory[MEMORY.home_x : MEMORY.top_speed] = 0.0
     turn_back(np.float64(sensed[row.TURN_RATE]) * period, memory)
     diagnose(sensed, period, memory)
 
@@ -207,6 +213,13 @@ def remember_row(
         memory[MEMORY.away] -= period * (home_x * x + home_y * y)
     memory[MEMORY.was_inside] = INSIDE if is_inside else OUTSIDE
     return home_x, home_y, sure
+
+
+@kernel
+def is_out(sensed: NDArray[np.float32]) -> bool:
+    """Return whether a row is of a robot out of the arena: zeros, as beams in it never all are."""
+    walls = sensed[row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS]
+    return bool(walls.max() == 0.0)
 
 
 @inlined_kernel

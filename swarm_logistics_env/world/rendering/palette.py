@@ -69,7 +69,7 @@ RUN_NAMES = (("REQUESTED", 3.0), ("SHUFFLING", 1.5))
 
 LOW_CHARGE = 0.3  # of a battery, below which it is drawn in another colour
 
-# The mark on a robot that fails in a mode. A removed robot is not drawn, so it has none.
+# The mark on a robot that fails in a mode. Who is out of the arena is not drawn, so it has none.
 MARKS = {name: mode.mark for name, mode in FAILURE_MODES.items() if mode.mark}
 
 # What lies behind, and what stands before it; smooth edges between the two take four steps.

@@ -52,6 +52,7 @@ class FailureMode:
         ranger_bias: what they read too far [m].
         radio_delay: how late its broadcasts come [s].
         present: False: it is out of the arena.
+        returns: who is out of the arena comes back when the fault ends; else it is out for good.
         lifts, delivers, sends, hears, hears_requests, honest, obeys, releases_inside,
             rangers_refresh, messages_refresh, messages_mean, messages_true: see `Capabilities`.
     """
@@ -67,6 +68,7 @@ class FailureMode:
     ranger_bias: float = 0.0
     radio_delay: float = 0.0
     present: bool = True
+    returns: bool = False
     lifts: bool = True
     delivers: bool = True
     sends: bool = True
@@ -177,6 +179,11 @@ FAILURE_MODES: dict[str, FailureMode] = {
     ),
     "removed": FailureMode(
         "out of the arena, what it carried is put down where it was", present=False
+    ),
+    "away": FailureMode(
+        "out of the arena, as if removed, until the fault ends; then back where it stood",
+        present=False,
+        returns=True,
     ),
 }
 

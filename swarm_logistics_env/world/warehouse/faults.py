@@ -57,7 +57,7 @@ class Fault(Record):
             same robots and the sets of m = 1, 2, 3 are nested; or the robots' numbers.
         onset: when it begins [s], from the start of the episode.
         duration: for how long it holds [s]; None: for good. A removed robot does not come back.
-            Robots that are `late` begin to work when it ends.
+            Robots that are `late` begin to work when it ends, and those that are `away` come back.
         factor: for `motor_slow`, `motor_wear` and `view_reduced`: what is left, in [0, 1).
         intermittent: for how long [s] it holds, and for how long not, both on average, in turn
             from its onset on; each robot's times are drawn from its own stream (exponential).
@@ -67,7 +67,8 @@ class Fault(Record):
 
     Raises:
         FaultError: an unknown mode or role, a factor, a duration or breaks that the mode does not
-            have, a robot that is named twice, a role beside robots that are named.
+            have, `away` without either, a robot that is named twice, a role beside robots that are
+            named.
 
     Example:
         >>> Fault("FM1", 2, onset=200.0).robots
@@ -114,6 +115,11 @@ class Fault(Record):
         for name in ("duration", "intermittent"):
             if self.mode == "removed" and getattr(self, name) is not None:
                 raise ValueError(f"a removed robot does not come back: {name} should be None")
+        if own_mode.returns and self.duration is None and self.intermittent is None:
+            raise ValueError(
+                f"duration = None: should say when robots that are {self.mode} come back, or "
+                "intermittent; robots that never do are removed"
+            )
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
             raise ValueError(f"robots = {self.robots}: should name each robot once")
         if self.role is not None and isinstance(self.robots, tuple):
@@ -324,11 +330,11 @@ LOST_AS_A_WHOLE = tuple(
 
 def apply_faults(
     state: WarehouseState, scenario: Scenario, occurrences: Sequence[Occurrence]
-) -> NDArray[np.bool_]:
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Give every robot what the faults that hold at `state.time` leave it.
 
     Returns:
-        Which robots a fault takes out of the arena, (N,).
+        Which robots faults take out of the arena for good (N,), and which of all others now (N,).
     """
     # By what robots do and see as faults begin, so that those of one moment choose alike.
     for occurrence in occurrences:
@@ -346,6 +352,7 @@ def apply_faults(
     for name in LOST_AS_A_WHOLE:
         getattr(able, name)[:] = True
     is_removed = np.zeros(state.n_robots, np.bool_)
+    is_away = np.zeros(state.n_robots, np.bool_)
     modes: list[list[str]] = [[] for _ in range(state.n_robots)]
     for occurrence in occurrences:
         mode = occurrence.mode
@@ -361,12 +368,13 @@ def apply_faults(
         able.radio_delay[robots] = np.maximum(able.radio_delay[robots], delay)
         for name in LOST_AS_A_WHOLE:
             getattr(able, name)[robots] &= getattr(mode, name)
-        is_removed[robots] |= not mode.present
+        is_removed[robots] |= not (mode.present or mode.returns)
+        is_away[robots] |= mode.returns
         for robot in robots.tolist():
             modes[robot].append(occurrence.fault.mode)
     state.failure_modes = tuple(map(tuple, modes))
     state.failed = np.array([bool(names) for names in modes])
-    return is_removed
+    return is_removed, is_away & ~is_removed
 
 
 def step_of_change(occurrences: Sequence[Occurrence], step: int, period: float) -> int:

@@ -223,24 +223,6 @@ def put_down(world: World, robot: int) -> None:
     put_item(engine, item, items.position)
 
 
-@engine_kernel
-def take_out(world: World, robot: int) -> None:
-    """Take a robot out of the arena; what it carries is put down where it is."""
-    robots = world.robots
-    engine = world.engine
-    if robots.item[robot] != NOBODY:
-        put_down(world, robot)
-    collide_with(engine, engine.robot_shapes[robot], NO_ONE)
-    robots.present[robot] = False
-    robots.in_delivery[robot] = False
-    robots.handling[robot, :] = IDLE
-    robots.memory[robot, :] = NOBODY
-    robots.position[robot, :] = 0.0
-    robots.velocity[robot, :] = 0.0
-    robots.heading[robot] = 0.0
-    robots.turn_rate[robot] = 0.0
-
-
 @inlined_kernel
 def remember(memory: Integers, robot: int, item: int) -> None:
     """Put `item` in front of a robot's memory, which forgets its oldest."""

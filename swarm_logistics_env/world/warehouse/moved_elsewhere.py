@@ -3,17 +3,37 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from swarm_logistics_env.core.errors import BodiesError
 from swarm_logistics_env.world.bodies import Bodies, Orders, Placement
 from swarm_logistics_env.world.bodies.bodies import checked_poses
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import CHIPMUNK, Scenario
 
 from . import stepping
+from .absence import remove
+from .failure_modes import failure_mode
+from .faults import Fault
 from .physics import N_CORNERS
 from .state import WarehouseState
 from .structs import NOBODY, Numbers, Sensed, World
+
+
+def check_returns(faults: Sequence[Fault], scenario: Scenario) -> Sequence[Fault]:
+    """Return the faults, by which robots come back only where the package's engine moves them.
+
+    Raises:
+        BodiesError: robots come back elsewhere, where nobody can put them.
+    """
+    for fault in faults:
+        if failure_mode(fault.mode).returns and scenario.bodies != CHIPMUNK:
+            raise BodiesError(
+                f"fault {fault.mode}: bodies = {scenario.bodies} cannot put a robot back into the "
+                f'arena; should be "dead", with which it stays there, or bodies = {CHIPMUNK}'
+            )
+    return faults
 
 
 class MovedElsewhere:
@@ -59,7 +79,7 @@ class MovedElsewhere:
         )
         poses = checked_poses(self._bodies.move(orders), len(self._motions))
         for robot in np.flatnonzero(poses.lost & state.robot_present).tolist():
-            stepping.remove(address, robot)
+            remove(address, robot)
         is_seen = state.robot_present
         moved = world.engine.bodies
         # Walls are the world's: nobody is outside, whatever a camera says.

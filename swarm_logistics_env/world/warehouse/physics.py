@@ -128,7 +128,7 @@ def collide_with(engine: EngineArrays, shape: int, categories: int) -> None:
 
 
 N_WORDS = 16  # of a body that are looked at: up to its force, which pointers follow
-_SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
+SLOP = 0.001  # [m]; the engine's default 0.1 lets robots of this size pass through each other
 _BIAS = 1e-4  # share of an overlap that is left after a second; the engine's default: 0.0018
 _WALL = 0.5  # [m], half the thickness of a wall
 N_WALLS = 4
@@ -143,7 +143,7 @@ def build(address: int) -> None:
     call = world.engine.functions
     space = made_at(call.cpSpaceNew, ())
     engine.space[0] = space
-    call_at(call.cpSpaceSetCollisionSlop, (space, _SLOP))
+    call_at(call.cpSpaceSetCollisionSlop, (space, SLOP))
     call_at(call.cpSpaceSetCollisionBias, (space, _BIAS))
     static = made_at(call.cpSpaceGetStaticBody, (space,))
     build_solids(world, static)

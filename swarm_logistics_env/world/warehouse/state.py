@@ -49,6 +49,7 @@ class WarehouseState:
     robot_heading_drift: Numbers
     robot_turn_rate: Numbers
     robot_present: Flags
+    robot_away: Flags
     robot_in_delivery: Flags
     robot_contact: Flags
     robot_item: Integers
@@ -168,6 +169,12 @@ class WarehouseState:
     def n_waiting(self) -> int:
         """Orders that came and are not asked for yet."""
         return int(self.orders.n_waiting[0])
+
+    @property
+    def in_episode(self) -> Flags:
+        """Which robots take part (N,): they are in the arena, or away and come back."""
+        takes_part: Flags = self.robot_present | self.robot_away
+        return takes_part
 
     @property
     def carries_requested(self) -> Flags:

@@ -16,7 +16,6 @@ from .logistics import (
     deliver,
     end_handling,
     open_grippers,
-    take_out,
     unmask_left,
 )
 from .orders import is_all_served, put_back_late, receive_orders
@@ -50,12 +49,6 @@ def perceive(address: int, rows: Sensed) -> None:
     n_anchored = sense(world, rows)
     count_step(world)
     progress.anchoring_seconds[0] += n_anchored * world.parameters.control_period
-
-
-@engine_kernel
-def remove(address: int, robot: int) -> None:
-    """Take a robot out of the arena of the world at `address`."""
-    take_out(unpacked_at(World, address), robot)
 
 
 @engine_kernel

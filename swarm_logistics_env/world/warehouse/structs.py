@@ -91,7 +91,9 @@ class Robots(NamedTuple):
     heading: Annotated[Numbers, "N"]  # [rad] from +x to the left, within +-pi
     heading_drift: Annotated[Numbers, "N"]  # [rad/s] at which its body turns unasked
     turn_rate: Annotated[Numbers, "N"]  # [rad/s] as its gyro tells, which misses the drift
-    present: Annotated[Flags, "N"]  # False once it was removed
+    present: Annotated[Flags, "N"]  # False once it was removed, and while it is away
+    away: Annotated[Flags, "N"]  # out of the arena, and comes back
+    left_at: Annotated[Numbers, "N", 3]  # x, y [m] and heading [rad] when it was taken out
     failed: Annotated[Flags, "N"]  # any failure mode holds
     in_delivery: Annotated[Flags, "N"]  # its centre is in a dock that takes what it carries
     last_in_delivery: Annotated[Integers, "N"]  # the last step in which it was, or NOBODY

@@ -19,12 +19,13 @@ from swarm_logistics_env.world.observations import n_columns
 from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN, Scenario
 
 from . import stepping
+from .absence import change_presence
 from .commands import MESSAGE, as_array, not_finite
 from .faults import Fault, FaultLike, Occurrence, apply_faults, checked_faults, step_of_change
 from .floor_cells import floor_map, floor_of
 from .grid import blank_grid
 from .layout import lay_out
-from .moved_elsewhere import MovedElsewhere
+from .moved_elsewhere import MovedElsewhere, check_returns
 from .one_thread import in_one_thread, used_elsewhere
 from .physics import N_CORNERS, Physics
 from .state import NOBODY, WarehouseState
@@ -96,9 +97,8 @@ class Warehouse:
         self._make_room_to_work()
         self._robot_places = state.robot_position.copy()
         self._build()
-        if bodies is None:
-            self._elsewhere = None
-        else:
+        self._elsewhere = None
+        if bodies is not None:
             self._elsewhere = MovedElsewhere(bodies, scenario, seed, self._world)
         stepping.begin(self._address)
         self._apply_faults()
@@ -203,6 +203,7 @@ class Warehouse:
 
         Raises:
             FaultError: a fault names robots that are not there.
+            BodiesError: a robot that is away cannot come back to the bodies.
             SetupError: the world was never reset.
         """
         seed = self._seed_of_episode("set_faults")
@@ -245,15 +246,14 @@ class Warehouse:
 
     @property
     def n_removed(self) -> int:
-        """How many robots were taken out of the arena so far."""
-        return int(np.count_nonzero(~self.state.robot_present))
+        """How many robots were taken out of the arena for good so far."""
+        return int(np.count_nonzero(~self.state.in_episode))
 
     @property
     def struck_robots(self) -> tuple[int, ...]:
         """The robots that any fault of this episode names, ascending."""
-        return tuple(
-            sorted({int(robot) for occurrence in self._occurrences for robot in occurrence.robots})
-        )
+        named = (occurrence.robots.tolist() for occurrence in self._occurrences)
+        return tuple(sorted(set[int]().union(*named)))
 
     @property
     def address(self) -> int:
@@ -383,16 +383,16 @@ class Warehouse:
     def _apply_faults(self) -> None:
         state = self.state
         period = self.scenario.control_period
-        is_removed = apply_faults(state, self.scenario, self._occurrences)
+        is_removed, is_away = apply_faults(state, self.scenario, self._occurrences)
         state.progress.is_changed[0] = True
         # Only now is known which robots fail, whose breaks are changes, too.
         state.progress.pause_step[0] = step_of_change(self._occurrences, state.step, period)
-        for robot in np.flatnonzero(is_removed & state.robot_present).tolist():
-            stepping.remove(self._address, robot)
+        change_presence(self._address, state, is_removed, is_away)
 
 
 def _occurrences(faults: Sequence[FaultLike], seed: int, scenario: Scenario) -> list[Occurrence]:
-    return [Occurrence(fault, seed, scenario) for fault in checked_faults("faults", faults)]
+    checked = check_returns(checked_faults("faults", faults), scenario)
+    return [Occurrence(fault, seed, scenario) for fault in checked]
 
 
 def _scenario(scenario: Scenario | None, otherwise: Scenario) -> Scenario:

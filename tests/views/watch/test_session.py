@@ -76,7 +76,7 @@ def test_robot_breaks_and_is_repaired(mode: str) -> None:
         (state.time, 3, mode)
     ]
     assert shown["robots1"][3][2] == ""
-    if mode == "removed":
+    if not FAILURE_MODES[mode].present:
         assert session.selected is None
         assert shown["robots0"][3] is None
         assert shown["poses0"][9:12] == [None] * 3

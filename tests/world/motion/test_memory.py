@@ -29,6 +29,7 @@ Memory = NDArray[np.float64]
 def sensed(*columns: int, item_at: float | None = None, recently_held: bool = False) -> Any:
     """A row (1, D) with 1 in some columns, and one item ahead [m], or none."""
     rows = np.zeros((1, row.N_COLUMNS), np.float32)
+    rows[0, row.RANGE_WALLS : row.RANGE_WALLS + row.N_BEAMS] = 2.0  # they meet nothing
     rows[0, list(columns)] = 1.0
     if item_at is not None:
         rows[0, row.ITEMS : row.ITEMS + row.ITEM_WIDTH] = [1, item_at, 0, 0, recently_held]

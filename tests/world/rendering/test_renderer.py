@@ -68,7 +68,7 @@ def test_frame_is_an_rgb_array_as_large_as_asked_for() -> None:
     assert picture.shape[0] % 2 == 0  # as films want it
     # Its size depends on the warehouse alone.
     other = scenario.replace(n_items=4, n_obstacles=2, delivery_width=1.0)
-    world.reset(1, [Fault(mode, 1) for mode in FAILURE_MODES if mode != "removed"], other)
+    world.reset(1, [Fault(mode, 1) for mode in palette.MARKS], other)
     assert frame(world.state, other, 800).shape == picture.shape
 
 
@@ -255,7 +255,7 @@ def test_what_a_robot_does_its_timer_and_its_heading_show() -> None:
 
 
 def test_every_failure_mode_has_a_mark_of_its_own() -> None:
-    assert set(palette.MARKS) == set(FAILURE_MODES) - {"removed"}
+    assert set(palette.MARKS) == set(FAILURE_MODES) - {"removed", "away"}
     state, scenario = situation([[2, 2], [4, 4]])
     state.failure_modes = ((), ())
     grey = [0.299, 0.587, 0.114]  # they are told apart in print as well

@@ -66,6 +66,7 @@ def test_each_robot_has_its_turn_and_faults_do_not_move_where_things_start() -> 
         ({"mode": "motor_slow", "factor": 1.0}, "Fault.factor = 1.0: "),
         ({"mode": "removed", "duration": 5.0}, "duration should be None"),
         ({"mode": "removed", "intermittent": (5, 5)}, "intermittent should be None"),
+        ({"mode": "away"}, "duration = None: should say when robots that are away come back"),
         ({"intermittent": (0.0, 5.0)}, "= 0.0: "),
     ],
 )
@@ -82,6 +83,7 @@ def test_an_impossible_fault_is_refused_with_the_reason(
         ("FM1:2@1234.567", Fault("FM1", 2, onset=1234.567)),
         ("FM4_jam:2:carrier@100+50", Fault("FM4_jam", 2, 100.0, 50.0, role="carrier")),
         ("dead:3@0+2.5", Fault("dead", 3, 0.0, 2.5)),
+        ("away:2@100+100", Fault("away", 2, 100.0, 100.0)),
         (None, Fault("motor_slow", 2, onset=200.0, duration=50.0, factor=0.1)),
         (None, Fault("FM4", [3, 7])),
         (None, Fault("rangers_blind", 2, intermittent=(5.0, 2.5))),
