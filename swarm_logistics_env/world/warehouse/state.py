@@ -115,6 +115,11 @@ class WarehouseState:
         self.delivered_by: list[int] = []  # robot, one per delivery
         self.delivered_due: list[float] = []  # [s] when each was due; infinite: never
 
+    def take_conditions(self, scenario: Scenario) -> None:
+        """Take over those conditions that stand in arrays, as a reset or a change has them."""
+        self.progress.last_step[0] = scenario.n_steps
+        self.batteries.n_dead[0] = scenario.dead_stations
+
     def note_deliveries(self, claims: Claims, count: int) -> None:
         """Note the deliveries of a step: when, by whom, and when each was due."""
         self.delivery_times += [self.time] * count

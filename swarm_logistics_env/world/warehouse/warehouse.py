@@ -297,8 +297,7 @@ class Warehouse:
         """Make the bodies, and tell compiled code where everything is."""
         scenario, state = self.scenario, self.state
         n, n_columns = self._command_shape
-        state.progress.last_step[0] = scenario.n_steps
-        state.batteries.n_dead[0] = scenario.dead_stations
+        state.take_conditions(scenario)
         lengths = lengths_of(scenario)
         floor = floor_of(scenario)
         self._physics = Physics(scenario, self._robot_places, len(floor.corners) // N_CORNERS)
