@@ -137,9 +137,10 @@ def _posterior(
 STORE = "runs.sqlite"
 # A removed robot is the reference of the others, and one that is away is it for a while; motor_wear
 # leaves more speed than motor_slow, and a late robot stands as a dead one does; only few
-# controllers send messages.
+# controllers send messages, and few robots have batteries.
 _NOT_TRIED = (
     "removed", "away", "motor_wear", "late", "message_frozen", "message_random", "message_lying",
+    "cell_fades",
 )  # fmt: skip
 MODES = tuple(mode for mode in FAILURE_MODES if mode not in _NOT_TRIED)
 _ONSETS = (0.0, 0.2, 0.4, 0.6)  # shares of an episode

@@ -61,7 +61,9 @@ spoiled = st.tuples(
 ).map(lambda pair: {**pair[0], **pair[1]})
 faults = st.builds(
     Fault,
-    st.sampled_from(sorted(FAILURE_MODES.keys() - {"away"})),  # which needs a duration
+    st.sampled_from(
+        sorted(FAILURE_MODES.keys() - {"away", "cell_fades"})
+    ),  # which need a duration, a battery
     st.integers(1, 3) | st.lists(st.integers(0, 4), min_size=1, max_size=2, unique=True),
     onset=st.floats(0.0, 0.4),
 )

@@ -46,7 +46,7 @@ class Case:
 
 @st.composite
 def planned_faults(draw: st.DrawFn, n_robots: int) -> Planned:
-    mode = draw(st.sampled_from(sorted(FAILURE_MODES)))
+    mode = draw(st.sampled_from(sorted(FAILURE_MODES.keys() - {"cell_fades"})))
     begins = draw(st.integers(0, 50)) if mode != "removed" else draw(st.integers(2, 60))
     passes = st.integers(begins + 1, begins + 40)
     ends = None
@@ -183,13 +183,13 @@ def assert_told(world: Warehouse, expected: list[float]) -> None:
 
 
 @pytest.mark.daily
-@pytest.mark.parametrize("first", sorted(FAILURE_MODES))
+@pytest.mark.parametrize("first", sorted(FAILURE_MODES.keys() - {"cell_fades"}))
 def test_any_two_modes_add_up(first: str) -> None:
     scenario = Scenario(
         n_robots=3, n_items=3, warehouse_width=2.5, warehouse_height=1.6, delivery_width=1.2,
         duration=STEPS * 0.1, restock=True, pickup_range=0.6, message_size=1, timer_limit=5.0,
     )  # fmt: skip
-    modes = sorted(FAILURE_MODES)
+    modes = sorted(FAILURE_MODES.keys() - {"cell_fades"})
     # Of the pairs of two modes one in four, and all of them at night; drawn cases have pairs, too.
     every = 1 if EXAMPLES >= 2000 else 4
     for number, second in list(enumerate(modes))[modes.index(first) :: every]:

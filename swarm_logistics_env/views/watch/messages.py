@@ -53,6 +53,7 @@ def fixed_data(session: Session) -> Message:
         "modes": [
             {"name": name, "mark": palette.MARKS.get(name, ""), "meaning": mode.description}
             for name, mode in FAILURE_MODES.items()
+            if mode.battery == 1.0 or session.scenario.battery is not None
         ],
         "speeds": SPEEDS,
         "choices": session.choices,

@@ -63,7 +63,7 @@ def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -
     assert session.paused
 
 
-@pytest.mark.parametrize("mode", FAILURE_MODES)
+@pytest.mark.parametrize("mode", sorted(FAILURE_MODES.keys() - {"cell_fades"}))
 def test_robot_breaks_and_is_repaired(mode: str) -> None:
     session = Session(SMALL)
     session.play(2.0)
