@@ -10,15 +10,20 @@ from swarm_logistics_env.core.errors import ScenarioError, suggest
 from swarm_logistics_env.world.floor import PLAN_SIZES, floor_title, with_plan_sizes
 
 from .checks import check
-from .fields import CHANGES_DURING_RUN, CHIPMUNK, LARGEST, SOURCES, ScenarioFields
+from .fields import CHANGES_DURING_RUN, CHIPMUNK, SOURCES, ScenarioFields
 from .order_file import orders_text, orders_title
+from .ranges import LARGEST
+from .robot_kinds import ROLES, RobotKind, Role, kinds_text
 
 __all__ = [
     "CHANGES_DURING_RUN",
     "CHIPMUNK",
     "LARGEST",
+    "ROLES",
     "SCENARIO_PRESETS",
     "SOURCES",
+    "RobotKind",
+    "Role",
     "Scenario",
 ]
 
@@ -92,6 +97,8 @@ def _with_orders(orders: str) -> str:
 
 
 def _as_text(value: object) -> str:
+    if isinstance(value, tuple) and all(isinstance(part, RobotKind) for part in value):
+        return kinds_text(value) or "none"
     return f"{value:g}" if isinstance(value, float) else orders_title(floor_title(str(value)))
 
 

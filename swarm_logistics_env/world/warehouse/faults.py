@@ -11,7 +11,7 @@ import math
 import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,19 +28,10 @@ from pydantic import (
 from swarm_logistics_env.core.errors import FaultError, SwarmLogisticsError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.core.streams import generator, row_keys
-from swarm_logistics_env.world.scenario import LARGEST, Scenario
+from swarm_logistics_env.world.scenario import LARGEST, Role, Scenario
 
 from .failure_modes import FAILURE_MODES, Capabilities, FailureMode, failure_mode
 from .state import WarehouseState, robots_in_role
-
-Role = Literal[
-    "carrier",  # carries a requested item
-    "neighbour",  # a carrier sees it with its cameras
-    "in_area",  # in the delivery area
-    "shuffling",  # carries an item that is not requested
-    "searching",  # empty, anywhere else
-]
-ROLES: tuple[str, ...] = get_args(Role)
 
 GRACE = 5e-7  # [s]; times are sums of control periods
 _SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
@@ -333,14 +324,17 @@ def apply_faults(
     able = state.able
     speed = np.resize(scenario.speed_mix, state.n_robots)
     sensing = np.resize(scenario.sensing_mix, state.n_robots)
-    able.max_speed[:] = scenario.max_speed * speed
-    able.max_turn_rate[:] = scenario.max_turn_rate * speed
-    able.ranger_range[:] = scenario.ranger_range * sensing
-    able.view_range[:] = scenario.view_range * sensing
+    able.max_speed[:] = scenario.of_robots("max_speed") * speed
+    able.max_turn_rate[:] = scenario.of_robots("max_turn_rate") * speed
+    able.max_acceleration[:] = scenario.of_robots("max_acceleration")
+    able.is_holonomic[:] = scenario.of_robots("drive") == "holonomic"
+    able.ranger_range[:] = scenario.of_robots("ranger_range") * sensing
+    able.view_range[:] = scenario.of_robots("view_range") * sensing
     able.ranger_bias[:] = 0.0
     able.radio_delay[:] = 0
     for name in LOST_AS_A_WHOLE:
         getattr(able, name)[:] = True
+    able.lifts[:] = scenario.of_robots("lifts")
     is_removed = np.zeros(state.n_robots, np.bool_)
     modes: list[list[str]] = [[] for _ in range(state.n_robots)]
     for occurrence in occurrences:

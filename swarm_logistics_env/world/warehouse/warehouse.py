@@ -284,7 +284,7 @@ class Warehouse:
     def _make_room_to_work(self) -> None:
         scenario = self.scenario
         n, width, height = scenario.n_robots, scenario.warehouse_width, scenario.warehouse_height
-        sees = max(scenario.ranger_range + scenario.robot_radius, scenario.view_range)
+        sees = max(scenario.ranger_reach + scenario.robot_radius, scenario.view_reach)
         hears = max(sees, scenario.radio_range)
         # Cells have half the side of the square that robots search: few rows, few of them in vain.
         self._robot_grid = blank_grid(width, height, hears / 2, n)

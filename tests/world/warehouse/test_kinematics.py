@@ -36,11 +36,11 @@ def test_a_robot_drives_along_its_mean_direction_at_most_at_its_top_speed(
 ) -> None:
     still = Warehouse(Scenario(n_robots=2, heading_drift=0.0))
     still.reset(0)
-    parameters = still._world.parameters._replace(control_period=period, is_holonomic=is_holonomic)
+    parameters = still._world.parameters._replace(control_period=period)
     world = still._world._replace(parameters=parameters)
     robots, able, wanted = world.robots, world.able, world.engine.wanted_velocity
     robots.heading[:], able.obeys[:], wanted[:] = heading, [True, False], 9.0
-    able.max_speed[:], able.max_turn_rate[:] = 2.0, 6.0
+    able.max_speed[:], able.max_turn_rate[:], able.is_holonomic[:] = 2.0, 6.0, is_holonomic
     world.commands.now[:] = commands
     words = packed(world)
     drive_at(words.ctypes.data)
