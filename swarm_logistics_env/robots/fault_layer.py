@@ -68,8 +68,9 @@ class FaultLayer:
         if not 0 <= number < scenario.n_robots:
             raise FaultError(f"number = {number}: robots are 0 to {scenario.n_robots - 1}")
         self._scenario = scenario
+        self._body = scenario.of_robot(number)
         self._number = number
-        self._occurrences = [Occurrence(fault, seed, scenario.n_robots) for fault in checked]
+        self._occurrences = [Occurrence(fault, seed, scenario) for fault in checked]
         self._beams: Row | None = None  # what frozen rangers repeat
         self._message: Numbers | None = None  # what a frozen channel repeats
         latest = max((fault.mode.radio_delay for fault in self._occurrences), default=0.0)
@@ -90,7 +91,7 @@ class FaultLayer:
         sensed = np.array(observation, np.float32)
         hears = self._keeps("hears", time)
         _, view = self._factors(time)
-        self._forget_unseen(sensed, view * self._scenario.view_range, hears)
+        self._forget_unseen(sensed, view * self._body.view_range, hears)
         if not hears:
             sensed[row.LOWEST_TIMER : row.CARRYING] = 0.0
         if not self._keeps("hears_requests", time):
@@ -183,7 +184,7 @@ class FaultLayer:
 
     def _spoil_beams(self, beams: Row, time: float) -> None:
         """Make of beams (48,) [m] what rangers that have failed report, in place."""
-        reach = self._scenario.ranger_range
+        reach = self._body.ranger_range
         if not self._keeps("rangers", time):
             beams[:] = reach
         bias = math.fsum(occurrence.mode.ranger_bias for occurrence in self._active(time))

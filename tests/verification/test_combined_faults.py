@@ -21,8 +21,8 @@ from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.reward_terms import REWARD_TERMS
 from swarm_logistics_env.policies.episode import Play
+from swarm_logistics_env.world.scenario import ROLES
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
-from swarm_logistics_env.world.warehouse.faults import ROLES
 from swarm_logistics_env.world.warehouse.state import WarehouseState
 from verification.invariants import Watch
 from verification.reference import Faults, Planned, Radio, ends, rewards

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.core.errors import ScenarioError
+from swarm_logistics_env.world.scenario import ROLES
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
-from swarm_logistics_env.world.warehouse.faults import ROLES
 from verification.trajectories import GROUPS
 
 EXAMPLES = 2000 if settings().max_examples >= 2000 else 5

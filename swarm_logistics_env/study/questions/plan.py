@@ -298,7 +298,7 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
     wanted = [definition for definition in comparing("fault") if definition.symbol in indicators]
     if task.removed is not None and any(definition.needs_removed for definition in wanted):
         # The robots that are removed are those that would have failed.
-        whom: Fields = {} if faults.role is None else {"role": faults.role}
+        whom = {name: x for name, x in faults.manner.items() if name in ("role", "kind")}
         for onset, m in product(faults.onsets, faults.robots):
             arms.append(arm(task.removed, m, onset, None, whom))
     yield from compared(table, arms)

@@ -18,7 +18,7 @@ from swarm_logistics_env.core.fingerprint import package_code
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.policies.episode import run_episode
 from swarm_logistics_env.policies.spec import NO_MAKERS
-from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario
+from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario, kinds_text
 from swarm_logistics_env.world.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.world.warehouse.faults import text_of
 
@@ -27,7 +27,7 @@ from .task_world import TaskWorld
 
 _WORLD = (
     "a warehouse of {width:g} m x {height:g} m{floor} with {n_items} items{restock}, robots of "
-    "{speed:g} m/s{drive}{handling}"
+    "{speed:g} m/s{drive}{handling}{kinds}"
 )
 
 _MOST_CHANGES = 4  # of a preset that is still named
@@ -125,6 +125,7 @@ class WarehouseTask(TaskWorld):
             speed=scenario.max_speed,
             drive=drive,
             handling=handling,
+            kinds=f" ({kinds_text(scenario.robot_kinds)})" if scenario.robot_kinds else "",
         )
 
     def preset_in_words(self, scenario: TaskScenario) -> str:
@@ -132,14 +133,14 @@ class WarehouseTask(TaskWorld):
         assert isinstance(scenario, Scenario)
         values = scenario.model_dump()
         differing = {
-            name: [field for field, value in preset.model_dump().items() if value != values[field]]
+            name: [field for field, value in preset if value != getattr(scenario, field)]
             for name, preset in SCENARIO_PRESETS.items()
         }
         nearest = min(differing, key=lambda name: len(differing[name]))
         fields = [field for field in differing[nearest] if field != "bodies"]
         if len(fields) > _MOST_CHANGES:
             return ""
-        changes = " and ".join(f"{field} = {values[field]}" for field in fields)
+        changes = " and ".join(f"{field} = {values.get(field, 'none')}" for field in fields)
         return f"preset {nearest} with {changes}" if changes else f"preset {nearest}"
 
     def engine(self, scenario: TaskScenario) -> str:
@@ -162,7 +163,7 @@ class WarehouseTask(TaskWorld):
             words.append("--trust-code")
         default = self.default.model_dump(mode="json")
         for name, value in case.scenario.model_dump(mode="json").items():
-            if value != default[name]:
+            if value != default.get(name):
                 text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
                 words += ["--set", f"{name}={text}"]
         for fault in case.faults:

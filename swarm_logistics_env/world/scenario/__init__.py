@@ -13,7 +13,7 @@ from .checks import check
 from .fields import CHANGES_DURING_RUN, CHIPMUNK, SOURCES, ScenarioFields
 from .order_file import orders_text, orders_title
 from .ranges import LARGEST
-from .robot_kinds import ROLES, RobotKind, Role, kinds_text
+from .robot_kinds import ROLES, RobotKind, Role, kinds_text, of_first_robots
 
 __all__ = [
     "CHANGES_DURING_RUN",
@@ -25,6 +25,8 @@ __all__ = [
     "RobotKind",
     "Role",
     "Scenario",
+    "kinds_text",
+    "of_first_robots",
 ]
 
 

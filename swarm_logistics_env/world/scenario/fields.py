@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.world.floor import FloorPlan, floor_plan
 
 from .order_file import NEXT, ORDER_SHAPES, OrderFile, order_file
 from .ranges import LARGEST, Count, Mix, NonNegative, Positive, Probability
-from .robot_kinds import OfKinds, RobotKind, kinds_of
+from .robot_kinds import Kinds, OfKinds
 
 # The public addresses of the sources that defaults were taken from.
 SOURCES = {
@@ -175,7 +175,7 @@ class ScenarioFields(OfKinds, Record):
     sensing_mix: Mix = Field(
         (1.0,), description="robot i has factor i (repeating) of ranger and view range; off"
     )
-    robot_kinds: Annotated[tuple[RobotKind, ...], BeforeValidator(kinds_of)] = Field(
+    robot_kinds: Kinds = Field(
         (),
         description="kinds of robots, each with a name, its count in a pattern that repeats over "
         "the robots, and the fields that differ; none: all are alike; off",

@@ -10,13 +10,13 @@ from __future__ import annotations
 import functools
 import json
 import re
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import BeforeValidator, PlainSerializer, model_validator
 
-from swarm_logistics_env.core.errors import ScenarioError
+from swarm_logistics_env.core.errors import FaultError, ScenarioError
 from swarm_logistics_env.core.records import Record
 
 from .ranges import Positive
@@ -78,12 +78,6 @@ class RobotKind(Record):
             )
         return self
 
-    @model_serializer(mode="wrap")
-    def _serialize(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # A field that a later version adds changes nothing that is stored.
-        written: dict[str, Any] = write(self)
-        return {name: value for name, value in written.items() if value is not None}
-
     @property
     def differing(self) -> dict[str, Any]:
         """The fields that it sets, with their values."""
@@ -122,6 +116,10 @@ def kinds_text(kinds: tuple[RobotKind, ...]) -> str:
     return ", ".join(map(str, kinds))
 
 
+# They are stored as their text, to which a field that a later version knows adds nothing.
+Kinds = Annotated[tuple[RobotKind, ...], BeforeValidator(kinds_of), PlainSerializer(kinds_text)]
+
+
 def _fields_of(text: str) -> dict[str, Any]:
     match = _TEXT.fullmatch(text)
     if match is None:
@@ -153,7 +151,7 @@ def check_names(kinds: tuple[RobotKind, ...], n_robots: int) -> None:
         ValueError: one has not.
     """
     names = [kind.name for kind in kinds]
-    numbers = numbers_of_kinds(tuple(kind.count for kind in kinds), n_robots)
+    numbers = np.resize(_pattern(tuple(kind.count for kind in kinds)), n_robots)
     for number, name in enumerate(names):
         if name in names[:number]:
             raise ValueError(f"robot_kinds: name = {name!r} is given twice: should be once")
@@ -164,18 +162,6 @@ def check_names(kinds: tuple[RobotKind, ...], n_robots: int) -> None:
             )
     if kinds and all(kind.lifts is False for kind in kinds):
         raise ValueError("robot_kinds: lifts = False in every kind: should be True in one of them")
-
-
-def numbers_of_kinds(counts: tuple[int, ...], n_robots: int) -> NDArray[np.int64]:
-    """Return the number of each robot's kind, from 0 on, shape (N,); zeros if there is no kind.
-
-    Any first n robots have about the shares of the counts.
-
-    Example:
-        >>> numbers_of_kinds((4, 1), 6).tolist()
-        [0, 0, 1, 0, 0, 0]
-    """
-    return np.resize(_pattern(counts), n_robots)
 
 
 @functools.lru_cache(maxsize=64)
@@ -211,15 +197,41 @@ class OfKinds:
         return np.array(self.of_kinds(name))[self.kind_numbers(self.n_robots)]
 
     def kind_numbers(self, n_robots: int) -> NDArray[np.int64]:
-        """Return the number of the kind of each of so many robots, from 0 on, shape (n_robots,)."""
-        return numbers_of_kinds(tuple(kind.count for kind in self.robot_kinds), n_robots)
+        """Return the numbers of the kinds of robots 0, 1, ..., from 0 on, shape (n_robots,).
 
-    def of_kind(self, number: int) -> Self:
-        """Return a scenario whose robots all are of the kind of that number."""
+        Any first n robots have about the shares of the counts.
+        """
+        return np.resize(self.kind_pattern, n_robots)
+
+    def is_of_kind(self, name: str) -> NDArray[np.bool_]:
+        """Return which robots are of the kind of that name (N,).
+
+        Raises:
+            FaultError: there is no such kind.
+        """
+        names = [kind.name for kind in self.robot_kinds]
+        if name not in names:
+            kinds = ", ".join(names) or "robot_kinds has none"
+            raise FaultError(
+                f"Fault.kind = {name!r}: should be a kind of robots ({kinds}), or, as its role, "
+                f"{', '.join(ROLES)}"
+            )
+        return np.asarray(self.kind_numbers(self.n_robots) == names.index(name))
+
+    @property
+    def kind_pattern(self) -> NDArray[np.int64]:
+        """The numbers of the kinds of the first robots, which repeat (P,); 0 if all are alike."""
+        return _pattern(tuple(kind.count for kind in self.robot_kinds))
+
+    def of_robot(self, number: int) -> Self:
+        """Return a scenario in which all robots have the body of the robot of that number.
+
+        Its robots lift, as whoever steers one robot takes it for one whose gripper may fail.
+        """
         if not self.robot_kinds:
             return self
-        fields = self.robot_kinds[number].differing
-        fields.pop("lifts", None)  # whoever plans for one robot takes it for one that may fail to
+        kind = self.robot_kinds[self.kind_pattern[number % len(self.kind_pattern)]]
+        fields = {name: value for name, value in kind.differing.items() if name != "lifts"}
         return self.replace(robot_kinds=(), **fields)
 
     @property
@@ -246,3 +258,15 @@ class OfKinds:
     def view_reach(self) -> float:
         """Range of the cameras of the kind that sees farthest [m]."""
         return float(max(self.of_kinds("view_range")))
+
+
+ScenarioT = TypeVar("ScenarioT", bound=OfKinds)
+
+
+def of_first_robots(scenario: ScenarioT) -> tuple[ScenarioT, ...]:
+    """Return scenarios as `OfKinds.of_robot` does, of the first robots, whose kinds repeat."""
+    if not scenario.robot_kinds:
+        return (scenario,)
+    kinds, first = np.unique(scenario.kind_pattern, return_index=True)
+    of_kind = dict(zip(kinds.tolist(), map(scenario.of_robot, first.tolist()), strict=True))
+    return tuple(of_kind[kind] for kind in scenario.kind_pattern.tolist())

@@ -86,7 +86,7 @@ class Warehouse:
         """
         scenario = _scenario(scenario, self.scenario)
         bodies = load_bodies(scenario.bodies)
-        occurrences = _occurrences(faults, seed, scenario.n_robots)
+        occurrences = _occurrences(faults, seed, scenario)
         state = WarehouseState(scenario)
         lay_out(state, scenario, seed)
         self.scenario = scenario
@@ -206,7 +206,7 @@ class Warehouse:
             SetupError: the world was never reset.
         """
         seed = self._seed_of_episode("set_faults")
-        self._occurrences = _occurrences(faults, seed, self.state.n_robots)
+        self._occurrences = _occurrences(faults, seed, self.scenario)
         self._apply_faults()
         self._remember()
 
@@ -237,7 +237,7 @@ class Warehouse:
         Given to `set_faults`, they change nothing.
         """
         return tuple(
-            occurrence.fault.replace(robots=tuple(occurrence.robots.tolist()), role=None)
+            occurrence.fault.replace(robots=tuple(occurrence.robots.tolist()), role=None, kind=None)
             if len(occurrence.robots)
             else occurrence.fault
             for occurrence in self._occurrences
@@ -389,8 +389,8 @@ class Warehouse:
             stepping.remove(self._address, robot)
 
 
-def _occurrences(faults: Sequence[FaultLike], seed: int, n_robots: int) -> list[Occurrence]:
-    return [Occurrence(fault, seed, n_robots) for fault in checked_faults("faults", faults)]
+def _occurrences(faults: Sequence[FaultLike], seed: int, scenario: Scenario) -> list[Occurrence]:
+    return [Occurrence(fault, seed, scenario) for fault in checked_faults("faults", faults)]
 
 
 def _scenario(scenario: Scenario | None, otherwise: Scenario) -> Scenario:

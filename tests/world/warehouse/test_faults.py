@@ -31,17 +31,19 @@ def test_chosen_sets_are_nested_the_same_for_every_mode_and_of_the_right_size(
     seed: int, n_robots: int, data: st.DataObject
 ) -> None:
     m = data.draw(st.integers(1, n_robots))
-    chosen = failed_robots(Fault("FM1", m), seed, n_robots)
+    scenario = Scenario(n_robots=n_robots)
+    chosen = failed_robots(Fault("FM1", m), seed, scenario)
     assert len(set(chosen)) == m
     assert set(chosen) <= set(range(n_robots))
     for mode in ("removed", "FM4", "dead"):
-        np.testing.assert_array_equal(failed_robots(Fault(mode, m, 7.0), seed, n_robots), chosen)
+        np.testing.assert_array_equal(failed_robots(Fault(mode, m, 7.0), seed, scenario), chosen)
     if m > 1:
-        assert set(failed_robots(Fault("FM1", m - 1), seed, n_robots)) < set(chosen)
+        assert set(failed_robots(Fault("FM1", m - 1), seed, scenario)) < set(chosen)
 
 
 def test_each_robot_has_its_turn_and_faults_do_not_move_where_things_start() -> None:
-    turns = np.bincount([failed_robots(Fault("FM1"), seed, 10)[0] for seed in range(200)])
+    ten = Scenario(n_robots=10)
+    turns = np.bincount([failed_robots(Fault("FM1"), seed, ten)[0] for seed in range(200)])
     assert 5 < turns.min() <= turns.max() < 45
     world, sound = Warehouse(SMALL), Warehouse(SMALL)
     sound.reset(9)
@@ -209,7 +211,7 @@ def test_roles_are_those_about_every_item_that_is_asked_for() -> None:
 
 
 def test_an_intermittent_fault_never_has_the_same_breaks_again() -> None:
-    occurrence = Occurrence(Fault("FM2", (0,), intermittent=(5.0, 5.0)), 0, 1)
+    occurrence = Occurrence(Fault("FM2", (0,), intermittent=(5.0, 5.0)), 0, Scenario(n_robots=1))
     times = [0.0]
     while len(times) < 130:
         times.append(occurrence.next_change(times[-1], math.inf))
@@ -240,7 +242,7 @@ def test_robots_keep_their_speeds_and_senses_when_another_is_removed(build: Buil
 
 def test_an_intermittent_fault_ends_with_its_duration_whatever_holds_then() -> None:
     fault = Fault("FM2", (0,), onset=1.0, duration=2.0, intermittent=(1000.0, 1000.0))
-    occurrence = Occurrence(fault, 0, 1)
+    occurrence = Occurrence(fault, 0, Scenario(n_robots=1))
     assert occurrence.next_change(0.0, math.inf) == 1.0
     assert occurrence.holds_for(1.0).tolist() == [0]
     assert occurrence.next_change(1.0, math.inf) == 3.0
