@@ -72,6 +72,7 @@ def cases(draw: st.DrawFn) -> Case:
         speed_mix=draw(st.sampled_from([(1.0,), (1.0, 0.5)])), heading_drift=0.5,
         sensing_mix=draw(st.sampled_from([(1.0,), (1.0, 0.4)])),
         drive=draw(st.sampled_from(["holonomic", "differential"])),
+        robot_kinds=draw(st.sampled_from(["", "plain, other max_speed=0.7 lifts=false"])),
     )  # fmt: skip
     some = st.lists(planned_faults(n), min_size=1, max_size=4).map(tuple)
     planned = draw(some)

@@ -13,6 +13,7 @@ from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.study.tasks.task import Case, Fields, Run, TaskFault, TaskScenario
+from swarm_logistics_env.study.tasks.task_world import world_of
 from swarm_logistics_env.study.trials import Trial
 
 from .comparison import (
@@ -255,6 +256,7 @@ def _title(factor: Factor, general: str, manner: str = "") -> str:
 
 def _arm(base: Case, setting: Setting, changes: Fields, *faults: TaskFault) -> Arm:
     scenario = base.task.vary(base.scenario, changes)
+    world_of(base.task).check_faults(scenario, faults)
     return Arm(setting, replace(base, scenario=scenario, faults=faults))
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from types import MappingProxyType
 
@@ -20,9 +20,9 @@ from swarm_logistics_env.policies.episode import run_episode
 from swarm_logistics_env.policies.spec import NO_MAKERS
 from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario, kinds_text
 from swarm_logistics_env.world.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.world.warehouse.faults import text_of
+from swarm_logistics_env.world.warehouse.faults import failed_robots, text_of
 
-from .task import Case, Fields, Outcome, TaskScenario
+from .task import Case, Fields, Outcome, TaskFault, TaskScenario
 from .task_world import TaskWorld
 
 _WORLD = (
@@ -142,6 +142,13 @@ class WarehouseTask(TaskWorld):
             return ""
         changes = " and ".join(f"{field} = {values.get(field, 'none')}" for field in fields)
         return f"preset {nearest} with {changes}" if changes else f"preset {nearest}"
+
+    def check_faults(self, scenario: TaskScenario, faults: Sequence[TaskFault]) -> None:
+        """Raise FaultError if a fault names a kind that the scenario has not, or too many of it."""
+        assert isinstance(scenario, Scenario)
+        for fault in faults:
+            if isinstance(fault, Fault):
+                failed_robots(fault, 0, scenario)
 
     def engine(self, scenario: TaskScenario) -> str:
         """Return the engine of the bodies."""

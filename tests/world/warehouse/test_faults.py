@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.core.errors import FaultError
 from swarm_logistics_env.world.observations import N_BEAMS
+from swarm_logistics_env.world.scenario import ROLES
 from swarm_logistics_env.world.warehouse.faults import (
-    ROLES,
     Occurrence,
     failed_robots,
     fault_of,
