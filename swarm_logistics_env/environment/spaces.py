@@ -211,7 +211,7 @@ class Spaces:
         changed = [
             f"{name} = {value}"
             for name, value in scenario.model_dump().items()
-            if value != getattr(self._own, name)
+            if getattr(scenario, name) != getattr(self._own, name)
         ]
         raise SetupError(
             f"{', '.join(changed)}: observations or states could leave their spaces; should be "

@@ -112,29 +112,6 @@ def test_each_robot_is_able_to_do_what_its_kind_can_times_its_factors() -> None:
     assert state.view_range.tolist() == [2.0, 0.5, 2.0, 0.25]
 
 
-def test_kinds_drive_gather_speed_and_lift_as_they_can() -> None:
-    kinds = "plain, wheels drive=differential, slow max_acceleration=1.0, scout lifts=false"
-    world = Warehouse(
-        Scenario(n_robots=4, n_items=4, robot_kinds=kinds, heading_drift=0.0, pickup_range=3.0)
-    )
-    world.reset(0)
-    state = world.state
-    state.item_position = state.robot_position + 0.05
-    world.step([HOLDS] * 4)
-    assert [item >= 0 for item in state.robot_item] == [True, True, True, False]
-    heading = state.robot_heading
-    forward, left = (
-        (state.robot_velocity * np.column_stack(axes)).sum(axis=1)
-        for axes in (
-            (np.cos(heading), np.sin(heading)),
-            (-np.sin(heading), np.cos(heading)),
-        )
-    )
-    assert left[0] == pytest.approx(forward[0])  # all of them far from walls and each other
-    assert (left[1], forward[1]) == (pytest.approx(0.0), pytest.approx(2.0))
-    assert np.hypot(forward[2], left[2]) == pytest.approx(0.1)  # after 0.1 s
-
-
 def test_rows_have_one_length_and_stay_within_the_bounds_of_all_kinds() -> None:
     scenario = MIXED.replace(robot_kinds=f"{TEXT}, far ranger_range=4.0 max_turn_rate=9.0")
     low, high = bounds(scenario)

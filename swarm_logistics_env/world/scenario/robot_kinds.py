@@ -177,10 +177,9 @@ def _pattern(counts: tuple[int, ...]) -> NDArray[np.int64]:
 class OfKinds:
     """What a scenario says of its kinds of robots."""
 
-    n_robots: int
-    robot_kinds: tuple[RobotKind, ...]
-
-    if TYPE_CHECKING:
+    if TYPE_CHECKING:  # or they would stand before the other fields of a scenario
+        n_robots: int
+        robot_kinds: tuple[RobotKind, ...]
 
         def replace(self, **fields: Any) -> Self: ...
 
@@ -194,7 +193,10 @@ class OfKinds:
 
     def of_robots(self, name: str) -> NDArray[Any]:
         """Return a field of `RobotKind` for each robot (N,), without its factor of a mix."""
-        return np.array(self.of_kinds(name))[self.kind_numbers(self.n_robots)]
+        values = self.of_kinds(name)
+        if len(values) == 1:
+            return np.full(self.n_robots, values[0])
+        return np.array(values)[self.kind_numbers(self.n_robots)]
 
     def kind_numbers(self, n_robots: int) -> NDArray[np.int64]:
         """Return the numbers of the kinds of robots 0, 1, ..., from 0 on, shape (n_robots,).
