@@ -72,7 +72,7 @@ def films() -> None:
     ]
     film = Film(takes, 240.0, speed=24.0, frame_rate=12.5, size=400)
     write_film(MEDIA / "fm4.gif", film.frames(), 12.5)
-    # Scripts send no messages, so that a spoilt one changes nothing; these robots have no batteries.
+    # Scripts send no messages, so that a spoilt one changes nothing, and nobody has a battery here.
     is_shown = {mode: not mode.startswith(("message_", "cell_")) for mode in FAILURE_MODES}
     for mode in (mode for mode in FAILURE_MODES if is_shown[mode]):
         # Who is late begins when the fault ends, and who is away comes back; others fail for good.

@@ -99,7 +99,7 @@ from tests.study.tasks.lane import LANE
     odometry_scale: Positive = Field(1.0, description="factor of velocities; off")
 @ world/warehouse/structs.py @    n_substeps:
     odometry_scale: float
-@ world/warehouse/sensing.py @    limit = parameters.max_speed
+@ world/warehouse/sensing.py @    limit = parameters.highest_speed
     forward *= parameters.odometry_scale
     left *= parameters.odometry_scale
 ### An observation column SENSE=sensing

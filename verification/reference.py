@@ -14,8 +14,9 @@ import numpy as np
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.compiler.kernels import pair_key, uniform
 from swarm_logistics_env.core.streams import generator, row_keys
+from swarm_logistics_env.world.warehouse.abilities import LOST_AS_A_WHOLE
 from swarm_logistics_env.world.warehouse.failure_modes import failure_mode
-from swarm_logistics_env.world.warehouse.faults import GRACE, LOST_AS_A_WHOLE, failed_robots
+from swarm_logistics_env.world.warehouse.faults import GRACE, failed_robots
 from swarm_logistics_env.world.warehouse.state import NOBODY
 from swarm_logistics_env.world.warehouse.state import WarehouseState as State
 
@@ -69,7 +70,7 @@ class Faults:
                 fault.struck = sorted(fault.robots)
             elif fault.role is None:  # whatever the mode, the seed chooses the same robots
                 like = Fault("FM1", fault.robots)
-                fault.struck = failed_robots(like, self._seed, self._scenario.n_robots).tolist()
+                fault.struck = failed_robots(like, self._seed, self._scenario).tolist()
 
     def expected(self, world: Warehouse, before: State) -> list[Able]:
         """Return of each robot what it can do now, its modes and whether it is there."""
@@ -99,14 +100,16 @@ class Faults:
         s = self._scenario
         speed = s.speed_mix[robot % len(s.speed_mix)]
         sensing = s.sensing_mix[robot % len(s.sensing_mix)]
+        own = s.of_robot(robot)
         return {
-            "max_speed": s.max_speed * speed,
-            "max_turn_rate": s.max_turn_rate * speed,
-            "view_range": s.view_range * sensing,
-            "ranger_range": s.ranger_range * sensing,
+            "max_speed": own.max_speed * speed,
+            "max_turn_rate": own.max_turn_rate * speed,
+            "view_range": own.view_range * sensing,
+            "ranger_range": own.ranger_range * sensing,
             "ranger_bias": 0.0,
             "radio_delay": 0,
             **dict.fromkeys(LOST_AS_A_WHOLE, True),
+            "lifts": bool(s.of_robots("lifts")[robot]),
             "modes": (),
             "there": True,
             "returns": True,

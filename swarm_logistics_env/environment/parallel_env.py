@@ -176,7 +176,7 @@ class SwarmLogisticsEnv(DictView):
         scenario = self.scenario_of(seed, options)
         self._spaces.check(scenario, len(self.possible_agents))
         faults = faults_among(options, self.faults)
-        check_somebody_is_there(faults, seed, scenario.n_robots)
+        check_somebody_is_there(faults, seed, scenario)
         return scenario, faults
 
     @property

@@ -159,7 +159,7 @@ def faults_among(options: Mapping[str, Any], default: Sequence[Fault]) -> tuple[
     return checked_faults('options["faults"]', options.get("faults", default), SetupError)
 
 
-def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -> None:
+def check_somebody_is_there(faults: Sequence[Fault], seed: int, scenario: Scenario) -> None:
     """Check that an episode with these faults begins with at least one robot.
 
     Raises:
@@ -170,8 +170,9 @@ def check_somebody_is_there(faults: Sequence[Fault], seed: int, n_robots: int) -
     for fault in faults:
         mode = failure_mode(fault.mode)
         if fault.onset <= GRACE and not (mode.present or mode.returns):
-            removed.update(failed_robots(fault, seed, n_robots).tolist())
-    if len(removed) == n_robots:
+            removed.update(failed_robots(fault, seed, scenario).tolist())
+    if len(removed) == scenario.n_robots:
         raise SetupError(
-            f"faults remove all {n_robots} robots at 0 s: should leave at least one to begin with"
+            f"faults remove all {scenario.n_robots} robots at 0 s: should leave at least one to "
+            "begin with"
         )

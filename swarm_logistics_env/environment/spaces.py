@@ -43,7 +43,7 @@ def _robot_place(world: Warehouse, axis: int, most: float) -> NDArray[np.float64
 
 
 def _robot_velocity(world: Warehouse, axis: int) -> NDArray[np.float64]:
-    limit = world.scenario.max_speed
+    limit = world.scenario.highest_speed
     return np.clip(world.state.robot_velocity[:, axis], -limit, limit)
 
 
@@ -76,8 +76,8 @@ ROBOT_FEATURES = {
     ),
     "cos_heading": Feature(lambda world: np.cos(world.state.robot_heading), is_signed=True),
     "sin_heading": Feature(lambda world: np.sin(world.state.robot_heading), is_signed=True),
-    "velocity_x": Feature(lambda world: _robot_velocity(world, 0), "max_speed", is_signed=True),
-    "velocity_y": Feature(lambda world: _robot_velocity(world, 1), "max_speed", is_signed=True),
+    "velocity_x": Feature(lambda world: _robot_velocity(world, 0), "highest_speed", is_signed=True),
+    "velocity_y": Feature(lambda world: _robot_velocity(world, 1), "highest_speed", is_signed=True),
     "carrying": Feature(lambda world: world.state.robot_item != NOBODY),
     "carrying_requested": Feature(_carries_requested),
     "timer": Feature(_timer, "timer_limit"),
@@ -121,7 +121,7 @@ def _rows(features: Mapping[str, Feature], world: Warehouse, n_rows: int) -> NDA
 
 # These fields bound the state: an episode may have at most the largest value declared.
 _BOUND_THE_STATE = (
-    "n_items", "warehouse_width", "warehouse_height", "max_speed", "timer_limit", "duration",
+    "n_items", "warehouse_width", "warehouse_height", "highest_speed", "timer_limit", "duration",
     "longest_way",
 )  # fmt: skip
 
@@ -211,7 +211,7 @@ class Spaces:
         changed = [
             f"{name} = {value}"
             for name, value in scenario.model_dump().items()
-            if value != getattr(self._own, name)
+            if getattr(scenario, name) != getattr(self._own, name)
         ]
         raise SetupError(
             f"{', '.join(changed)}: observations or states could leave their spaces; should be "

@@ -30,7 +30,7 @@ from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.frame import MotionView
 from swarm_logistics_env.world.motion.memory import fading, length_of, note_command, remember_row
 from swarm_logistics_env.world.motion.steering import set_velocity, steer
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import Scenario, of_first_robots
 from swarm_logistics_env.world.warehouse.state import WarehouseState
 
 
@@ -73,17 +73,17 @@ Parameters = BiasedWalkParameters.for_kernels()
 
 
 class WalkConstants(NamedTuple):
-    """What follows from parameters, swarm and body for one control period.
+    """What follows from parameters, swarm and bodies for one control period.
 
     Attributes:
-        largest_turn: of the stored heading [rad].
-        drop_probability: of an item that is not requested.
+        largest_turn: of the stored heading of each robot (N,) [rad].
+        drop_probability: of an item that is not requested, of each robot (N,).
         push: away from robots and items, times distance [1/m].
         period: the control period [s].
     """
 
-    largest_turn: float
-    drop_probability: float
+    largest_turn: NDArray[np.float64]
+    drop_probability: NDArray[np.float64]
     push: float
     period: float
 
@@ -115,10 +115,13 @@ class BiasedWalk(RowPolicy, Scripted):
     def configure(self, scenario: Scenario) -> None:
         """Take what the maker of a robot knows: its speed and control period, and the swarm."""
         parameters = self.parameters
-        stride = scenario.max_speed * scenario.control_period
-        self._constants = WalkConstants(
-            largest_turn=math.sqrt(3.0 * parameters.diffusion * stride),
-            drop_probability=-math.expm1(-parameters.drop_rate * stride),
+        # Of the first robots, whose kinds repeat.
+        strides = [one.max_speed * one.control_period for one in of_first_robots(scenario)]
+        turns = [math.sqrt(3.0 * parameters.diffusion * stride) for stride in strides]
+        drops = [-math.expm1(-parameters.drop_rate * stride) for stride in strides]
+        self._of_first = WalkConstants(
+            largest_turn=np.array(turns),
+            drop_probability=np.array(drops),
             push=parameters.push / max(scenario.n_robots - 1, 1),
             period=scenario.control_period,
         )
@@ -128,6 +131,10 @@ class BiasedWalk(RowPolicy, Scripted):
     def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode with random stored headings."""
         self._frame.begin(keys)
+        self._constants = self._of_first._replace(
+            largest_turn=np.resize(self._of_first.largest_turn, len(keys)),
+            drop_probability=np.resize(self._of_first.drop_probability, len(keys)),
+        )
         self._heading = np.array([math.tau * uniform(key, 0) for key in keys])
         self._compass = np.empty((0, 2))
 
@@ -208,7 +215,7 @@ def act_biased_walk(
         delivers = observation[row.CARRYING_REQUESTED] > 0.5
         share = 2.0 * uniform(keys[robot], 2 * counts[robot]) - 1.0
         body_turn = period * np.float64(observation[row.TURN_RATE])
-        heading[robot] += constants.largest_turn * share - body_turn
+        heading[robot] += constants.largest_turn[robot] * share - body_turn
         x = math.cos(heading[robot])
         y = math.sin(heading[robot])
         if delivers:
@@ -229,7 +236,7 @@ def act_biased_walk(
         x += push_x
         y += push_y
         number = uniform(keys[robot], 2 * counts[robot] + 1)
-        drops = carries and not delivers and number < constants.drop_probability
+        drops = carries and not delivers and number < constants.drop_probability[robot]
         set_velocity(x, y, 1.0, -1.0 if drops else 1.0, commands[robot])
         note_command(observation, commands[robot], memory)
         steer(memory, commands[robot])

@@ -51,8 +51,13 @@ class Central(Scripted):
     def configure(self, scenario: Scenario) -> None:
         """Take the sizes of the warehouse and of the robots, and the floor plan."""
         self._scenario = scenario
-        self._stride = scenario.max_speed * scenario.control_period  # [m] in a control step
-        self._braking_distance = scenario.max_speed**2 / (2.0 * scenario.max_acceleration)
+        # Of the kind that gets farthest: others come to a stand in time, too.
+        self._stride = scenario.highest_speed * scenario.control_period  # [m] in a control step
+        speed = np.array(scenario.of_kinds("max_speed"))
+        braking_distances = speed**2 / (2.0 * np.array(scenario.of_kinds("max_acceleration")))
+        self._braking_distance = float(braking_distances.max())
+        self._full_turn = np.array(scenario.of_kinds("max_turn_rate")) * scenario.control_period
+        self._lifts = np.array(scenario.of_kinds("lifts"))
         self._ground = ground_of(scenario)
 
     def reset(self, n_robots: int, seed: int) -> None:
@@ -157,7 +162,7 @@ class Central(Scripted):
         return worker
 
     def _nearest(self, state: WarehouseState, item: int, is_trusted: NDArray[np.bool_]) -> int:
-        free = state.robot_present & (state.robot_item == NOBODY)
+        free = state.robot_present & (state.robot_item == NOBODY) & self._lifts[state.robot_kind]
         if not free.any():
             return NOBODY
         is_candidate = free & is_trusted if (free & is_trusted).any() else free
@@ -280,12 +285,12 @@ class Central(Scripted):
     ) -> NDArray[np.float64]:
         heading = state.robot_heading
         commands = commands_of(velocity, np.cos(heading), np.sin(heading), gripper)
-        if self._scenario.drive == "differential":
-            forward = commands[:, 0]
-            left = commands[:, 1]
-            turn = commands[:, 2]
-            full_turn = self._scenario.max_turn_rate * self._scenario.control_period
-            turn[:] = np.clip(np.arctan2(left, forward) / full_turn, -1.0, 1.0)
-            forward[:] = np.maximum(forward, 0.0)
-            left[:] = 0.0
+        turns = ~state.is_holonomic
+        if turns.any():
+            forward = commands[turns, 0]
+            angle = np.arctan2(commands[turns, 1], forward)
+            full_turn = self._full_turn[state.robot_kind[turns]]
+            commands[turns, 2] = np.clip(angle / full_turn, -1.0, 1.0)
+            commands[turns, 0] = np.maximum(forward, 0.0)
+            commands[turns, 1] = 0.0
         return commands

@@ -15,7 +15,7 @@ from swarm_logistics_env.policies.driving import HOLD, LET_GO, away_from_neighbo
 from swarm_logistics_env.policies.policy import Holding, Policy, check_policy, identity_parts
 from swarm_logistics_env.policies.row_policy import RowPolicy, check_row_policy
 from swarm_logistics_env.world import observations as row
-from swarm_logistics_env.world.motion.memory import BODY, MEMORY, N_COLUMNS, body_of, length_of
+from swarm_logistics_env.world.motion.memory import BODY, MEMORY, N_COLUMNS, bodies_of, length_of
 from swarm_logistics_env.world.motion.steering import set_velocity, steer
 from swarm_logistics_env.world.scenario import Scenario
 
@@ -37,7 +37,7 @@ def drive_to_charge(
     needs_charge: NDArray[np.bool_],
     side: NDArray[np.float64],
     in_vain: NDArray[np.float64],
-    body: NDArray[np.float64],
+    bodies: NDArray[np.float64],
     diameter: float,
     period: float,
     commands: NDArray[np.float64],
@@ -51,7 +51,7 @@ def drive_to_charge(
     Args:
         in_vain: for how long each stood on a station that did not charge it [s], (N,); below 0: it
             looks for another one for so long.
-        body: memory (N_COLUMNS,) of a robot, of which the body is read.
+        bodies: memories (N, N_COLUMNS), of which the bodies are read.
         diameter: of a robot [m].
     """
     for robot in range(len(rows)):
@@ -59,6 +59,7 @@ def drive_to_charge(
             continue
         sensed = rows[robot]
         command = commands[robot]
+        body = bodies[robot]
         is_inside = sensed[row.IN_DELIVERY_AREA] > 0.5
         is_useless = sensed[row.CARRYING] > 0.5 and sensed[row.CARRYING_REQUESTED] < 0.5
         gripper = LET_GO if is_useless and not is_inside else HOLD
@@ -150,6 +151,7 @@ class Charging(RowPolicy, Holding):
         self.until = until
         self.stream = getattr(policy, "stream", "charging")
         self._has_battery = False
+        self._bodies_of_kinds = np.zeros((1, BODY.stop - BODY.start))
         self._set_robots(0)
 
     def __repr__(self) -> str:
@@ -174,8 +176,7 @@ class Charging(RowPolicy, Holding):
         self._has_battery = scenario.battery is not None
         self._period = scenario.control_period
         self._diameter = 2.0 * scenario.robot_radius
-        self._body = np.zeros(N_COLUMNS)
-        self._body[BODY] = body_of(scenario)
+        self._bodies_of_kinds = bodies_of(scenario)
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode of robots whose streams have these keys (N,)."""
@@ -192,6 +193,8 @@ class Charging(RowPolicy, Holding):
         self._was_inside = np.zeros(n_robots, np.bool_)
         self._side = np.ones(n_robots)
         self._in_vain = np.zeros(n_robots)
+        self._bodies = np.zeros((n_robots, N_COLUMNS))
+        self._bodies[:, BODY] = np.resize(self._bodies_of_kinds, (n_robots, BODY.stop - BODY.start))
 
     def memories(self) -> dict[str, NDArray[Any]]:
         """Return all that robots remember, the policy's memories among it."""
@@ -221,8 +224,8 @@ class Charging(RowPolicy, Holding):
             rows[goes_home, row.CARRYING_REQUESTED] = 1.0
         commands = np.array(self.policy.act(rows), np.float64)
         drive_to_charge(
-            observations, self._needs_charge, self._side, self._in_vain, self._body, self._diameter,
-            self._period, commands,
+            observations, self._needs_charge, self._side, self._in_vain, self._bodies,
+            self._diameter, self._period, commands,
         )  # fmt: skip
         return commands
 

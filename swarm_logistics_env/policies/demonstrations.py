@@ -289,15 +289,16 @@ def _outputs_of(
     a speed as goes with a direction at most a quarter off: beyond that it would drive backwards.
     """
     forward, left, turn, gripper = commands[:, :4].T
-    if scenario.drive == "differential":
-        turned_by = turn * scenario.max_turn_rate * scenario.control_period
+    is_differential = scenario.of_robots("drive") == "differential"
+    if is_differential.any():
+        turned_by = turn * scenario.of_robots("max_turn_rate") * scenario.control_period
         off = np.arccos(np.clip(np.abs(forward), 0.0, 1.0))  # of the mean direction
         most = 0.5 * np.pi - 1e-4  # as float32 rounds
         angle = np.minimum(0.5 * np.abs(turned_by) + off, most) * np.sign(turn)
         angle = np.where(np.abs(turn) < 1.0, turned_by, angle)
         speed = forward / np.cos(angle - 0.5 * turned_by)
-        forward = speed * np.cos(angle)
-        left = speed * np.sin(angle)
+        forward = np.where(is_differential, speed * np.cos(angle), forward)
+        left = np.where(is_differential, speed * np.sin(angle), left)
     cosine = np.cos(turned)
     sine = np.sin(turned)
     return np.stack([cosine * forward + sine * left, cosine * left - sine * forward, gripper], 1)

@@ -86,6 +86,20 @@ def check_row_policy(policy: object) -> RowPolicy:
     return policy
 
 
+def refuse_kinds(scenario: Scenario, what: str) -> None:
+    """Refuse a scenario with robots of several kinds for what holds one body.
+
+    Raises:
+        PolicyError: it has some.
+    """
+    if scenario.robot_kinds:
+        names = ", ".join(kind.name for kind in scenario.robot_kinds)
+        raise PolicyError(
+            f"robot_kinds = {names}: {what} is for one body: should be of scenario.of_robot(i), "
+            "where robot i is of the kind that is meant"
+        )
+
+
 class Robot:
     """One robot that a policy steers, with a frame, a memory and random numbers of its own.
 
@@ -96,12 +110,13 @@ class Robot:
         policy: which is copied, so that it may steer others as well.
         body: a scenario, of which the policy reads what a robot's maker knows. Most read the body
             and its drive, some also how many robots and items there are, so no smaller record does.
+            Of several kinds it reads that of the robot's number.
         period: the time from one step to the next [s].
         seed: with `number` it decides all that is random.
         number: of the robot in its swarm, from 0 on.
 
     Attributes:
-        body: as given, with the period.
+        body: as given, with the period and with the body of this robot's kind.
 
     Raises:
         PolicyError: the policy does not decide from rows alone, or there is no such number.
@@ -115,7 +130,7 @@ class Robot:
         if operator.index(number) < 0:
             raise PolicyError(f"number = {number}: should be 0 or more")
         self._policy = copy.copy(check_row_policy(policy))  # configured, it shares constants alone
-        self.body = body
+        self.body = body = body.of_robot(number)
         if period != body.control_period:
             # Nobody plays physics here, and a scenario wants whole steps of it.
             substeps = max(math.ceil(period / body.physics_period), 1)

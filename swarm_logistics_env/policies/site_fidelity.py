@@ -40,7 +40,6 @@ from swarm_logistics_env.world.motion.frame import command_own_frames
 from swarm_logistics_env.world.motion.memory import MEMORY, is_out, length_of, to_frame
 from swarm_logistics_env.world.motion.network_inputs import turn_frames
 from swarm_logistics_env.world.motion.steering import set_velocity
-from swarm_logistics_env.world.scenario import Scenario
 
 Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
 STEP = 0.08  # [m] of the source, whose rates are per step
@@ -122,11 +121,6 @@ class SiteFidelity(Homing):
     parameters_type = SiteFidelityParameters
     parameters: SiteFidelityParameters
 
-    def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows: the control period and the top speed."""
-        super().configure(scenario)
-        self._n_steps = scenario.max_speed * scenario.control_period / STEP
-
     def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode: all leave, in random directions, with empty memories."""
         super().begin(keys)
@@ -148,7 +142,7 @@ class SiteFidelity(Homing):
         commands = np.empty((len(observations), 4))
         act_site_fidelity(
             observations, frame.memory, self._trips, frame.keys, frame.counts, frame.turned,
-            self._period, self._n_steps, self._values, commands,
+            self._period, self._values, commands,
         )  # fmt: skip
         return commands
 
@@ -162,15 +156,12 @@ def act_site_fidelity(
     counts: NDArray[np.int64],
     turned: NDArray[np.float64],
     period: float,
-    n_steps: float,
     values: tuple[float, ...],
     commands: NDArray[np.float64],
 ) -> None:
     """Fill the commands (N, 4) of a control period; memories, trips and counts go on.
 
-    Args:
-        n_steps: of the source in a control period.
-        values: of the fields of `SiteFidelityParameters`.
+    `values` are those of the fields of `SiteFidelityParameters`.
     """
     turn_frames(rows, period, memories, turned)
     counts += 1
@@ -179,6 +170,7 @@ def act_site_fidelity(
     for robot in range(rows.shape[0]):
         observation = rows[robot]
         memory = memories[robot]
+        n_steps = memory[MEMORY.top_speed] * period / STEP  # of the source in a control period
         key = pair_key(keys[robot], SEARCH_STREAM)
         is_inside = observation[row.IN_DELIVERY_AREA] > 0.5
         if is_out(observation):

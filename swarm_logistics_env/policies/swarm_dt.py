@@ -24,7 +24,7 @@ from swarm_logistics_env.policies.policy import Scripted, ScriptParameters
 from swarm_logistics_env.policies.row_policy import UNREAD, RowPolicy
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import length_of
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import Scenario, of_first_robots
 
 
 class SwarmDTParameters(ScriptParameters):
@@ -113,6 +113,13 @@ class StepConstants(NamedTuple):
     turn_of_body: float
 
 
+def turn_of_body(scenario: Scenario) -> float:
+    """Return how far a robot's body turns in a control period [rad]; 0 if it never has to."""
+    if scenario.drive == "holonomic":
+        return 0.0
+    return scenario.max_turn_rate * scenario.control_period
+
+
 class SwarmDT(RowPolicy, Scripted):
     """Swarm Diffusion-Taxis: a robot with the requested item follows the lowest timer it hears.
 
@@ -140,17 +147,25 @@ class SwarmDT(RowPolicy, Scripted):
         """Take what the maker of a robot knows: its control period and its drive."""
         parameters = self.parameters
         period = scenario.control_period
-        is_differential = scenario.drive == "differential"
         self._constants = StepConstants(
             turn_by_diffusion=math.sqrt(3.0 * parameters.diffusion * period),
             drop_probability=-math.expm1(-parameters.drop_rate * period),
-            turn_of_body=scenario.max_turn_rate * period if is_differential else 0.0,
+            turn_of_body=turn_of_body(scenario),
         )
+        self._turns = [turn_of_body(body) for body in of_first_robots(scenario)]
         self._values = parameters.values()
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode; the first step draws the stored headings."""
         self._keys = keys
+        turns = np.resize(self._turns, len(keys))
+        # Robots whose bodies turn alike decide together.
+        self._groups: list[tuple[StepConstants, slice | NDArray[np.intp]]] = [
+            (self._constants._replace(turn_of_body=turn), np.flatnonzero(turns == turn))
+            for turn in np.unique(turns).tolist()
+        ]
+        if len(self._groups) < 2:
+            self._groups = [(self._constants, slice(None))]
         self._heading = np.full(len(keys), np.nan)
         self._step = 0
 
@@ -166,15 +181,15 @@ class SwarmDT(RowPolicy, Scripted):
                 f"{self._heading.shape[0]}"
             )
         commands = np.empty((observations.shape[0], 4))
-        decide_swarm_dt(
-            observations,
-            self._keys,
-            self._step,
-            self._values,
-            self._constants,
-            self._heading,
-            commands,
-        )
+        for constants, robots in self._groups:
+            heading = self._heading[robots]
+            of_group = commands[robots]
+            decide_swarm_dt(
+                observations[robots], self._keys[robots], self._step, self._values, constants,
+                heading, of_group,
+            )  # fmt: skip
+            self._heading[robots] = heading
+            commands[robots] = of_group
         self._step += 1
         return commands
 

@@ -20,6 +20,7 @@ from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.records import atomic_write
 from swarm_logistics_env.policies.layers import hyperbolic_tangent
 from swarm_logistics_env.policies.policy import Policy
+from swarm_logistics_env.policies.row_policy import refuse_kinds
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import BODY, N_COLUMNS, body_of, face_anywhere, fading
 from swarm_logistics_env.world.motion.network_inputs import random_heading_number
@@ -63,6 +64,7 @@ def write_c(policy: Policy, scenario: Scenario, path: Path | str) -> CFiles:
     Raises:
         PolicyError: the policy cannot be written in C, or a file cannot be written.
     """
+    refuse_kinds(scenario, "a file in C")
     configured: Any = copy.deepcopy(policy)
     if hasattr(configured, "configure"):
         configured.configure(scenario)

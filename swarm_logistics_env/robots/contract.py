@@ -18,7 +18,7 @@ from pydantic import JsonValue
 from swarm_logistics_env.core.errors import RobotError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.core.streams import row_keys
-from swarm_logistics_env.policies.row_policy import check_row_policy
+from swarm_logistics_env.policies.row_policy import check_row_policy, refuse_kinds
 from swarm_logistics_env.world.observations import SENSORS, columns, n_columns
 from swarm_logistics_env.world.scenario import Scenario
 
@@ -145,12 +145,14 @@ def contract_of(policy: object, scenario: Scenario) -> Contract:
     """Return the contract of a policy for the robots of a scenario.
 
     Raises:
-        PolicyError: it does not decide from rows alone.
+        PolicyError: it does not decide from rows alone, or robots are of several kinds.
     """
+    refuse_kinds(scenario, "a contract")
     row_policy = copy.copy(check_row_policy(policy))
     body = _ReadFields(scenario)
     row_policy.configure(cast("Scenario", body))
     row_policy.begin(row_keys(0, row_policy.stream, 2))
+    body.values.pop("robot_kinds", None)
     inputs = inputs_of(scenario, row_policy.ignores)
     sensors = {part.sensor for part in inputs if part.used}
     parameters = cast("Any", row_policy).parameters

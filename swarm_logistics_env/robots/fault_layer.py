@@ -72,6 +72,7 @@ class FaultLayer:
         if not 0 <= number < scenario.n_robots:
             raise FaultError(f"number = {number}: robots are 0 to {scenario.n_robots - 1}")
         self._scenario = scenario
+        self._body = scenario.of_robot(number)
         self._number = number
         self._occurrences = [Occurrence(fault, seed, scenario) for fault in checked]
         self._beams: Row | None = None  # what frozen rangers repeat
@@ -96,7 +97,7 @@ class FaultLayer:
             return np.zeros_like(sensed)
         hears = self._keeps("hears", time)
         view = self._factor("view", time)
-        self._forget_unseen(sensed, view * self._scenario.view_range, hears)
+        self._forget_unseen(sensed, view * self._body.view_range, hears)
         if not hears:
             sensed[row.LOWEST_TIMER : row.CARRYING] = 0.0
         if not self._keeps("hears_requests", time):
@@ -192,7 +193,7 @@ class FaultLayer:
 
     def _spoil_beams(self, beams: Row, time: float) -> None:
         """Make of beams (48,) [m] what rangers that have failed report, in place."""
-        reach = self._scenario.ranger_range
+        reach = self._body.ranger_range
         if not self._keeps("rangers", time):
             beams[:] = reach
         bias = math.fsum(occurrence.mode.ranger_bias for occurrence in self._active(time))

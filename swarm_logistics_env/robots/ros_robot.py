@@ -69,7 +69,7 @@ class RobotNode:
         robot = Robot(policy, body, body.control_period, seed, number)
         self._robot = RobotOverMiddleware(robot, stop_after)
         self._ignores = check_row_policy(policy).ignores
-        self._body = body
+        self._body = body.of_robot(number)
         self._number = number
         self._layer = FaultLayer(faults, body, number, seed) if faults else None
         self._patience = stop_after * body.control_period

@@ -13,7 +13,7 @@ from swarm_logistics_env.robots import ros_messages
 from swarm_logistics_env.robots.middleware import Arrival, Link, Middleware
 from swarm_logistics_env.robots.ros_messages import load_rclpy
 from swarm_logistics_env.robots.ros_robot import RobotNode
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import Scenario, of_first_robots
 from swarm_logistics_env.world.warehouse import Warehouse
 from swarm_logistics_env.world.warehouse.faults import FaultLike
 
@@ -60,6 +60,7 @@ class WorldNode:
 
         self.world = Warehouse(scenario)
         self._rows = self.world.reset(seed, faults)
+        self._bodies = of_first_robots(scenario)
         self.n_late = 0
         n_robots = scenario.n_robots
         self.middleware = middleware or Middleware()
@@ -131,15 +132,18 @@ class WorldNode:
         self._rows = self.world.step(self._link.commands())
 
     def _publish(self, arrival: Arrival) -> None:
-        body = self.world.scenario
+        body = self._body_of(arrival.robot)
         stamp = ros_messages.stamp_of(arrival.period, body)
         scans, senses = self._publishers[arrival.robot]
         senses.publish(ros_messages.senses_of(arrival.row, body, stamp))
         scans.publish(ros_messages.scan_of(arrival.row, body, stamp))
 
+    def _body_of(self, robot: int) -> Scenario:
+        return self._bodies[robot % len(self._bodies)]
+
     def _take(self, robot: int, topic: str, message: Any) -> None:
         """Take half of a command; both halves are the answer to the row of their stamp."""
-        body = self.world.scenario
+        body = self._body_of(robot)
         period = ros_messages.period_of(message.header.stamp, body)
         halves = self._halves.setdefault((robot, period), {})
         halves[topic] = message

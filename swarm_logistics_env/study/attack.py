@@ -24,9 +24,8 @@ from swarm_logistics_env.study.runs.store import Runs
 from swarm_logistics_env.study.tasks.task import Case, Outcome, Run
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.verdicts.cell import Cell, same_runs
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import ROLES, Scenario
 from swarm_logistics_env.world.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.world.warehouse.faults import ROLES
 
 # Plays pairs of a fault's index in the list and the number of its run, 0, 1, ..; returns the change
 # of performance, P_F - P_o, of each: the lower, the worse the fault.

@@ -33,7 +33,8 @@ class Teacher:
         """Begin an episode in a world, of robots whose streams have these keys (N,)."""
         script = self._scripts[world]
         # It says where to drive. How robots on wheels turn there is up to the frame of motion.
-        script.configure(scenario.replace(drive="holonomic"))
+        kinds = tuple(kind.replace(drive=None) for kind in scenario.robot_kinds)
+        script.configure(scenario.replace(drive="holonomic", robot_kinds=kinds))
         script.begin(keys)
 
     def act(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:

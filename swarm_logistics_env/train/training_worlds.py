@@ -22,7 +22,7 @@ from swarm_logistics_env.train.teacher import Teacher
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.world.motion.classes import GROUPS, classes_of, outputs_of
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
-from swarm_logistics_env.world.motion.memory import body_of
+from swarm_logistics_env.world.motion.memory import bodies_of
 from swarm_logistics_env.world.warehouse import Fault
 from swarm_logistics_env.wrappers import IndicatorReward, Wrapper
 
@@ -200,7 +200,8 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         # Every episode may have robots of another kind.
         bodies = np.empty((self.num_envs, 4))
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
-            bodies[rows] = body_of(world.warehouse.scenario)
+            of_first = bodies_of(world.warehouse.scenario)
+            bodies[rows] = of_first[np.arange(len(rows)) % len(of_first)]
         return bodies
 
     def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:

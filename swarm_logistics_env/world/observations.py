@@ -147,10 +147,10 @@ class Column:
 
 def columns(scenario: Scenario) -> tuple[Column, ...]:
     """Return the named columns of a row in `scenario`; together they cover it without a gap."""
-    reach = scenario.ranger_range
+    reach = scenario.ranger_reach
     limit = scenario.timer_limit
-    speed = scenario.max_speed
-    turn = scenario.max_turn_rate
+    speed = scenario.highest_speed
+    turn = scenario.highest_turn_rate
     beam = "beam k looks k * 22.5 degrees left of forward; the full range where it meets nothing"
     beams = partial(Column, sensor="rangers", absent=reach)
     return (
@@ -193,7 +193,7 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
 
 def _columns_of_others(scenario: Scenario) -> tuple[Column, ...]:
     """Return the columns of items, neighbours, and of who tells the lowest timer."""
-    view = scenario.view_range
+    view = scenario.view_reach
     limit = scenario.timer_limit
     far = max(view, scenario.radio_range)
     items = _block(ITEMS, N_ITEMS_IN_VIEW, ITEM_FEATURES)
@@ -238,7 +238,7 @@ def _columns_of_battery(scenario: Scenario) -> tuple[Column, ...]:
     if scenario.battery is None:
         return ()
     first = n_columns(scenario) - N_BATTERY_COLUMNS
-    view = scenario.view_range
+    view = scenario.view_reach
     stations = _block(first + BATTERY.stations, N_STATIONS_IN_VIEW, STATION_FEATURES)
     gauge = partial(Column, sensor="battery gauge")
     station = partial(Column, sensor="station camera", absent=0, flag="station_present")

@@ -94,9 +94,10 @@ class MotionFrame(Wrapper):
         most = self.observation_space("robot_0").high[_OF_BODIES]
         is_declared = scenario in self.unwrapped.declared_scenarios
         if not is_declared and (_input_space([scenario]).high[_OF_BODIES] > most).any():
+            least = min(scenario.of_kinds("max_acceleration"))
             raise SetupError(
-                f"handling_time = {scenario.handling_time}, max_speed = {scenario.max_speed}, "
-                f"max_acceleration = {scenario.max_acceleration}: inputs could leave their space; "
+                f"handling_time = {scenario.handling_time}, max_speed = {scenario.highest_speed}, "
+                f"max_acceleration = {least}: inputs could leave their space; "
                 "should be declared by env.declare_spaces(scenario)"
             )
         return self._read(super().reset_arrays(seed, options))
@@ -145,9 +146,11 @@ def _input_space(scenarios: Iterable[Scenario]) -> Box:
     high = np.ones(len(INPUTS))
     for scenario in scenarios:
         # A vector whose parts are within a limit is longer by the root of 2.
-        view = math.sqrt(2.0) * scenario.view_range
-        far = math.sqrt(2.0) * max(scenario.view_range, scenario.radio_range)
-        speed = math.sqrt(2.0) * scenario.max_speed
+        view = math.sqrt(2.0) * scenario.view_reach
+        far = math.sqrt(2.0) * max(scenario.view_reach, scenario.radio_range)
+        speed = math.sqrt(2.0) * scenario.highest_speed
+        speeds = scenario.of_robots("max_speed")
+        accelerations = scenario.of_robots("max_acceleration")
         most = {
             "requested_distance": view,
             "lead_distance": far / 4.0,
@@ -155,9 +158,9 @@ def _input_space(scenarios: Iterable[Scenario]) -> Box:
             "timer": scenario.timer_limit / 10.0,
             "velocity_along": speed / 2.0,
             "velocity_aside": speed / 2.0,
-            "top_speed": scenario.max_speed / 2.0,
+            "top_speed": scenario.highest_speed / 2.0,
             "handling_time": scenario.handling_time / 2.0,
-            "time_to_top_speed": scenario.max_speed / scenario.max_acceleration,
+            "time_to_top_speed": float((speeds / accelerations).max()),
         }
         for obstacle, part in product(range(N_OBSTACLES), ("along", "aside")):
             most[f"obstacle_{obstacle}_{part}"] = view
@@ -260,8 +263,8 @@ class DiscreteActions(Wrapper):
         world = self.warehouse
         repeats = (self._grippers != 0.0) & (self._grippers == self._gripper[:, None])
         legal: NDArray[np.bool_] = ~repeats
-        if world.scenario.drive == "differential" and not self._is_of_motion:
-            legal &= ~self._goes_aside
+        if not self._is_of_motion:
+            legal &= world.state.is_holonomic[:, np.newaxis] | ~self._goes_aside
         legal[~world.state.robot_present, 1:] = False
         return legal
 

@@ -82,7 +82,7 @@ class FaultInjection(Wrapper):
         self._onset = onset
         self.injected: tuple[Fault, ...] = ()
         for scenario in self.env.scenarios:
-            failed_robots(self._fault, 0, scenario.n_robots)
+            failed_robots(self._fault, 0, scenario)
 
     @property
     def failed_robots(self) -> tuple[int, ...]:
@@ -92,13 +92,12 @@ class FaultInjection(Wrapper):
 
     def plan(self, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         """Return the options with this episode's faults added to theirs."""
-        n_robots = self.env.scenario_of(seed, options).n_robots
-        faults = self._draw_faults(seed, n_robots)
+        faults = self._draw_faults(seed, self.env.scenario_of(seed, options))
         return {**options, "faults": (*faults_among(options, self.unwrapped.faults), *faults)}
 
     def begun(self, seed: int) -> None:
         """Store this episode's faults."""
-        self.injected = self._draw_faults(seed, self.warehouse.state.n_robots)
+        self.injected = self._draw_faults(seed, self.warehouse.scenario)
 
     def declare_spaces(self, scenario: Scenario) -> None:
         """Widen the spaces for `scenario`; see `SwarmLogisticsEnv.declare_spaces`.
@@ -106,10 +105,10 @@ class FaultInjection(Wrapper):
         Raises:
             FaultError: `scenario` has fewer robots than are to fail.
         """
-        failed_robots(self._fault, 0, scenario.n_robots)
+        failed_robots(self._fault, 0, scenario)
         self.env.declare_spaces(scenario)
 
-    def _draw_faults(self, seed: int, n_robots: int) -> tuple[Fault, ...]:
+    def _draw_faults(self, seed: int, scenario: Scenario) -> tuple[Fault, ...]:
         rng = generator(seed, "fault onsets", self._n_alike_inside())
         if callable(self._onset):
             onsets = sorted(_as_times(self._onset(rng)))
@@ -122,8 +121,8 @@ class FaultInjection(Wrapper):
         size = self._fault.robots
         for number, onset in enumerate(onsets, start=1):
             # The first group has to exist; later groups are drawn from the robots that are left.
-            group = self._fault.replace(robots=max(size, min(number * size, n_robots)))
-            failing = set(failed_robots(group, seed, n_robots).tolist())
+            group = self._fault.replace(robots=max(size, min(number * size, scenario.n_robots)))
+            failing = set(failed_robots(group, seed, scenario).tolist())
             if new_robots := tuple(sorted(failing - failed)):
                 faults.append(self._fault.replace(robots=new_robots, onset=onset))
             failed = failing

@@ -179,8 +179,8 @@ class SwarmSize(Wrapper):
             SetupError: all of them are to leave at 0 s.
         """
         for fault in self._departures:
-            failed_robots(fault, 0, scenario.n_robots)
-        check_somebody_is_there(self._departures, 0, scenario.n_robots)
+            failed_robots(fault, 0, scenario)
+        check_somebody_is_there(self._departures, 0, scenario)
         self.env.declare_spaces(scenario)
 
 

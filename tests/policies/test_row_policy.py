@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import subprocess
 import sys
@@ -17,6 +18,8 @@ from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.policies import NAMES, files, load
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.policies.row_policy import Robot, RowPolicy
+from swarm_logistics_env.robots.c_export import write_c
+from swarm_logistics_env.robots.contract import contract_of
 from swarm_logistics_env.world import observations
 from verification import trajectories
 
@@ -55,9 +58,18 @@ GOLDEN |= {
     f"{name} with wheels": trajectories.GoldenTrajectory(WHEELS, policy=name, seed=1)
     for name in ROW_POLICIES
 }
+# Each robot reads its own body, in the swarm as alone.
+KINDS = Scenario(
+    **SMALL, robot_kinds="plain:2 max_speed=1.0, wheels:1 drive=differential, scout:1 lifts=false"
+)
+GOLDEN |= {
+    f"{name} of kinds": trajectories.GoldenTrajectory(KINDS, policy=name, seed=1)
+    for name in ROW_POLICIES
+}
 IN_GATE = {
     "homing", "homing-stock that lifts slowly", "ppo-robust", "swarm-dt", "other periods",
     *(f"{name} with wheels" for name in ROW_POLICIES),
+    "swarm-dt of kinds", "homing of kinds", "biased-walk of kinds", "site-fidelity of kinds",
 }  # fmt: skip
 
 
@@ -111,6 +123,16 @@ def test_a_row_that_cannot_be_is_refused_and_not_remembered(row: Any, words: str
     with pytest.raises(PolicyError, match=words):
         robot.step(row)
     assert robot.memory == memory
+
+
+def test_a_robot_has_the_body_of_its_kind() -> None:
+    robots = [Robot(load("homing"), KINDS, 0.1, seed=0, number=number) for number in range(4)]
+    speeds = [robot.memory["top_speed"] for robot in robots]
+    assert speeds == [KINDS.of_robot(number).max_speed for number in range(4)]
+    assert sorted(speeds) == [1.0, 1.0, 2.0, 2.0]
+    for of_one_body in (contract_of, functools.partial(write_c, path="none.c")):
+        with pytest.raises(PolicyError, match=r"= plain, wheels, scout: .* one body"):
+            of_one_body(load("homing"), KINDS)
 
 
 def test_its_period_is_that_of_its_loop() -> None:

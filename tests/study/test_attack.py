@@ -18,7 +18,7 @@ from swarm_logistics_env.study.attack import STORE, Attack, attack, search
 from swarm_logistics_env.study.runs.engines import serial
 from swarm_logistics_env.study.runs.store import Runs
 from swarm_logistics_env.study.tasks.task import Outcome, Run
-from swarm_logistics_env.world.warehouse.faults import ROLES
+from swarm_logistics_env.world.scenario import ROLES
 from tests.made_up import delivered
 
 SCENARIO = Scenario(

@@ -21,8 +21,8 @@ from swarm_logistics_env import Scenario, Warehouse, policies
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.reward_terms import REWARD_TERMS
 from swarm_logistics_env.policies.episode import Play
+from swarm_logistics_env.world.scenario import ROLES
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
-from swarm_logistics_env.world.warehouse.faults import ROLES
 from swarm_logistics_env.world.warehouse.state import WarehouseState
 from verification.invariants import Watch
 from verification.reference import Faults, Planned, Radio, ends, rewards
@@ -75,6 +75,7 @@ def cases(draw: st.DrawFn) -> Case:
         speed_mix=draw(st.sampled_from([(1.0,), (1.0, 0.5)])), heading_drift=0.5,
         sensing_mix=draw(st.sampled_from([(1.0,), (1.0, 0.4)])),
         drive=draw(st.sampled_from(["holonomic", "differential"])),
+        robot_kinds=draw(st.sampled_from(["", "plain, other max_speed=0.7 lifts=false"])),
     )  # fmt: skip
     some = st.lists(planned_faults(n), min_size=1, max_size=4).map(tuple)
     planned = draw(some)

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.core.errors import ScenarioError
+from swarm_logistics_env.world.scenario import ROLES
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
-from swarm_logistics_env.world.warehouse.faults import ROLES
 from verification.trajectories import GROUPS
 
 EXAMPLES = 2000 if settings().max_examples >= 2000 else 5
 STEPS = 1000  # beyond the rebuilding of bodies, which comes after 500 steps
+KINDS = "plain, other max_speed=0.7 max_acceleration=3.0 drive=differential lifts=false"
 Change = tuple[int, Callable[[Warehouse], None]]
 Copy = Callable[[Warehouse], Warehouse]
 
@@ -51,6 +52,7 @@ def scenarios(draw: st.DrawFn) -> Scenario:
         ranger_noise=draw(st.sampled_from([0.0, 0.05])),
         radio_loss=draw(st.sampled_from([0.0, 0.3])),
         speed_mix=draw(st.sampled_from([(1.0,), (1.0, 0.5)])),
+        robot_kinds=draw(st.sampled_from(["", KINDS])),
     )
 
 

@@ -112,6 +112,7 @@ PAPER: dict[str, Any] = {
     "max_speed": 2.0, "max_acceleration": 20.0, "max_turn_rate": 6.0,
     "ranger_range": 2.0, "view_range": 1.0, "radio_range": 4.0, "pickup_range": 0.25,
     "drive": "holonomic", "heading_drift": 0.02, "speed_mix": (1.0,), "sensing_mix": (1.0,),
+    "robot_kinds": (),
     "memory_size": 2, "timer_limit": 10.0, "relay": "none",
     "ranger_noise": 0.0, "position_noise": 0.0, "sensor_dropout": 0.0, "radio_loss": 0.0,
     "message_size": 0, "item_radius": 0.125, "control_period": 0.1, "physics_period": 0.02,

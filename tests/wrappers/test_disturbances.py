@@ -45,7 +45,7 @@ def test_each_further_onset_takes_more_of_the_same_nested_order() -> None:
     assert [fault.onset for fault in env.injected] == [3.0, 5.0, 7.0]
     groups = [set(fault.robots) for fault in env.injected]  # type: ignore[arg-type]
     for count in (1, 2, 3):
-        first = set(failed_robots(Fault("FM1", 2 * count), 1, 6).tolist())
+        first = set(failed_robots(Fault("FM1", 2 * count), 1, env.warehouse.scenario).tolist())
         assert set().union(*groups[:count]) == first
     assert env.failed_robots == tuple(range(6))
 
@@ -189,7 +189,7 @@ def test_the_size_of_an_episode_decides_who_of_it_fails() -> None:
         env.reset_arrays(seed)
         state = env.warehouse.state
         sizes.add(state.n_robots)
-        expected = failed_robots(Fault("FM1", 2), seed, state.n_robots).tolist()
+        expected = failed_robots(Fault("FM1", 2), seed, env.warehouse.scenario).tolist()
         assert np.flatnonzero(state.failed).tolist() == expected
         assert env.env.failed_robots == tuple(expected)
     assert sizes == {3, 9}

@@ -13,6 +13,7 @@ from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.spi.definitions import comparing
 from swarm_logistics_env.study.tasks.task import Case, Fields, Run, TaskFault, TaskScenario
+from swarm_logistics_env.study.tasks.task_world import world_of
 from swarm_logistics_env.study.trials import Trial
 
 from .comparison import (
@@ -255,6 +256,7 @@ def _title(factor: Factor, general: str, manner: str = "") -> str:
 
 def _arm(base: Case, setting: Setting, changes: Fields, *faults: TaskFault) -> Arm:
     scenario = base.task.vary(base.scenario, changes)
+    world_of(base.task).check_faults(scenario, faults)
     return Arm(setting, replace(base, scenario=scenario, faults=faults))
 
 
@@ -298,7 +300,7 @@ def _robustness(faults: Faults, base: Case, indicators: Collection[str]) -> Iter
     wanted = [definition for definition in comparing("fault") if definition.symbol in indicators]
     if task.removed is not None and any(definition.needs_removed for definition in wanted):
         # The robots that are removed are those that would have failed.
-        whom: Fields = {} if faults.role is None else {"role": faults.role}
+        whom = {name: x for name, x in faults.manner.items() if name in ("role", "kind")}
         for onset, m in product(faults.onsets, faults.robots):
             arms.append(arm(task.removed, m, onset, None, whom))
     yield from compared(table, arms)

@@ -124,6 +124,7 @@ class Faults(Factor):
             turn: random failure and repair; without it, it holds without a break.
         role: which robots fail: those that do this at the onset, of `world.warehouse.faults.ROLES`;
             without it, they are drawn.
+        kind: which robots fail: drawn from those of this kind of the scenario's `robot_kinds`.
     """
 
     modes: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -133,11 +134,14 @@ class Faults(Factor):
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
     intermittent: tuple[PositiveFloat, PositiveFloat] | None = None
     role: str | None = None
+    kind: str | None = None
 
     @property
     def manner(self) -> FieldTable:
         """The fields of a fault that say how it fails and whom it strikes, as far as given."""
-        return self.model_dump(include={"factor", "intermittent", "role"}, exclude_none=True)
+        return self.model_dump(
+            include={"factor", "intermittent", "role", "kind"}, exclude_none=True
+        )
 
     def __str__(self) -> str:
         """Return in words how long, how far and how steadily robots fail; empty: for good."""
@@ -147,6 +151,7 @@ class Faults(Factor):
             held, paused = self.intermittent
             parts.append(f"{held:g} s failed, {paused:g} s not, in turn")
         parts += [] if self.role is None else [f"role {self.role}"]
+        parts += [] if self.kind is None else [f"kind {self.kind}"]
         return ", ".join(parts)
 
 

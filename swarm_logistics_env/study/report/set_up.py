@@ -43,7 +43,7 @@ def _variations(plan: Plan) -> Iterator[str]:
     base = study.scenario.model_dump()
     for factor in (*study.sizes, *study.faults, *study.parameters, *study.ablations):
         changed = plan.cases[0].task.vary(study.scenario, factor.scenario).model_dump()
-        differing = [f"{name} = {x}" for name, x in changed.items() if x != base[name]]
+        differing = [f"{name} = {x}" for name, x in changed.items() if x != base.get(name)]
         if differing:
             title = factor.title or type(factor).__name__
             yield f"{title} differs: {', '.join(differing)}."

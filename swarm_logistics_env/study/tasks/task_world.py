@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-from .task import Case, Outcome, Task, TaskScenario
+from .task import Case, Outcome, Task, TaskFault, TaskScenario
 
 
 class TaskWorld:
@@ -33,6 +34,9 @@ class TaskWorld:
     def largest_performance(self, scenario: TaskScenario) -> float:
         """Return the largest P that a run can have; infinite: none is."""
         return math.inf
+
+    def check_faults(self, scenario: TaskScenario, faults: Sequence[TaskFault]) -> None:
+        """Raise a SwarmLogisticsError if a fault names robots that a scenario has not."""
 
     def watch_command(self, case: Case) -> str | None:
         """Return the command that shows a run of a case, but for its seed; None: there is none."""

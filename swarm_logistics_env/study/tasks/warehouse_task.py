@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from types import MappingProxyType
 from typing import Any
@@ -19,11 +19,11 @@ from swarm_logistics_env.core.fingerprint import package_code
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.policies.episode import run_episode
 from swarm_logistics_env.policies.spec import NO_MAKERS
-from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario
+from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario, kinds_text
 from swarm_logistics_env.world.warehouse import FAILURE_MODES, Fault
-from swarm_logistics_env.world.warehouse.faults import text_of
+from swarm_logistics_env.world.warehouse.faults import failed_robots, text_of
 
-from .task import Case, Fields, Outcome, TaskScenario
+from .task import Case, Fields, Outcome, TaskFault, TaskScenario
 from .task_world import TaskWorld
 
 _MOST_CHANGES = 4  # of a preset that is still named
@@ -115,11 +115,12 @@ class WarehouseTask(TaskWorld):
         drive = "" if scenario.drive == "holonomic" else f" and {scenario.drive} drive"
         handling = f" that lift in {scenario.handling_time:g} s" if scenario.handling_time else ""
         floor = f" (floor {scenario.floor})" if scenario.floor else ""
+        kinds = f" ({kinds_text(scenario.robot_kinds)})" if scenario.robot_kinds else ""
         restock = " that come back" if scenario.restock else ""
         return (
             f"a warehouse of {scenario.warehouse_width:g} m x {scenario.warehouse_height:g} m"
             f"{floor} with {scenario.n_items} items{restock}, robots of {scenario.max_speed:g} m/s"
-            f"{drive}{handling}"
+            f"{drive}{handling}{kinds}"
         )
 
     def preset_in_words(self, scenario: TaskScenario) -> str:
@@ -127,15 +128,22 @@ class WarehouseTask(TaskWorld):
         assert isinstance(scenario, Scenario)
         values = scenario.model_dump()
         differing = {
-            name: [field for field, value in preset.model_dump().items() if value != values[field]]
+            name: [field for field, value in preset if value != getattr(scenario, field)]
             for name, preset in SCENARIO_PRESETS.items()
         }
         nearest = min(differing, key=lambda name: len(differing[name]))
         fields = [field for field in differing[nearest] if field != "bodies"]
         if len(fields) > _MOST_CHANGES:
             return ""
-        changes = " and ".join(f"{field} = {values[field]}" for field in fields)
+        changes = " and ".join(f"{field} = {values.get(field, 'none')}" for field in fields)
         return f"preset {nearest} with {changes}" if changes else f"preset {nearest}"
+
+    def check_faults(self, scenario: TaskScenario, faults: Sequence[TaskFault]) -> None:
+        """Raise FaultError if a fault names a kind that the scenario has not, or too many of it."""
+        assert isinstance(scenario, Scenario)
+        for fault in faults:
+            if isinstance(fault, Fault):
+                failed_robots(fault, 0, scenario)
 
     def engine(self, scenario: TaskScenario) -> str:
         """Return the engine of the bodies."""
@@ -157,7 +165,7 @@ class WarehouseTask(TaskWorld):
             words.append("--trust-code")
         default = self.default.model_dump(mode="json")
         for name, value in case.scenario.model_dump(mode="json").items():
-            if value != default[name]:
+            if value != default.get(name):
                 text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
                 words += ["--set", f"{name}={text}"]
         for fault in case.faults:

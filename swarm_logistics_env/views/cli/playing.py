@@ -16,9 +16,8 @@ from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.core.records import atomic_write
 from swarm_logistics_env.policies import display_name, known_policies, load
 from swarm_logistics_env.policies.episode import Play, run_episode
-from swarm_logistics_env.world.scenario import SOURCES
+from swarm_logistics_env.world.scenario import ROLES, SOURCES
 from swarm_logistics_env.world.warehouse import FAILURE_MODES
-from swarm_logistics_env.world.warehouse.faults import ROLES
 from swarm_logistics_env.world.warehouse.orders import OrderMeasures
 
 from .policy_choice import (
@@ -282,9 +281,9 @@ def list_command(
     elif what == "faults":
         descriptions = [(name, mode.description) for name, mode in FAILURE_MODES.items()]
         line = (
-            "As --fault takes one: MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM4:2@200: two "
-            "robots (one if not given) from 200 s on (0 s), in any role, for good. Roles: "
-            f"{', '.join(ROLES)}"
+            "As --fault takes one: MODE[:ROBOTS[:ROLE or KIND]][@ONSET[+DURATION]], e.g. "
+            "FM4:2@200: two robots (one if not given) from 200 s on (0 s), in any role, for good. "
+            f"Roles: {', '.join(ROLES)}. Kinds: those of robot_kinds"
         )
         show_table("Failure modes", ("mode", "what it does to a robot"), descriptions, line)
     else:

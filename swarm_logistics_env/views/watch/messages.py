@@ -42,7 +42,7 @@ _TIMER_STEPS = 8  # shades of the timer's halo
 
 
 def fixed_data(session: Session) -> Message:
-    """Return what holds for a world: colours, failure modes, speeds, policies, the floor plan."""
+    """Return what holds for a world: colours, failure modes, speeds, policies, plan and kinds."""
     light = palette.ROBOT_COLOURS | palette.PLAN_COLOURS
     return {
         "colours": {
@@ -58,6 +58,7 @@ def fixed_data(session: Session) -> Message:
         "speeds": SPEEDS,
         "choices": session.choices,
         "plan": _plan_message(session.scenario),
+        "kinds": [kind.name for kind in session.scenario.robot_kinds],
     }
 
 
@@ -89,7 +90,8 @@ def frame_message(session: Session) -> Message:
     `events` are [time, label of the mark, sentence] of what was done to the run.
     For each of the two runs, with its number 0 or 1 behind the name: `poses` (3 N numbers: x, y,
     heading of each robot, or None where it is absent), `robots` ([activity, age of its timer in 1/8
-    of the limit or None, mark, robot it follows] of each), `items` (x, y of each that is stored),
+    of the limit or None, mark, robot it follows] of each), `kinds` (the number of each robot's
+    kind; empty where there are none), `items` (x, y of each that is stored),
     `requested` ([x, y, carrier] of each that is asked for; where it names its dock, also the dock's
     letter and the name of its colour), `late` (indices of those that are overdue), `waiting` (how
     many orders wait), `deliveries` (their times), `charge` (of each robot's battery in percent, if
@@ -207,6 +209,7 @@ def _arena(play: Play) -> Message:
     return {
         "poses": poses,
         "robots": robots,
+        "kinds": state.robot_kind.tolist() if scenario.robot_kinds else [],
         "items": _millimetres(state.item_position[stored & ~requested]),
         "requested": [
             [*position, carrier, *label]
@@ -238,11 +241,13 @@ def _selected(session: Session) -> Message | None:
     if robot is None:
         return None
     state = session.state
+    kinds = session.scenario.robot_kinds
     observation = unflatten(session.run.world.observe()[robot], session.scenario)
     beams = np.min([observation[f"range_{kind}"] for kind in ("robots", "walls", "items")], axis=0)
     return {
         "robot": robot,
         "activity": palette.activity(state, robot),
+        "kind": kinds[state.robot_kind[robot]].name if kinds else "",
         "modes": list(state.failure_modes[robot]),
         "beams": [round(float(reach), 3) for reach in beams],
         "reach": round(float(state.ranger_range[robot]), 3),

@@ -31,7 +31,7 @@ class Placement(NamedTuple):
     """Where everything is when an episode begins; x and y from a corner of the floor [m].
 
     Attributes:
-        scenario: sizes, limits, drive and periods.
+        scenario: sizes, limits, drive and periods; `of_robots` tells those of each robot.
         seed: of the episode, from which bodies draw all that is random.
         position: of the robots (N, 2).
         heading: of the robots (N,) [rad], counter-clockwise from the x axis.

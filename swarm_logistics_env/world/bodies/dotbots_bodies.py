@@ -90,7 +90,7 @@ class DotbotsBodies:
         self._robots = {address: robot for robot, address in enumerate(self._addresses)}
         self._is_present = np.ones(scenario.n_robots, np.bool_)
         self._guard = PoseGuard(
-            placement.position, placement.heading, self._period, scenario.max_speed
+            placement.position, placement.heading, self._period, scenario.highest_speed
         )
 
     def move(self, orders: Orders) -> Poses:
@@ -169,7 +169,7 @@ class DotbotsBodies:
 
 def _check(placement: Placement) -> None:
     scenario = placement.scenario
-    if scenario.is_holonomic:
+    if "holonomic" in scenario.of_kinds("drive"):
         raise BodiesError("drive = 'holonomic': DotBots have two wheels, so should be differential")
     if len(placement.boxes) or len(placement.obstacles):
         name = f"floor = {scenario.floor!r}" if len(placement.boxes) else "n_obstacles"
@@ -191,10 +191,14 @@ def _check_motion(scenario: Scenario) -> None:
             f"control_period = {scenario.control_period} s: for DotBots should be a multiple of "
             f"{SIMULATOR_STEP_DELTA_T} s, as their firmware steps"
         )
-    wheel = scenario.max_speed + 0.5 * _TRACK * scenario.max_turn_rate
+    speeds = scenario.of_kinds("max_speed")
+    turn_rates = scenario.of_kinds("max_turn_rate")
+    wheels = [s + 0.5 * _TRACK * turn for s, turn in zip(speeds, turn_rates, strict=True)]
+    wheel = max(wheels)
     if wheel > _FASTEST_WHEEL:
+        fastest = wheels.index(wheel)
         raise BodiesError(
-            f"max_speed = {scenario.max_speed} m/s with max_turn_rate = {scenario.max_turn_rate} "
+            f"max_speed = {speeds[fastest]} m/s with max_turn_rate = {turn_rates[fastest]} "
             f"rad/s: a DotBot's wheel would run at {wheel:.2f} m/s; should be at most "
             f"{_FASTEST_WHEEL} m/s, as in the preset dotbots"
         )

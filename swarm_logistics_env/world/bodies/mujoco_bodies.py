@@ -77,7 +77,11 @@ class MujocoBodies:
         self._positions = self._model.jnt_qposadr[joints]  # the first of each robot's in qpos
         self._velocities = self._model.jnt_dofadr[joints]  # and in qvel
         wheels = self._model.actuator_trnid[:, 0].reshape(-1, 2)
-        self._wheels = self._model.jnt_dofadr[wheels]  # left and right, in qvel; none if holonomic
+        self._wheels = self._model.jnt_dofadr[wheels]  # left and right, in qvel, of who has some
+        slides = scenario.of_robots("drive") == "holonomic"
+        self._sliding = np.flatnonzero(slides)  # robots
+        self._wheeled = np.flatnonzero(~slides)
+        self._limits = scenario.of_robots("max_acceleration")  # [m/s2]
         self._masses = self._model.body_mass[self._chassis].copy()
         self._is_present = np.ones(scenario.n_robots, np.bool_)
         self._put(placement)
@@ -93,9 +97,11 @@ class MujocoBodies:
             self._take_out(robot)
         self._is_present = orders.present
         self._model.body_mass[self._chassis] = self._masses * (1.0 + _ITEM_MASS * orders.laden)
-        drive = self._push if self._scenario.is_holonomic else self._turn_wheels
         for _ in range(self._n_substeps):
-            drive(orders)
+            if len(self._sliding):
+                self._push(orders)
+            if len(self._wheeled):
+                self._turn_wheels(orders)
             mujoco.mj_step(self._model, self._data)
         if any(warning.number for warning in self._data.warning):
             raise BodiesError(
@@ -106,37 +112,39 @@ class MujocoBodies:
 
     def _put(self, placement: Placement) -> None:
         half = placement.heading / 2.0
+        height = _wheel_radius(self._scenario)
         for robot, first in enumerate(self._positions.tolist()):
             self._data.qpos[first : first + 2] = placement.position[robot]
-            if self._scenario.is_holonomic:
+            if robot in self._sliding:
                 self._data.qpos[first + 2] = placement.heading[robot]
             else:
-                height = _wheel_radius(self._scenario)
                 quaternion = math.cos(half[robot]), 0.0, 0.0, math.sin(half[robot])
                 self._data.qpos[first + 2 : first + 7] = height, *quaternion
 
     def _push(self, orders: Orders) -> None:
         """Push and turn robots towards what they want, by their greatest acceleration at most."""
         data = self._data
-        limit = self._scenario.max_acceleration
-        heading = data.qpos[self._positions + 2]
-        forward, left, turn_rate = orders.motion.T
+        robots = self._sliding
+        first = self._velocities[robots]
+        heading = data.qpos[self._positions[robots] + 2]
+        forward, left, turn_rate = orders.motion[robots].T
         wanted = np.column_stack(
             [
                 np.cos(heading) * forward - np.sin(heading) * left,
                 np.sin(heading) * forward + np.cos(heading) * left,
             ]
         )
-        change = wanted - data.qvel[self._velocities[:, None] + np.arange(2)]
+        change = wanted - data.qvel[first[:, None] + np.arange(2)]
         acceleration = change / self._timestep
         size = np.linalg.norm(acceleration, axis=1, keepdims=True)
+        limit = self._limits[robots, None]
         acceleration *= np.minimum(1.0, limit / np.maximum(size, 1e-12))
-        mass = self._model.body_mass[self._chassis]
-        inertia = self._model.body_inertia[self._chassis, 2]
-        turn = (turn_rate - data.qvel[self._velocities + 2]) / _ANSWER
-        data.qfrc_applied[self._velocities] = mass * acceleration[:, 0]
-        data.qfrc_applied[self._velocities + 1] = mass * acceleration[:, 1]
-        data.qfrc_applied[self._velocities + 2] = inertia * turn
+        mass = self._model.body_mass[self._chassis[robots]]
+        inertia = self._model.body_inertia[self._chassis[robots], 2]
+        turn = (turn_rate - data.qvel[first + 2]) / _ANSWER
+        data.qfrc_applied[first] = mass * acceleration[:, 0]
+        data.qfrc_applied[first + 1] = mass * acceleration[:, 1]
+        data.qfrc_applied[first + 2] = inertia * turn
 
     def _turn_wheels(self, orders: Orders) -> None:
         """Give the motors speeds within their torque: for turning first, for driving what is left.
@@ -147,9 +155,11 @@ class MujocoBodies:
         radius = _wheel_radius(scenario)
         wheels = self._data.qvel[self._wheels]  # left and right [rad/s]
         left, right = wheels.T
-        forward = orders.motion[:, 0] / radius - (right + left) / 2.0
-        turning = 0.5 * _track(scenario) * orders.motion[:, 2] / radius - (right - left) / 2.0
-        limit = _ANSWER * _greatest_acceleration(scenario) / radius  # what takes all the torque
+        motion = orders.motion[self._wheeled]
+        forward = motion[:, 0] / radius - (right + left) / 2.0
+        turning = 0.5 * _track(scenario) * motion[:, 2] / radius - (right - left) / 2.0
+        greatest = np.minimum(self._limits[self._wheeled], _STRONGEST)
+        limit = _ANSWER * greatest / radius  # what takes all the torque
         turning = np.clip(turning, -limit, limit)
         left_over = limit - np.abs(turning)
         forward = np.clip(forward, -left_over, left_over)
@@ -160,11 +170,9 @@ class MujocoBodies:
         data = self._data
         position = data.qpos[self._positions[:, None] + np.arange(2)]
         velocity = data.qvel[self._velocities[:, None] + np.arange(2)]
-        if self._scenario.is_holonomic:
-            heading = data.qpos[self._positions + 2]
-        else:
-            w, x, y, z = data.qpos[self._positions[:, None] + np.arange(3, 7)].T
-            heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        heading = data.qpos[self._positions + 2]  # of who slides
+        w, x, y, z = data.qpos[self._positions[self._wheeled, None] + np.arange(3, 7)].T
+        heading[self._wheeled] = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         return Poses(position, heading, velocity, np.zeros(len(position), np.bool_))
 
     def _take_out(self, robot: int) -> None:
@@ -184,11 +192,6 @@ def _track(scenario: Scenario) -> float:
     return 1.4 * scenario.robot_radius
 
 
-def _greatest_acceleration(scenario: Scenario) -> float:
-    """Return what both wheels together give a robot [m/s2]."""
-    return min(scenario.max_acceleration, _STRONGEST)
-
-
 def _model(placement: Placement, timestep: float) -> Xml.Element:
     root = Xml.Element("mujoco")
     Xml.SubElement(
@@ -199,12 +202,17 @@ def _model(placement: Placement, timestep: float) -> Xml.Element:
     _add_geom(world, "plane", _FLOOR, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), _WHEEL_FRICTION)
     _add_solids(world, placement)
     actuators = Xml.SubElement(root, "actuator")
-    for robot in range(placement.scenario.n_robots):
+    scenario = placement.scenario
+    drives = scenario.of_robots("drive").tolist()
+    accelerations = scenario.of_robots("max_acceleration").tolist()
+    for robot, (drive, acceleration) in enumerate(zip(drives, accelerations, strict=True)):
         body = Xml.SubElement(world, "body", name=f"robot {robot}")
-        if placement.scenario.is_holonomic:
-            _add_sliding(body, placement.scenario)
+        if drive == "holonomic":
+            _add_sliding(body, scenario)
         else:
-            _add_wheeled(body, actuators, placement.scenario, robot)
+            # What both wheels together give a robot [m/s2].
+            greatest = min(acceleration, _STRONGEST)
+            _add_wheeled(body, actuators, scenario, robot, greatest)
     return root
 
 
@@ -239,8 +247,13 @@ def _add_sliding(body: Xml.Element, scenario: Scenario) -> None:
     _add_geom(body, "sphere", _OUTLINE, level, size, _OUTLINE_FRICTION, scenario.robot_mass)
 
 
-def _add_wheeled(body: Xml.Element, actuators: Xml.Element, scenario: Scenario, robot: int) -> None:
-    """Add a chassis, two wheels with a motor each, and two casters without friction."""
+def _add_wheeled(
+    body: Xml.Element, actuators: Xml.Element, scenario: Scenario, robot: int, greatest: float
+) -> None:
+    """Add a chassis, two wheels with a motor each, and two casters without friction.
+
+    `greatest` is its acceleration at most [m/s2].
+    """
     radius = scenario.robot_radius
     wheel_radius = _wheel_radius(scenario)
     mass = scenario.robot_mass
@@ -255,7 +268,7 @@ def _add_wheeled(body: Xml.Element, actuators: Xml.Element, scenario: Scenario, 
         )
     # Both wheels together give the robot its greatest acceleration, as long as they do not slip.
     inertia = (0.5 + _ARMATURE) * mass * wheel_radius**2  # that each motor moves
-    torque = inertia * _greatest_acceleration(scenario) / wheel_radius
+    torque = inertia * greatest / wheel_radius
     gain = inertia / _ANSWER
     for side, left in (("left", 1.0), ("right", -1.0)):
         wheel = Xml.SubElement(body, "body", pos=f"0 {left * _track(scenario) / 2.0} 0")

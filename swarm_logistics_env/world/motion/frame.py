@@ -15,7 +15,7 @@ from swarm_logistics_env.world.motion.memory import (
     BODY,
     N_COLUMNS,
     MemoryColumns,
-    body_of,
+    bodies_of,
     face_anywhere,
     length_of,
     note_command,
@@ -50,7 +50,7 @@ class MotionView:
 
     def __init__(self, scenario: Scenario, listens: bool = True, has_role: bool = False) -> None:
         self.period = scenario.control_period
-        self._body = body_of(scenario)
+        self._bodies = bodies_of(scenario)
         self._listens = listens
         self._n_inputs = len(INPUTS) + (len(ROLE_INPUTS) if has_role else 0)
         self.begin(np.empty(0, np.uint64))
@@ -59,7 +59,8 @@ class MotionView:
         """Begin an episode of as many rows as there are keys, which are those of their streams.
 
         Args:
-            bodies: (N, 4) of robots that are not all as the scenario has them (`memory.body_of`).
+            bodies: (N, 4) of robots that are not all as the scenario has them (`memory.body_of`);
+                else row i is robot i, which may be of a kind.
         """
         n = len(keys)
         self.keys = np.empty(n, np.uint64)
@@ -78,7 +79,7 @@ class MotionView:
         self.keys[rows] = keys
         self.counts[rows] = 0
         fresh = np.zeros((len(rows), N_COLUMNS))
-        fresh[:, BODY] = self._body if bodies is None else bodies
+        fresh[:, BODY] = self._bodies[rows % len(self._bodies)] if bodies is None else bodies
         face_anywhere(keys, fresh)
         self.memory[rows] = fresh
 

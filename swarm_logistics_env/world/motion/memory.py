@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env.compiler.kernels import inlined_kernel, kernel, uniform
 from swarm_logistics_env.world import observations as row
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import Scenario, of_first_robots
 
 BEAM_ANGLE = 2.0 * math.pi / row.N_BEAMS
 QUARTER = 0.5 * math.pi
@@ -123,8 +123,16 @@ STANDS = 0.2  # [m/s] and less
 MOVES = 0.1  # [m/s] and more: its velocity has a direction
 
 
+def bodies_of(scenario: Scenario) -> NDArray[np.float64]:
+    """Return what their maker knows of the first robots, which repeats (P, 4); see `body_of`.
+
+    P is 1 unless robots are of several kinds.
+    """
+    return np.array([body_of(one) for one in of_first_robots(scenario)])
+
+
 def body_of(scenario: Scenario) -> NDArray[np.float64]:
-    """Return what its maker knows of a robot (4,).
+    """Return what its maker knows of a robot (4,) of a scenario whose robots are alike.
 
     Top speed [m/s], handling time [s], widest turn in a period [rad], and acceleration [m/s2]. The
     widest turn is 0 of a robot that drives in every direction and never has to turn.

@@ -23,6 +23,7 @@ def legend(scenario: Scenario, height: int) -> dict[str, Surface]:
     sprites.arrow(link, (0, height - 2), (link.get_width(), 1), 0.0)
     return {
         **robots,
+        **_kind_marks(scenario, height),
         "timer": _above(sprites.halo(0.7 * radius, 0), small_robot),
         "lowest timer heard": link,
         "failed": sprites.badge(MARKS["FM4"], round(0.9 * height)),
@@ -32,6 +33,14 @@ def legend(scenario: Scenario, height: int) -> dict[str, Surface]:
         **_battery_marks(scenario, height),
         **_plan_marks(scenario, height),
         OBSTACLE: sprites.obstacle(1.1 * radius),
+    }
+
+
+def _kind_marks(scenario: Scenario, height: int) -> dict[str, Surface]:
+    small_robot = sprites.robot(0.2 * height, "searching", 0, False)
+    return {
+        f"kind {kind.name}": _above(sprites.outline(0.2 * height, number), small_robot)
+        for number, kind in enumerate(scenario.robot_kinds)
     }
 
 

@@ -183,6 +183,9 @@ class Picture:
         for robot in np.flatnonzero(state.robot_present).tolist():
             activity = palette.activity(state, robot)
             is_faulty = bool(state.failed[robot])
+            if state.robot_kind[robot]:
+                outline = sprites.outline(self._robot_radius, int(state.robot_kind[robot]))
+                self._stamp(outline, robots[robot])
             sprite = sprites.robot(self._robot_radius, activity, headings[robot], is_faulty)
             self._stamp(sprite, robots[robot])
 

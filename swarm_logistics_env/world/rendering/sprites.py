@@ -104,6 +104,30 @@ def robot(radius: float, activity: str, heading: int, is_faulty: bool) -> Surfac
     return _shrink(sheet)
 
 
+KIND_OUTLINES = 4  # kinds of robots that outlines tell apart; further ones begin anew
+
+
+@lru_cache(maxsize=256)
+def outline(radius: float, kind: int) -> Surface:
+    """Return what is about a robot of that radius [px], by the number of its kind.
+
+    Nothing about the first kind, a ring about the second, then a square and a diamond.
+    """
+    reach = 1.45 * radius + 2.0
+    sheet = _sheet(1.5 * reach, INK)
+    width = round(_LARGER * max(1.2, 0.16 * radius))
+    middle = Vector2(sheet.get_rect().center)
+    shape = kind % KIND_OUTLINES
+    if shape == 1:
+        pygame.draw.circle(sheet, INK, middle, _LARGER * reach, width)
+    elif shape > 1:
+        arm = Vector2(_LARGER * reach * 1.3, 0.0)
+        first = 45 if shape == 2 else 0
+        corners = [middle + arm.rotate(first + 90 * side) for side in range(4)]
+        pygame.draw.polygon(sheet, INK, corners, width)
+    return _shrink(sheet)
+
+
 @lru_cache(maxsize=256)
 def halo(radius: float, age: int) -> Surface:
     """Return the glow about a robot of that radius [px]; `age` in [0, HALOS), oldest last."""

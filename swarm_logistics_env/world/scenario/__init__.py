@@ -11,16 +11,23 @@ from swarm_logistics_env.world.floor import PLAN_SIZES, floor_title, with_plan_s
 
 from .battery_fields import BatteryFields, check_batteries
 from .checks import check
-from .fields import CHANGES_DURING_RUN, CHIPMUNK, LARGEST, SOURCES
+from .fields import CHANGES_DURING_RUN, CHIPMUNK, SOURCES
 from .order_file import orders_text, orders_title
+from .ranges import LARGEST
+from .robot_kinds import ROLES, RobotKind, Role, kinds_text, of_first_robots
 
 __all__ = [
     "CHANGES_DURING_RUN",
     "CHIPMUNK",
     "LARGEST",
+    "ROLES",
     "SCENARIO_PRESETS",
     "SOURCES",
+    "RobotKind",
+    "Role",
     "Scenario",
+    "kinds_text",
+    "of_first_robots",
 ]
 
 
@@ -94,6 +101,8 @@ def _with_orders(orders: str) -> str:
 
 
 def _as_text(value: object) -> str:
+    if isinstance(value, tuple) and all(isinstance(part, RobotKind) for part in value):
+        return kinds_text(value) or "none"
     return f"{value:g}" if isinstance(value, float) else orders_title(floor_title(str(value)))
 
 

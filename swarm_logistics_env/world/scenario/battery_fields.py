@@ -14,7 +14,8 @@ from pydantic import Field
 
 from swarm_logistics_env.world.floor.floor_plan import STATION, STORAGE
 
-from .fields import LARGEST, NonNegative, Positive, ScenarioFields
+from .fields import ScenarioFields
+from .ranges import LARGEST, NonNegative, Positive
 
 _N_STATIONS = 4  # in a room without a plan
 _FROM_WALL = 2.0  # robot radii from the wall to a station's centre, so that a robot gets onto it
@@ -84,6 +85,12 @@ def check_batteries(scenario: BatteryFields) -> None:
                 f"dead_stations = {scenario.dead_stations}: should have batteries, as battery = "
                 "5000, or be 0"
             )
+        kinds = [kind for kind in scenario.robot_kinds if kind.battery is not None]
+        if kinds:
+            raise ValueError(
+                f"robot_kinds: battery = {kinds[0].battery:g} of the kind {kinds[0].name!r}: "
+                "should stand beside the scenario's battery, which is that of the other robots"
+            )
         return
     n_stations = len(scenario.stations)
     if scenario.plan is not None and scenario.n_stations not in (None, n_stations):
@@ -101,7 +108,7 @@ def check_batteries(scenario: BatteryFields) -> None:
             "are no more stations"
         )
     if n_stations:
-        _check_reach(scenario, scenario.battery)
+        _check_reach(scenario, min(scenario.of_kinds("battery")))
 
 
 def _check_reach(scenario: BatteryFields, energy: float) -> None:
@@ -119,7 +126,7 @@ def _check_reach(scenario: BatteryFields, energy: float) -> None:
     for station_x, station_y in scenario.stations.tolist():
         np.minimum(nearest, np.hypot(x - station_x, y - station_y), out=nearest)
     way = float(nearest.max())
-    needed = way * (scenario.driving_energy + scenario.idle_power / scenario.max_speed)
+    needed = way * (scenario.driving_energy + scenario.idle_power / scenario.highest_speed)
     if energy < needed:
         raise ValueError(
             f"battery = {energy:g} J does not bring a robot the {way:.1f} m from the storage to a "

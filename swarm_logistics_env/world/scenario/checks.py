@@ -9,6 +9,7 @@ import math
 
 from .fields import ScenarioFields
 from .order_file import ANY, OrderFile
+from .robot_kinds import check_names
 
 # Discs may cover this part of the floor; random sequential addition ends at 0.547.
 DENSEST_COVER = 0.4
@@ -22,6 +23,7 @@ MOST_SUBSTEPS = 1000
 
 def check(scenario: ScenarioFields) -> None:
     """Check everything."""
+    check_names(scenario.robot_kinds, scenario.n_robots)
     check_periods(scenario)
     check_storage(scenario)
     check_requests(scenario)
@@ -47,11 +49,11 @@ def check_periods(scenario: ScenarioFields) -> None:
             f"control_period = {scenario.control_period} s should be a whole multiple of "
             f"physics_period = {scenario.physics_period} s"
         )
-    longest = LONGEST_STRIDE * scenario.robot_radius / scenario.max_speed
+    longest = LONGEST_STRIDE * scenario.robot_radius / scenario.highest_speed
     if scenario.physics_period > longest * (1.0 + 1e-9):
         raise ValueError(
             f"physics_period = {scenario.physics_period} s lets a robot cross "
-            f"{scenario.max_speed * scenario.physics_period:g} m between two collision checks: "
+            f"{scenario.highest_speed * scenario.physics_period:g} m between two collision checks: "
             f"should be at most {LONGEST_STRIDE} robot_radius / max_speed = {longest:g} s"
         )
     if scenario.duration < scenario.control_period:

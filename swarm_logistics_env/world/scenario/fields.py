@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.world.floor import FloorPlan, floor_plan
 
 from .order_file import NEXT, ORDER_SHAPES, OrderFile, order_file
+from .ranges import LARGEST, Count, Mix, NonNegative, Positive, Probability
+from .robot_kinds import Kinds, OfKinds
 
 # The public addresses of the sources that defaults were taken from.
 SOURCES = {
@@ -24,15 +26,6 @@ CHIPMUNK = "chipmunk"  # the engine of the package, which pymunk brings
 
 # Where `demand` is "zipf", item i is asked for with a weight of 1 / (i + 1) ** ZIPF_EXPONENT.
 ZIPF_EXPONENT = 1.0
-
-# Numbers beyond these do not survive in float32 observations, or vanish when squared.
-SMALLEST = 1e-9
-LARGEST = 1e9
-Positive = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
-NonNegative = Annotated[float, Field(ge=0, le=LARGEST)]
-Count = Annotated[int, Field(ge=1, le=LARGEST)]
-Probability = Annotated[float, Field(ge=0, le=1)]
-Mix = Annotated[tuple[Annotated[float, Field(gt=0, le=1)], ...], Field(min_length=1)]
 
 # These may change while robots are at work; the others are built into arena, bodies and spaces.
 CHANGES_DURING_RUN = frozenset(
@@ -68,8 +61,12 @@ CHANGES_DURING_RUN = frozenset(
     }
 )
 
+# Left out of what is written while they are off, as before there were such fields, so that stored
+# runs stay known.
+UNWRITTEN_WHEN_OFF = ("robot_kinds",)
 
-class ScenarioFields(Record):
+
+class ScenarioFields(OfKinds, Record):
     """What a `Scenario` consists of, whose docstring says how a description ends.
 
     Each value is within its range; `checks` compares the values with each other.
@@ -180,6 +177,11 @@ class ScenarioFields(Record):
     sensing_mix: Mix = Field(
         (1.0,), description="robot i has factor i (repeating) of ranger and view range; off"
     )
+    robot_kinds: Kinds = Field(
+        (),
+        description="kinds of robots, each with a name, its count in a pattern that repeats over "
+        "the robots, and the fields that differ; none: all are alike; off",
+    )
     memory_size: Annotated[int, Field(ge=0, le=16)] = Field(
         2, description="items last put down, not lifted again until a delivery; source: simulator"
     )
@@ -209,6 +211,14 @@ class ScenarioFields(Record):
     item_radius: Positive = Field(0.125, description="[m]; source: simulator, descendant")
     control_period: Positive = Field(0.1, description="one command per [s]; fitted")
     physics_period: Positive = Field(0.02, description="one physics step per [s]; fitted")
+
+    @model_serializer(mode="wrap")
+    def _serialize(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        written: dict[str, Any] = write(self)
+        for name in UNWRITTEN_WHEN_OFF:
+            if not getattr(self, name):
+                written.pop(name, None)
+        return written
 
     @property
     def storage_width(self) -> float:

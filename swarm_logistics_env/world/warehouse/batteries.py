@@ -101,7 +101,7 @@ def sense_battery(me: int, pose: Pose, world: World, out: Sensed) -> None:
         position = batteries.station_position[station]
         farther_than = (position[0] - pose.x) ** 2 + (position[1] - pose.y) ** 2
         forward, left = in_frame(pose, position[0], position[1])
-        limit = world.parameters.view_range
+        limit = world.parameters.view_reach
         noise = world.parameters.position_noise
         if noise > 0.0:
             key = pair_key(world.robots.sensor_key[me], _PLACED + station)

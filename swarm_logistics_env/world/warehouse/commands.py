@@ -85,7 +85,7 @@ def wanted_motion(world: World, robot: int) -> tuple[float, float, float, float,
     command = world.commands.now[robot]
     able = world.able
     forward = min(max(command[FORWARD], -1.0), 1.0)
-    left = min(max(command[LEFT], -1.0), 1.0) if world.parameters.is_holonomic else 0.0
+    left = min(max(command[LEFT], -1.0), 1.0) if able.is_holonomic[robot] else 0.0
     norm = math.sqrt(forward * forward + left * left)
     speed = able.max_speed[robot] / max(norm, 1.0)
     turn = min(max(command[TURN], -1.0), 1.0)

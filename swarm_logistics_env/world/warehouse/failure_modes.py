@@ -16,6 +16,8 @@ class Capabilities(NamedTuple):
 
     max_speed: Annotated[NDArray[np.float64], "N"]  # [m/s]
     max_turn_rate: Annotated[NDArray[np.float64], "N"]  # [rad/s]
+    max_acceleration: Annotated[NDArray[np.float64], "N"]  # [m/s2]
+    is_holonomic: Annotated[NDArray[np.bool_], "N"]  # False: no sideways motion
     ranger_range: Annotated[NDArray[np.float64], "N"]  # [m], 0 when blind
     view_range: Annotated[NDArray[np.float64], "N"]  # [m]
     lifts: Annotated[NDArray[np.bool_], "N"]  # False: takes up no item

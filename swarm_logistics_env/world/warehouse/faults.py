@@ -1,7 +1,7 @@
 """Faults: which robots, by seed or by role, fail in which mode, from when and for how long.
 
 Callers write a fault as `Fault`, as the dict of its arguments, or in one word,
-MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]].
+MODE[:ROBOTS[:ROLE or KIND]][@ONSET[+DURATION]].
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,19 +28,10 @@ from pydantic import (
 from swarm_logistics_env.core.errors import FaultError, SwarmLogisticsError
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.core.streams import generator, row_keys
-from swarm_logistics_env.world.scenario import LARGEST, Scenario
+from swarm_logistics_env.world.scenario import LARGEST, ROLES, Role, Scenario
 
-from .failure_modes import FAILURE_MODES, Capabilities, FailureMode, failure_mode
+from .failure_modes import FAILURE_MODES, failure_mode
 from .state import WarehouseState, robots_in_role
-
-Role = Literal[
-    "carrier",  # carries a requested item
-    "neighbour",  # a carrier sees it with its cameras
-    "in_area",  # in the delivery area
-    "shuffling",  # carries an item that is not requested
-    "searching",  # empty, anywhere else
-]
-ROLES: tuple[str, ...] = get_args(Role)
 
 GRACE = 5e-7  # [s]; times are sums of control periods
 _SWITCHES = 32  # beginnings and ends of an intermittent fault that are drawn at a time
@@ -64,11 +55,13 @@ class Fault(Record):
             None: it holds without a break.
         role: one of `ROLES`: the robots are chosen at the onset by what they are doing then, see
             `robots_in_role`; None: by the seed.
+        kind: the robots are of this kind of the scenario's `robot_kinds`, chosen by the seed; None:
+            of any.
 
     Raises:
         FaultError: an unknown mode or role, a factor, a duration or breaks that the mode does not
-            have, `away` without either, a robot that is named twice, a role beside robots that are
-            named.
+            have, `away` without either, a robot that is named twice, a role or a kind beside robots
+            that are named, or both.
 
     Example:
         >>> Fault("FM1", 2, onset=200.0).robots
@@ -84,6 +77,7 @@ class Fault(Record):
     factor: Annotated[float, Field(ge=0, lt=1)] | None = None
     intermittent: tuple[Duration, Duration] | None = None
     role: Role | None = None
+    kind: str | None = None
 
     def __init__(
         self,
@@ -94,16 +88,18 @@ class Fault(Record):
         factor: float | None = None,
         intermittent: tuple[float, float] | None = None,
         role: str | None = None,
+        kind: str | None = None,
     ) -> None:
         fields = {"mode": mode, "robots": robots, "onset": onset, "duration": duration}
-        super().__init__(**fields, factor=factor, intermittent=intermittent, role=role)
+        super().__init__(**fields, factor=factor, intermittent=intermittent, role=role, kind=kind)
 
     @model_serializer(mode="wrap")
     def _serialize(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # Without a role it is written as before there were roles, so that stored runs stay known.
+        # Without these it is written as before there were any, so that stored runs stay known.
         written: dict[str, Any] = write(self)
-        if self.role is None:
-            del written["role"]
+        for name in ("role", "kind"):
+            if getattr(self, name) is None:
+                del written[name]
         return written
 
     @model_validator(mode="after")
@@ -122,8 +118,16 @@ class Fault(Record):
             )
         if isinstance(self.robots, tuple) and len(set(self.robots)) < len(self.robots):
             raise ValueError(f"robots = {self.robots}: should name each robot once")
-        if self.role is not None and isinstance(self.robots, tuple):
-            raise ValueError(f"role = {self.role!r}: robots should be a number, not {self.robots}")
+        for name in ("role", "kind"):
+            value = getattr(self, name)
+            if value is not None and isinstance(self.robots, tuple):
+                raise ValueError(
+                    f"{name} = {value!r}: robots should be a number, not {self.robots}"
+                )
+        if self.role is not None and self.kind is not None:
+            raise ValueError(
+                f"role = {self.role!r} and kind = {self.kind!r}: should be one of them"
+            )
         return self
 
     def is_active(self, time: float) -> bool:
@@ -137,7 +141,7 @@ FaultLike: TypeAlias = Fault | Mapping[str, Any] | str
 
 _NUMBER = r"\d+\.?\d*|\.\d+"
 _FAULT = re.compile(
-    r"(?P<mode>\w+)(:(?P<robots>\d+)(:(?P<role>\w+))?)?"
+    r"(?P<mode>\w+)(:(?P<robots>\d+)(:(?P<whom>\w+))?)?"
     rf"(@(?P<onset>{_NUMBER})(\+(?P<duration>{_NUMBER}))?)?"
 )
 
@@ -192,10 +196,12 @@ def fault_of(text: str) -> Fault:
     match = _FAULT.fullmatch(text)
     if match is None:
         raise FaultError(
-            f"fault {text!r}: should be MODE[:ROBOTS[:ROLE]][@ONSET[+DURATION]], e.g. FM1:2@200, "
-            "with ROBOTS a whole number and ONSET and DURATION in seconds"
+            f"fault {text!r}: should be MODE[:ROBOTS[:ROLE or KIND]][@ONSET[+DURATION]], e.g. "
+            "FM1:2@200, with ROBOTS a whole number and ONSET and DURATION in seconds"
         )
     parts: dict[str, Any] = match.groupdict()
+    whom = parts.pop("whom")
+    parts["role" if whom in ROLES else "kind"] = whom
     if parts["mode"] == "late" and parts["onset"] and not parts["duration"]:
         start = f"late:{parts['robots'] or 1}@0+{parts['onset']}"
         raise FaultError(f"fault {text!r}: late robots begin when it ends: should be {start}")
@@ -205,10 +211,10 @@ def fault_of(text: str) -> Fault:
 def text_of(fault: Fault) -> str | None:
     """Return the text that describes the fault; None: none does, as it has a factor, say."""
     digits = functools.partial(np.format_float_positional, trim="-")
-    role = f":{fault.role}" if fault.role else ""
+    whom = f":{fault.role or fault.kind}" if fault.role or fault.kind else ""
     lasts = f"+{digits(fault.duration)}" if fault.duration else ""
     onset = f"@{digits(fault.onset)}{lasts}" if fault.onset or lasts else ""
-    text = f"{fault.mode}:{fault.robots}{role}{onset}"
+    text = f"{fault.mode}:{fault.robots}{whom}{onset}"
     if fault.mode == "late" and onset and not lasts:
         return None
     return text if _FAULT.fullmatch(text) and fault_of(text) == fault else None
@@ -220,7 +226,7 @@ class Occurrence:
     Args:
         fault: which.
         seed: the episode's seed.
-        scenario: of the episode.
+        scenario: of the episode, for how many robots there are, and of which kinds.
 
     Attributes:
         mode: the failure mode.
@@ -241,8 +247,15 @@ class Occurrence:
         self._seed = seed
         # The times at which an intermittent fault begins, ends, begins, ..., by robot.
         self._switches: dict[int, list[float]] = {}
-        affected = failed_robots(fault, seed, scenario.n_robots)
+        affected = failed_robots(fault, seed, scenario)
         self.robots = affected if fault.role is None else affected[:0]
+
+    @property
+    def numbered(self) -> Fault:
+        """The fault with the numbers of its robots; as it is if they are not chosen yet."""
+        if not len(self.robots):
+            return self.fault
+        return self.fault.replace(robots=tuple(self.robots.tolist()), role=None, kind=None)
 
     def choose_by_role(self, state: WarehouseState) -> None:
         """Choose the robots of a fault that strikes by role, once it holds."""
@@ -303,12 +316,14 @@ class Occurrence:
         return bisect_right(switches, time + GRACE)
 
 
-def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
+def failed_robots(fault: Fault, seed: int, scenario: Scenario) -> NDArray[np.int64]:
     """Return the numbers of the robots that `fault` affects, ascending.
 
     Raises:
-        FaultError: it is of more robots than there are, or of one that is not there.
+        FaultError: it is of more robots than there are, of one that is not there, or of a kind that
+            there is not.
     """
+    n_robots = scenario.n_robots
     if isinstance(fault.robots, tuple):
         if max(fault.robots) >= n_robots:  # before numpy, whose integers end at 2**63
             raise FaultError(
@@ -319,62 +334,14 @@ def failed_robots(fault: Fault, seed: int, n_robots: int) -> NDArray[np.int64]:
         raise FaultError(f"Fault.robots = {fault.robots}: should be at most n_robots = {n_robots}")
     # Ranked by a key of seed and robot alone: nested in m, the same for every mode and any N.
     order = np.argsort(row_keys(seed, "faulty robots", n_robots), kind="stable")
+    if fault.kind is not None:
+        order = order[scenario.is_of_kind(fault.kind)[order]]
+        if fault.robots > len(order):
+            raise FaultError(
+                f"Fault.robots = {fault.robots} of kind = {fault.kind!r}: should be at most "
+                f"{len(order)}, as so many of the {n_robots} robots are of that kind"
+            )
     return np.sort(order[: fault.robots]).astype(np.int64)
-
-
-# Capabilities that a mode takes away as a whole: each is a field of both.
-LOST_AS_A_WHOLE = tuple(
-    name for name in Capabilities._fields if getattr(FailureMode, name, None) is True
-)
-
-
-def apply_faults(
-    state: WarehouseState, scenario: Scenario, occurrences: Sequence[Occurrence]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Give every robot what the faults that hold at `state.time` leave it.
-
-    Returns:
-        Which robots faults take out of the arena for good (N,), and which of all others now (N,).
-    """
-    # By what robots do and see as faults begin, so that those of one moment choose alike.
-    for occurrence in occurrences:
-        occurrence.choose_by_role(state)
-    able = state.able
-    speed = np.resize(scenario.speed_mix, state.n_robots)
-    sensing = np.resize(scenario.sensing_mix, state.n_robots)
-    able.max_speed[:] = scenario.max_speed * speed
-    able.max_turn_rate[:] = scenario.max_turn_rate * speed
-    able.ranger_range[:] = scenario.ranger_range * sensing
-    able.view_range[:] = scenario.view_range * sensing
-    able.battery[:] = scenario.battery_energy
-    able.ranger_bias[:] = 0.0
-    able.radio_delay[:] = 0
-    for name in LOST_AS_A_WHOLE:
-        getattr(able, name)[:] = True
-    is_removed = np.zeros(state.n_robots, np.bool_)
-    is_away = np.zeros(state.n_robots, np.bool_)
-    modes: list[list[str]] = [[] for _ in range(state.n_robots)]
-    for occurrence in occurrences:
-        mode = occurrence.mode
-        robots = occurrence.holds_for(state.time)
-        left = occurrence.remaining_factors(state.time, scenario.duration)
-        able.max_speed[robots] *= left["speed"]
-        able.max_turn_rate[robots] *= left["speed"]
-        able.view_range[robots] *= left["view"]
-        able.battery[robots] *= left["battery"]
-        able.ranger_range[robots] *= mode.rangers
-        able.ranger_bias[robots] += mode.ranger_bias
-        delay = round(mode.radio_delay / scenario.control_period)
-        able.radio_delay[robots] = np.maximum(able.radio_delay[robots], delay)
-        for name in LOST_AS_A_WHOLE:
-            getattr(able, name)[robots] &= getattr(mode, name)
-        is_removed[robots] |= not (mode.present or mode.returns)
-        is_away[robots] |= mode.returns
-        for robot in robots.tolist():
-            modes[robot].append(occurrence.fault.mode)
-    state.failure_modes = tuple(map(tuple, modes))
-    state.failed = np.array([bool(names) for names in modes])
-    return is_removed, is_away & ~is_removed
 
 
 def step_of_change(occurrences: Sequence[Occurrence], step: int, period: float) -> int:

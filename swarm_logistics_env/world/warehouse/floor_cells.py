@@ -26,7 +26,7 @@ def floor_of(scenario: Scenario) -> Floor:
     """Return the cells of a scenario's floor; worlds of the same plan share them."""
     if scenario.floor is None:
         return _EMPTY_ROOM
-    reach = scenario.ranger_range * max(scenario.sensing_mix)
+    reach = scenario.ranger_reach * max(scenario.sensing_mix)
     return _cells_of(scenario.floor, scenario.cell_size, 2.0 * scenario.robot_radius, reach)
 
 

@@ -131,7 +131,8 @@ def start_energies(scenario: Scenario, seed: int) -> Numbers:
     So not all robots need a station at once.
     """
     keys = row_keys(seed, "start energy", scenario.n_robots)
-    return scenario.battery_energy * np.array([0.5 + 0.5 * uniform(key, 0) for key in keys])
+    shares = np.array([0.5 + 0.5 * uniform(key, 0) for key in keys])
+    return np.asarray(scenario.of_robots("battery") * shares)
 
 
 @kernel

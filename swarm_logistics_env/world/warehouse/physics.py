@@ -68,25 +68,29 @@ def advance(world: World) -> None:
     iterations = min(_FEWEST_ITERATIONS + n_touching // _TOUCHING_PER_ITERATION, _MOST_ITERATIONS)
     call_at(engine.functions.cpSpaceSetIterations, (engine.space[0], iterations))
     period = parameters.physics_period
-    greatest = parameters.max_acceleration * period
     for _ in range(parameters.n_substeps):
-        push(engine, greatest, parameters.robot_mass / period)
+        push(engine, world.able.max_acceleration, period, parameters.robot_mass)
         call_at(engine.functions.cpSpaceStep, (engine.space[0], period))
     read(engine)
 
 
 @engine_kernel
-def push(engine: EngineArrays, greatest: float, mass_per_period: float) -> None:
-    """Give every robot the force that changes its velocity as wanted, by `greatest` [m/s] at most.
+def push(engine: EngineArrays, most: Numbers, period: float, mass: float) -> None:
+    """Give every robot the force that changes its velocity as wanted, as far as it can.
 
-    `mass_per_period` [kg/s] makes a force of a change of velocity.
+    Args:
+        most: acceleration of each robot (N,) [m/s2].
+        period: of a substep [s].
+        mass: of a robot [kg].
     """
     at = engine.body_words
+    mass_per_period = mass / period  # makes a force of a change of velocity
     for robot in range(len(engine.wanted_velocity)):
         body = words_of(engine, robot)
         change_x = engine.wanted_velocity[robot, 0] - body[at.velocity]
         change_y = engine.wanted_velocity[robot, 1] - body[at.velocity + 1]
         change = math.sqrt(change_x * change_x + change_y * change_y)
+        greatest = most[robot] * period
         share = mass_per_period * (1.0 if change <= greatest else greatest / change)
         body[at.force] = share * change_x
         body[at.force + 1] = share * change_y

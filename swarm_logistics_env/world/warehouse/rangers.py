@@ -29,7 +29,7 @@ _ONE_BEAM = 1.001 / math.sin(math.pi / _N_BEAMS) ** 2
 def full_range(world: World, robot: int) -> float:
     """Return the reading of beams that meet nothing [m], also where its rangers are blind."""
     reach = world.able.ranger_range[robot]
-    return reach if reach > 0.0 else world.parameters.ranger_range
+    return reach if reach > 0.0 else world.parameters.ranger_reach
 
 
 @inlined_kernel

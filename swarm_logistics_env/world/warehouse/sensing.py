@@ -126,7 +126,7 @@ def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     velocity_y = robots.velocity[me, 1]
     forward = velocity_x * pose.cosine + velocity_y * pose.sine
     left = velocity_y * pose.cosine - velocity_x * pose.sine
-    limit = parameters.max_speed
+    limit = parameters.highest_speed
     carried = robots.item[me]
     timer = robots.timer[me]
     runs = not math.isnan(timer)
@@ -139,5 +139,5 @@ def feel_itself(me: int, pose: Pose, world: World, out: Sensed) -> None:
     out[row.VELOCITY_X] = min(max(forward, -limit), limit)
     out[row.VELOCITY_Y] = min(max(left, -limit), limit)
     out[row.CONTACT] = 1.0 if robots.contact[me] else 0.0
-    limit = parameters.max_turn_rate
+    limit = parameters.highest_turn_rate
     out[row.TURN_RATE] = min(max(robots.turn_rate[me], -limit), limit)

@@ -69,11 +69,11 @@ def disturb_beams(
 @kernel
 def disturb_positions(key: np.uint64, first: int, parameters: Parameters, out: Sensed) -> None:
     """Add noise to the places of what is there in a row, from number `first` of the stream."""
-    far = max(parameters.view_range, parameters.radio_range)
+    far = max(parameters.view_reach, parameters.radio_range)
     for thing in range(_N_THINGS):
         if thing < row.N_ITEMS_IN_VIEW:
             column = row.ITEMS + row.ITEM_WIDTH * thing
-            limit = parameters.view_range
+            limit = parameters.view_reach
         else:
             column = row.NEIGHBOURS + row.NEIGHBOUR_WIDTH * (thing - row.N_ITEMS_IN_VIEW)
             limit = far

@@ -43,6 +43,7 @@ class WarehouseState:
     know where it lies.
     """
 
+    robot_kind: Integers
     robot_position: Numbers
     robot_velocity: Numbers
     robot_heading: Numbers
@@ -64,6 +65,8 @@ class WarehouseState:
 
     max_speed: Numbers
     max_turn_rate: Numbers
+    max_acceleration: Numbers
+    is_holonomic: Flags
     ranger_range: Numbers
     view_range: Numbers
     lifts: Flags
@@ -91,6 +94,7 @@ class WarehouseState:
         self.orders = blank(Orders, lengths)
         self.contacts = blank(ContactCounts, lengths)
         robots.present[:] = True
+        robots.kind[:] = scenario.kind_numbers(scenario.n_robots)
         for nobody in (robots.item, robots.memory, robots.last_in_delivery, self.items.carrier):
             nobody[...] = NOBODY
         for silent in (robots.timer, robots.told, robots.heard, robots.told_before):

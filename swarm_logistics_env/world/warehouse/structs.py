@@ -43,11 +43,10 @@ class Parameters(NamedTuple):
     robot_mass: float
     item_radius: float
     obstacle_radius: float
-    max_speed: float
-    max_turn_rate: float
-    max_acceleration: float
-    ranger_range: float
-    view_range: float
+    highest_speed: float
+    highest_turn_rate: float
+    ranger_reach: float
+    view_reach: float
     radio_range: float
     pickup_range: float
     timer_limit: float
@@ -75,7 +74,6 @@ class Parameters(NamedTuple):
     tells_all: bool
     restock: bool
     is_gossip: bool
-    is_holonomic: bool
     battery_energy: float
     idle_power: float
     driving_energy: float
@@ -86,6 +84,7 @@ class Parameters(NamedTuple):
 class Robots(NamedTuple):
     """The robots; a row is one robot for good."""
 
+    kind: Annotated[Integers, "N"]  # number of its kind, from 0 on; 0 if all are alike
     position: Annotated[Numbers, "N", 2]  # [m]
     velocity: Annotated[Numbers, "N", 2]  # [m/s]
     heading: Annotated[Numbers, "N"]  # [rad] from +x to the left, within +-pi

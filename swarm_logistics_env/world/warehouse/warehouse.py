@@ -19,9 +19,10 @@ from swarm_logistics_env.world.observations import n_columns
 from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN, Scenario
 
 from . import stepping
+from .abilities import apply_faults
 from .absence import change_presence
 from .commands import MESSAGE, as_array, not_finite
-from .faults import Fault, FaultLike, Occurrence, apply_faults, checked_faults, step_of_change
+from .faults import Fault, FaultLike, Occurrence, checked_faults, step_of_change
 from .floor_cells import floor_map, floor_of
 from .grid import blank_grid
 from .layout import lay_out
@@ -237,12 +238,7 @@ class Warehouse:
 
         Given to `set_faults`, they change nothing.
         """
-        return tuple(
-            occurrence.fault.replace(robots=tuple(occurrence.robots.tolist()), role=None)
-            if len(occurrence.robots)
-            else occurrence.fault
-            for occurrence in self._occurrences
-        )
+        return tuple(occurrence.numbered for occurrence in self._occurrences)
 
     @property
     def n_removed(self) -> int:
@@ -284,7 +280,7 @@ class Warehouse:
     def _make_room_to_work(self) -> None:
         scenario = self.scenario
         n, width, height = scenario.n_robots, scenario.warehouse_width, scenario.warehouse_height
-        sees = max(scenario.ranger_range + scenario.robot_radius, scenario.view_range)
+        sees = max(scenario.ranger_reach + scenario.robot_radius, scenario.view_reach)
         hears = max(sees, scenario.radio_range)
         # Cells have half the side of the square that robots search: few rows, few of them in vain.
         self._robot_grid = blank_grid(width, height, hears / 2, n)

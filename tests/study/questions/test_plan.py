@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from swarm_logistics_env import Scenario
-from swarm_logistics_env.core.errors import StudyError, SwarmLogisticsError
+from swarm_logistics_env.core.errors import FaultError, StudyError, SwarmLogisticsError
 from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.study.questions.comparison import OTHER_BEHAVIOUR
 from swarm_logistics_env.study.questions.presets import PRESETS
@@ -195,6 +195,19 @@ def test_for_p_s_of_faults_by_role_those_of_the_role_are_removed() -> None:
     assert {fault for case in plan.cases for fault in case.faults} == {
         Fault(mode, m, onset=50.0, role="carrier") for mode in ("FM4", "removed") for m in (1, 2)
     }
+
+
+def test_faults_of_a_kind_strike_it_and_for_p_s_robots_of_that_kind_are_removed() -> None:
+    scenario = {"robot_kinds": "lifter:4, scout:1"}
+    faults = {"modes": ["FM1"], "robots": [2], "kind": "scout"}
+    plan = Study(scenario=scenario, faults=[faults]).plan()
+    struck = {fault.mode: fault.kind for case in plan.cases for fault in case.faults}  # type: ignore[attr-defined]
+    assert struck == {"FM1": "scout", "removed": "scout"}
+    (command,) = {WAREHOUSE.watch_command(case) for case in plan.cases if not case.faults}
+    assert command.endswith("--set 'robot_kinds=lifter:4, scout:1'")
+    for wrong, complaint in ({"kind": "scuot"}, "lifter, scout"), ({"robots": [6]}, "at most 5"):
+        with pytest.raises(FaultError, match=complaint):
+            Study(scenario=scenario, faults=[{**faults, **wrong}]).plan()
 
 
 def test_a_change_of_the_scenario_reaches_tables_with_a_preset_of_their_own() -> None:

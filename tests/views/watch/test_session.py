@@ -220,6 +220,16 @@ def test_what_the_selected_robot_senses_is_shown() -> None:
         assert shown["beams"] == pytest.approx(nearest, abs=0.00051)
 
 
+def test_the_kinds_of_robots_are_shown_where_there_are_any() -> None:
+    assert frame_message(Session(SMALL))["kinds0"] == []
+    session = Session(SMALL.replace(robot_kinds="lifter:3, scout:1"))
+    session.select(2)
+    shown = frame_message(session)
+    assert shown["fixed"]["kinds"] == ["lifter", "scout"]
+    assert shown["kinds0"] == session.scenario.kind_numbers(8).tolist()
+    assert shown["selected"]["kind"] == ["lifter", "scout"][shown["kinds0"][2]]
+
+
 def test_a_recording_begins_anew_with_each_episode() -> None:
     session = Session(SMALL)
     recording = Recording(session)

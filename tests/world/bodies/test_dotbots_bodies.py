@@ -120,6 +120,8 @@ def test_a_robot_that_falls_silent_is_lost() -> None:
         ({"drive": "holonomic"}, "should be differential"),
         ({"control_period": 0.035, "physics_period": 0.005}, "should be a multiple of 0.01 s"),
         ({"max_speed": 0.6}, "wheel would run at 0.80 m/s; should be at most 0.7"),
+        ({"robot_kinds": "plain, ball drive=holonomic"}, "should be differential"),
+        ({"robot_kinds": "plain, fast max_speed=0.6"}, "wheel would run at 0.80 m/s"),
         ({"robot_radius": 0.06}, "DotBots have 0.05 m"),
         ({"warehouse_width": 70.0}, "should be at most 60.0 m"),
     ],

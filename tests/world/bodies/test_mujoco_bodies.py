@@ -38,14 +38,19 @@ def test_bodies_need_nothing_that_draws(name: str) -> None:
     assert printed.split()[-1] == name
 
 
-def placed(drive: Any, positions: Any, heading: float = 0.0) -> Any:
+def placed(drive: Any, positions: Any, heading: float = 0.0, kinds: Any = ()) -> Any:
     """Return bodies of robots that look in one direction, in a room of 10 m x 10 m."""
     from swarm_logistics_env.world.bodies.mujoco_bodies import MujocoBodies
 
     position = np.array(positions, float)
     n = len(position)
     scenario = Scenario(
-        bodies="mujoco", drive=drive, n_robots=n, max_acceleration=2.0, max_speed=1.0
+        bodies="mujoco",
+        drive=drive,
+        n_robots=n,
+        max_acceleration=2.0,
+        max_speed=1.0,
+        robot_kinds=kinds,
     )
     bodies = MujocoBodies()
     nothing = np.zeros((0, 2)), np.zeros((0, 4))
@@ -87,6 +92,19 @@ def test_a_robot_goes_whither_it_wants_in_its_own_frame(drive: str, left: float)
     ahead = np.array([np.cos(0.7), np.sin(0.7)])
     aside = np.array([-np.sin(0.7), np.cos(0.7)])
     assert poses.velocity[0] == pytest.approx(0.6 * ahead + left * aside, abs=0.01)
+
+
+def test_kinds_of_either_drive_go_side_by_side_each_as_its_own_motors_can() -> None:
+    kinds = "slides, wheels drive=differential, slow max_acceleration=0.5"
+    positions = [(2.0, 2.0), (2.0, 4.0), (2.0, 6.0)]
+    bodies = placed("holonomic", positions, kinds=kinds)
+    for _ in range(10):
+        poses = bodies.move(orders(*[(0.8, 0.3, 0.0)] * 3))
+    way = poses.position - positions
+    assert way[0, 0] > way[2, 0] > 0.1
+    assert way[0, 1] > 0.1
+    assert abs(way[1, 1]) < 0.01 < way[1, 0]
+    assert poses.heading == pytest.approx(0.0, abs=0.02)
 
 
 @pytest.mark.parametrize("drive", DRIVES)

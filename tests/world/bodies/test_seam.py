@@ -61,6 +61,7 @@ def worlds(draw: st.DrawFn) -> tuple[Scenario, tuple[Planned, ...], int]:
         handling_time=draw(st.sampled_from([0.0, 0.3])),
         speed_mix=draw(st.sampled_from([(1.0,), (1.0, 0.5)])),
         drive=draw(st.sampled_from(["holonomic", "differential"])),
+        robot_kinds=draw(st.sampled_from(["", "plain, wheels drive=differential"])),
     )  # fmt: skip
     planned = draw(st.lists(planned_faults(n_robots), max_size=2).map(tuple))
     return scenario, planned, draw(st.integers(0, 2**32))

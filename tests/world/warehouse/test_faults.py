@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from swarm_logistics_env import Fault, Scenario, Warehouse
 from swarm_logistics_env.core.errors import FaultError
 from swarm_logistics_env.world.observations import N_BEAMS
+from swarm_logistics_env.world.scenario import ROLES
 from swarm_logistics_env.world.warehouse.faults import (
-    ROLES,
     Occurrence,
     failed_robots,
     fault_of,
@@ -31,17 +31,19 @@ def test_chosen_sets_are_nested_the_same_for_every_mode_and_of_the_right_size(
     seed: int, n_robots: int, data: st.DataObject
 ) -> None:
     m = data.draw(st.integers(1, n_robots))
-    chosen = failed_robots(Fault("FM1", m), seed, n_robots)
+    scenario = Scenario(n_robots=n_robots)
+    chosen = failed_robots(Fault("FM1", m), seed, scenario)
     assert len(set(chosen)) == m
     assert set(chosen) <= set(range(n_robots))
     for mode in ("removed", "FM4", "dead"):
-        np.testing.assert_array_equal(failed_robots(Fault(mode, m, 7.0), seed, n_robots), chosen)
+        np.testing.assert_array_equal(failed_robots(Fault(mode, m, 7.0), seed, scenario), chosen)
     if m > 1:
-        assert set(failed_robots(Fault("FM1", m - 1), seed, n_robots)) < set(chosen)
+        assert set(failed_robots(Fault("FM1", m - 1), seed, scenario)) < set(chosen)
 
 
 def test_each_robot_has_its_turn_and_faults_do_not_move_where_things_start() -> None:
-    turns = np.bincount([failed_robots(Fault("FM1"), seed, 10)[0] for seed in range(200)])
+    ten = Scenario(n_robots=10)
+    turns = np.bincount([failed_robots(Fault("FM1"), seed, ten)[0] for seed in range(200)])
     assert 5 < turns.min() <= turns.max() < 45
     world, sound = Warehouse(SMALL), Warehouse(SMALL)
     sound.reset(9)

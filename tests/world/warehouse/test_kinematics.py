@@ -15,7 +15,8 @@ from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.compiler.packing import packed
 from swarm_logistics_env.world.observations import TURN_RATE
 from swarm_logistics_env.world.warehouse.commands import drive
-from swarm_logistics_env.world.warehouse.structs import World
+from swarm_logistics_env.world.warehouse.structs import NOBODY, World
+from tests.world.warehouse.conftest import HOLD, Build, steps
 
 
 @kernel
@@ -36,11 +37,11 @@ def test_a_robot_drives_along_its_mean_direction_at_most_at_its_top_speed(
 ) -> None:
     still = Warehouse(Scenario(n_robots=2, heading_drift=0.0))
     still.reset(0)
-    parameters = still._world.parameters._replace(control_period=period, is_holonomic=is_holonomic)
+    parameters = still._world.parameters._replace(control_period=period)
     world = still._world._replace(parameters=parameters)
     robots, able, wanted = world.robots, world.able, world.engine.wanted_velocity
     robots.heading[:], able.obeys[:], wanted[:] = heading, [True, False], 9.0
-    able.max_speed[:], able.max_turn_rate[:] = 2.0, 6.0
+    able.max_speed[:], able.max_turn_rate[:], able.is_holonomic[:] = 2.0, 6.0, is_holonomic
     world.commands.now[:] = commands
     words = packed(world)
     drive_at(words.ctypes.data)
@@ -54,6 +55,19 @@ def test_a_robot_drives_along_its_mean_direction_at_most_at_its_top_speed(
     assert abs(turned) <= math.pi + 1e-12
     assert math.remainder(turned - heading - turn * 6.0 * period, math.tau) == pytest.approx(0.0)
     assert (wanted[1].tolist(), robots.heading[1]) == ([0.0, 0.0], heading)
+
+
+def test_kinds_drive_gather_speed_and_lift_as_they_can(build: Build) -> None:
+    robots = [(2.0, y) for y in (2.0, 4.0, 6.0, 8.0)]
+    kinds = "plain, wheels drive=differential, slow max_acceleration=1.0, scout lifts=false"
+    world = build(robots, robots, robot_kinds=kinds)
+    steps(world, *[HOLD] * 4)
+    assert (world.state.robot_item != NOBODY).tolist() == [True, True, True, False]
+    steps(world, *[(1.0, 1.0, 0.0, 1.0)] * 4)
+    plain, wheels, slow, _ = world.state.robot_velocity.tolist()
+    assert plain == pytest.approx([math.sqrt(2.0), math.sqrt(2.0)])
+    assert wheels == pytest.approx([2.0, 0.0])
+    assert math.hypot(*slow) == pytest.approx(0.1)  # after 0.1 s
 
 
 def test_every_robot_drifts_at_a_rate_of_its_own_that_depends_on_no_other() -> None:

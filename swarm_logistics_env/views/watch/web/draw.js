@@ -70,6 +70,16 @@ function body(pen, x, y, radius, colour, isFaulty) {
   disc(pen, x, y, radius - edge, colour);
 }
 
+// About a robot by the number of its kind: nothing, a ring, a square, a diamond, then anew.
+function kindOutline(pen, x, y, radius, kind) {
+  const reach = 1.45 * radius + 2, width = Math.max(1.2, 0.16 * radius), shape = kind % 4;
+  if (shape === 1) ring(pen, x, y, reach, width, colours.INK);
+  if (shape < 2) return;
+  const arm = 1.3 * reach, turn = shape === 2 ? Math.PI / 4 : 0;
+  pen.lineJoin = "miter";
+  line(pen, [0, 1, 2, 3, 4, 5].map((side) => [x + arm * Math.cos(turn + (side * Math.PI) / 2), y + arm * Math.sin(turn + (side * Math.PI) / 2)]), width, colours.INK);
+}
+
 function halo(pen, x, y, radius, age) {
   const strength = 1 - age, reach = radius * (1.5 + strength);
   const glow = pen.createRadialGradient(x, y, radius, x, y, reach);
@@ -260,6 +270,7 @@ function drawArena(canvas, number, now, next, share, options) {
     const isCarrier = requested.some(([, , carrier]) => carrier === robot);
     if (leader && (isCarrier || options.links)) arrow(pen, at(pose), at(leader), radius, isCarrier ? Math.max(2, radius / 3.5) : 1, colours.LINK);
   });
+  const kinds = now[`kinds${number}`] ?? [];  // a recording of a former version has none
   const watched = options.selected && poses[options.selected.robot];
   if (watched && number === 0) drawBeams(pen, options.selected, watched, at, scale);
   poses.forEach((pose, robot) => {
@@ -270,6 +281,7 @@ function drawArena(canvas, number, now, next, share, options) {
       if (activity === "shuffling") item(ink, mid, mid, Math.max(1.5, 0.45 * radius), false);
     });
     const [x, y] = at(pose);
+    if (kinds[robot]) kindOutline(pen, x, y, radius, kinds[robot]);
     pen.translate(x, y);
     pen.rotate(-pose[2]);
     pen.drawImage(picture, -size, -size, picture.width / ratio, picture.height / ratio);

@@ -29,7 +29,7 @@ function planEntries(plan) {
 }
 
 // Name, explanation and picture of each mark that this warehouse may show.
-function legendEntries({ modes, plan }, now) {
+function legendEntries({ modes, plan, kinds }, now) {
   const { obstacles, scenario } = now;
   const robot = (name, load) => (pen) => {
     body(pen, 10, MID, 7, colours[name], false);
@@ -49,6 +49,7 @@ function legendEntries({ modes, plan }, now) {
     ["item", "An item in store that is not requested.", (pen) => item(pen, MID, MID, 5.5, false)],
     ["requested item", "An item that has to be brought to the delivery area. The sight about it goes with it.", (pen) => { target(pen, MID, MID, 6.5); item(pen, MID, MID, 3.5, true); }],
   ];
+  (kinds ?? []).forEach((name, kind) => entries.push([`kind ${name}`, `A robot of the kind ${name}, by what is about it.`, (pen) => { kindOutline(pen, MID, MID, 4, kind); body(pen, MID, MID, 4, colours.SEARCHING, false); }]));
   if (scenario.has_due_times) entries.push(["late", "What is asked for and overdue.", (pen) => badge(pen, MID, MID, 15, LATE)]);
   if (now.charge0?.length) entries.push(["charge", `How full a robot's battery is; orange below ${LOW_CHARGE} %. An empty robot stands.`, (pen) => chargeBar(pen, MID, -4, 9, 60)]);
   if (now.stations0?.length) entries.push(["station", "Charges a robot that stands on it. Crossed out: it charges nobody.", (pen) => station(pen, MID, MID, 8, true)]);

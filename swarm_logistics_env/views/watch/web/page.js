@@ -232,7 +232,7 @@ function showWords() {
     if (document.activeElement !== element(name)) element(name).value = scenario[name];
   }
   const { meaning } = fixed.modes.find(({ name }) => name === latest.mode);
-  const present = selected ? `It is ${selected.activity} and ${selected.modes.length ? `fails: ${selected.modes.join(", ")}` : "sound"}. ` : "";
+  const present = selected ? `It is ${selected.kind ? `of the kind ${selected.kind}, ` : ""}${selected.activity} and ${selected.modes.length ? `fails: ${selected.modes.join(", ")}` : "sound"}. ` : "";
   const does = isBehind ? "The past is shown; break and repair act on the present. " : present;
   element("meaning").textContent = `${does}${latest.mode}: ${meaning}.`;
   element("robot").textContent = selected ? `Robot ${selected.robot}` : `${touched.matches ? "Tap" : "Click"} a robot`;
