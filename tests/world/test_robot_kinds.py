@@ -31,8 +31,8 @@ def test_any_first_robots_have_the_shares_of_the_kinds_whatever_the_swarm_size(
     assert np.bincount(numbers[: sum(counts)]).tolist() == counts
     shares = np.array(counts) / sum(counts)
     for n in range(1, n_robots + 1):
-        found = np.bincount(numbers[:n], minlength=len(counts))
-        assert (np.abs(found - n * shares) <= len(counts) / 2).all()
+        n_of_kind = np.bincount(numbers[:n], minlength=len(counts))
+        assert (np.abs(n_of_kind - n * shares) <= len(counts) / 2).all()
     more = scenario.replace(n_robots=n_robots + 9)
     assert more.kind_numbers(more.n_robots)[:n_robots].tolist() == numbers.tolist()
 
@@ -106,8 +106,8 @@ def test_each_robot_is_able_to_do_what_its_kind_can_times_its_factors() -> None:
     assert state.lifts.tolist() == [True, False, True, False]
     assert set(scenario.robot_kinds[1].differing) == set(KIND_FIELDS)
     for name in ("max_turn_rate", "max_acceleration", "ranger_range"):
-        own = getattr(scenario.robot_kinds[1], name)
-        assert getattr(state, name)[[0, 1]].tolist() == [getattr(scenario, name), own]
+        of_kind = getattr(scenario.robot_kinds[1], name)
+        assert getattr(state, name)[[0, 1]].tolist() == [getattr(scenario, name), of_kind]
     world.change(drive="differential", view_range=2.0)  # of the kinds that do not say otherwise
     assert state.is_holonomic.tolist() == [False] * 4
     assert state.view_range.tolist() == [2.0, 0.5, 2.0, 0.25]
