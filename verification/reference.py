@@ -100,12 +100,12 @@ class Faults:
         s = self._scenario
         speed = s.speed_mix[robot % len(s.speed_mix)]
         sensing = s.sensing_mix[robot % len(s.sensing_mix)]
-        own = s.of_robot(robot)
+        body = s.of_robot(robot)
         return {
-            "max_speed": own.max_speed * speed,
-            "max_turn_rate": own.max_turn_rate * speed,
-            "view_range": own.view_range * sensing,
-            "ranger_range": own.ranger_range * sensing,
+            "max_speed": body.max_speed * speed,
+            "max_turn_rate": body.max_turn_rate * speed,
+            "view_range": body.view_range * sensing,
+            "ranger_range": body.ranger_range * sensing,
             "ranger_bias": 0.0,
             "radio_delay": 0,
             **dict.fromkeys(LOST_AS_A_WHOLE, True),

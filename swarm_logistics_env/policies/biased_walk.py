@@ -116,7 +116,7 @@ class BiasedWalk(RowPolicy, Scripted):
         """Take what the maker of a robot knows: its speed and control period, and the swarm."""
         parameters = self.parameters
         # Of the first robots, whose kinds repeat.
-        strides = [one.max_speed * one.control_period for one in of_first_robots(scenario)]
+        strides = [body.max_speed * body.control_period for body in of_first_robots(scenario)]
         turns = [math.sqrt(3.0 * parameters.diffusion * stride) for stride in strides]
         drops = [-math.expm1(-parameters.drop_rate * stride) for stride in strides]
         self._of_first = WalkConstants(

@@ -59,8 +59,8 @@ GOLDEN |= {
     for name in ROW_POLICIES
 }
 # Each robot reads its own body, in the swarm as alone.
-KINDS = Scenario(
-    **SMALL, robot_kinds="plain:2 max_speed=1.0, wheels:1 drive=differential, scout:1 lifts=false"
+KINDS = Scenario(**SMALL).replace(
+    robot_kinds="plain:2 max_speed=1.0, wheels:1 drive=differential, scout:1 lifts=false"
 )
 GOLDEN |= {
     f"{name} of kinds": trajectories.GoldenTrajectory(KINDS, policy=name, seed=1)

@@ -17,7 +17,7 @@ from swarm_logistics_env.world.scenario.robot_kinds import KIND_FIELDS
 from swarm_logistics_env.world.warehouse.faults import failed_robots, fault_of, text_of
 
 TEXT = "lifter:4 drive=differential, scout:1 max_speed=0.5 view_range=2.0 lifts=false"
-MIXED = Scenario(n_robots=10, n_items=20, robot_kinds=TEXT)
+MIXED = Scenario(n_robots=10, n_items=20).replace(robot_kinds=TEXT)
 HOLDS = (1.0, 1.0, 0.0, 1.0)  # drives askew, and its gripper holds
 
 
@@ -26,13 +26,14 @@ def test_any_first_robots_have_the_shares_of_the_kinds_whatever_the_swarm_size(
     counts: list[int], n_robots: int
 ) -> None:
     kinds = [{"name": f"kind_{number}", "count": count} for number, count in enumerate(counts)]
-    numbers = Scenario(n_robots=n_robots, robot_kinds=kinds).kind_numbers(n_robots)
+    scenario = Scenario(n_robots=n_robots).replace(robot_kinds=kinds)
+    numbers = scenario.kind_numbers(n_robots)
     assert np.bincount(numbers[: sum(counts)]).tolist() == counts
     shares = np.array(counts) / sum(counts)
     for n in range(1, n_robots + 1):
-        found = np.bincount(numbers[:n], minlength=len(counts))
-        assert (np.abs(found - n * shares) <= len(counts) / 2).all()
-    more = Scenario(n_robots=n_robots + 9, robot_kinds=kinds)
+        n_of_kind = np.bincount(numbers[:n], minlength=len(counts))
+        assert (np.abs(n_of_kind - n * shares) <= len(counts) / 2).all()
+    more = scenario.replace(n_robots=n_robots + 9)
     assert more.kind_numbers(more.n_robots)[:n_robots].tolist() == numbers.tolist()
 
 
@@ -42,7 +43,7 @@ def test_text_tables_json_and_the_command_line_say_the_same(tmp_path: Any) -> No
         {"name": "scout", "max_speed": 0.5, "view_range": 2, "lifts": False},
     ]
     size: dict[str, Any] = {"n_robots": 10, "n_items": 20}
-    assert Scenario(**size, robot_kinds=tables) == MIXED
+    assert Scenario(**size).replace(robot_kinds=tables) == MIXED
     assert Scenario.from_json(MIXED.to_json()) == Scenario(**MIXED.model_dump()) == MIXED
     assert MIXED.model_dump()["robot_kinds"] == TEXT
     file = tmp_path / "mixed.toml"
@@ -95,7 +96,7 @@ def test_each_robot_is_able_to_do_what_its_kind_can_times_its_factors() -> None:
         "plain, other max_speed=0.5 max_turn_rate=1.0 max_acceleration=2.0 drive=differential "
         "ranger_range=3.0 view_range=0.5 lifts=false"
     )
-    scenario = Scenario(n_robots=4, n_items=2, robot_kinds=kinds, speed_mix=(1.0, 1.0, 0.5))
+    scenario = Scenario(n_robots=4, n_items=2, speed_mix=(1.0, 1.0, 0.5)).replace(robot_kinds=kinds)
     world = Warehouse(scenario)
     world.reset(0, [Fault("view_reduced", (3,))])
     state = world.state
@@ -105,8 +106,8 @@ def test_each_robot_is_able_to_do_what_its_kind_can_times_its_factors() -> None:
     assert state.lifts.tolist() == [True, False, True, False]
     assert set(scenario.robot_kinds[1].differing) == set(KIND_FIELDS)
     for name in ("max_turn_rate", "max_acceleration", "ranger_range"):
-        own = getattr(scenario.robot_kinds[1], name)
-        assert getattr(state, name)[[0, 1]].tolist() == [getattr(scenario, name), own]
+        of_kind = getattr(scenario.robot_kinds[1], name)
+        assert getattr(state, name)[[0, 1]].tolist() == [getattr(scenario, name), of_kind]
     world.change(drive="differential", view_range=2.0)  # of the kinds that do not say otherwise
     assert state.is_holonomic.tolist() == [False] * 4
     assert state.view_range.tolist() == [2.0, 0.5, 2.0, 0.25]

@@ -193,7 +193,10 @@ def _check_motion(scenario: Scenario) -> None:
         )
     speeds = scenario.of_kinds("max_speed")
     turn_rates = scenario.of_kinds("max_turn_rate")
-    wheels = [s + 0.5 * _TRACK * turn for s, turn in zip(speeds, turn_rates, strict=True)]
+    wheels = [
+        speed + 0.5 * _TRACK * turn_rate
+        for speed, turn_rate in zip(speeds, turn_rates, strict=True)
+    ]
     wheel = max(wheels)
     if wheel > _FASTEST_WHEEL:
         fastest = wheels.index(wheel)

@@ -128,7 +128,7 @@ def bodies_of(scenario: Scenario) -> NDArray[np.float64]:
 
     P is 1 unless robots are of several kinds.
     """
-    return np.array([body_of(one) for one in of_first_robots(scenario)])
+    return np.array([body_of(of_robot) for of_robot in of_first_robots(scenario)])
 
 
 def body_of(scenario: Scenario) -> NDArray[np.float64]:

@@ -204,7 +204,7 @@ def test_faults_of_a_kind_strike_it_and_for_p_s_robots_of_that_kind_are_removed(
     struck = {fault.mode: fault.kind for case in plan.cases for fault in case.faults}  # type: ignore[attr-defined]
     assert struck == {"FM1": "scout", "removed": "scout"}
     (command,) = {WAREHOUSE.watch_command(case) for case in plan.cases if not case.faults}
-    assert command.endswith("--set 'robot_kinds=lifter:4, scout:1'")
+    assert str(command).endswith("--set 'robot_kinds=lifter:4, scout:1'")
     for wrong, complaint in ({"kind": "scuot"}, "lifter, scout"), ({"robots": [6]}, "at most 5"):
         with pytest.raises(FaultError, match=complaint):
             Study(scenario=scenario, faults=[{**faults, **wrong}]).plan()
