@@ -124,6 +124,12 @@ GOLDEN |= {
         Fault("FM3", 3, 2.0, 9.0, None, (1.0, 1.0)),
     ),
     "without drift": _small(heading_drift=0.0),
+    "a day's robots": GoldenTrajectory(
+        Scenario.preset("day").replace(battery=2000.0, order_rate=0.5),
+        (Fault("away", 2, 5.0, 10.0), Fault("dead", 2, intermittent=(5.0, 5.0))),
+        policy="homing+charging",
+        steps=650,
+    ),
     "batteries that run empty": _small(
         battery=200.0, position_noise=0.05, sensor_dropout=0.1, message_size=2, steps=300
     ),
