@@ -133,7 +133,7 @@ _ORDERS: dict[str, Any] = {
     "request_timeout": 60.0,
 }
 # Chosen, so that 16 robots are late now and then: eight hours with the orders of a shop's day, one
-# every 17 s on average. A battery is that of TurtleBot3 Burger; stations give what all use, and more.
+# every 17 s on average. A battery is that of TurtleBot3 Burger; stations give more than all use.
 _DAY: dict[str, Any] = {
     **_REALISTIC,
     "floor": "day",

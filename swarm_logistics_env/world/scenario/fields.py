@@ -63,7 +63,13 @@ CHANGES_DURING_RUN = frozenset(
 
 # Left out of what is written while they are off, as before there were such fields, so that stored
 # runs stay known.
-UNWRITTEN_WHEN_OFF = ("robot_kinds",)
+UNWRITTEN_WHEN_OFF = {
+    "robot_kinds": ("robot_kinds",),
+    "battery": (
+        "battery", "idle_power", "driving_energy", "lifting_energy", "charging_power",
+        "n_stations", "dead_stations",
+    ),
+}  # fmt: skip
 
 
 class ScenarioFields(OfKinds, Record):
@@ -215,9 +221,11 @@ class ScenarioFields(OfKinds, Record):
     @model_serializer(mode="wrap")
     def _serialize(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         written: dict[str, Any] = write(self)
-        for name in UNWRITTEN_WHEN_OFF:
-            if not getattr(self, name):
-                written.pop(name, None)
+        for switch, names in UNWRITTEN_WHEN_OFF.items():
+            is_on = bool(getattr(self, switch))
+            for name in names:
+                if not is_on and getattr(self, name) == type(self).model_fields[name].default:
+                    written.pop(name, None)
         return written
 
     @property
