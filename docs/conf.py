@@ -63,6 +63,7 @@ CONTENTS = {
     "Look up": (
         "Commands and files <reference>",
         "python",
+        "versions",
         "What cannot be done <limits>",
         "Comparison <comparison>",
     ),

@@ -35,6 +35,7 @@ from swarm_logistics_env.study.verdicts.columns import (
 )
 from swarm_logistics_env.train.training import Training, load_training, preset_names
 from swarm_logistics_env.views.cli.app import command_line
+from swarm_logistics_env.views.cli.output import EXIT_CODES
 from swarm_logistics_env.world.observations import columns, n_columns
 from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
 
@@ -106,6 +107,7 @@ def reference() -> dict[str, str]:
     head = ("command", "what it does", "options")
     return {
         "commands": table(head, list(commands(command_line(), "swarm-logistics"))),
+        "exit codes": table(("exit code", "meaning"), EXIT_CODES.items()),
         "training": fields(Training),
         "parts of a training": sections(Training, PARTS),
         "trainings": "\n".join(
