@@ -21,6 +21,7 @@ LEARNERS  := .venvs/learners
 TASKS     := .venvs/tasks
 DOTBOTS   := .venvs/dotbots
 ROS       := .venvs/ros
+JOSS      := .venvs/joss
 
 INSTALLED := .venvs/lowest .venvs/newest
 
@@ -34,7 +35,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots ros bodies docs docs-check dist absolute-links format clean
+.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots ros bodies docs docs-check dist joss absolute-links format clean
 
 help:
 	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
@@ -63,6 +64,7 @@ help:
 	@echo "make daily           once a day: tests of whole commands, pages, examples and processes, which the gate leaves out"
 	@echo "make docs-check      once a day: what every page prints, and every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
+	@echo "make joss            the paper for the Journal of Open Source Software as a PDF to read: build/paper.pdf"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
 
@@ -205,6 +207,10 @@ dist: $(DEV)/installed
 		(cd build/dist && bin/swarm-logistics run --seed 0 --set duration=20) || exit 1; \
 	done
 
+# Programs that come as wheels: no LaTeX is needed.
+joss: $(JOSS)/installed
+	$(JOSS)/bin/python paper/build.py build/paper.pdf
+
 # For the page on the package index; it changes README.md and pyproject.toml, so only a release calls it, which knows the address.
 absolute-links: $(DEV)/installed
 	sed -i 's|^\[project.urls\]$$|&\nRepository = "$(REPOSITORY)"|' pyproject.toml
@@ -265,6 +271,12 @@ $(BENCHMARK)/installed: EXTRAS := study,train
 
 $(CANARY)/installed: EXTRAS := study,train
 $(CANARY)/installed: OTHERS := hypothesis pytest
+
+# Without the package, which the paper does not run.
+$(JOSS)/installed:
+	$(PYTHON) -m venv $(JOSS)
+	$(JOSS)/bin/python -m pip install --no-compile "pypandoc-binary>=1.13" "typst>=0.11"
+	@touch $@
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
 # pip would compile what it installs on one core, which is half of its time. `|| true`: some packages hold templates that are no Python.

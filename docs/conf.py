@@ -55,6 +55,7 @@ CONTENTS = {
     "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
     "Research": (
         "results",
+        "models",
         "research/questions_of_the_field",
         "research/readings_and_tries",
         "research/paper_fit",

@@ -12,6 +12,7 @@ from typing import Any, get_args, get_origin
 import numpy as np
 from pydantic_core import PydanticUndefined
 
+from docs.model_cards import model_cards
 from docs.python_reference import python_names
 from research.tables import ROOT, table, with_blocks
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
@@ -297,6 +298,7 @@ PAGES = {
     "indicators": indicators,
     "reference": reference,
     "python": python,
+    "models": model_cards,
 }
 
 
