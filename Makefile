@@ -4,6 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 SEEDS  ?= 20
 MINUTES ?= 10
 OUT    ?= results/paper
+VERSION = $(shell sed -n 's/^version = "\([^"]*\)".*/\1/p' pyproject.toml)
 
 DEV   := .venvs/dev
 STUDY := .venvs/study
@@ -35,7 +36,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots ros bodies docs docs-check dist joss absolute-links format clean
+.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots ros bodies docs docs-versions docs-check dist joss release-check absolute-links format clean
 
 help:
 	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
@@ -65,6 +66,7 @@ help:
 	@echo "make docs-check      once a day: what every page prints, and every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
 	@echo "make joss            the paper for the Journal of Open Source Software as a PDF to read: build/paper.pdf"
+	@echo "make release-check   all of a release that needs no account: the gate, both distributions, the site, the paper, what pages print"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
 
@@ -182,10 +184,18 @@ ros: $(ROS)/installed
 	$(ROS)/bin/python -m pytest tests/robots/test_ros.py
 	$(ROS)/bin/swarm-logistics ros homing --preset realistic --set duration=20 --loss 0.1 --delay 0.05
 
-# study: autodoc reads the package. -W: a warning is an error.
+# study: autodoc reads the package, and the notebook is run; render: it films. -W: a warning is an error.
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python -m docs.generate
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
+
+# The site with those of former versions (tags v1.0.0 ..) below it, each as its own tree builds it; a release publishes it.
+docs-versions: export SITE_VERSIONS = $(shell git tag --list "v[1-9]*" --sort=-version:refname | grep -vx "v$(VERSION)")
+docs-versions: docs
+	for tag in $(SITE_VERSIONS); do \
+		rm -rf build/$$tag && git worktree add --force build/$$tag $$tag && $(MAKE) -C build/$$tag docs && \
+		cp -r build/$$tag/site site/$$tag && git worktree remove --force build/$$tag || exit 1; \
+	done
 
 # A recorded run to look at: no page needs it.
 docs/media/run.html: $(DEV)/installed
@@ -211,6 +221,14 @@ dist: $(DEV)/installed
 joss: $(JOSS)/installed
 	$(JOSS)/bin/python paper/build.py build/paper.pdf
 
+# What is left to a person with the accounts stands in docs/releasing.md.
+release-check: test dist docs joss
+	$(DEV)/bin/python -m docs.api
+	git diff --exit-code docs
+	build/dist/bin/python -m pip install --quiet "$$(echo dist/*.whl)[study]"
+	cd build/dist && bin/swarm-logistics judge homing --seeds 3 --all-seeds --set duration=60 --out judged
+	@echo "Ready: dist/, site/ and build/paper.pdf. What is left: docs/releasing.md."
+
 # For the page on the package index; it changes README.md and pyproject.toml, so only a release calls it, which knows the address.
 absolute-links: $(DEV)/installed
 	sed -i 's|^\[project.urls\]$$|&\nRepository = "$(REPOSITORY)"|' pyproject.toml
@@ -231,7 +249,7 @@ $(DEV)/installed: BARE := "pydotbot>=0.33,<0.34" pydotbot-utils
 $(STUDY)/installed: EXTRAS := study
 $(NEWER)/installed: EXTRAS := study
 $(NEWER)/installed: OTHERS := hypothesis pytest
-$(DOCS)/installed: EXTRAS := docs,study
+$(DOCS)/installed: EXTRAS := docs,study,render
 $(TORCHRL)/installed: OTHERS := hypothesis pytest torch torchrl
 $(BENCHMARL)/installed: OTHERS := hypothesis pytest torch benchmarl
 $(RLLIB)/installed: OTHERS := hypothesis pytest torch "ray[rllib]"

@@ -287,6 +287,21 @@ def _rooms_above(file: Path) -> tuple[tuple[int, str], ...]:
     return tuple((ROOMS.index(room) if level == 0 else 0, room) for level, room in enumerate(rooms))
 
 
+def gallery() -> dict[str, str]:
+    """Return the pictures of failure modes, three a row, each with what the robot has lost."""
+    media = ROOT / "docs" / "media"
+    names = [name for name in FAILURE_MODES if (media / f"mode-{name}.gif").exists()]
+    cells = [
+        f"![{name}](media/mode-{name}.gif) **{name}**: {FAILURE_MODES[name].description}"
+        for name in names
+    ]
+    cells += [""] * (-len(cells) % 3)
+    rows = zip(cells[::3], cells[1::3], cells[2::3])
+    # By hand: a table of the report has no pictures.
+    lines = ["|  |  |  |", "| --- | --- | --- |", *(f"| {' | '.join(row)} |" for row in rows)]
+    return {"gallery": "\n".join(lines)}
+
+
 def python() -> dict[str, str]:
     """Return the block of the page about Python."""
     return {"python": python_names()}
@@ -299,6 +314,7 @@ PAGES = {
     "reference": reference,
     "python": python,
     "models": model_cards,
+    "gallery": gallery,
 }
 
 
