@@ -24,6 +24,8 @@ DOTBOTS   := .venvs/dotbots
 ROS       := .venvs/ros
 JOSS      := .venvs/joss
 
+PEERS     := mpe2 pogema rware vmas
+
 INSTALLED := .venvs/lowest .venvs/newest
 
 # The newest Python here, among commands or pyenv's, if it is newer than the gate's.
@@ -36,7 +38,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots ros bodies docs docs-versions docs-check dist joss release-check absolute-links format clean
+.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark benchmark-peers interop interop-calls tasks dotbots ros bodies docs docs-versions docs-check dist joss release-check absolute-links format clean
 
 help:
 	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
@@ -55,6 +57,7 @@ help:
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make canary          golden trajectories, both ways of compiling, with the newest numba and the newest everything"
 	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
+	@echo "make benchmark-peers  speed of RWARE, POGEMA, MPE2 and VMAS beside this package, as ratios, into docs/comparison.md"
 	@echo "make interop         four learners of other people's code, three trainings each (1.4 core-hours): results/interop"
 	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; six learners with P before and after; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
@@ -159,6 +162,10 @@ test-lowest test-newest: test-%: .venvs/%/wheel
 
 benchmark: $(BENCHMARK)/installed
 	$(BENCHMARK)/bin/python -m benchmarks --out results/benchmark
+
+# Each in an environment of its own, without this package, whose dependencies some of them exclude.
+benchmark-peers: $(DEV)/installed $(PEERS:%=.venvs/peer-%/installed)
+	$(DEV)/bin/python benchmarks/peers.py
 
 # Each library in an environment of its own: what learns with it, and calls of its wrappers as tests.
 interop: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed
@@ -289,6 +296,11 @@ $(BENCHMARK)/installed: EXTRAS := study,train
 
 $(CANARY)/installed: EXTRAS := study,train
 $(CANARY)/installed: OTHERS := hypothesis pytest
+
+.venvs/peer-%/installed:
+	$(PYTHON) -m venv .venvs/peer-$*
+	.venvs/peer-$*/bin/python -m pip install --no-compile --constraint constraints.txt $*
+	@touch $@
 
 # Without the package, which the paper does not run.
 $(JOSS)/installed:

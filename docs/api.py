@@ -132,7 +132,7 @@ def column_entries() -> Iterator[Entry]:
     with Runs(None) as runs:
         outcome = Outcome(np.array([1.0]), 500.0, False, (), 1.0, all_served=False)
         runs.add([(Run(case, "code", 0), outcome)])
-        yield from (("column of study export", name, "") for name in runs.frame())
+        yield from (("column of study export", str(name), "") for name in runs.frame())
     yield from (("column of append_trial", name, "") for name in TRIAL_COLUMNS)
     yield from (("column of a file of orders", name, "") for name in COLUMNS)
     yield from (("column of trials", name, "") for name in COLUMN_NAMES)

@@ -18,9 +18,10 @@ from docs.site_parts import (
     write_replay,
 )
 
-project = html_title = "swarm-logistics-env"
+project = "swarm-logistics-env"
 author = project_copyright = "swarm-logistics-env contributors"
 version = release = installed_version("swarm-logistics-env")
+html_title = f"{project} {version}"
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 # A command without its prompt; what it prints has no button.

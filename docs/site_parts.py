@@ -66,8 +66,9 @@ def cell_outputs(source: str, names: dict[str, Any]) -> list[str]:
         if isinstance(last, ast.Expr):
             value = eval(compile(ast.Expression(last.value), "notebook", "eval"), names)
     outputs = [f"```text\n{out.getvalue()}```"] if out.getvalue() else []
-    if hasattr(value, "_repr_html_"):
-        outputs.append(raw_html(value._repr_html_()))
+    show = getattr(value, "_repr_html_", None)
+    if show is not None:
+        outputs.append(raw_html(show()))
     elif value is not None:
         outputs.append(f"```text\n{value!r}\n```")
     return outputs
