@@ -84,12 +84,13 @@ def rware() -> tuple[str, Take]:
     env: Any = gymnasium.make("rware-large-19ag-v2").unwrapped
     env.reset(seed=0)
     actions = [env.action_space.sample() for _ in range(50)]
+    n_agents: int = env.n_agents
 
     def take() -> int:
         env.reset(seed=0)
         for action in actions:
             env.step(action)
-        return len(actions) * env.n_agents
+        return len(actions) * n_agents
 
     return "rware", take
 
@@ -128,7 +129,7 @@ def vmas(n_worlds: int) -> tuple[str, Take]:
     def take() -> int:
         for _ in range(10):
             env.step(actions)
-        return 10 * env.n_agents * n_worlds
+        return 10 * len(actions) * n_worlds
 
     return "vmas", take
 
@@ -170,11 +171,11 @@ def compare(turns: int) -> list[tuple[str, ...]]:
     results: dict[str, list[dict[str, Any]]] = {name: [] for name in PEERS}
     for _ in range(turns):
         for name, (folder, _, _) in PEERS.items():
-            command = [interpreter(folder), __file__, "--one", name]
+            command = [str(interpreter(folder)), __file__, "--one", name]
             done = subprocess.run(command, capture_output=True, text=True, check=True)
             results[name].append(json.loads(done.stdout.splitlines()[-1]))
     ours = [result["rate"] for result in results["ours, arrays"]]
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, (_, _, world) in PEERS.items():
         rates = [result["rate"] for result in results[name]]
         ratio = statistics.median(rate / base for rate, base in zip(rates, ours))
