@@ -4,6 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 SEEDS  ?= 20
 MINUTES ?= 10
 OUT    ?= results/paper
+VERSION = $(shell sed -n 's/^version = "\([^"]*\)".*/\1/p' pyproject.toml)
 
 DEV   := .venvs/dev
 STUDY := .venvs/study
@@ -21,6 +22,9 @@ LEARNERS  := .venvs/learners
 TASKS     := .venvs/tasks
 DOTBOTS   := .venvs/dotbots
 ROS       := .venvs/ros
+JOSS      := .venvs/joss
+
+PEERS     := mpe2 pogema rware vmas
 
 INSTALLED := .venvs/lowest .venvs/newest
 
@@ -34,7 +38,7 @@ NEWER_PYTHON = $(shell exec 2> /dev/null; gate=$$($(PYTHON) -c "import sys; prin
 # Tests start many processes, and each would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark interop interop-calls tasks dotbots ros bodies docs docs-check dist absolute-links format clean
+.PHONY: help first-look paper paper-fit tune tables test daily interpreted quick lint check soak combined-faults mutants test-python on-newer-python canary test-lowest test-newest benchmark benchmark-peers interop interop-calls tasks dotbots ros bodies docs docs-versions docs-check dist joss release-check absolute-links format clean
 
 help:
 	@echo "make first-look      within three minutes, an environment, then P, S, R, FT and A of a shipped script with a report, results/first-look/report.html"
@@ -53,6 +57,7 @@ help:
 	@echo "make test-lowest     the wheel with the oldest dependencies that it allows; test-newest: with the newest"
 	@echo "make canary          golden trajectories, both ways of compiling, with the newest numba and the newest everything"
 	@echo "make benchmark       cost of a control step beside the bare physics; results/benchmark"
+	@echo "make benchmark-peers  speed of RWARE, POGEMA, MPE2 and VMAS beside this package, as ratios, into docs/comparison.md"
 	@echo "make interop         four learners of other people's code, three trainings each (1.4 core-hours): results/interop"
 	@echo "make interop-calls   TorchRL, BenchMARL, RLlib and SuperSuit, each for some steps; six learners with P before and after; see interop/"
 	@echo "make tasks           the studies of RWARE, simple_spread and VMAS in examples/tasks, in small"
@@ -63,6 +68,8 @@ help:
 	@echo "make daily           once a day: tests of whole commands, pages, examples and processes, which the gate leaves out"
 	@echo "make docs-check      once a day: what every page prints, and every command of README and pages, with few seeds and steps"
 	@echo "make dist            sdist and wheel in dist/, checked as the package index checks them, each installed and run"
+	@echo "make joss            the paper for the Journal of Open Source Software as a PDF to read: build/paper.pdf"
+	@echo "make release-check   all of a release that needs no account: the gate, both distributions, the site, the paper, what pages print"
 	@echo "make format          sort imports and format"
 	@echo "make clean           remove environments, builds and caches, never results"
 
@@ -156,6 +163,10 @@ test-lowest test-newest: test-%: .venvs/%/wheel
 benchmark: $(BENCHMARK)/installed
 	$(BENCHMARK)/bin/python -m benchmarks --out results/benchmark
 
+# Each in an environment of its own, without this package, whose dependencies some of them exclude.
+benchmark-peers: $(DEV)/installed $(PEERS:%=.venvs/peer-%/installed)
+	$(DEV)/bin/python benchmarks/peers.py
+
 # Each library in an environment of its own: what learns with it, and calls of its wrappers as tests.
 interop: $(DEV)/installed $(TORCHRL)/installed $(BENCHMARL)/installed
 	$(DEV)/bin/python -m interop
@@ -180,10 +191,18 @@ ros: $(ROS)/installed
 	$(ROS)/bin/python -m pytest tests/robots/test_ros.py
 	$(ROS)/bin/swarm-logistics ros homing --preset realistic --set duration=20 --loss 0.1 --delay 0.05
 
-# study: autodoc reads the package. -W: a warning is an error.
+# study: autodoc reads the package, and the notebook is run; render: it films. -W: a warning is an error.
 docs: $(DOCS)/installed
 	$(DOCS)/bin/python -m docs.generate
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
+
+# The site with those of former versions (tags v1.0.0 ..) below it, each as its own tree builds it; a release publishes it.
+docs-versions: export SITE_VERSIONS = $(shell git tag --list "v[1-9]*" --sort=-version:refname | grep -vx "v$(VERSION)")
+docs-versions: docs
+	for tag in $(SITE_VERSIONS); do \
+		rm -rf build/$$tag && git worktree add --force build/$$tag $$tag && $(MAKE) -C build/$$tag docs && \
+		cp -r build/$$tag/site site/$$tag && git worktree remove --force build/$$tag || exit 1; \
+	done
 
 # A recorded run to look at: no page needs it.
 docs/media/run.html: $(DEV)/installed
@@ -205,6 +224,18 @@ dist: $(DEV)/installed
 		(cd build/dist && bin/swarm-logistics run --seed 0 --set duration=20) || exit 1; \
 	done
 
+# Programs that come as wheels: no LaTeX is needed.
+joss: $(JOSS)/installed
+	$(JOSS)/bin/python paper/build.py build/paper.pdf
+
+# What is left to a person with the accounts stands in docs/releasing.md.
+release-check: test dist docs joss
+	$(DEV)/bin/python -m docs.api
+	git diff --exit-code docs
+	build/dist/bin/python -m pip install --quiet "$$(echo dist/*.whl)[study]"
+	cd build/dist && bin/swarm-logistics judge homing --seeds 3 --all-seeds --set duration=60 --out judged
+	@echo "Ready: dist/, site/ and build/paper.pdf. What is left: docs/releasing.md."
+
 # For the page on the package index; it changes README.md and pyproject.toml, so only a release calls it, which knows the address.
 absolute-links: $(DEV)/installed
 	sed -i 's|^\[project.urls\]$$|&\nRepository = "$(REPOSITORY)"|' pyproject.toml
@@ -225,7 +256,7 @@ $(DEV)/installed: BARE := "pydotbot>=0.33,<0.34" pydotbot-utils
 $(STUDY)/installed: EXTRAS := study
 $(NEWER)/installed: EXTRAS := study
 $(NEWER)/installed: OTHERS := hypothesis pytest
-$(DOCS)/installed: EXTRAS := docs,study
+$(DOCS)/installed: EXTRAS := docs,study,render
 $(TORCHRL)/installed: OTHERS := hypothesis pytest torch torchrl
 $(BENCHMARL)/installed: OTHERS := hypothesis pytest torch benchmarl
 $(RLLIB)/installed: OTHERS := hypothesis pytest torch "ray[rllib]"
@@ -265,6 +296,17 @@ $(BENCHMARK)/installed: EXTRAS := study,train
 
 $(CANARY)/installed: EXTRAS := study,train
 $(CANARY)/installed: OTHERS := hypothesis pytest
+
+.venvs/peer-%/installed:
+	$(PYTHON) -m venv .venvs/peer-$*
+	.venvs/peer-$*/bin/python -m pip install --no-compile --constraint constraints.txt $*
+	@touch $@
+
+# Without the package, which the paper does not run.
+$(JOSS)/installed:
+	$(PYTHON) -m venv $(JOSS)
+	$(JOSS)/bin/python -m pip install --no-compile "pypandoc-binary>=1.13" "typst>=0.11"
+	@touch $@
 
 # The stamp comes last: an installation that was cut short is taken up again. Editable, so that a change of source needs no new one.
 # pip would compile what it installs on one core, which is half of its time. `|| true`: some packages hold templates that are no Python.

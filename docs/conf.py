@@ -2,15 +2,26 @@
 
 from functools import partial
 from importlib.metadata import version as installed_version
+from pathlib import Path
 from typing import Any
 
 from docutils.nodes import SkipNode
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 
-project = html_title = "swarm-logistics-env"
+from docs.site_parts import (
+    ROOT,
+    notebook_markdown,
+    replay_frame,
+    versions_list,
+    with_outside_links,
+    write_replay,
+)
+
+project = "swarm-logistics-env"
 author = project_copyright = "swarm-logistics-env contributors"
 version = release = installed_version("swarm-logistics-env")
+html_title = f"{project} {version}"
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 # A command without its prompt; what it prints has no button.
@@ -18,7 +29,7 @@ copybutton_prompt_text = "$ "
 copybutton_selector = "div:not(.highlight-text) > div.highlight > pre"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
-exclude_patterns = ["media"]
+exclude_patterns = ["media", "releasing.md"]
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
@@ -41,21 +52,26 @@ toc_object_entries_show_parents = "hide"
 # The pages in the order of the site's menu. They stand here, because GitHub would show a list of
 # contents in a page as it is written.
 CONTENTS = {
-    "Use": (
-        "quickstart",
+    "Begin": ("quickstart", "gallery", "notebook"),
+    "Train": (
+        "training",
         "The environment <environment>",
         "floors",
-        "bodies",
-        "training",
-        "faults",
         "own",
-        "robots",
-        "Controllers in C <c>",
+        "models",
     ),
-    "Judge": ("Judging <trials>", "studies", "indicators", "Other swarms <tasks>"),
-    "Research": (
+    "Judge": (
+        "Judging <trials>",
+        "indicators",
+        "faults",
+        "studies",
+        "Other swarms <tasks>",
+    ),
+    "Robots": ("robots", "Controllers in C <c>", "bodies"),
+    "What is known": (
         "results",
         "research/questions_of_the_field",
+        "Published swarms <published>",
         "research/readings_and_tries",
         "research/paper_fit",
         "research/tuning",
@@ -63,6 +79,7 @@ CONTENTS = {
     "Look up": (
         "Commands and files <reference>",
         "python",
+        "versions",
         "What cannot be done <limits>",
         "Comparison <comparison>",
     ),
@@ -71,7 +88,9 @@ CONTENTS = {
 
 def setup(app: Sphinx) -> None:
     """Render formulas as MathML, which browsers draw themselves; add the contents."""
+    app.connect("build-finished", record_replay)
     app.connect("source-read", add_contents)
+    app.connect("source-read", add_site_parts)
     renderers = [(partial(formula, display), None) for display in ("inline", "block")]
     app.add_html_math_renderer("mathml", *renderers)
     app.connect("autodoc-process-docstring", tidy, priority=100)  # before napoleon
@@ -83,6 +102,24 @@ def add_contents(app: Sphinx, page: str, text: list[str]) -> None:
         for caption, pages in CONTENTS.items():
             lines = "\n".join(pages)
             text[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{lines}\n```\n"
+
+
+def record_replay(app: Sphinx, error: Exception | None) -> None:
+    """Record the run that plays on the site."""
+    if error is None:
+        write_replay(Path(app.outdir))
+
+
+def add_site_parts(app: Sphinx, page: str, text: list[str]) -> None:
+    """Put into a page what only the site has, and let links out of the pages lead somewhere."""
+    text[0] = with_outside_links(text[0], page)
+    if page == "notebook":
+        notebook = notebook_markdown(ROOT / "examples" / "first_steps.ipynb")
+        text[0] = text[0].replace("<!-- site: notebook -->", notebook)
+    if page == "gallery":
+        text[0] = text[0].replace("<!-- site: replay -->", replay_frame())
+    if page == "versions":
+        text[0] += f"\n{versions_list()}\n"
 
 
 def tidy(app: Any, what: str, name: Any, obj: Any, options: Any, lines: list[str]) -> None:

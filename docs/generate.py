@@ -12,6 +12,7 @@ from typing import Any, get_args, get_origin
 import numpy as np
 from pydantic_core import PydanticUndefined
 
+from docs.model_cards import model_cards
 from docs.python_reference import python_names
 from research.tables import ROOT, table, with_blocks
 from swarm_logistics_env import FAILURE_MODES, Fault, Scenario, wrappers
@@ -35,6 +36,7 @@ from swarm_logistics_env.study.verdicts.columns import (
 )
 from swarm_logistics_env.train.training import Training, load_training, preset_names
 from swarm_logistics_env.views.cli.app import command_line
+from swarm_logistics_env.views.cli.output import EXIT_CODES
 from swarm_logistics_env.world.observations import columns, n_columns
 from swarm_logistics_env.world.scenario import CHANGES_DURING_RUN, SCENARIO_PRESETS, SOURCES
 
@@ -106,6 +108,7 @@ def reference() -> dict[str, str]:
     head = ("command", "what it does", "options")
     return {
         "commands": table(head, list(commands(command_line(), "swarm-logistics"))),
+        "exit codes": table(("exit code", "meaning"), EXIT_CODES.items()),
         "training": fields(Training),
         "parts of a training": sections(Training, PARTS),
         "trainings": "\n".join(
@@ -284,6 +287,21 @@ def _rooms_above(file: Path) -> tuple[tuple[int, str], ...]:
     return tuple((ROOMS.index(room) if level == 0 else 0, room) for level, room in enumerate(rooms))
 
 
+def gallery() -> dict[str, str]:
+    """Return the pictures of failure modes, three a row, each with what the robot has lost."""
+    media = ROOT / "docs" / "media"
+    names = [name for name in FAILURE_MODES if (media / f"mode-{name}.gif").exists()]
+    cells = [
+        f"![{name}](media/mode-{name}.gif) **{name}**: {FAILURE_MODES[name].description}"
+        for name in names
+    ]
+    cells += [""] * (-len(cells) % 3)
+    rows = zip(cells[::3], cells[1::3], cells[2::3])
+    # By hand: a table of the report has no pictures.
+    lines = ["|  |  |  |", "| --- | --- | --- |", *(f"| {' | '.join(row)} |" for row in rows)]
+    return {"gallery": "\n".join(lines)}
+
+
 def python() -> dict[str, str]:
     """Return the block of the page about Python."""
     return {"python": python_names()}
@@ -295,6 +313,8 @@ PAGES = {
     "indicators": indicators,
     "reference": reference,
     "python": python,
+    "models": model_cards,
+    "gallery": gallery,
 }
 
 

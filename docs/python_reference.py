@@ -162,13 +162,17 @@ def _described(name: str, value: Any) -> str:
     """Return the signature and the docstring of a function, class or property."""
     function = getattr(value, "__func__", getattr(value, "fget", value))
     text = docstring_markdown(inspect.getdoc(function) or "")
-    if isinstance(value, property) or not callable(function):
+    signature = signature_text(value)
+    if not signature:
         return f"`{name}`\n\n{text}"
-    return f"```text\n{name}{_signature(function)}\n```\n\n{text}"
+    return f"```text\n{name}{signature}\n```\n\n{text}"
 
 
-def _signature(function: Any) -> str:
-    """Return the names of the arguments, and their defaults."""
+def signature_text(value: Any) -> str:
+    """Return the names of the arguments, and their defaults; "": it is a property or a value."""
+    function = getattr(value, "__func__", value)
+    if isinstance(function, property) or not callable(function):
+        return ""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):

@@ -108,6 +108,24 @@ def test_every_interval_comes_from_a_command(name: str) -> None:
     assert typed_by_hand(f"{block}R = .007 [-.001,\n.015], in [0, 1]") == {"[-.001,\n.015]"}
 
 
+def test_every_page_of_the_site_is_two_clicks_from_its_first_one_and_in_its_menu() -> None:
+    pages = {str(path.relative_to(DOCS)): path for path in DOCS.rglob("*.md")}
+    del pages["releasing.md"]  # for maintainers, who have a clone
+
+    def linked_from(name: str) -> set[str]:
+        text = pages[name].read_text(encoding="utf-8")
+        folder = pages[name].parent
+        paths = [(folder / target).resolve() for target in re.findall(r"\]\(([^)#\s]+)", text)]
+        return {str(path.relative_to(DOCS)) for path in paths if path.is_relative_to(DOCS)}
+
+    first = linked_from("index.md") & pages.keys()
+    second = set().union(*map(linked_from, first))
+    assert pages.keys() - first - second == {"index.md"}
+    menu = (DOCS / "conf.py").read_text(encoding="utf-8")
+    names = {name.removesuffix(".md") for name in pages} - {"index"}
+    assert {name for name in names if not re.search(rf'[<"]{re.escape(name)}[>"]', menu)} == set()
+
+
 def run(block: str) -> dict[str, Any]:
     names: dict[str, Any] = {}
     exec(compile(block, "README.md", "exec"), names)

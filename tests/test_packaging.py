@@ -89,7 +89,8 @@ def test_nothing_may_write_but_the_release_which_needs_no_password() -> None:
     assert jobs["publish"]["permissions"] == {"id-token": "write"}
     assert jobs["publish"]["needs"] == "build"
     made = re.findall(r"make ([\w-]+)", WORKFLOWS["release.yml"])
-    assert made == ["test", "absolute-links", "dist"]
+    assert made == ["test", "absolute-links", "dist", "docs-versions"]
+    assert jobs["site"]["needs"] == "build"
     [step] = [step for step in jobs["publish"]["steps"] if "pypi-publish" in step["uses"]]
     assert step["with"] == {"attestations": True}
     assert any("attest-build-provenance" in step.get("uses", "") for step in jobs["build"]["steps"])

@@ -88,9 +88,13 @@ def users_line(traceback: str) -> tuple[str, str] | None:
 
 def how_to_install(extra: str) -> str:
     """Return the end of an error message about a package of one of the extras that is missing."""
+    package = f"'swarm-logistics-env[{extra}]'"
     if (Path(__file__).parents[2] / "constraints.txt").is_file():  # in a clone
-        return f"pip install -c constraints.txt -e '.[{extra}]'"
-    return f"pip install 'swarm-logistics-env[{extra}]'"
+        package = f"-c constraints.txt -e '.[{extra}]'"
+    command = f"pip install {package}"
+    if extra == "train":
+        return f"{command}, or without 5 GB of CUDA: uv pip install --torch-backend cpu {package}"
+    return command
 
 
 def suggest(name: str, names: Iterable[str]) -> str:

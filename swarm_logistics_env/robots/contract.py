@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,6 +92,7 @@ class Contract(_Part):
     """What a robot and a policy have to agree on.
 
     Args:
+        format: the version of a contract's form.
         policy: in words.
         parameters: what its decisions depend on; of a trained one with a digest of its weights.
         period: from one row and command to the next [s]; `frequency` is its inverse [Hz].
@@ -105,6 +106,7 @@ class Contract(_Part):
         leans_on: what of the simulator's senses it uses, and what each has to tell.
     """
 
+    format: Literal[1] = 1
     policy: str
     parameters: dict[str, JsonValue]
     period: float

@@ -39,6 +39,15 @@ def rows_of_run(scenario: Scenario, *faults: str) -> NDArray[np.float32]:
     return np.concatenate(read)
 
 
+def test_one_of_another_form_is_refused_and_one_without_its_number_is_of_the_first() -> None:
+    contract = contract_of(load("homing"), NOISY)
+    fields = yaml.safe_load(contract.to_yaml())
+    with pytest.raises(RobotError, match=r"Contract.format = 2: should be 1"):
+        Contract(**fields | {"format": 2})
+    del fields["format"]
+    assert Contract(**fields) == contract
+
+
 @pytest.mark.parametrize("name", [*NAMES, "ppo-robust"])
 def test_it_is_yaml_of_all_that_a_robot_has_to_know(name: str) -> None:
     contract = contract_of(load(name), NOISY)

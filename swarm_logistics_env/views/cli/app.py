@@ -19,7 +19,7 @@ from swarm_logistics_env.core.current_folder import search_current_folder
 from swarm_logistics_env.core.errors import SwarmLogisticsError
 from swarm_logistics_env.core.records import plain
 
-from .output import prepare_output
+from .output import BAD_INPUT, DONE, FAILED, STOPPED, prepare_output
 
 PROGRAM = "swarm-logistics"
 # In the order of use, as the help shows them. A module is imported when its command is called.
@@ -38,9 +38,9 @@ COMMANDS = {
 
 
 class Application:
-    """The command line. A call ends the process with 0 (done), 2 (bad input) or 130 (Ctrl-C).
+    """The command line. A call ends the process with one of `output.EXIT_CODES`.
 
-    It ends with 1 where code of the user's own fails, whose traceback is shown.
+    Where code of the user's own fails, its traceback is shown.
 
     A command ends otherwise by raising `typer.Exit(code)`.
     """
@@ -69,19 +69,19 @@ class Application:
             code = command(typed, PROGRAM, standalone_mode=False, obj=words)
             sys.stdout.flush()
         except (KeyboardInterrupt, typer.Abort):
-            return _complain(["stopped"], 130)
+            return _complain(["stopped"], STOPPED)
         except SystemExit as error:  # no command of ours ends so, and 0 would say that all is well
             raise RuntimeError("a policy or a task called sys.exit()") from error
         except Exception as error:
             sentences = _sentences(error)
             if sentences:
-                return _complain(sentences, 2)
+                return _complain(sentences, BAD_INPUT)
             report = _users_part(error)
             if report is None:
                 raise
             sys.stderr.write(report)
-            return 1
-        return code if isinstance(code, int) else 0
+            return FAILED
+        return code if isinstance(code, int) else DONE
 
 
 app = Application()

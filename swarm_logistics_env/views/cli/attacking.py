@@ -12,6 +12,7 @@ from swarm_logistics_env.study.report.section import bracketed, fixed, percent
 from swarm_logistics_env.study.runs.engines import engine_named
 from swarm_logistics_env.world.warehouse.faults import text_of
 
+from .output import STOPPED
 from .study_commands import ProcessesOption
 from .terminal import show_table
 from .world_choice import PresetOption, Repeated, ScenarioOption, SetOption, scenario_of
@@ -63,7 +64,7 @@ def attack_command(
             f"\nStopped. What is finished is kept in {directory}; the same command goes on.",
             err=True,
         )
-        raise Exit(130) from None
+        raise Exit(STOPPED) from None
     _show_attack(result, policy, robots, fresh)
 
 

@@ -25,6 +25,7 @@ from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.world.scenario import Scenario
 
+from .output import DONE, FAILED
 from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption, policies_of
 from .study_choice import ask_in_world, study_of, switch_to_clearing
 from .study_commands import (
@@ -151,7 +152,7 @@ def judge_policy_command(
         words = [*names, *world.options_again, "--first-seed", unseen]
         _suggest_more_seeds(words, directory, results)
     say_what_was_played(tally)
-    raise Exit(1 if tally.failed else 0)
+    raise Exit(FAILED if tally.failed else DONE)
 
 
 def _benchmark_of(policies: Sequence[PolicySpec], out: Path | None) -> Study:

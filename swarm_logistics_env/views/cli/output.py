@@ -9,6 +9,18 @@ import os
 import sys
 from typing import Any, TextIO
 
+# What a command ends with.
+DONE = 0
+FAILED = 1
+BAD_INPUT = 2
+STOPPED = 130
+EXIT_CODES = {
+    DONE: "done",
+    FAILED: "a run failed, or a gate, or code of your own",
+    BAD_INPUT: "bad input, told in one sentence",
+    STOPPED: "stopped by Ctrl-C",
+}
+
 # What is written instead of a sign that the encoding of a terminal or a pipe lacks.
 _SPELLINGS = {
     "→": "->", "–": "-", "—": "-", "−": "-", "…": "...", "†": "+", "∞": "inf", "×": "x",

@@ -25,6 +25,7 @@ from swarm_logistics_env.study.verdicts.gate import SUBJECTS, Gate, GateAnswer, 
 from swarm_logistics_env.study.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 from swarm_logistics_env.study.verdicts.verdict import why_untestable
 
+from .output import DONE, FAILED, STOPPED
 from .policy_choice import EnvOption, FrameOption, NormalizeOption, TrustOption, policies_of
 from .study_choice import change_scenario, changes_in_words, study_of, switch_to_clearing
 from .terminal import (
@@ -180,7 +181,7 @@ def run_command(
         )
     # The last line: where it is looked for after a report of many pages.
     say_what_was_played(tally)
-    raise Exit(1 if tally.failed else 0)
+    raise Exit(FAILED if tally.failed else DONE)
 
 
 def _engine_for(processes: int | None, address: str | None) -> str:
@@ -313,7 +314,7 @@ def compare_command(
         result = "fails" if fails else "passes"
         title = f"Gate {result} (fails if {gate.text})" if gates else "Change of P"
         _show_answers(title, gate_answers, left_out if gate.subject == "change" else ())
-    raise Exit(1 if failed else 0)
+    raise Exit(FAILED if failed else DONE)
 
 
 def _show_answers(
@@ -367,7 +368,7 @@ def export_command(
     echo(f"{count} runs in {to}, SHA-256 {digest}")
     if damage:
         echo(plain(damage), err=True)
-        raise Exit(1)
+        raise Exit(FAILED)
 
 
 def run_study(
@@ -389,4 +390,4 @@ def run_study(
             f"same command goes on with {missing}.",
             err=True,
         )
-        raise Exit(130) from None
+        raise Exit(STOPPED) from None

@@ -15,6 +15,7 @@ from swarm_logistics_env.policies import read_card
 from swarm_logistics_env.study.report.section import P_LEVEL
 from swarm_logistics_env.train.training import load_training, preset_names
 
+from .output import STOPPED
 from .terminal import show_table
 
 
@@ -52,7 +53,7 @@ def train_command(
         path = train(training, out, command=str(context.obj), device=device)
     except KeyboardInterrupt:
         echo("\nStopped. The same command goes on.", err=True)
-        raise Exit(130) from None
+        raise Exit(STOPPED) from None
     _show_training(path)
     echo(f"Written: {path}")
     echo(f"Watch it: swarm-logistics watch --policy {quote(str(path))}")
