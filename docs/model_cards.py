@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from research.tables import table
+from swarm_logistics_env.policies.catalogue import SCRIPTED, TRAINED, known_policies
 from swarm_logistics_env.policies.files import read_policy
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard, Score
-from swarm_logistics_env.policies.spec import SCRIPTED, TRAINED, known_policies
 
 
 def model_cards() -> dict[str, str]:
