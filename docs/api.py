@@ -19,8 +19,8 @@ from swarm_logistics_env import FAILURE_MODES, SCENARIO_PRESETS, Fault, Scenario
 from swarm_logistics_env.core.moved_names import MOVED
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.environment.reward_terms import REWARD_TERMS
-from swarm_logistics_env.policies.learned import PolicyCard
 from swarm_logistics_env.policies.catalogue import NAMES
+from swarm_logistics_env.policies.learned import PolicyCard
 from swarm_logistics_env.policies.spec import PolicySpec
 from swarm_logistics_env.robots.contract import Contract
 from swarm_logistics_env.robots.fault_layer import TRIAL_COLUMNS
