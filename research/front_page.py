@@ -172,9 +172,9 @@ _POLICIES = {
 }
 _CONDITIONS = {
     "no fault": "no fault",
-    "FM1, m = 2": "FM1: two mislead the others",
-    "FM4, m = 2": "FM4: two deliver nothing",
-    "FM4_jam, m = 2": "FM4_jam: nor let go of the item",
+    "FM1, m = 2": "two mislead the others (FM1)",
+    "FM4, m = 2": "two deliver nothing (FM4)",
+    "FM4_jam, m = 2": "nor let go of the item (FM4_jam)",
     "contacts, no fault": "contacts a robot-minute, no fault",
 }
 
