@@ -32,6 +32,8 @@ def compiler_of(path: Path) -> list[str]:
     Raises:
         PolicyError: there is none.
     """
+    if path.suffix not in COMPILERS:
+        raise PolicyError(f"{path}: should end in {' or '.join(COMPILERS)}")
     variable, names = COMPILERS[path.suffix]
     if command := os.environ.get(variable, "").split():
         return command

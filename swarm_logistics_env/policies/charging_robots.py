@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, JsonValue
 
 from swarm_logistics_env.compiler.kernels import kernel
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.fingerprint import joined
 from swarm_logistics_env.policies.driving import HOLD, LET_GO, away_from_neighbours
-from swarm_logistics_env.policies.policy import Holding, Policy, check_policy, identity_parts
+from swarm_logistics_env.policies.policy import (
+    Holding,
+    Policy,
+    ScriptParameters,
+    check_policy,
+    identity_parts,
+)
 from swarm_logistics_env.policies.row_policy import RowPolicy, check_row_policy
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import BODY, MEMORY, N_COLUMNS, bodies_of, length_of
 from swarm_logistics_env.world.motion.steering import set_velocity, steer
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import LARGEST, Scenario
 
 SUFFIX = "+charging"  # of a policy's name
 AT = 0.3
@@ -121,6 +128,14 @@ def along_the_wall(sensed: NDArray[np.float32], side: float) -> tuple[float, flo
     return x, y
 
 
+class ChargingParameters(ScriptParameters):
+    """When robots go to charge and when they go on, and the parameters of their policy."""
+
+    at: Annotated[float, Field(gt=0.0, lt=1.0, description="charge below which it goes")] = AT
+    until: Annotated[float, Field(gt=0.0, le=1.0, description="charge at which it goes on")] = UNTIL
+    policy: dict[str, JsonValue] = Field({}, description="parameters of the policy, if any")
+
+
 class Charging(RowPolicy, Holding):
     """Another policy, whose robots go to charge while their batteries are nearly empty.
 
@@ -137,6 +152,8 @@ class Charging(RowPolicy, Holding):
         PolicyError: `policy` is none or needs the state, or the shares cannot be.
     """
 
+    ignores: frozenset[str]
+
     def __init__(self, policy: Policy, at: float = AT, until: float = UNTIL) -> None:
         check_policy(policy)
         if getattr(policy, "needs_state", False):
@@ -144,28 +161,33 @@ class Charging(RowPolicy, Holding):
                 f"policy = {type(policy).__name__}: should decide from rows alone, as a central "
                 "controller has to send its robots to charge itself"
             )
-        if not 0.0 < at < until <= 1.0:
-            raise PolicyError(f"at = {at}, until = {until}: should be 0 < at < until <= 1")
+        inner = getattr(policy, "parameters", None)
+        of_policy = inner.model_dump(mode="json") if isinstance(inner, ScriptParameters) else {}
+        self.parameters = ChargingParameters(at=at, until=until, policy=of_policy)
+        if at >= until:
+            raise PolicyError(f"at = {at}: should be less than until = {until}")
         self.policy = policy
-        self.at = at
-        self.until = until
+        self.ignores = getattr(policy, "ignores", frozenset()) - {
+            column.name for column in row.columns_of_battery(Scenario(battery=LARGEST))
+        }
         self.stream = getattr(policy, "stream", "charging")
         self._has_battery = False
         self._bodies_of_kinds = np.zeros((1, BODY.stop - BODY.start))
         self._set_robots(0)
 
     def __repr__(self) -> str:
-        return f"Charging({self.policy!r}, at={self.at}, until={self.until})"
+        shares = self.parameters
+        return f"Charging({self.policy!r}, at={shares.at}, until={shares.until})"
 
     def __copy__(self) -> Charging:
-        return type(self)(copy.copy(self.policy), self.at, self.until)
+        return type(self)(copy.copy(self.policy), self.parameters.at, self.parameters.until)
 
     def identity_parts(self) -> dict[str, Any]:
         """Return the policy's parts, and the shares."""
         inner = identity_parts(self.policy)
         prints = joined([inner]) if "value" in inner else {}
         policy = {name: part for name, part in inner.items() if name not in prints}
-        shares = {"at": self.at, "until": self.until}
+        shares = {"at": self.parameters.at, "until": self.parameters.until}
         return {"class": "Charging", **shares, "policy": policy, **prints}
 
     def configure(self, scenario: Scenario) -> None:
@@ -211,8 +233,8 @@ class Charging(RowPolicy, Holding):
         if not self._has_battery:
             return self.policy.act(observations)
         charge = observations[:, observations.shape[1] - row.N_BATTERY_COLUMNS]
-        self._needs_charge |= charge < self.at
-        self._needs_charge &= charge < self.until
+        self._needs_charge |= charge < self.parameters.at
+        self._needs_charge &= charge < self.parameters.until
         is_inside = observations[:, row.IN_DELIVERY_AREA] > 0.5
         self._side[self._was_inside & ~is_inside] *= -1.0  # next time it goes the other way round
         self._was_inside = is_inside

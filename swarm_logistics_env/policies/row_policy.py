@@ -5,15 +5,15 @@ from __future__ import annotations
 import copy
 import math
 import operator
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swarm_logistics_env.core.errors import PolicyError
 from swarm_logistics_env.core.streams import row_keys
-from swarm_logistics_env.world.observations import n_columns
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.observations import columns_of_battery, n_columns
+from swarm_logistics_env.world.scenario import LARGEST, Scenario
 
 # Streams count modulo 2**64, and kernels divide as IEEE 754 says; the interpreter would warn of it.
 _as_compiled = np.errstate(over="ignore", divide="ignore")
@@ -27,6 +27,7 @@ UNREAD = frozenset(
         "neighbour_timer_heard",
         "neighbour_timer",
         "neighbour_message",
+        *(column.name for column in columns_of_battery(Scenario(battery=LARGEST))),
     }
 )
 
@@ -43,7 +44,7 @@ class RowPolicy:
     """
 
     stream: str
-    ignores: ClassVar[frozenset[str]] = frozenset()
+    ignores: frozenset[str] = frozenset()
 
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows; what was begun before is not changed."""

@@ -187,7 +187,7 @@ def columns(scenario: Scenario) -> tuple[Column, ...]:
             "to the left, as its gyro tells: without its drift", "gyro",
         ),
         *_messages(scenario),
-        *_columns_of_battery(scenario),
+        *columns_of_battery(scenario),
     )  # fmt: skip
 
 
@@ -234,7 +234,8 @@ def _messages(scenario: Scenario) -> tuple[Column, ...]:
     return (Column("neighbour_message", "1", numbers, -1, 1, meaning, "radio", 0),)
 
 
-def _columns_of_battery(scenario: Scenario) -> tuple[Column, ...]:
+def columns_of_battery(scenario: Scenario) -> tuple[Column, ...]:
+    """Return the last columns of a row where robots have batteries; else none."""
     if scenario.battery is None:
         return ()
     first = n_columns(scenario) - N_BATTERY_COLUMNS
