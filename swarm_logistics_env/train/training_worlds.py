@@ -200,8 +200,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         # Every episode may have robots of another kind.
         bodies = np.empty((self.num_envs, 4))
         for world, rows in zip(self.venv.worlds, self.venv.rows_of_worlds):
-            of_first = bodies_of(world.warehouse.scenario)
-            bodies[rows] = of_first[np.arange(len(rows)) % len(of_first)]
+            bodies[rows] = np.resize(bodies_of(world.warehouse.scenario), bodies[rows].shape)
         return bodies
 
     def _read(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:

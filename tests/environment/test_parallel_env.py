@@ -135,7 +135,7 @@ def test_a_name_among_many_is_told() -> None:
         ({"n_robot": 3}, ScenarioError, "did you mean 'n_robots'"),
         ({"render_mode": "hologram"}, SetupError, "render_mode = 'hologram': should be"),
         ({"scenario": {"n_robots": 3}}, SetupError, "scenario = .*: should be a Scenario"),
-        ({"num_agents": 3}, ArgumentError, "'num_agents'; known: announced, bodies, "),
+        ({"num_agents": 3}, ArgumentError, "'num_agents'; known: announced, battery, bodies, "),
         ({"max_robots": 24}, SetupError, "max_robots = 24: should be .* of at least 25"),
         ({"max_cycles": 0}, SetupError, "max_cycles = 0: should be a whole number"),
         ({"rewards": ["delivery"]}, SetupError, r"rewards = \[.*\]: should be None or a dict"),

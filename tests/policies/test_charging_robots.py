@@ -61,9 +61,7 @@ def test_its_identity_is_that_of_the_policy_and_of_the_shares() -> None:
 def test_what_cannot_go_to_charge_is_refused() -> None:
     with pytest.raises(PolicyError, match="policy = Central: should decide from rows alone"):
         policies.load("central+charging")
-    with pytest.raises(
-        PolicyError, match=r"at = 0\.9: should be less than until"
-    ):
+    with pytest.raises(PolicyError, match=r"at = 0\.9: should be less than until"):
         policies.charging(policies.load("homing"), at=0.9, until=0.5)
 
 

@@ -47,7 +47,8 @@ class Case:
 @st.composite
 def planned_faults(draw: st.DrawFn, n_robots: int) -> Planned:
     mode = draw(st.sampled_from(sorted(FAILURE_MODES.keys() - {"cell_fades"})))
-    begins = draw(st.integers(0, 50)) if mode != "removed" else draw(st.integers(2, 60))
+    is_left = mode in ("removed", "away")  # after a step, as the reference looks at who was there
+    begins = draw(st.integers(2, 60)) if is_left else draw(st.integers(0, 50))
     passes = st.integers(begins + 1, begins + 40)
     ends = None
     if mode != "removed":

@@ -104,7 +104,7 @@ def test_each_robot_is_able_to_do_what_its_kind_can_times_its_factors() -> None:
     assert state.max_speed.tolist() == [2.0, 0.5, 1.0, 0.5]
     assert state.view_range.tolist() == [1.0, 0.5, 1.0, 0.25]
     assert state.lifts.tolist() == [True, False, True, False]
-    assert set(scenario.robot_kinds[1].differing) == set(KIND_FIELDS)
+    assert {*scenario.robot_kinds[1].differing, "battery"} == set(KIND_FIELDS)
     for name in ("max_turn_rate", "max_acceleration", "ranger_range"):
         of_kind = getattr(scenario.robot_kinds[1], name)
         assert getattr(state, name)[[0, 1]].tolist() == [getattr(scenario, name), of_kind]

@@ -127,13 +127,14 @@ OTHER: dict[str, Any] = {
     "sensing_mix": (0.5,), "ranger_noise": 0.1, "position_noise": 0.1, "sensor_dropout": 0.2,
     "radio_loss": 0.2, "demand": "zipf", "dock_capacity": 0.5, "request_timeout": 0.5,
     "request_delay": 0.5, "request_loss": 0.5, "order_rate": 1.0, "order_cycle": 2.0,
-    "order_due": 1.0,
+    "order_due": 1.0, "charging_power": 50.0, "dead_stations": 2,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", sorted(CHANGES_DURING_RUN))
 def test_in_mid_run_it_is_a_change_of_the_warehouse_at_that_time(name: str) -> None:
-    wrapped, plain = ParameterChange(small(), name, OTHER[name], at=1.0), small()
+    fields = {"battery": 500.0} if name in ("charging_power", "dead_stations") else {}
+    wrapped, plain = ParameterChange(small(**fields), name, OTHER[name], at=1.0), small(**fields)
     plain.declare_spaces(plain.scenario.replace(**{name: OTHER[name]}))
     rng = np.random.default_rng(0)
     np.testing.assert_array_equal(wrapped.reset_arrays(3), plain.reset_arrays(3))

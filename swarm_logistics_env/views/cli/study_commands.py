@@ -43,7 +43,7 @@ StudyArgument = Annotated[
     Argument(
         metavar="FILE|PRESET",
         # Literal, as to import the presets would slow every command.
-        help="TOML file of a study, or a preset: orders, paper-fit, paper, quick, resilience, "
+        help="TOML file of a study, or a preset: day, orders, paper-fit, paper, quick, resilience, "
         "scorecard.",
     ),
 ]

@@ -35,8 +35,9 @@ def test_the_first_line_is_the_side_of_the_highest_y() -> None:
 def test_a_shipped_plan_keeps_its_name_and_gives_the_sizes(name: str) -> None:
     scenario = Scenario(floor=name)
     assert scenario.floor == name
-    size = (40.0, 20.0) if name == "large" else (10.0, 10.0)
-    assert (scenario.warehouse_width, scenario.warehouse_height) == size
+    sizes = {"large": (40.0, 20.0), "day": (16.0, 10.0)}
+    size = (scenario.warehouse_width, scenario.warehouse_height)
+    assert size == sizes.get(name, (10.0, 10.0))
     assert Scenario.from_json(scenario.to_json()) == scenario
 
 
