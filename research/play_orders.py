@@ -1,8 +1,8 @@
-"""Plays the studies of requests that end and of orders, and writes their tables.
+"""Plays the studies of requests that end, of orders and of a day, and writes their tables.
 
     python -m research.play_orders
 
-It writes two blocks of docs/environment.md. What is played is kept, as by `play_tables`.
+It writes three blocks of docs/environment.md. What is played is kept, as by `play_tables`.
 """
 
 from collections.abc import Iterator
@@ -56,10 +56,18 @@ def _served(cells: tuple[Cell, ...]) -> Iterator[tuple[str, ...]]:
 
 
 def main() -> None:
-    """Play both studies, and rewrite their tables."""
+    """Play the studies, and rewrite their tables."""
     (timeout,) = play([example(OUT, "request_timeout")])
     (orders,) = play([Study.preset("orders", out=OUT / "orders")])
-    rewrite(PAGE, {"request timeout": robustness_by_rule(timeout), "orders": on_time(orders)})
+    (day,) = play([Study.preset("day", out=OUT / "day")])
+    rewrite(
+        PAGE,
+        {
+            "request timeout": robustness_by_rule(timeout),
+            "orders": on_time(orders),
+            "day": on_time(day),
+        },
+    )
 
 
 if __name__ == "__main__":
