@@ -96,7 +96,7 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
         f"{section.join_names(results.policies)}{place} {world}, {results.seeds_text}",
     ]
     if answer.comparison:
-        sentences.append(answer.comparison[:-1])
+        sentences.append(answer.comparison.removesuffix("."))
     sentences.append(_subjects(answer))
     method = (
         "Verdicts by Holm's method over all questions on an indicator of one policy, "
