@@ -304,6 +304,7 @@ def _values(name: str, x_o: float | None, group: Sequence[Trial]) -> _Varied:
             f"line {line}: A is relative to one value of {name!r}, and no condition "
             "without a fault has more trials than all others: say "
             f"{' or '.join(options)}, or leave it out by --ignore {quote(name)}"
+            f"{_work_hint(name, group)}"
         )
     if x_o == 0.0:
         raise StudyError(
@@ -314,6 +315,16 @@ def _values(name: str, x_o: float | None, group: Sequence[Trial]) -> _Varied:
         return []
     values = sorted(by_value, key=lambda x: (x != x_o, x))
     return [(Setting("parameter", name, value), by_value[value]) for value in values]
+
+
+def _work_hint(name: str, group: Sequence[Trial]) -> str:
+    """Return what else to say where a column may count what each run had to do, by its time."""
+    is_count = all(dict(row.parameters)[name] % 1.0 == 0.0 for row in group)
+    is_one_by_time = all(row.times is None and row.performance < 1.0 for row in group)
+    if not (is_count and is_one_by_time):
+        return ""
+    column = quote(f"work={name}")
+    return f"; if it counts what a run had to do, P is that by its time: --column {column}"
 
 
 def _refuse_unused(origin: Origin, plan: Plan) -> None:

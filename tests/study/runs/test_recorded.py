@@ -249,6 +249,10 @@ HEAD = "robots,fault,faulty,width,delivered\n"
         (HEAD + "5,,,0,9\n5,,,0,8\n5,,,2,9\n", "width = 0 is the reference, and A is relative"),
         (HEAD + "5,,,1,9\n5,,,2,9\n", "say --reference width=1 or --reference width=2, or leave"),
         (
+            "robots,boxes,time to finish [s]\n5,10,90\n5,20,150\n",
+            "if it counts what a run had to do, P is that by its time: --column work=boxes",
+        ),
+        (
             "robots,tags,delivered\n4,8,9\n4,8,8\n8,16,20\n",
             "line 2: the number of robots and 'tags' change together",
         ),
