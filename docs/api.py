@@ -94,7 +94,7 @@ def command_entries() -> Iterator[Entry]:
             yield "option", f"{command} {option}", ""
     for code, meaning in EXIT_CODES.items():
         yield "exit code", str(code), meaning
-    known: dict[str, Iterable[str]] = {
+    names_by_kind: dict[str, Iterable[str]] = {
         "policy": NAMES,
         "failure mode": FAILURE_MODES,
         "reward term": REWARD_TERMS,
@@ -106,7 +106,7 @@ def command_entries() -> Iterator[Entry]:
         "task": TASKS,
         "export format": FORMATS,
     }
-    for kind, names in known.items():
+    for kind, names in names_by_kind.items():
         for name in names:
             yield kind, name, ""
 

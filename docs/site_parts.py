@@ -28,14 +28,14 @@ def with_outside_links(text: str, page: str) -> str:
     """
 
     def of_the_site(match: re.Match[str]) -> str:
-        words, target, place = match.groups()
+        words, target, anchor = match.groups()
         path = ((DOCS / page).parent / target).resolve()
         is_page = path.is_relative_to(DOCS) and path.suffix == ".md"
         is_file_to_load = path.suffix != ".md" and path.is_file()
         if is_page or is_file_to_load:
             return match[0]
         if REPOSITORY:
-            return f"[{words}]({REPOSITORY}/blob/main/{path.relative_to(ROOT)}{place or ''})"
+            return f"[{words}]({REPOSITORY}/blob/main/{path.relative_to(ROOT)}{anchor or ''})"
         return words if words.startswith("`") else f"{words} (`{path.relative_to(ROOT)}`)"
 
     return _LINK.sub(of_the_site, text)

@@ -287,8 +287,8 @@ def _spread(corners: NDArray[np.int32], n_wide: int) -> NDArray[np.int32]:
 
 def _check_reached(kind: Cells, reached: Mask, problem: str) -> None:
     ways = ((DOCK, "this dock", "storage"), (STORAGE, "this storage", "a dock"))
-    others = ((START, "this start", "a dock"), (STATION, "this station", "a dock"))
-    for code, origin, goal in (*ways, *others):
+    starts = ((START, "this start", "a dock"), (STATION, "this station", "a dock"))
+    for code, origin, goal in (*ways, *starts):
         rows, columns = np.nonzero((kind == code) & ~reached)
         if len(rows):
             first = int(np.lexsort((columns, -rows))[0])  # from the first line on

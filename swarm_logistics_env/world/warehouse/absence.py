@@ -116,8 +116,8 @@ def free_place(world: World, robot: int) -> tuple[float, float, bool]:
     for ring in range(_RINGS + 1):
         distance = ring * world.parameters.robot_radius / _RINGS_PER_RADIUS
         n_places = max(_PLACES_PER_RING * ring, 1)
-        for place in range(n_places):
-            angle = 2.0 * math.pi * place / n_places
+        for number in range(n_places):
+            angle = 2.0 * math.pi * number / n_places
             x = left_x + distance * math.cos(angle)
             y = left_y + distance * math.sin(angle)
             if has_room(world, x, y) and is_in_sight(world, left_x, left_y, x, y):
