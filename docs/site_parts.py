@@ -36,7 +36,8 @@ def with_outside_links(text: str, page: str) -> str:
             return match[0]
         if REPOSITORY:
             return f"[{words}]({REPOSITORY}/blob/main/{path.relative_to(ROOT)}{anchor or ''})"
-        return words if words.startswith("`") else f"{words} (`{path.relative_to(ROOT)}`)"
+        name = str(path.relative_to(ROOT))
+        return words if words.startswith("`") or words == name else f"{words} (`{name}`)"
 
     return _LINK.sub(of_the_site, text)
 
