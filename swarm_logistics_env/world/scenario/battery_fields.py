@@ -108,11 +108,14 @@ def check_batteries(scenario: BatteryFields) -> None:
             "are no more stations"
         )
     if n_stations:
-        _check_reach(scenario, min(scenario.of_kinds("battery")))
+        _check_reach(scenario)
 
 
-def _check_reach(scenario: BatteryFields, energy: float) -> None:
-    """Check that a full battery lasts for the straight way from where items lie to a station."""
+def _check_reach(scenario: BatteryFields) -> None:
+    """Check that a full battery lasts for the straight way from where items lie to a station.
+
+    Robots of each kind have to get there, so that a swarm of one of the kinds alone may be, too.
+    """
     if scenario.plan is None:
         width = np.linspace(0.0, scenario.storage_width, _GRID)
         height = np.linspace(0.0, scenario.warehouse_height, _GRID)
@@ -126,9 +129,11 @@ def _check_reach(scenario: BatteryFields, energy: float) -> None:
     for station_x, station_y in scenario.stations.tolist():
         np.minimum(nearest, np.hypot(x - station_x, y - station_y), out=nearest)
     way = float(nearest.max())
-    needed = way * (scenario.driving_energy + scenario.idle_power / scenario.highest_speed)
-    if energy < needed:
-        raise ValueError(
-            f"battery = {energy:g} J does not bring a robot the {way:.1f} m from the storage to a "
-            f"station: should be at least {needed:.0f} J, or there be a station nearer"
-        )
+    kinds = zip(scenario.of_kinds("battery"), scenario.of_kinds("max_speed"), strict=True)
+    for energy, speed in kinds:
+        needed = way * (scenario.driving_energy + scenario.idle_power / speed)
+        if energy < needed:
+            raise ValueError(
+                f"battery = {energy:g} J does not bring a robot the {way:.1f} m from the storage "
+                f"to a station: should be at least {needed:.0f} J, or there be a station nearer"
+            )

@@ -134,3 +134,11 @@ def test_robots_start_with_half_a_battery_to_a_full_one() -> None:
     energy = world.state.batteries.energy
     assert 2500.0 <= energy.min() < energy.max() <= 5000.0
     np.testing.assert_array_equal(world.state.robot_charge, energy / 5000.0)
+
+
+def test_robots_of_every_kind_have_to_reach_a_station() -> None:
+    kinds = [{"name": "fast", "count": 3}, {"name": "slow", "count": 1, "max_speed": 0.1}]
+    with pytest.raises(ScenarioError, match=r"battery = 200 J .* at least 590 J"):
+        Scenario().replace(battery=200.0, robot_kinds=kinds)
+    mixed = Scenario().replace(battery=600.0, robot_kinds=kinds)
+    assert mixed.of_robot(3).max_speed in (0.1, 2.0)
