@@ -209,8 +209,8 @@ class Spaces:
         if is_seen_within and is_state_within:
             return
         changed = [
-            f"{name} = {value}"
-            for name, value in scenario.model_dump().items()
+            f"{name} = {getattr(scenario, name)}"
+            for name in type(scenario).model_fields
             if getattr(scenario, name) != getattr(self._own, name)
         ]
         raise SetupError(

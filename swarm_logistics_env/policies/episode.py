@@ -37,6 +37,7 @@ class Episode:
             hexadecimal. Runs of equal digest went the same way, whatever their timers said.
         contacts: how often robots ran into each other, how deep, and their accelerations.
         orders: how late they were served, and how many waited.
+        charge: (N,) what was left in the batteries at the end, as shares; empty: there were none.
     """
 
     seed: int
@@ -48,6 +49,7 @@ class Episode:
     digest: str
     contacts: ContactMeasures = field(default_factory=ContactMeasures)
     orders: OrderMeasures = field(default_factory=OrderMeasures)
+    charge: tuple[float, ...] = ()
 
     @property
     def delivered(self) -> int:
@@ -225,4 +227,5 @@ def run_episode(
         digest=digest.hexdigest(),
         contacts=state.contact_measures,
         orders=state.order_measures,
+        charge=() if scenario.battery is None else tuple(state.robot_charge.round(9).tolist()),
     )

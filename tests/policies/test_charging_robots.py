@@ -26,6 +26,7 @@ def test_robots_charge_and_hardly_any_runs_empty(drive: str) -> None:
         for _ in range(scenario.n_steps):
             rows = world.step(decide(policy, rows, world.state))
         empty[name] = int(world.state.robot_is_empty.sum())
+        assert sum(1 for share in world.state.robot_charge if share == 0.0) == empty[name]
     assert empty["homing"] == 12
     assert empty["homing+charging"] <= 1
 

@@ -112,6 +112,12 @@ def run_command(
         echo(f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, longest wait {wait:.1f} s")
     for line in _orders_in_words(episode.orders):
         echo(line)
+    if episode.charge:
+        n_empty = episode.charge.count(0.0)
+        echo(
+            f"batteries at the end: {np.mean(episode.charge):.0%} on average, "
+            f"{n_empty} of {scenario.n_robots} empty"
+        )
     if episode.failed_robots:
         echo(
             f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "

@@ -82,6 +82,8 @@ def read_text(path: Path) -> str:
 def floor_title(text: str) -> str:
     """Return how a table names a floor: its rows are too long for that."""
     rows = re.split(r"\n|/", text.strip("\n"))
+    if re.search(r"\.[a-z0-9]+$", text):  # the path of a file, which has no rows
+        return text
     return (
         text
         if not _looks_like_rows(text) and len(rows) == 1

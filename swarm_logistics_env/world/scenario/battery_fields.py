@@ -85,6 +85,11 @@ def check_batteries(scenario: BatteryFields) -> None:
                 f"dead_stations = {scenario.dead_stations}: should have batteries, as battery = "
                 "5000, or be 0"
             )
+        if scenario.n_stations is not None:
+            raise ValueError(
+                f"n_stations = {scenario.n_stations}: should have batteries, as battery = 5000, or "
+                "be left out"
+            )
         kinds = [kind for kind in scenario.robot_kinds if kind.battery is not None]
         if kinds:
             raise ValueError(
@@ -129,11 +134,13 @@ def _check_reach(scenario: BatteryFields) -> None:
     for station_x, station_y in scenario.stations.tolist():
         np.minimum(nearest, np.hypot(x - station_x, y - station_y), out=nearest)
     way = float(nearest.max())
-    kinds = zip(scenario.of_kinds("battery"), scenario.of_kinds("max_speed"), strict=True)
-    for energy, speed in kinds:
+    names = [f" of the kind {kind.name!r}" for kind in scenario.robot_kinds] or [""]
+    energies = scenario.of_kinds("battery")
+    speeds = scenario.of_kinds("max_speed")
+    for name, energy, speed in zip(names, energies, speeds, strict=True):
         needed = way * (scenario.driving_energy + scenario.idle_power / speed)
         if energy < needed:
             raise ValueError(
-                f"battery = {energy:g} J does not bring a robot the {way:.1f} m from the storage "
-                f"to a station: should be at least {needed:.0f} J, or there be a station nearer"
+                f"battery = {energy:g} J does not bring a robot{name} the {way:.1f} m from the "
+                f"storage to a station: should be at least {needed:.0f} J, or a station be nearer"
             )
