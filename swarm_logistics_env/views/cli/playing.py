@@ -110,14 +110,8 @@ def run_command(
     if len(times):
         wait = np.diff(times, prepend=0.0).max()
         echo(f"first at {times[0]:.1f} s, last at {times[-1]:.1f} s, longest wait {wait:.1f} s")
-    for line in _orders_in_words(episode.orders):
+    for line in (*_orders_in_words(episode.orders), *_batteries_in_words(episode.charge)):
         echo(line)
-    if episode.charge:
-        n_empty = episode.charge.count(0.0)
-        echo(
-            f"batteries at the end: {np.mean(episode.charge):.0%} on average, "
-            f"{n_empty} of {scenario.n_robots} empty"
-        )
     if episode.failed_robots:
         echo(
             f"failed robots {', '.join(map(str, episode.failed_robots))}; working robots touched "
@@ -137,6 +131,16 @@ def _orders_in_words(measures: OrderMeasures) -> Iterator[str]:
         yield f"longest queue {measures.longest_queue}, {measures.turned_away} turned away"
     if measures.put_back is not None:
         yield f"{measures.put_back} requests put back"
+
+
+def _batteries_in_words(charge: tuple[float, ...]) -> Iterator[str]:
+    """Yield a line on what is left in the batteries, if there are any."""
+    if charge:
+        n_empty = charge.count(0.0)
+        yield (
+            f"batteries at the end: {np.mean(charge):.0%} on average, "
+            f"{n_empty} of {len(charge)} empty"
+        )
 
 
 def watch_command(
