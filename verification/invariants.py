@@ -314,7 +314,8 @@ class Watch:
         balance = self._in_batteries_but_for_use() - self._energy_at_start
         largest = 1e-9 * (1.0 + batteries.used + batteries.charged)
         self._demand(np.abs(balance) <= largest, "energy comes from nowhere or goes there")
-        empty = state.robot_present & before.robot_is_empty
+        was_there = before.robot_present & state.robot_present
+        empty = was_there & before.robot_is_empty
         is_still = state.robot_heading == before.robot_heading
         self._each(empty, is_still, "robot {} turns with an empty battery")
         self._each(empty, ~self._took(), "robot {} lifts with an empty battery")

@@ -33,6 +33,9 @@ def test_a_robot_uses_what_standing_driving_gaining_speed_and_lifting_take(build
     way = world.state.robot_position[0, 0] - x
     kinetic = 0.5 * world.scenario.robot_mass * 0.5**2  # at a quarter of 2 m/s
     assert used[0] == pytest.approx(25.5 + 10.0 + 10.0 * way + kinetic, rel=1e-3)
+    before = used[0]
+    steps(world, STAY)  # braking gives nothing back
+    assert used[0] >= before + 0.5
 
 
 def test_an_empty_robot_stands_tells_nothing_and_lifts_nothing(build: Build) -> None:
