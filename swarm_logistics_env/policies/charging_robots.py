@@ -20,11 +20,11 @@ from swarm_logistics_env.policies.policy import (
     check_policy,
     identity_parts,
 )
-from swarm_logistics_env.policies.row_policy import RowPolicy, check_row_policy
+from swarm_logistics_env.policies.row_policy import OF_BATTERY, RowPolicy, check_row_policy
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import BODY, MEMORY, N_COLUMNS, bodies_of, length_of
 from swarm_logistics_env.world.motion.steering import set_velocity, steer
-from swarm_logistics_env.world.scenario import LARGEST, Scenario
+from swarm_logistics_env.world.scenario import Scenario
 
 SUFFIX = "+charging"  # of a policy's name
 AT = 0.3
@@ -167,9 +167,7 @@ class Charging(RowPolicy, Holding):
         if at >= until:
             raise PolicyError(f"at = {at}: should be less than until = {until}")
         self.policy = policy
-        self.ignores = getattr(policy, "ignores", frozenset()) - {
-            column.name for column in row.columns_of_battery(Scenario(battery=LARGEST))
-        }
+        self.ignores = getattr(policy, "ignores", frozenset()) - OF_BATTERY
         self.stream = getattr(policy, "stream", "charging")
         self._has_battery = False
         self._bodies_of_kinds = np.zeros((1, BODY.stop - BODY.start))

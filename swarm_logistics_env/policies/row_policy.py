@@ -19,7 +19,9 @@ from swarm_logistics_env.world.scenario import LARGEST, Scenario
 _as_compiled = np.errstate(over="ignore", divide="ignore")
 
 
-# Columns that no policy of this package reads.
+# Columns that only `charging_robots` reads.
+OF_BATTERY = frozenset(column.name for column in columns_of_battery(Scenario(battery=LARGEST)))
+# Columns that no other policy of this package reads.
 UNREAD = frozenset(
     {
         "range_robots",
@@ -27,7 +29,7 @@ UNREAD = frozenset(
         "neighbour_timer_heard",
         "neighbour_timer",
         "neighbour_message",
-        *(column.name for column in columns_of_battery(Scenario(battery=LARGEST))),
+        *OF_BATTERY,
     }
 )
 

@@ -128,9 +128,9 @@ def test_rows_have_one_length_and_stay_within_the_bounds_of_all_kinds() -> None:
 def test_a_fault_strikes_robots_of_its_kind_the_same_for_every_mode_and_nested() -> None:
     scouts = np.flatnonzero(MIXED.kind_numbers(10) == 1).tolist()
     for seed in range(5):
-        one = failed_robots(Fault("FM1", 1, kind="scout"), seed, MIXED).tolist()
-        assert set(one) < set(scouts)
-        assert failed_robots(fault_of("removed:1:scout@9"), seed, MIXED).tolist() == one
+        struck = failed_robots(Fault("FM1", 1, kind="scout"), seed, MIXED).tolist()
+        assert set(struck) < set(scouts)
+        assert failed_robots(fault_of("removed:1:scout@9"), seed, MIXED).tolist() == struck
         assert failed_robots(Fault("FM4", 2, kind="scout"), seed, MIXED).tolist() == scouts
     world = Warehouse(MIXED)
     world.reset(0, ["dead:1:scout@0.1", "FM1:1:carrier@0.1"])

@@ -54,9 +54,9 @@ class BatteryFields(ScenarioFields):
     )
 
     @property
-    def battery_energy(self) -> float:
-        """Energy in a full battery [J]; 0: there are none."""
-        return 0.0 if self.battery is None else self.battery
+    def has_batteries(self) -> bool:
+        """Whether robots have batteries."""
+        return self.battery is not None
 
     @property
     def stations(self) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ _PLACED = 2**41
 def use(world: World, robot: int, energy: float) -> None:
     """Take energy [J] out of a robot's battery, at most what is in it."""
     batteries = world.batteries
-    if world.parameters.battery_energy == 0.0:
+    if not world.parameters.has_batteries:
         return
     taken = min(energy, batteries.energy[robot])
     batteries.energy[robot] -= taken
@@ -36,7 +36,7 @@ def run_batteries(world: World) -> None:
     centre is within a robot's radius of a station's is on it; two discs cannot both be.
     """
     parameters = world.parameters
-    if parameters.battery_energy == 0.0:
+    if not parameters.has_batteries:
         return
     robots = world.robots
     batteries = world.batteries
@@ -85,7 +85,7 @@ def charge(world: World, robot: int) -> None:
 @kernel
 def sense_battery(me: int, pose: Pose, world: World, out: Sensed) -> None:
     """Fill the last columns of a row: charge, whether it charges, the nearest stations in view."""
-    if world.parameters.battery_energy == 0.0:
+    if not world.parameters.has_batteries:
         return
     batteries = world.batteries
     first = len(out) - row.N_BATTERY_COLUMNS

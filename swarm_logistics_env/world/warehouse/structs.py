@@ -74,7 +74,7 @@ class Parameters(NamedTuple):
     tells_all: bool
     restock: bool
     is_gossip: bool
-    battery_energy: float
+    has_batteries: bool
     idle_power: float
     driving_energy: float
     lifting_energy: float

@@ -18,7 +18,7 @@ ON_STATION = (9.75, 2.5)
 
 
 def fill(world: Warehouse) -> None:
-    world.state.batteries.energy[:] = world.scenario.battery_energy
+    world.state.batteries.energy[:] = world.state.able.battery
 
 
 def test_a_robot_uses_what_standing_driving_gaining_speed_and_lifting_take(build: Build) -> None:
