@@ -135,7 +135,9 @@ def main(
     script: Annotated[
         list[str], typer.Option(help="A name of `tune.PARAMETERS`; again for several.")
     ],
-    minutes: Annotated[float, typer.Option(help="Of a core, for each script, all presets together.")] = 30.0,
+    minutes: Annotated[
+        float, typer.Option(help="Of a core, for each script, all presets together.")
+    ] = 30.0,
     preset: Annotated[list[str] | None, typer.Option(help="All of them without it.")] = None,
 ) -> None:
     """Search scripts anew in each preset, compare with the shipped sets, and write the table."""
