@@ -49,18 +49,20 @@ def delivered(script: str, values: tune.Values, scenario: Scenario, seed: int) -
     return run_episode(scenario, policies.load(script, **parameters), seed).delivered
 
 
-def loss_and_seconds(
-    point: NDArray[np.float64], script: str, scenario: Scenario
-) -> tuple[float, float]:
-    """Return minus the mean of ln(P) at a point of the unit cube, and what it took of a core.
-
-    P of a run counts as 1 at least.
-    """
-    start = time.process_time()
+def loss(point: NDArray[np.float64], script: str, scenario: Scenario) -> float:
+    """Return minus the mean of ln(P) at a point of the unit cube, P of a run at least 1."""
     values = tune.values_at(script, point.tolist())
     seeds = range(FIRST_SEED, FIRST_SEED + SEARCHED)
     p = [delivered(script, values, scenario, seed) for seed in seeds]
-    return -float(np.mean(np.log(np.maximum(p, 1)))), time.process_time() - start
+    return -float(np.mean(np.log(np.maximum(p, 1))))
+
+
+def loss_and_seconds(
+    function: Callable[[NDArray[np.float64]], float], point: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Return the loss at a point, and how many seconds of a core it took."""
+    start = time.process_time()
+    return function(point), time.process_time() - start
 
 
 def search(
@@ -76,10 +78,9 @@ def search(
     spent: list[float] = []
 
     def in_processes(
-        function: Callable[[NDArray[np.float64]], tuple[float, float]],
-        sets: Iterable[NDArray[np.float64]],
+        function: Callable[[NDArray[np.float64]], float], sets: Iterable[NDArray[np.float64]]
     ) -> list[float]:
-        played = list(processes.map(function, sets))
+        played = list(processes.map(partial(loss_and_seconds, function), sets))
         spent.extend(of_a_core for _, of_a_core in played)
         return [set_loss for set_loss, _ in played]
 
@@ -88,7 +89,7 @@ def search(
             raise StopIteration
 
     best = differential_evolution(
-        partial(loss_and_seconds, script=script, scenario=scenario),
+        partial(loss, script=script, scenario=scenario),
         Bounds(np.zeros(n), np.ones(n)),
         init=points,
         rng=generator,
