@@ -88,6 +88,14 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
         return (yield)
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """Measure the fixtures of a test that is marked `unmeasured`, but not the test."""
+    measured = item.get_closest_marker("unmeasured") is None
+    with contextlib.nullcontext() if measured else _uncovered():
+        return (yield)
+
+
 @contextlib.contextmanager
 def _uncovered() -> Iterator[None]:
     # pytest-cov's `no_cover` ends one of the two measurements that a worker of xdist starts.

@@ -144,4 +144,4 @@ def test_readme_runs_as_written() -> None:
     example = (ROOT / "examples" / "wanderer.py").read_text(encoding="utf-8")
     assert example.partition("\n\n")[2] in PAGES["quickstart.md"]
     wanderer = run(example)["Wanderer"]
-    assert run_episode(Scenario(), wanderer(), seed=0).delivered > 3
+    assert run_episode(Scenario(duration=150.0), wanderer(), seed=0).delivered > 0

@@ -83,6 +83,7 @@ def test_own_policy_is_judged_beside_swarm_dt(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "report.html").exists()
 
 
+@pytest.mark.daily
 def test_own_failure_mode_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(FAILURE_MODES, "hoarder", FAILURE_MODES["FM4"])  # gone again afterwards
     estimates = main("failure_mode", seeds=2, n_robots=10, m=3, duration=60.0)

@@ -262,6 +262,7 @@ def test_a_copy_goes_on_as_the_original(copied: Callable[[SwarmVecEnv], SwarmVec
         np.testing.assert_equal(returned[:3], returned_by_copy[:3])
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
 @pytest.mark.parametrize("method", ["before_step", "after_step"])
 def test_worlds_go_on_after_an_error_in_a_wrapper(

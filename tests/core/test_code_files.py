@@ -101,6 +101,7 @@ def test_packages_of_another_environment_are_no_code_of_the_users(tmp_path: Path
     assert not is_users_own(os.__file__)
 
 
+@pytest.mark.unmeasured
 @given(st.permutations(["v1", "v2", "v1/deep", "."]))
 def test_a_path_is_its_file_in_any_order(
     tmp_path_factory: pytest.TempPathFactory, order: list[str]

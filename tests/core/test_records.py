@@ -121,6 +121,7 @@ with atomic_write(Path(sys.argv[1]), PolicyError) as part:
 """
 
 
+@pytest.mark.unmeasured
 @pytest.mark.skipif(sys.platform == "win32", reason="locks of POSIX")
 def test_what_a_killed_writer_left_is_removed_once_nobody_writes(tmp_path: Path) -> None:
     for name in ("x[1].csv", "x.csv", "x.csv"):

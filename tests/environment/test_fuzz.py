@@ -22,7 +22,10 @@ SMALL = Scenario(n_robots=3, n_items=4, warehouse_width=4.0, warehouse_height=3.
 STEPS = 3
 FEWER = settings(max_examples=settings().max_examples // 2)
 
-pytestmark = pytest.mark.filterwarnings("ignore:reset option:UserWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:reset option:UserWarning"),
+    pytest.mark.unmeasured,
+]
 
 odd_numbers = st.sampled_from([math.nan, math.inf, -math.inf, -1, 0, -0.0, 1e-300, 1e308, 2**63])
 junk = (

@@ -56,7 +56,7 @@ def later(env: Any, steps: int) -> list[Any]:
 
 @pytest.mark.parametrize("kind", MAKERS)
 @given(request=requests, begun=st.booleans(), steps=st.integers(0, 3))
-@settings(max_examples=max(30, settings().max_examples // 10))
+@settings(max_examples=max(15, settings().max_examples // 10))
 def test_a_reset_that_is_refused_changes_nothing(
     kind: str, request: tuple[Any, Any], begun: bool, steps: int
 ) -> None:

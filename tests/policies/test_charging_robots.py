@@ -14,7 +14,10 @@ from tests.policies.test_row_policy import SMALL, Alone
 DAY = Scenario(battery=3000.0, n_robots=12, restock=True, duration=300.0)
 
 
-@pytest.mark.parametrize("drive", ["holonomic", "differential"])
+@pytest.mark.unmeasured
+@pytest.mark.parametrize(
+    "drive", ["holonomic", pytest.param("differential", marks=pytest.mark.daily)]
+)
 def test_robots_charge_and_hardly_any_runs_empty(drive: str) -> None:
     empty = {}
     scenario = DAY.replace(drive=drive)

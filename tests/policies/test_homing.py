@@ -95,6 +95,7 @@ def test_it_follows_the_lowest_timer_heard_until_it_knows_the_way_for_sure() -> 
     assert (commands[:, 0] > 0.9).all()
 
 
+@pytest.mark.unmeasured
 @pytest.mark.compiled
 @pytest.mark.parametrize("name", WITHOUT_STOCK)
 @pytest.mark.parametrize("mode", ["FM1", "FM2", "FM3", "FM4", "motor_dead", "removed"])

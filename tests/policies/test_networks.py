@@ -61,6 +61,7 @@ class Holder:
             return network(torch.as_tensor(rows)).numpy()
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     "form",
     [

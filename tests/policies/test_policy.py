@@ -53,6 +53,7 @@ def commands_of(policy: Any) -> Any:
 
 
 # One that is told of the world needs a world: tests/policies/test_told.py.
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("name", sorted(SCRIPTED.keys() - {"homing-told"}))
 def test_every_argument_of_a_script_changes_its_identity_its_repr_and_its_commands(
     name: str,

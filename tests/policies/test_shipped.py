@@ -12,6 +12,8 @@ from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.train.training import load_training, preset_names
 from swarm_logistics_env.world.warehouse import Fault
 
+pytestmark = pytest.mark.unmeasured
+
 SHIPPED = sorted(path.stem for path in WEIGHTS.glob("*.safetensors"))
 
 
@@ -50,7 +52,10 @@ def delivered(name: str, *faults: Fault, **fields: Any) -> float:
 
 @pytest.mark.parametrize(
     ("name", "n_robots"),
-    [*((name, 30) for name in SHIPPED), *((name, 5) for name in SHIPPED if "@" not in name)],
+    [
+        *((name, n_robots) for name in SHIPPED if "@" not in name for n_robots in (5, 30)),
+        *(pytest.param(name, 30, marks=pytest.mark.daily) for name in SHIPPED if "@" in name),
+    ],
 )
 def test_they_deliver_more_than_swarm_dt(name: str, n_robots: int) -> None:
     assert delivered(name, n_robots=n_robots) > 1.5 * delivered("swarm-dt", n_robots=n_robots)

@@ -12,6 +12,7 @@ from swarm_logistics_env.policies import NAMES, Policy, load
 from swarm_logistics_env.world.observations import N_COLUMNS
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("name", NAMES)
 def test_the_same_seed_gives_a_named_policy_the_same_bits(name: str) -> None:
     scenario, policy = Scenario(n_robots=10, duration=20.0), load(name)

@@ -119,6 +119,7 @@ def take_over(policy: Any, controller: CFile, robots: NDArray[np.int64]) -> None
     controller._robots = structs.tobytes()
 
 
+@pytest.mark.unmeasured
 @needs_gcc
 @pytest.mark.compiled
 @pytest.mark.parametrize("name", NAMES)
@@ -169,6 +170,7 @@ def test_the_c_file_decides_as_the_policy_does_in_a_quarter_of_a_million_decisio
     assert (in_double.n_elsewhere, in_double.n_rounded) == (0, 0)
 
 
+@pytest.mark.unmeasured
 @needs_gcc
 @pytest.mark.parametrize("name", NAMES)
 def test_it_compiles_without_a_warning_and_takes_little(name: str, tmp_path: Path) -> None:
@@ -199,6 +201,7 @@ def test_it_compiles_for_a_cortex_m4_and_fits(name: str, tmp_path: Path) -> None
     assert sizes.stack < 4 * 1024
 
 
+@pytest.mark.unmeasured
 @needs_gcc
 @pytest.mark.parametrize(
     ("name", "n_steps"),

@@ -48,6 +48,7 @@ def test_one_of_another_form_is_refused_and_one_without_its_number_is_of_the_fir
     assert Contract(**fields) == contract
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("name", [*NAMES, "ppo-robust"])
 def test_it_is_yaml_of_all_that_a_robot_has_to_know(name: str) -> None:
     contract = contract_of(load(name), NOISY)

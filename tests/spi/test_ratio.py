@@ -16,6 +16,8 @@ from swarm_logistics_env.spi.hidden import stalls
 from swarm_logistics_env.spi.ratio import RAISED, Design, Term, ratio_test
 from verification.verdict_errors import share_supported, wrong_verdicts
 
+pytestmark = pytest.mark.unmeasured
+
 P_O = np.array([35.0, 41, 38, 29, 44, 36, 40])
 P_F = np.array([33.0, 36, 39, 25, 40, 36, 35])
 FEWER_F = P_F[:5]  # of a sample that shares no seeds

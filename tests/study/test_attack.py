@@ -27,6 +27,7 @@ SCENARIO = Scenario(
 )  # fmt: skip
 
 
+@pytest.mark.unmeasured
 def test_the_search_comes_nearer_to_the_worst_fault_than_chance() -> None:
     modes, roles = ("FM1", "FM2", "FM3", "FM4", "dead"), ("carrier", "searching")
     kinds = list(product(modes, roles, (10.0, 30.0), (None, 15.0)))
@@ -53,6 +54,7 @@ def test_the_search_comes_nearer_to_the_worst_fault_than_chance() -> None:
     assert by_search < 0.8 * by_chance
 
 
+@pytest.mark.unmeasured
 def test_a_search_that_was_stopped_goes_on_ends_alike_and_tells_how_far_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -284,6 +284,7 @@ def test_another_specification_makes_another_plan(tmp_path: Path) -> None:
     assert imported.plan().origin is not None
 
 
+@pytest.mark.unmeasured
 def test_the_same_outcomes_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     study, looks_at = until_clear(30), list[int]()
 

@@ -81,6 +81,7 @@ def test_scores_are_of_several_sizes_and_of_faults(
     assert {score.condition for score in scores if score.measure == "P"} == conditions
 
 
+@pytest.mark.unmeasured
 def test_the_best_evaluation_is_the_highest_and_the_curve_is_written(tmp_path: Path) -> None:
     rows = [(0, 1.0), (500, 40.0), (1000, 90.0), (1500, 80.0)]
     log = TrainingLog(

@@ -165,6 +165,7 @@ def test_a_checkpoint_of_worlds_with_removed_robots_goes_on_to_the_same_bits(
             assert array.tobytes() == saved_array.tobytes()
 
 
+@pytest.mark.unmeasured
 def test_a_policy_follows_from_its_seed_whatever_callbacks_see_or_stop(
     small: Any, done: Path, tmp_path: Path
 ) -> None:
@@ -337,6 +338,7 @@ def test_deviations_keep_above_their_floor(small: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(ended["deviations"], [0.5, 0.4, 0.4], rtol=1e-5)
 
 
+@pytest.mark.unmeasured
 def test_where_the_rate_begins_anew_adam_does_too_also_in_a_training_that_goes_on(
     small: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,6 +10,7 @@ from swarm_logistics_env.train import Training, load_training, preset_names
 from swarm_logistics_env.train.settings import PPOSettings
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("name", preset_names())
 def test_every_preset_can_be(name: str) -> None:
     training = load_training(name)

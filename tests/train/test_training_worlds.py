@@ -20,6 +20,7 @@ def mixed(*kinds: Conditions) -> EpisodeMix:
     return EpisodeMix(SwarmLogisticsEnv(n_robots=4, n_items=5, duration=1.0), kinds)
 
 
+@pytest.mark.unmeasured
 def test_episodes_are_drawn_by_weight_and_seed() -> None:
     kinds = (
         Conditions(weight=3.0),

@@ -49,8 +49,8 @@ def test_every_golden_trajectory_is_as_recorded_when_a_copy_goes_on_beside_other
         complain(explained(dict(zip(GOLDEN, played, strict=True))))
 
 
+@pytest.mark.daily  # The gate begins with all of them, in a process of its own.
 def test_another_process_plays_them_as_recorded() -> None:
-    # Some of them: `make test` begins with all, in a process of its own.
     words = [sys.executable, "-c", ANOTHER_PROCESS]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.stdout == "None\n", done.stdout + done.stderr

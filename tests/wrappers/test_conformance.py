@@ -81,6 +81,7 @@ def conformance(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
         yield importlib.import_module("pettingzoo.test")
 
 
+@pytest.mark.unmeasured
 @each_stack
 def test_pettingzoos_own_tests_pass(conformance: ModuleType, stack: str) -> None:
     conformance.parallel_api_test(stacked(stack, 12), num_cycles=45)
@@ -116,6 +117,7 @@ def test_two_wrappers_stack_in_either_order_or_are_refused_when_made(
         conformance.parallel_api_test(WRAPPERS[outer](env), num_cycles=45)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("n_robots", [1, 12])
 @each_stack
 def test_what_is_seen_stays_in_its_space_and_no_step_follows_the_end(
@@ -165,6 +167,7 @@ def test_a_copy_made_halfway_is_an_exact_twin(stack: str) -> None:
         np.testing.assert_equal(env.reset(), twin.reset())
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("stack", list(STACKS)[:3])
 def test_arrays_and_dicts_are_one_environment(stack: str) -> None:
     dicts, arrays = stacked(stack, 6), stacked(stack, 6)

@@ -131,6 +131,7 @@ OTHER: dict[str, Any] = {
 }  # fmt: skip
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("name", sorted(CHANGES_DURING_RUN))
 def test_in_mid_run_it_is_a_change_of_the_warehouse_at_that_time(name: str) -> None:
     fields = {"battery": 500.0} if name in ("charging_power", "dead_stations") else {}

@@ -53,6 +53,7 @@ def test_means_at_the_start_hold_for_the_whole_episode() -> None:
         assert env.payments == payments
 
 
+@pytest.mark.unmeasured
 def test_running_means_are_those_of_the_episodes_that_ended() -> None:
     means = RunningMeans(window=2)
     env = rewarded({"R": 1.0, "FT": 1.0}, means)

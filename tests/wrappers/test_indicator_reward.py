@@ -117,6 +117,7 @@ def test_a_change_in_mid_run_makes_the_return_the_adaptability() -> None:
     assert not rewards[:59].any()
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(("onset", "role"), [(0.0, "searching"), (4.0, "shuffling")])
 @pytest.mark.parametrize(("mode", "lost"), [("motor_slow", "n_failed"), ("removed", "n_removed")])
 def test_faults_by_role_count_as_the_robots_that_they_strike(
@@ -176,6 +177,7 @@ WITHOUT_ONE: dict[str, tuple[Condition, Any, Callable[[int], float]]] = {
 }
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("credit", ["team", "deliverer"])
 @each_indicator
 def test_the_same_robots_are_removed_in_the_references(name: str, credit: Any) -> None:

@@ -21,6 +21,8 @@ from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.study.verdicts.verdict import Decision
 from tests.made_up import decided, delivered, judged, paper
 
+pytestmark = pytest.mark.unmeasured
+
 
 def test_every_question_has_a_row_with_its_numbers_and_one_word(few: StudyResults) -> None:
     lines = answer(few).lines

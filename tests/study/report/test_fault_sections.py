@@ -102,6 +102,7 @@ def test_swarm_that_never_comes_back_is_censored() -> None:
     assert row[1::2] == ("refuted", "refuted")
 
 
+@pytest.mark.unmeasured
 def test_no_loss_leaves_robustness_local_in_time_but_for_a_cap() -> None:
     unharmed = after_a_fault(1.0, back=END)
     (comparison,) = (c for c in unharmed.plan.comparisons if c.indicator == "FT")

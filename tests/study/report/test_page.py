@@ -33,6 +33,8 @@ from tests.conftest import SMALL, figures_drawn
 from tests.made_up import delivered, judged
 from verification.browser import Browser
 
+pytestmark = pytest.mark.unmeasured
+
 HOSTILE = "</script><script>alert(1)</script>"
 
 

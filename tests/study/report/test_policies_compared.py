@@ -38,6 +38,7 @@ def play(policy: str, setting: Setting, seed: int) -> Outcome:
     return delivered(usual, digest=f"{policy} {setting} {seed}")
 
 
+@pytest.mark.unmeasured
 def test_the_first_line_says_the_factor_where_it_holds_turns_and_is_open() -> None:
     results = judged(study_of("homing", "swarm-dt"), play)
     words = comparison_in_words(results)
@@ -87,6 +88,7 @@ def test_one_figure_has_p_of_both_policies_in_every_condition() -> None:
     assert len(panel.points) == 2 * 4
 
 
+@pytest.mark.unmeasured
 def test_the_factor_is_that_of_the_means_and_its_interval_as_a_bootstraps() -> None:
     rng = np.random.default_rng(0)
     scatter = {policy: rng.normal(0.0, 12.0, 12) for policy in ("homing", "swarm-dt")}

@@ -18,6 +18,8 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from tests.conftest import figures_drawn
 from tests.made_up import delivered, judged
 
+pytestmark = pytest.mark.unmeasured
+
 
 def results(sizes: list[int], missing: int | None = None) -> StudyResults:
     """Two policies, of which homing delivers more and has fewer contacts.

@@ -55,6 +55,7 @@ def test_there_are_as_many_workers_as_this_process_may_use_cores(
     assert cores() == 61
 
 
+@pytest.mark.unmeasured
 def test_two_shards_merged(played: Path, tmp_path: Path) -> None:
     parts, half = [tmp_path / "1", tmp_path / "2"], len(Study.stored(played).plan().runs) // 2
     for number, part in enumerate(parts, start=1):

@@ -17,6 +17,8 @@ from swarm_logistics_env.policies import PolicySpec
 from swarm_logistics_env.policies.catalogue import WEIGHTS
 from swarm_logistics_env.study.studies import Study
 
+pytestmark = pytest.mark.unmeasured
+
 SCALED = """\
 from gains import GAIN
 from swarm_logistics_env import policies

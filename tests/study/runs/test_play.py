@@ -18,6 +18,8 @@ from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.policies.episode import Play, run_episode
 from swarm_logistics_env.study.studies import Study
 
+pytestmark = pytest.mark.unmeasured
+
 
 class Exiting(SwarmDT):
     """Ends the process, as it thinks, at a moment of its second run."""

@@ -85,6 +85,7 @@ def test_csv_says_what_the_store_holds_sorted_and_without_wall_times(
 
 
 # An empty policy beside another one is refused.
+@pytest.mark.unmeasured
 @given(text=st.text(st.sampled_from("=+-@'\"a1 ;.\t\r\n"), max_size=5).filter(str.strip))
 def test_no_text_in_a_csv_is_a_formula_and_each_is_read_again(text: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
@@ -191,6 +192,7 @@ def test_contacts_that_nobody_counted_are_missing_and_never_0(tmp_path: Path) ->
     assert "longest_queue" not in table  # of orders, which no run had
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     "text", ["\udc80a\0b\x1b[2J\u2028", "x" * 5_000_000, "line\n" * 30_000, "\n", ""]
 )
@@ -233,6 +235,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.unmeasured
 def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     makers = [subprocess.Popen([sys.executable, "-c", MAKER, name], **pipes) for name in "01"]

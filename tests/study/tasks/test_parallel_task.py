@@ -52,6 +52,7 @@ def only_run(task: object, **fields: Any) -> Run:
     return study.plan().runs[0]
 
 
+@pytest.mark.unmeasured
 def test_a_study_plays_sizes_parameters_and_failure_modes(study: Study) -> None:
     results = study.findings()
     p = {(cell.policy, cell.words): cell.by_seed for cell in results.cells}
@@ -197,7 +198,9 @@ def test_failing_runs_are_outcomes_with_their_reason(
     task: ParallelTask, policy: object, words: str
 ) -> None:
     assert words in str(only_run(task, policies=[policy]).play().error)
-    # By references, what is below zero is a score.
+
+
+def test_by_references_what_is_below_zero_is_a_score() -> None:
     scored = only_run(task_of(performance=costs, references=(-20.0, 0.0))).play()
     assert (scored.error, scored.delivered) == (None, 0.5)
 
@@ -237,6 +240,7 @@ def test_what_cannot_be_is_refused_before_any_run(fields: dict[str, Any], words:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.unmeasured
 def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
     assert task_of().code() == task_of().code()
     assert "pettingzoo" in task_of().code()
@@ -245,6 +249,7 @@ def test_settings_code_and_versions_are_part_of_the_code_version() -> None:
     assert len({task.code() for task in (task_of(), *changed_tasks)}) == 6
 
 
+@pytest.mark.unmeasured
 def test_a_task_is_known_by_what_its_functions_hold() -> None:
     def closed(length: int) -> ParallelTask:
         return task_of(make_env=lambda n_robots: Lane(n_robots, length))
@@ -284,6 +289,7 @@ def test_a_task_has_one_code_version_in_every_process_and_folder(tmp_path: Path)
     assert len(codes) == 1
 
 
+@pytest.mark.unmeasured
 def test_a_task_that_cannot_be_compared_plays_in_its_workers_and_counts_for_no_other() -> None:
     def made() -> ParallelTask:
         lock = threading.RLock()

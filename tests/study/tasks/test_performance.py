@@ -94,6 +94,7 @@ def test_a_condition_without_the_measure_is_refused_before_it_is_played() -> Non
         Performance(measure="stands_still").of_run(Outcome(untimed=3.0))
 
 
+@pytest.mark.unmeasured
 def test_the_same_runs_are_judged_by_another_measure_which_is_exploratory(tmp_path: Path) -> None:
     asked = {"scenario": ORDERS, "policies": ["homing"], "seeds": 3, **FAULTS}
     study = Study(out=tmp_path, performance="on_time", **asked)

@@ -65,6 +65,7 @@ def test_a_gate_names_the_verdicts_that_fail_or_is_refused() -> None:
             Gate.parse(text)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("text", "old", "new", "failing"),
     [

@@ -20,6 +20,8 @@ from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 from tests.conftest import SMALL
 from tests.made_up import decided, judged, paper, published
 
+pytestmark = pytest.mark.unmeasured
+
 
 def by_question(results: StudyResults) -> dict[tuple[str, str, float], Verdict]:
     """The verdicts by indicator, comparison and threshold."""

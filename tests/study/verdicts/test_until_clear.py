@@ -179,6 +179,7 @@ def test_clear_comparisons_stop_early_and_their_conditions_get_no_more_seeds(
         assert estimate.p_value == alone.p_value
 
 
+@pytest.mark.unmeasured
 def test_a_change_within_the_margin_is_played_no_further() -> None:
     def hardly_changed(run: Run, _: Outcome) -> Outcome:
         rng = np.random.default_rng([run.seed, *map(ord, mode_of(run))])
@@ -283,6 +284,7 @@ def test_another_most_is_exploratory_and_shards_are_refused(tmp_path: Path) -> N
         longer.run(Engine(), shard=Shard(1, 2))
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("model", MODELS)
 def test_wrong_verdicts_over_all_looks_are_bounded(model: str) -> None:
     # 1,000 studies tell 0.05 to 0.014; `python -m verification.verdict_errors` plays 2,000.
@@ -344,6 +346,7 @@ def test_every_step_of_holm_at_a_look_has_a_level_of_its_own() -> None:
     } == dict.fromkeys(wanted, ("supported", 10))
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("shares", "equivalent"),
     [((0.85, 0.85, 0.85), {"FM2", "FM3", "FM4"}), ((0.85, 1.2, 0.85), {"FM4"})],

@@ -85,6 +85,7 @@ def test_an_error_of_usage_is_a_line_and_names_the_help(command: Command) -> Non
     assert "Help: swarm-logistics run --help" in command("run --sed 3", code=2)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("module", ["swarm_logistics_env", "swarm_logistics_env.views.cli"])
 def test_the_package_is_the_command(module: str) -> None:
     words = [sys.executable, "-m", module, "--version"]

@@ -45,6 +45,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("new", "gate", "code", "words"),
     [

@@ -177,6 +177,7 @@ def test_trials_are_judged_from_python_without_a_file(
     assert {*folder.rglob("*")} == before
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("option", ["", "--out mine"])
 def test_the_same_trials_again_finish_a_judgement_that_was_interrupted(
     option: str, command: Command, monkeypatch: pytest.MonkeyPatch
@@ -248,6 +249,7 @@ def test_help_shows_the_options_of_what_is_judged(command: Command) -> None:
         assert {*names} == {*mine, "--out", "--full", "--help"}
 
 
+@pytest.mark.unmeasured
 def test_a_policy_is_judged_and_the_same_command_plays_nothing_twice(command: Command) -> None:
     words = "judge homing --processes 1 --seeds 5"
     printed = command(f"{words} --minutes 0")

@@ -145,6 +145,7 @@ class Waiting(SwarmDT):
 """
 
 
+@pytest.mark.unmeasured
 def test_ctrl_c_stops_and_says_how_to_go_on(file: Path) -> None:
     Path("waiting_policy.py").write_text(WAITING)
     words = "study run mine.toml --seeds 30 --processes 2 --out out --policy waiting_policy:Waiting"

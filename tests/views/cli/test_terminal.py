@@ -13,7 +13,7 @@ from rich.console import Console
 from swarm_logistics_env.core.progress_bar import clock
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.verdicts.results import judge
+from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.views.cli import terminal
 from swarm_logistics_env.views.cli.terminal import what_the_rest_takes
 from tests.made_up import delivered, looked_at, paper
@@ -24,16 +24,23 @@ def console_of(width: int | None) -> Callable[..., Console]:
     return partial(Console, width=width, force_terminal=width is not None)
 
 
+@pytest.fixture(scope="module")
+def judged_studies() -> list[StudyResults]:
+    """Return a study of two policies and one that plays until its verdicts are clear."""
+    return [paper(seeds=4, policies=["swarm-dt", "swarm-dt-follow"]), looked_at()]
+
+
 @pytest.mark.parametrize("width", [60, 80, 120, None])
 def test_terminal_pipe_and_file_have_the_same_content_and_no_row_is_folded(
     width: int | None,
+    judged_studies: list[StudyResults],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(terminal, "Console", console_of(width))
     monkeypatch.setattr(terminal, "write_document", lambda *_: [tmp_path])
-    for results in (paper(seeds=4, policies=["swarm-dt", "swarm-dt-follow"]), looked_at()):
+    for results in judged_studies:
         terminal.show_report(results, tmp_path, full=False)
         printed = capsys.readouterr().out
         text, _, _ = printed.partition("\nReport: ")

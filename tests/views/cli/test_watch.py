@@ -44,6 +44,7 @@ sys.exit(app.run(["watch", "--port", "0", "--set", "n_robots=5"]))
 """
 
 
+@pytest.mark.unmeasured
 def test_page_is_served_until_ctrl_c_without_pygame() -> None:
     started = subprocess.Popen(
         [sys.executable, "-u", "-c", SCRIPT],

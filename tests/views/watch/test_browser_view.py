@@ -13,6 +13,8 @@ from swarm_logistics_env.views.watch.messages import recorded_page
 from tests.views.watch.conftest import SMALL, Served
 from verification.browser import Browser
 
+pytestmark = pytest.mark.unmeasured
+
 
 @pytest.fixture
 def browser(tmp_path: Path) -> Iterator[Browser]:

@@ -63,6 +63,7 @@ def test_time_passes_at_the_speed_that_the_budget_allows_unless_it_is_paused() -
     assert session.paused
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("mode", sorted(FAILURE_MODES.keys() - {"cell_fades"}))
 def test_robot_breaks_and_is_repaired(mode: str) -> None:
     session = Session(SMALL)
@@ -274,6 +275,7 @@ def test_a_long_recording_is_bounded_and_its_frames_stay_right(
     assert failed == [2 if time >= 7.0 else 0 for time in times]
 
 
+@pytest.mark.daily
 def test_what_a_fault_costs_shows_within_ten_seconds() -> None:
     session = Session(SMALL, "random-walk", against="homing")
     session.pause()
@@ -325,6 +327,7 @@ def broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], S
     return lambda name: Session(SMALL, "homing", f"broken_policy:{name}")
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("name", "reason"),
     [

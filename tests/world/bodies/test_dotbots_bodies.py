@@ -57,6 +57,7 @@ def test_a_robot_turns_to_the_left_at_the_rate_that_it_wants() -> None:
     assert turned == pytest.approx([2.0, -2.0], abs=0.3)
 
 
+@pytest.mark.unmeasured
 def test_a_fence_stops_robots_at_the_walls_that_the_simulator_has_not() -> None:
     bodies = placed(headings=(0.0, np.pi))
     poses = drive(bodies, 10.0, (0.3, 0.0), (0.3, 0.0))

@@ -180,6 +180,7 @@ def test_a_robot_that_presses_on_a_wall_still_turns(heading: float) -> None:
     assert float(poses.heading[0]) - heading > 0.4 * (6 * 0.1 * 2.0)
 
 
+@pytest.mark.unmeasured
 def test_an_episode_is_the_same_twice_and_no_item_vanishes() -> None:
     scenario = Scenario.preset("realistic").replace(
         bodies="mujoco", n_robots=6, n_items=12, duration=20.0

@@ -138,6 +138,7 @@ def test_the_border_sets_right_how_far_it_is_home(memory: Memory) -> None:
         assert memory[0, MEMORY.away] == pytest.approx(-0.1 * speed)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.compiled
 def test_in_a_run_robots_with_fm2_find_out_and_no_healthy_one_believes_it() -> None:
     policy: Any = policies.load("ppo-robust")

@@ -255,6 +255,7 @@ def test_nothing_is_left_once_the_file_is_served(build: Build) -> None:
     assert (requested_items(world), waiting_items(world)) == ([], [])
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("number", range(6))
 def test_every_promise_holds_in_random_worlds_with_all_fields(number: int) -> None:
     source = random.Random(number)

@@ -20,6 +20,8 @@ from swarm_logistics_env.world.observations import N_COLUMNS
 from swarm_logistics_env.world.warehouse import thread_pool
 from swarm_logistics_env.world.warehouse.thread_pool import WorldThreadPool
 
+pytestmark = pytest.mark.unmeasured
+
 SIZES, FIRSTS = (2, 5, 1, 3), [0, 2, 7, 8]
 
 

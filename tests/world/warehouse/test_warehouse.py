@@ -113,6 +113,7 @@ def test_a_change_of_the_top_speed_holds_from_the_next_step_on(build: Build) -> 
     assert world.state.robot_velocity[0, 0] == pytest.approx(0.5)
 
 
+@pytest.mark.unmeasured
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda world: pickle.loads(pickle.dumps(world))])
 @pytest.mark.parametrize(("moment", "is_changed"), [(20, True), (520, False), (520, True)])
 def test_a_copy_goes_on_alike_after_many_steps_and_after_a_change(
