@@ -106,18 +106,29 @@ class Indicators(Part):
     """Indicators as the reward: arguments of `wrappers.IndicatorReward`.
 
     Args:
-        weights: "R", "A" and "P" with their weights. FT needs P of a smaller swarm too, and S a
-            swarm that grows: give them to `wrappers.IndicatorReward` in a loop of your own. A is
-            of episodes in which one parameter differs.
-        references: P_o of the policy to improve on [items].
+        weights: "S", "FT", "R", "A" and "P" with their weights. A is of episodes in which one
+            parameter differs. FT is relative to episodes in which robots are "removed", and S to
+            the smallest swarm among worlds that are alike but for their size.
+        references: P_o of the policy to improve on [items], for R, A and P; or "measured", the
+            running means of the policy that learns, in worlds that are alike but for their size.
         credit: the robots that are paid for a delivery: "team" or "deliverer".
         constant: whether to pay an indicator's constant.
     """
 
-    weights: Annotated[dict[Literal["R", "A", "P"], float], Field(min_length=1)]
-    references: PositiveFloat
+    weights: Annotated[dict[Literal["S", "FT", "R", "A", "P"], float], Field(min_length=1)]
+    references: PositiveFloat | Literal["measured"]
     credit: Literal["team", "deliverer"] = "team"
     constant: bool = True
+
+    @model_validator(mode="after")
+    def _check_references(self) -> Self:
+        for name in {"S", "FT"} & self.weights.keys():
+            if self.references != "measured":
+                raise ValueError(
+                    f'references = {self.references}: should be "measured" where {name} is paid, '
+                    "which is relative to swarms of another size"
+                )
+        return self
 
 
 class PPOSettings(Part):

@@ -99,6 +99,7 @@ class Training(Part):
         if any(scenario.message_size for _, scenario in self.each_world):
             raise ValueError("scenario.message_size: should be 0, the network sends no messages")
         self._check_decisions()
+        self._check_indicators()
         if self.network.says_classes:
             for name in ("deviations", "least_deviation", "least_until"):
                 if getattr(self.ppo, name) != PPOSettings.model_fields[name].default:
@@ -142,6 +143,26 @@ class Training(Part):
                 " and delivered items should come back, or episodes end between two decisions"
             )
 
+    def _check_indicators(self) -> None:
+        """Raise a ValueError if no episode has what an indicator is relative to."""
+        weights = self.indicators.weights if self.indicators else {}
+        if "S" in weights and all(
+            scenario == self.smallest_alike(scenario) for _, scenario in self.each_world
+        ):
+            raise ValueError(
+                "indicators.weights: S should have worlds that differ in n_robots alone, as it is "
+                "relative to the smallest of them"
+            )
+        for world in self.worlds if "FT" in weights else ():
+            kinds = world.conditions or self.conditions
+            removed = {m for kind in kinds if "removed" in kind.modes for m in kind.robots}
+            faulty = {m for kind in kinds if {*kind.modes} - {"removed"} for m in kind.robots}
+            for m in sorted(faulty - removed):
+                raise ValueError(
+                    f'indicators.weights: FT should have conditions with modes = ["removed"], '
+                    f"robots = [{m}], as FT of {m} faulty robots is relative to them"
+                )
+
     def rewards_at(self, progress: float) -> dict[str, float]:
         """Return the weights of the reward's terms at a time of the training, from 0 to 1."""
         ends = {**self.rewards, **self.final_rewards}
@@ -158,6 +179,15 @@ class Training(Part):
             for kind in self.worlds
             for _ in range(kind.count)
         )
+
+    def smallest_alike(self, scenario: Scenario) -> Scenario:
+        """Return the smallest of the worlds' scenarios that differ from one in `n_robots` alone."""
+        sizes = [
+            alike.n_robots
+            for _, alike in self.each_world
+            if alike == scenario.replace(n_robots=alike.n_robots)
+        ]
+        return scenario.replace(n_robots=min(sizes))
 
     @property
     def evaluation_scenario(self) -> Scenario:

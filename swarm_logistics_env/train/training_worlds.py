@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -23,21 +24,31 @@ from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.world.motion.classes import GROUPS, classes_of, outputs_of
 from swarm_logistics_env.world.motion.frame import OUTPUTS, MotionView
 from swarm_logistics_env.world.motion.memory import bodies_of
+from swarm_logistics_env.world.scenario import Scenario
 from swarm_logistics_env.world.warehouse import Fault
-from swarm_logistics_env.wrappers import IndicatorReward, Wrapper
+from swarm_logistics_env.wrappers import IndicatorReward, RunningMeans, SwarmSize, Wrapper
 
 
 def make_worlds(training: Training) -> SwarmVecEnv:
     """Return the worlds of a training, not yet begun; it raises what `NetworkView` does."""
     worlds = training.each_world
+    means: defaultdict[Scenario, RunningMeans] = defaultdict(RunningMeans)
 
     def make_env(number: int) -> Wrapper:
         kind, scenario = worlds[number]
-        core = SwarmLogisticsEnv(scenario, rewards=training.rewards)
-        env = EpisodeMix(core, kind.conditions or training.conditions)
-        if training.indicators is None:
-            return env
-        return IndicatorReward(env, **dict(training.indicators), own_reward=1.0)
+        conditions = kind.conditions or training.conditions
+        indicators = training.indicators
+        if indicators is None:
+            return EpisodeMix(SwarmLogisticsEnv(scenario, rewards=training.rewards), conditions)
+        smallest = training.smallest_alike(scenario)
+        base = smallest if "S" in indicators.weights else scenario
+        env: Wrapper = EpisodeMix(SwarmLogisticsEnv(base, rewards=training.rewards), conditions)
+        if base != scenario:
+            env = SwarmSize(env, [kind.n_robots])
+        arguments = dict(indicators)
+        if indicators.references == "measured":
+            arguments["references"] = means[smallest]
+        return IndicatorReward(env, **arguments, own_reward=1.0)
 
     return SwarmVecEnv(make_env=make_env, n_worlds=len(worlds), threads=training.threads)
 

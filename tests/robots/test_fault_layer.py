@@ -20,7 +20,7 @@ SILENT = Scenario(
     n_robots=8, n_items=14, warehouse_width=5.0, warehouse_height=4.0, duration=60.0, restock=True,
     radio_range=0.01,
 )  # fmt: skip
-N_STEPS = 250
+N_STEPS = 170
 
 
 def run(scenario: Scenario, faults: list[Any], layers: list[FaultLayer]) -> np.ndarray[Any, Any]:

@@ -22,7 +22,7 @@ threads = 1
 agent_steps = 800
 worlds = [{ n_robots = 3 }, { n_robots = 5 }]
 conditions = [{}, { modes = ["FM1", "removed"], robots = [1] }]
-indicators = { weights = { R = 1.0, P = 0.1 }, references = 5.0 }
+indicators = { weights = { S = 1.0, FT = 1.0, R = 1.0, P = 0.1 }, references = "measured" }
 network = { hidden = [8] }
 ppo = { n_steps = 20, n_minibatches = 2, epochs = 2, value_hidden = [8] }
 evaluation = { every = 200, seeds = 2, n_robots = 5, faults = { FM4 = 1 } }

@@ -64,7 +64,19 @@ def test_worlds_of_several_kinds_stand_side_by_side() -> None:
         ("worlds = [{ scenario.n_robots = 5 }]", "the swarm size is a field of its own"),
         ("worlds = [{ n_robots = 2 }]\nconditions = [{ modes = ['FM1'] }]", "swarm, 2 robots"),
         ("conditions = [{ modes = ['FM9'] }]", "no failure mode 'FM9'; did you mean"),
-        ("indicators = { weights.FT = 1.0, references = 9.0 }", "should be 'R', 'A' or 'P'"),
+        ("indicators = { weights.Q = 1.0, references = 9.0 }", "should be 'S', 'FT', 'R', 'A' or"),
+        ("indicators = { weights.FT = 1.0, references = 9.0 }", 'should be "measured" where FT'),
+        (
+            "indicators = { weights.S = 1.0, references = 'measured' }",
+            "S should have worlds that differ in n_robots alone",
+        ),
+        (
+            (
+                "conditions = [{ modes = ['FM4'], robots = [2] }]\n"
+                "indicators = { weights.FT = 1.0, references = 'measured' }"
+            ),
+            r'FT should have conditions with modes = \["removed"\], robots = \[2\]',
+        ),
         ("conditions = [{ onset = [9, 1] }]", "should be the earliest time, then the latest"),
         ("conditions = [{ scenario.n_robots = [5] }]", "swarm sizes belong in `worlds`"),
     ],

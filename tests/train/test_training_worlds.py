@@ -14,6 +14,7 @@ from swarm_logistics_env.train.settings import Conditions
 from swarm_logistics_env.train.training_worlds import EpisodeMix, NetworkView, make_worlds
 from swarm_logistics_env.world.motion.memory import BODY, MEMORY, OPEN, body_of
 from swarm_logistics_env.world.warehouse import Fault
+from swarm_logistics_env.wrappers import Condition
 
 
 def mixed(*kinds: Conditions) -> EpisodeMix:
@@ -63,6 +64,38 @@ def test_kinds_of_worlds_play_their_own_conditions_or_else_those_of_the_training
     env.reset()
     faults = [[(f.mode, f.robots) for f in world.warehouse.faults] for world in env.worlds]
     assert faults == [[("FM2", 1)], [("FM4", 2)]]
+
+
+def test_indicators_are_relative_to_what_was_measured_in_worlds_that_are_alike(small: Any) -> None:
+    conditions = [
+        {"modes": ["FM4"], "robots": [1]},
+        {"modes": ["removed"], "robots": [1]},
+        {"scenario": {"max_speed": [1.5]}},
+    ]
+    kinds = [{"n_robots": 2}, {"n_robots": 4}, {"n_robots": 4, "scenario": {"n_items": 6}}]
+    weights = {"S": 1.0, "FT": 1.0, "R": 1.0, "A": 1.0, "P": 0.1}
+    indicators = {"weights": weights, "references": "measured"}
+    env = make_worlds(small(worlds=kinds, conditions=conditions, indicators=indicators))
+    few, many, apart = env.worlds
+    assert few.measured is many.measured is not apart.measured
+    assert env.num_envs == 2 + 4 + 4
+    for condition, p in (
+        (Condition(2), 10),
+        (Condition(2, ("FM4",), 1), 5),
+        (Condition(2, n_removed=1), 4),
+        (Condition(4), 16),
+    ):
+        few.measured.add(condition, p)
+    # S of twice as many robots is relative to the small world: 2 / 2 x (P - 10) / 10.
+    assert many.payments_of(Condition(4))["S"].share == pytest.approx(0.1)
+    assert many.payments_of(Condition(4))["S"].constant == pytest.approx(-1.0)
+    ft = few.payments_of(Condition(2, ("FM4",), 1))["FT"]
+    assert (ft.share, ft.constant) == (pytest.approx(0.1), pytest.approx(-0.4))
+    env.seed(0)
+    env.reset()
+    for _ in range(2 * 60):  # two episodes in each world
+        env.step(np.zeros((env.num_envs, 4), np.float32))
+    assert {condition.n_robots for condition in apart.measured.conditions} == {4}
 
 
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:

@@ -27,7 +27,7 @@ from swarm_logistics_env.world.warehouse.state import WarehouseState
 from verification.invariants import Watch
 from verification.reference import Faults, Planned, Radio, ends, rewards
 
-EXAMPLES = 2000 if settings().max_examples >= 2000 else 25
+EXAMPLES = 2000 if settings().max_examples >= 2000 else 15
 STEPS = 36  # a radio that is late by 2 s is late by 20 of these
 
 

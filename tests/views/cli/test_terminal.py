@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from swarm_logistics_env.core.progress_bar import clock
-from swarm_logistics_env.study.report.answer import answer
+from swarm_logistics_env.study.report.document import Document, document
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.views.cli import terminal
@@ -25,29 +25,31 @@ def console_of(width: int | None) -> Callable[..., Console]:
 
 
 @pytest.fixture(scope="module")
-def judged_studies() -> list[StudyResults]:
+def documents() -> list[tuple[StudyResults, Document]]:
     """Return a study of two policies and one that plays until its verdicts are clear."""
-    return [paper(seeds=4, policies=["swarm-dt", "swarm-dt-follow"]), looked_at()]
+    studies = [paper(seeds=4, policies=["swarm-dt", "swarm-dt-follow"]), looked_at()]
+    return [(results, document(results)) for results in studies]
 
 
 @pytest.mark.parametrize("width", [60, 80, 120, None])
 def test_terminal_pipe_and_file_have_the_same_content_and_no_row_is_folded(
     width: int | None,
-    judged_studies: list[StudyResults],
+    documents: list[tuple[StudyResults, Document]],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(terminal, "Console", console_of(width))
     monkeypatch.setattr(terminal, "write_document", lambda *_: [tmp_path])
-    for results in judged_studies:
+    for results, report in documents:
+        monkeypatch.setattr(terminal, "document", lambda _, report=report: report)
         terminal.show_report(results, tmp_path, full=False)
         printed = capsys.readouterr().out
         text, _, _ = printed.partition("\nReport: ")
         assert "\x1b" not in printed
         assert width is None or max(map(len, text.splitlines())) <= width
         unfolded = " ".join(text.split())
-        study_answer = answer(results)
+        study_answer = report.answer
         for sentence in (*study_answer.head, study_answer.notes):
             assert sentence in unfolded
         rows = text.splitlines()
