@@ -120,7 +120,9 @@ def publish(rows: Sequence[dict[str, Any]]) -> None:
     """Write the table of the page."""
     body = []
     for row in rows:
-        change = spi.Interval(*(float(row[end]) for end in ENDS))
+        # Without spread between seeds there are no limits.
+        limits = (float(row[end]) if row[end] else None for end in ("low", "high"))
+        change = spi.Interval(float(row["change"]), *limits)
         p = (f"{float(row[name]):.1f}" for name in ("shipped P", "searched P"))
         body.append((f"`{row['script']}`", row["preset"], row["sets"], *p, _percent(change)))
     head = ("script", "preset", "sets", "P, shipped", "P, searched there alone", "change")

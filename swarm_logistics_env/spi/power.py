@@ -255,11 +255,12 @@ def _needed(estimate: Estimate, distance: float, n: int, sd: float) -> tuple[flo
     needed = float(stdtrit(df, 1.0 - error))
     if hidden is not None:
         seen = Hidden(np.floor(hidden.seen / hidden.of * n), n, hidden.most)
-        for share in np.linspace(0.0, hidden.most, _SHARES)[1:]:
-            remaining, chance = remainder_and_chance(float(share), seen)
-            if chance > error:
-                lost = reached - float(statistic(log_ratio(more * remaining, less), s))
-                needed = max(needed, float(stdtrit(df, 1.0 - error / chance)) + lost)
+        shares = np.linspace(0.0, hidden.most, _SHARES)[1:]
+        remaining, chance = remainder_and_chance(shares, seen)
+        counts = chance > error
+        lost = reached - statistic(log_ratio(more * remaining[counts], less), s)
+        needed_if_hidden = stdtrit(df, 1.0 - error / chance[counts]) + lost
+        needed = float(np.max(needed_if_hidden, initial=needed))
     return needed, reached
 
 
