@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from research import play_curves
+from research.tables import rewrite
 from swarm_logistics_env.study import Study
 
 
@@ -44,5 +45,10 @@ def test_a_table_of_a_curve_has_p_standstills_and_r_at_each_point(
     assert [row.split(" | ")[1] for row in rows[:3]] == labels
     assert rows[1].startswith("| `homing` | runs that stand still | 100 % |")  # none in 3 s
     assert "FM4 in 8 % of the robots" in rows[-1]
-    play_curves.draw(results)
+    page = tmp_path / "page.md"
+    begin_and_end = [f"<!-- tables: {name} -->\n<!-- end of tables -->" for name in blocks]
+    page.write_text("\n".join(begin_and_end), encoding="utf-8")
+    rewrite(page, blocks)
+    monkeypatch.setattr(play_curves, "PAGE", page)
+    play_curves.draw()
     assert (tmp_path / "curves.png").stat().st_size > 1_000

@@ -30,6 +30,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # 
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LINES = ("-", "--", "-.", ":")
 WIDTH = 5.2  # inch: still legible at the width of a phone
+_LEGEND_WIDTH = 1.6  # inch, of a column
 _LETTERS_OF_AN_INCH = 16.0  # of a note
 _LINE_HEIGHT = 0.15  # inch, of a note
 _WIDEST = 30.0  # times the smallest P, up to which an axis of P is linear
@@ -354,7 +355,8 @@ def add_legend(canvas: Canvas, axes: Axes) -> None:
     """Put the legend of one pair of axes above all of them, each series once."""
     handles, labels = axes.get_legend_handles_labels()
     series = dict(zip(labels, handles))
-    canvas.legend(series.values(), series, loc="outside upper left", ncols=min(len(series), 3))
+    n_columns = min(len(series), int(canvas.get_figwidth() / _LEGEND_WIDTH))
+    canvas.legend(series.values(), series, loc="outside upper left", ncols=n_columns)
 
 
 def marker_of(index: int) -> str:

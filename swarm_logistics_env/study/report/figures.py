@@ -61,7 +61,7 @@ def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]
         _rows(results, verdicts),
         0.9 + 0.2 * len(rows),
         partial(drawing.forest, columns={forest_label(answer): rows}, title=title),
-        _note(results, verdicts),
+        note_on_verdicts(results, verdicts),
     )
 
 
@@ -130,7 +130,7 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
             rows,
             0.3 + 2.3 * len(panels),
             partial(drawing.intervals, panels=panels),
-            _note(results, verdicts) + crosses,
+            note_on_verdicts(results, verdicts) + crosses,
             title=f"{' and '.join(symbols)}: {condition}",
             panels=panels,
         )
@@ -278,7 +278,7 @@ def _rows(results: StudyResults, verdicts: Sequence[Verdict]) -> pd.DataFrame:
 CAPPED = "†: P is capped, every item was delivered in a run."
 
 
-def _note(results: StudyResults, verdicts: Sequence[Verdict]) -> str:
+def note_on_verdicts(results: StudyResults, verdicts: Sequence[Verdict]) -> str:
     """Return what the marks of verdicts mean, and over which seeds they are."""
     caps = f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
     return (
