@@ -103,9 +103,11 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
     lines = [f"# {document.title}", ""]
     for paragraph in (*document.text, note):
         lines += [_inert(paragraph), ""] if paragraph else []
-    compared = document.answer.compared or Section("")
-    head = compared._replace(title="Answer", lines=tuple(document.answer.head))
-    lines += [section_markdown(head), section_markdown(document.answer.section)]
+    answer = document.answer
+    overview = answer.overview or Section("")
+    opening = Section("Answer", lines=tuple(answer.opening))
+    summary = overview._replace(lines=tuple(answer.summary))
+    lines += map(section_markdown, (opening, summary, answer.section))
     for chapter in document.chapters:
         lines += [f"## {chapter.title}", ""]
         lines += [chapter.text, ""] if chapter.text else []
