@@ -214,20 +214,16 @@ def _overview(results: StudyResults, subjects: Sequence[SubjectAnswer]) -> Secti
     if len(subjects) <= _MOST_WITH_SENTENCES:
         return None
     conditions = {subject.condition for subject in subjects}
-    is_one = len(conditions) == 1
-    where = f", {subjects[0].condition}" if is_one else ""
-    columns = ["", f"{results.plan.name_of_p} [{section.P_LEVEL}]{where}"]
-    rows = [[subject.name, subject.p] for subject in subjects]
-    if not is_one:
-        columns.append("at")
-        for row, subject in zip(rows, subjects):
-            row.append(subject.condition)
+    columns = [f"[{section.P_LEVEL}]", results.plan.name_of_p]
+    if len(conditions) == 1:
+        columns[1] += f", {subjects[0].condition}"
+        rows = [[subject.name, subject.p] for subject in subjects]
+    else:
+        rows = [[f"{subject.name}, {subject.condition}", subject.p] for subject in subjects]
     if by_subject := factors(results):
-        first = next(iter(by_subject.values())).first
-        columns += [f"times P of {first} [{section.P_LEVEL}]", ""]
-        for row in rows:
-            factor = by_subject.get(row[0])
-            row += [factor.times, factor.word] if factor else ["", ""]
+        columns += ["times the first", ""]
+        for row, subject in zip(rows, subjects):
+            row += by_subject.get(subject.name, ("", ""))
     return Section("", tuple(columns), tuple(map(tuple, rows)))
 
 

@@ -53,22 +53,11 @@ def turns_in_words(results: StudyResults) -> str:
     return f"The order turns in some of {n_others} comparisons elsewhere: {'; '.join(turned)}."
 
 
-class Factor(NamedTuple):
-    """How P of a policy compares with that of the first one.
+def factors(results: StudyResults) -> dict[str, tuple[str, str]]:
+    """Return how P of each policy, and task, compares with that of the first policy.
 
-    Attributes:
-        first: the first policy.
-        times: by which factor P is larger, with its interval.
-        word: "more", "less", or why it is open.
+    That is: by which factor it is larger, with its interval; and "more", "less", or why it is open.
     """
-
-    first: str
-    times: str
-    word: str
-
-
-def factors(results: StudyResults) -> dict[str, Factor]:
-    """Return the factor of each policy, and task, that is compared with the first policy."""
     by_subject = map_reduce(
         between_policies(results.verdicts),
         lambda v: subject_of(v.compared.original.case, v.compared.policy),
@@ -160,15 +149,15 @@ class _Compared(NamedTuple):
         return f"{text}{_elsewhere(self.elsewhere, self.is_ahead)}."
 
     @property
-    def factor(self) -> Factor:
-        """The factor of the other policy to the first one."""
+    def factor(self) -> tuple[str, str]:
+        """The factor of the other policy to the first one, and whether it is decided."""
         times = section.NOTHING
         if self.main.interval is not None:
             inverse = _factor(self.main.interval, inverted=True)
             times = section.bracketed(inverse, 2, [1.0])
         words = {"supported": "less", "refuted": "more"}
         word = self.main.on_threshold.adjusted
-        return Factor(self.main.after.name, times, words.get(word, self.main.in_words))
+        return times, words.get(word, self.main.in_words)
 
     @property
     def turned(self) -> str:

@@ -61,7 +61,7 @@ def test_three_policies_stand_in_one_table_beside_the_first_and_holm_counts_all_
     of_three = answer(results)
     assert of_three.overview is not None
     head, *rows = of_three.overview.columns, *of_three.overview.rows
-    assert head == ("", "P [95 %], N = 25, no fault", "times P of homing [95 %]", "")
+    assert head == ("[95 %]", "P, N = 25, no fault", "times the first", "")
     assert rows[0] == ("homing", "209.0 [204.5, 213.5]", "", "")
     assert rows[1][0] == "swarm-dt"
     assert rows[1][2:] == ("0.50 [0.50, 0.50]", "less")
