@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -63,8 +63,8 @@ def curves(
         logarithmic: whether both axes are.
     """
     n_rows = math.ceil(len(panels) / n_columns)
-    shared = "row" if n_columns > 1 else "all"
-    grid = canvas.subplots(n_rows, n_columns, squeeze=False, sharey=shared)
+    sharey: Literal["row", "all"] = "row" if n_columns > 1 else "all"
+    grid = canvas.subplots(n_rows, n_columns, squeeze=False, sharey=sharey)
     for axes, panel in zip(grid.flat, panels):
         for index, curve in enumerate(panel.curves):
             _draw(axes, curve, index)

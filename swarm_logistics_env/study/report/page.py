@@ -140,9 +140,9 @@ class _Axis(NamedTuple):
 
     @property
     def ticks(self) -> list[float]:
-        from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
+        from matplotlib.ticker import Locator, MaxNLocator, SymmetricalLogLocator
 
-        locator = MaxNLocator(6, steps=[1, 2, 5, 10])
+        locator: Locator = MaxNLocator(6, steps=[1, 2, 5, 10])
         if self.is_stretched:
             locator = SymmetricalLogLocator(base=10.0, linthresh=1.0)
         ticks = locator.tick_values(self.low, self.high)
