@@ -50,7 +50,12 @@ def test_each_condition_has_a_row_with_a_point_a_policy() -> None:
     with figures_drawn("svg"):
         svg = svg_image(figure.draw, figure.height, figure.note)
     assert [svg.count(f">N = {n}<") for n in (5, 10, 20)] == [1, 1, 1]
-    for text in ("performance P", "contacts per robot-minute", "homing", "95 % intervals"):
+    for text in (
+        "performance P",
+        "contacts per robot-minute",
+        "homing",
+        "95\N{NO-BREAK SPACE}% intervals",
+    ):
         assert text in svg
 
 
