@@ -34,6 +34,7 @@ _LEGEND_WIDTH = 1.6  # inch, of a column
 _LETTERS_OF_AN_INCH = 16.0  # of a note
 _LINE_HEIGHT = 0.15  # inch, of a note
 _WIDEST = 30.0  # times the smallest P, up to which an axis of P is linear
+_MARGIN = 1.5  # of a logarithmic axis, to both sides
 _FAR = 5.0  # an indicator from which on axes are linear up to 1 alone, and logarithmic beyond
 _STYLE: Any = {  # matplotlib types each of its names
     "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "grid.color": INK,
@@ -225,6 +226,8 @@ def _panel(axes: Axes, panel: Panel) -> None:
         _stretch(axes, panel.points)
     elif has_far_values(panel.points):
         axes.set_yscale("symlog", linthresh=1.0)
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.set_ylim(*(_MARGIN * end for end in axes.get_ylim()))
     axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
 
 
@@ -345,10 +348,12 @@ def _forest(axes: Axes, rows: Rows) -> None:
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
     all_points = [point for _, points in rows for point in points]
+    axes.set_xlim(limits(all_points))
     is_of_indicators = any(point.published is not None for point in all_points)
     if is_of_indicators and has_far_values(all_points):
         axes.set_xscale("symlog", linthresh=1.0)
-    axes.set_xlim(limits(all_points))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.set_xlim(*(_MARGIN * end for end in axes.get_xlim()))
 
 
 def add_legend(canvas: Canvas, axes: Axes) -> None:
