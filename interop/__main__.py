@@ -19,7 +19,8 @@ import typer
 
 from interop.small_world import FAULTY, MODES, RESULTS, SEEDS, WORLDS, Learning
 from swarm_logistics_env import policies, spi
-from swarm_logistics_env.study.report.drawing import COLOURS, INK, LINES, svg_image
+from swarm_logistics_env.study.report.curves import Curve, CurvePanel, curves
+from swarm_logistics_env.study.report.drawing import COLOURS, svg_image
 from swarm_logistics_env.study.report.section import Section, bracketed
 from swarm_logistics_env.study.report.write import section_markdown
 from swarm_logistics_env.train.evaluation import performances
@@ -28,6 +29,10 @@ ROOT = RESULTS.parents[1]
 TRAININGS = range(3)
 BEST = 2  # learners that learn in the paper's world too
 REFERENCES = ("swarm-dt-2026", "ppo-delivery")
+NOTE = (
+    "Mean P of 4 evaluation seeds; thin: single trainings; band: 95 % t-interval of the mean over "
+    "trainings, cut off at 0; straight: shipped policies on 20 other seeds."
+)
 Beside = dict[str, dict[str, list[float]]]  # P of policies on the same seeds, by world and name
 
 
@@ -62,7 +67,7 @@ def main(processes: int = 1) -> None:
     scripted = references()
     text = table(scripted)
     (RESULTS / "table.md").write_text(text, encoding="utf-8")
-    picture = svg_image(lambda canvas: draw(canvas, scripted), 5.2)
+    picture = svg_image(lambda canvas: draw(canvas, scripted), 6.0, NOTE)
     (RESULTS / "learners.svg").write_text(picture, encoding="utf-8")
     print(text)
 
@@ -157,18 +162,31 @@ def is_clear(p: list[float], reference: list[float]) -> bool:
 
 
 def draw(canvas: Any, scripted: Beside) -> None:
-    """Draw P over agent-steps of every training, a panel for each world."""
-    for world, axes in zip(WORLDS, canvas.subplots(len(WORLDS))):
-        for (name, colour), seed in product(zip(LEARNERS, COLOURS), TRAININGS):
-            path = RESULTS / f"{name}-{world}@{seed}.csv"
-            if path.exists():
-                steps, _, p = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
-                axes.plot(steps / 1e6, p, color=colour, label=name if seed == 0 else None)
-        for (name, delivered), line in zip(scripted[world].items(), LINES[1:]):
-            axes.axhline(np.mean(delivered), color=INK, linestyle=line, linewidth=1, label=name)
-        axes.set(title=f"{world} world", ylim=(0, None))
-        axes.set(xlabel="million agent-steps", ylabel="P [items]")
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7)
+    """Draw P over agent-steps, a panel for each learner in each world where it has trainings."""
+    panels = []
+    p_by_panel = []
+    for world, name in product(WORLDS, LEARNERS):
+        paths = [RESULTS / f"{name}-{world}@{seed}.csv" for seed in TRAININGS]
+        files = [np.loadtxt(path, delimiter=",", skiprows=1) for path in paths if path.exists()]
+        if not files:
+            continue
+        millions = files[0][:, 0] / 1e6
+        p = np.array([file[:, 2] for file in files])  # (trainings, k)
+        mean, low, high = np.array([spi.mean_interval(at_step) for at_step in p.T]).T
+        ends = millions[[0, -1]]
+        no_limits = np.full(2, np.nan)
+        beside = [
+            Curve(reference, ends, np.full(2, np.mean(delivered)), no_limits, no_limits)
+            for reference, delivered in scripted[world].items()
+        ]
+        trained = Curve(f"mean of {len(p)} trainings", millions, mean, low, high)
+        panels.append(
+            CurvePanel(f"{name}, {world} world", "million agent-steps", [trained, *beside])
+        )
+        p_by_panel.append(p)
+    curves(canvas, panels, "P [items]", n_columns=2)
+    for axes, panel, p in zip(canvas.axes, panels, p_by_panel):
+        axes.plot(panel.curves[0].x, p.T, color=COLOURS[0], linewidth=0.7)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@
 played. The sentences stand in the README alone; here are the numbers of each in their order.
 """
 
-import math
 import re
 import tomllib
 from collections import Counter
@@ -15,12 +14,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from research.fit_paper import read_tried
 from research.play_claims import judged_claims, runs_a_cell
 from research.play_paper_fit import by_set
-from research.tables import ROOT, read_rows, table, with_blocks
+from research.tables import ROOT, block_rows, read_rows, table, with_blocks
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.study.report import drawing, section
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 README = ROOT / "README.md"
@@ -127,10 +125,8 @@ def intervals() -> dict[str, list[str]]:
 
 def third_edition(*entries: str) -> list[str]:
     """Return the scores of entries of the benchmark as docs/results.md has them."""
-    page = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
-    _, _, block = page.partition("<!-- tables: benchmark -->")
-    rows = [line.split(" | ") for line in block.splitlines() if line.startswith("| `")]
-    scores = {cells[0].strip("|` "): cells[1] for cells in reversed(rows)}
+    rows = block_rows(ROOT / "docs" / "results.md", "benchmark")
+    scores = {cells[0]: cells[1] for cells in rows}
     return [scores[entry] for entry in entries]
 
 
@@ -200,36 +196,29 @@ def draw(rows: Rows, path: Path) -> None:
     """Draw the forest plot: a row a policy, a panel a question; equal rows give equal bytes."""
     names = list(rows["P, N = 25"])
 
+    def points(label: str, name: str) -> list[drawing.Point]:
+        if name not in rows[label]:
+            return []
+        style = int(name.startswith(_LEARNED))
+        return [drawing.Point(name, style, "", *rows[label][name].interval, decided=True)]
+
     def draw_panels(canvas: "Figure") -> None:
-        canvas.set_size_inches(9.2, 2.7)
-        panels = canvas.subplots(1, len(_PANELS), sharey=True)
-        for axes in panels[3:]:  # the modes on one scale
-            axes.sharex(panels[2])
-        for axes, (label, title) in zip(panels, _PANELS.items(), strict=True):
+        columns = {label: [(name, points(label, name)) for name in names] for label in _PANELS}
+        drawing.forest(canvas, columns)
+        modes = canvas.axes[2:]  # on one scale
+        ends = [end for axes in modes for end in axes.get_xlim()]
+        for axes in modes:
+            axes.set_xlim(min(ends), max(ends))
+        for axes, title in zip(canvas.axes, _PANELS.values(), strict=True):
+            axes.set_xlabel("")
             axes.set_title(title, fontsize=8.5)
-            axes.axvline(0.0, color=drawing.INK, linewidth=0.8)
-            for height, name in enumerate(names):
-                if name in rows[label]:
-                    _mark(axes, height, rows[label][name].interval, name.startswith(_LEARNED))
-            axes.set_ylim(len(names) - 0.4, -0.6)
-            axes.spines["left"].set_visible(False)
-            axes.tick_params(axis="y", length=0)
-        panels[0].set_yticks(range(len(names)), names)
-        panels[0].set_xlim(left=0.0)
 
-    path.write_text(drawing.svg_image(draw_panels, 2.7), encoding="utf-8")
-
-
-def _mark(axes: "Axes", height: float, interval: Interval, is_learned: bool) -> None:
-    style = 1 if is_learned else 0
-    colour = drawing.COLOURS[style]
-    value, low, high = interval
-    if low is not None and high is not None:
-        if math.isinf(high - low):  # no limit: dotted from side to side
-            axes.axhline(height, color=colour, linewidth=1.4, linestyle=":")
-        else:
-            axes.plot([low, high], [height, height], color=colour, linewidth=2.2)
-    axes.plot([value], [height], drawing.MARKERS[style], color=colour, markersize=5.5)
+    note = (
+        "Means with 95 % intervals, without an end where they leave the axis; circles: scripts, "
+        "squares: learned, over trainings and seeds."
+    )
+    style = drawing.FigureStyle(9.2)
+    path.write_text(drawing.svg_image(draw_panels, 2.7, note, style), encoding="utf-8")
 
 
 def with_address(text: str, address: str) -> str:

@@ -48,11 +48,13 @@ from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Change
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.study.questions.comparison import NO_FAULT, Question, Setting
+from swarm_logistics_env.study.report import drawing
+from swarm_logistics_env.study.report.drawing import Point
 from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.world.scenario import Scenario
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
 
 FIRST_SEED = 5_400_000  # nothing else uses the seeds from here to 5,402,999
 SETS = 30
@@ -63,7 +65,7 @@ UPPER = 0.75
 FOLDER = ROOT / "docs" / "results" / "paper_fit"
 PICTURE = ROOT / "docs" / "media" / "paper-fit-claims.png"
 MILD = ("FM1", "FM2", "FM3")  # the modes whose R and FT are near 0, in the paper and here
-COLOURS = {"holds": "#2a7f62", "fails": "#b3392f", "open": "#9aa3ad"}
+WORDS = ("holds", "fails", "open")
 
 
 class Job(NamedTuple):
@@ -288,26 +290,26 @@ def block(rows: Sequence[Tried], claims: Sequence[Claim]) -> str:
 
 def draw(claims: Sequence[Claim], path: Path = PICTURE) -> None:
     """Draw the share of the sets under which each claim holds by means, with its limits."""
-    from matplotlib.figure import Figure
-
     shown = [claim for claim in claims if can_fail(claim.question)]
-    figure = Figure(figsize=(8.0, 0.24 * len(shown) + 1.0), layout="constrained")
-    axes: Axes = figure.add_subplot()
-    for height, claim in enumerate(shown):
+    rows = []
+    for claim in shown:
         n = len(claim.of_sets)
-        colour = COLOURS[claim.word]
-        axes.plot(limits(claim.n_holding, n), [height, height], color=colour, linewidth=2.2)
-        axes.plot([claim.n_holding / n], [height], "o", color=colour, markersize=5.5)
-    for limit in (LOWER, UPPER):
-        axes.axvline(limit, color="black", linewidth=0.8, linestyle=":")
-    axes.set(
-        xlim=(-0.01, 1.01),
-        xlabel="share of the sets under which it holds by means (green: holds, red: fails)",
+        share = claim.n_holding / n, *limits(claim.n_holding, n)
+        point = Point(claim.word, WORDS.index(claim.word), "", *share, decided=claim.word != "open")
+        rows.append((claim_text(claim.question), [point]))
+
+    def picture(canvas: Canvas) -> None:
+        drawing.forest(canvas, {"share of the sets under which it holds by means": rows})
+        (axes,) = canvas.axes
+        for limit in (LOWER, UPPER):
+            axes.axvline(limit, color=drawing.INK, linewidth=0.8, linestyle=":")
+        drawing.add_legend(canvas, axes)
+
+    note = (
+        f"{len(shown[0].of_sets)} sets; bars: one-sided 95 % limits of the share; dotted: above "
+        f"{UPPER:g} a claim holds, below {LOWER:g} it fails."
     )
-    axes.set_yticks(range(len(shown)), [claim_text(claim.question) for claim in shown])
-    axes.invert_yaxis()
-    axes.margins(y=0.01)
-    figure.savefig(path, dpi=110)
+    path.write_bytes(drawing.images(picture, 0.9 + 0.2 * len(shown), note).png)
 
 
 def main(minutes: float = 60.0, folder: Path = FOLDER) -> None:

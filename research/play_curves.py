@@ -10,20 +10,17 @@ and writes the tables and the picture of docs/results.md. What is played is kept
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from functools import partial
+from typing import Any
 
 from research.play_tables import MEDIA, OUT, PAGE
-from research.tables import play, rewrite, seeds_from, table
+from research.tables import block_rows, curve_of, play, rewrite, seeds_from, table
 from swarm_logistics_env.study import Study
-from swarm_logistics_env.study.report import section
+from swarm_logistics_env.study.report import drawing, section
+from swarm_logistics_env.study.report.curves import CurvePanel, curves
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 POLICIES = ("swarm-dt", "homing", "homing-stock", "ppo-delivery", "ppo-robust")
 N_ROBOTS, ITEMS_A_ROBOT, DURATION = 25, 2.4, 500.0  # where the curves cross, as in `realistic`
@@ -82,7 +79,12 @@ def blocks(results: StudyResults) -> Iterator[tuple[str, str]]:
             f"{seeds_from(results)}; 95 % intervals; R with FM4 in {100 * BROKEN:g} % of the "
             "robots, at least one."
         )
-        yield f"curve_{curve.split()[0]}", table(("policy", "", *titles), rows, line)
+        yield _block(curve), table(("policy", "", *titles), rows, line)
+
+
+def _block(curve: str) -> str:
+    """Return the name of the block on the page that a curve stands in."""
+    return f"curve_{curve.split()[0]}"
 
 
 def _measures(
@@ -101,35 +103,26 @@ def _measures(
     }
 
 
-def draw(results: StudyResults) -> None:
-    """Draw P over each of the three, a panel a curve."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 3.2), layout="constrained")
-    panels: list[Axes] = list(figure.subplots(1, len(CURVES)))
-    cells = {(c.table, c.policy): c for c in results.cells if not c.arm.setting.value}
-    for panel, (curve, values) in zip(panels, CURVES.items(), strict=True):
-        for policy in results.policies:
-            means = [cells[f"{value:g} {curve}", policy].mean for value in values]
-            (line,) = panel.plot(
-                values, [m.value for m in means], marker="o", markersize=3, label=policy
-            )
-            low = np.array([mean.low for mean in means], np.float64)
-            high = np.array([mean.high for mean in means], np.float64)
-            panel.fill_between(values, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
-        panel.set(xlabel=curve, xscale="log", ylim=(0.0, None))
-        panel.set_xticks(values, [f"{value:g}" for value in values])
-        panel.minorticks_off()
-    panels[0].set(ylabel="P")
-    panels[0].legend(fontsize=7)
-    figure.savefig(MEDIA / "curves.png", dpi=130)
+def draw() -> None:
+    """Draw P over each of the three, a panel a curve, of the tables on the page."""
+    panels = []
+    for curve, values in CURVES.items():
+        rows = block_rows(PAGE, _block(curve))
+        of_policies = [curve_of(policy, values, p) for policy, what, *p in rows if what == "P"]
+        panels.append(CurvePanel("", curve, of_policies))
+    picture = partial(
+        curves, panels=panels, y_label="P [items]", n_columns=len(panels), logarithmic=True
+    )
+    note = "Means of 8 seeds; bands: 95 % intervals; all axes are logarithmic."
+    images = drawing.images(picture, 2.9, note, drawing.FigureStyle(8.0))
+    (MEDIA / "curves.png").write_bytes(images.png)
 
 
 def main() -> None:
     """Play what is missing, then write tables and picture."""
     (results,) = play([study()])
-    draw(results)
     rewrite(PAGE, dict(blocks(results)))
+    draw()
 
 
 if __name__ == "__main__":

@@ -14,23 +14,21 @@ different sides of 0.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import combinations, pairwise, product
-from typing import TYPE_CHECKING
 
 from more_itertools import map_reduce
 from scipy.stats import binomtest, ttest_ind
 
-from research.tables import ROOT, play, rewrite, seeds_from, side, table
+from research.tables import ROOT, block_rows, curve_of, play, rewrite, seeds_from, side, table
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.study import Study
-from swarm_logistics_env.study.report import section
+from swarm_logistics_env.study.report import drawing, section
+from swarm_logistics_env.study.report.curves import CurvePanel, curves
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.world.scenario import Scenario
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 PAGE = ROOT / "docs" / "floors.md"
 PICTURE = ROOT / "docs" / "media" / "floors-scaling.png"
@@ -186,31 +184,24 @@ def adaptability_block(results: Mapping[float, StudyResults]) -> str:
     )
 
 
-def draw(results: Results) -> None:
-    """Draw P over the number of robots, a panel for each floor."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 3.2), layout="constrained")
-    panels: Sequence[Axes] = figure.subplots(1, len(results), sharey=True)
-    for panel, (floor, of_floor) in zip(panels, results.items(), strict=True):
-        cells = cells_of(of_floor)
-        for policy in of_floor.policies:
-            means = [cells[policy, n].mean for n in SIZES]
-            p = [mean.value for mean in means]
-            (line,) = panel.plot(SIZES, p, marker="o", markersize=3, label=policy)
-            low, high = ([getattr(mean, end) for mean in means] for end in ("low", "high"))
-            panel.fill_between(SIZES, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
-        panel.set(title=floor, xlabel="robots N")
-    panels[0].set(ylabel="P in 200 s", ylim=(0.0, None))
-    panels[0].legend(fontsize=7)
-    figure.savefig(PICTURE, dpi=130)
+def draw() -> None:
+    """Draw P over the number of robots, a panel for each floor, of the table on the page."""
+    by_floor = map_reduce(block_rows(PAGE, "floors p"), lambda cells: cells[0])
+    panels = [
+        CurvePanel(floor, "robots N", [curve_of(policy, SIZES, p) for _, policy, *p in rows])
+        for floor, rows in by_floor.items()
+    ]
+    picture = partial(
+        curves, panels=panels, y_label="P in 200 s [items]", n_columns=3, logarithmic=True
+    )
+    note = "Means of 6 seeds, of each training; bands: 95 % intervals; both axes are logarithmic."
+    PICTURE.write_bytes(drawing.images(picture, 2.9, note, drawing.FigureStyle(8.0)).png)
 
 
 def main() -> None:
     """Play what is missing, then write tables and picture."""
     on_floors = [study(name, scenario_on(floor)) for name, floor in FLOORS.items()]
     results = dict(zip(FLOORS, play(on_floors)))
-    draw(results)
     in_halls = [study(f"aisles-{x:g}-m", hall(x), SIZES_IN_WIDTHS) for x in WIDTHS]
     in_widths = dict(zip(WIDTHS, play(in_halls)))
     blocks = {
@@ -221,6 +212,7 @@ def main() -> None:
     }
     tables = {name: block(results) for name, block in blocks.items()}
     rewrite(PAGE, {**tables, "floors a": adaptability_block(in_widths)})
+    draw()
 
 
 if __name__ == "__main__":

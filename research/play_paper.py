@@ -228,5 +228,5 @@ def draw_figures(parts: Sequence[StudyResults], media: Path) -> None:
     """Draw the paper's figures with its values as crosses and ours with their intervals."""
     for figure in chain.from_iterable(map(indicator_figures, parts[:2])):
         if figure.name.startswith(("S-", "FT-", "A-")):
-            svg = svg_image(figure.draw, figure.height)
+            svg = svg_image(figure.draw, figure.height, figure.note)
             (media / f"paper-{figure.name}.svg").write_text(svg, encoding="utf-8")

@@ -18,9 +18,11 @@ from research import question_tables
 from research.play_tables import OUT
 from research.tables import ROOT, example, play, rewrite
 from swarm_logistics_env.study.report import drawing
+from swarm_logistics_env.study.report.curves import Curve, CurvePanel, curves
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.drawing import Draw, Panel, Point
-from swarm_logistics_env.study.verdicts.mid_run_faults import RateCurve, rate_curves
+from swarm_logistics_env.study.report.figures import note_on_verdicts
+from swarm_logistics_env.study.verdicts.mid_run_faults import rate_curves
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 
@@ -28,14 +30,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
 DOCS = ROOT / "docs"
-Answer = tuple[Mapping[str, str], Draw, float]  # blocks of the page; figure and its height [inch]
+# Blocks of the page; its figure, the height of it [inch], and the note below it.
+Answer = tuple[Mapping[str, str], Draw, float, str]
 
 
 def policies_compared(results: StudyResults) -> Answer:
     """Answer with all policies side by side, and the report's figure of R."""
     figures = document(results).figures
     figure = next(figure for figure in figures if figure.name.startswith("R-Two-robots"))
-    return {"answer": question_tables.side_by_side(results)}, figure.draw, figure.height
+    blocks = {"answer": question_tables.side_by_side(results)}
+    return blocks, figure.draw, figure.height, figure.note
 
 
 def larger_swarms(results: StudyResults) -> Answer:
@@ -61,7 +65,8 @@ def larger_swarms(results: StudyResults) -> Answer:
         )
         panels.append(Panel(mode, "robustness R", points, (0.0,), ""))
     panels[-1] = replace(panels[-1], x_label="swarm size N, faulty robots m")
-    return blocks, partial(on_one_scale, panels=panels), 0.7 + 1.8 * len(panels)
+    note = note_on_verdicts(results, robustness)
+    return blocks, partial(on_one_scale, panels=panels), 0.7 + 1.8 * len(panels), note
 
 
 def on_one_scale(canvas: "Canvas", panels: Sequence[Panel]) -> None:
@@ -79,27 +84,33 @@ def wear_and_repair(results: StudyResults) -> Answer:
         "repair": question_tables.repairs(results),
         "after": question_tables.after_repairs(results),
     }
-    panels: dict[str, dict[str, RateCurve]] = {}
+    by_policy: dict[str, dict[str, Curve]] = {}
     for test in results.verdicts:
         if test.after.name == "FM4":
-            curves = {curve.runs: curve for curve in rate_curves(results, test.compared)}
-            sound = float(curves["no fault"].deliveries.mean())
-            panel = panels.setdefault(f"{test.compared.policy}, 100 % are {sound:.1f} items", {})
-            for runs, curve in curves.items():
+            rates = {rate.runs: rate for rate in rate_curves(results, test.compared)}
+            sound = float(rates["no fault"].deliveries.mean())
+            title = f"{test.compared.policy}, 100 % are {sound:.1f} items"
+            of_policy = by_policy.setdefault(title, {})
+            for runs, rate in rates.items():
                 label = test.compared.table.lower() if runs == "fault" else runs
-                percentages = (100.0 / sound * column for column in curve[2:])
-                panel[label] = RateCurve(label, curve.seconds, *percentages)
-    by_title = {title: list(panel.values()) for title, panel in panels.items()}
-    draw = partial(drawing.rates, panels=by_title, onset=100.0, y_label="deliveries [%]")
-    return blocks, draw, 0.5 + 1.9 * len(panels)
+                percentages = (100.0 / sound * column for column in rate[2:])
+                of_policy[label] = Curve(label, rate.seconds, *percentages)
+    panels = [
+        CurvePanel(title, "end of the window [s]", list(of_policy.values()))
+        for title, of_policy in by_policy.items()
+    ]
+    draw = partial(curves, panels=panels, y_label="deliveries [%]", onset=100.0)
+    note = f"Means of {results.seeds_text}; bands: pointwise 95 % t-intervals; dotted: the fault."
+    return blocks, draw, 0.5 + 1.9 * len(panels), note
 
 
 def realistic_robots(results: StudyResults) -> Answer:
     """Answer with all policies, and each beside itself in the ideal world."""
-    blocks, draw, height = policies_compared(results)
+    blocks, draw, height, note = policies_compared(results)
     seeds = len(results.plan.seeds)
     (ideal,) = play([example(OUT, "questions/central_or_swarm", seeds=seeds)])
-    return {**blocks, "lost": question_tables.losses_between_worlds(results, ideal)}, draw, height
+    blocks = {**blocks, "lost": question_tables.losses_between_worlds(results, ideal)}
+    return blocks, draw, height, note
 
 
 QUESTIONS: dict[str, Callable[[StudyResults], Answer]] = {
@@ -114,8 +125,8 @@ def main(names: list[str]) -> None:
     """Play the studies of these names, and rewrite their tables and figures."""
     for name in names or QUESTIONS:
         (results,) = play([example(OUT, f"questions/{name}")])
-        blocks, draw, height = QUESTIONS[name](results)
-        svg = drawing.svg_image(draw, height)
+        blocks, draw, height, note = QUESTIONS[name](results)
+        svg = drawing.svg_image(draw, height, note)
         (DOCS / "media" / f"{name}.svg").write_text(svg, encoding="utf-8")
         page_blocks = {f"{name} {part}": block for part, block in blocks.items()}
         rewrite(DOCS / "research" / "questions_of_the_field.md", page_blocks)

@@ -9,8 +9,9 @@ is written from what `make benchmark` left, if it did.
 import json
 import math
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from more_itertools import map_reduce
 
@@ -25,8 +26,10 @@ from research.play_paper import (
 )
 from research.tables import (
     ROOT,
+    block_rows,
     by_policy,
     example,
+    interval_in,
     play,
     rewrite,
     seeds_from,
@@ -39,9 +42,6 @@ from swarm_logistics_env.study.report.tables import contacts_text
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PAGE = ROOT / "docs" / "results.md"
 RESULTS = ROOT / "docs" / "results"
@@ -225,28 +225,19 @@ def _p_and_stalls(cell: Cell) -> str:
     return f"{p}; {cell.stalled:.0%} stalled" if cell.stalled else p
 
 
-def draw_ladder(restocked: StudyResults, path: Path) -> None:
-    """Draw P of each rung with its interval, without and with a handling time."""
-    worlds = list(enumerate(ablation_cells(restocked).items()))
-    rows = [
-        (
-            rung,
-            [
-                drawing.Point(title, style, "", *cells[rung].mean)
-                for style, (title, cells) in worlds
-            ],
-        )
-        for rung in restocked.policies
-    ]
-
-    def draw(canvas: "Figure") -> None:
-        drawing.forest(canvas, rows, "P, items delivered in 500 s where items come back")
-        (axes,) = canvas.axes
-        axes.set_xlim(left=0.0)
-        marks, names = axes.get_legend_handles_labels()
-        axes.legend(marks[: len(worlds)], names[: len(worlds)], loc="upper right")
-
-    path.write_text(drawing.svg_image(draw, 2.9), encoding="utf-8")
+def draw_ladder(path: Path) -> None:
+    """Draw P of each rung with its interval, without and with a handling time, of the table."""
+    worlds = "lifting takes no time", "lifting takes 1 s"
+    rows = []
+    for rung, _, at_once, _, in_a_second in block_rows(PAGE, "ladder"):
+        points = [
+            drawing.Point(world, style, "", *interval_in(text), decided=True)
+            for style, (world, text) in enumerate(zip(worlds, (at_once, in_a_second)))
+        ]
+        rows.append((rung, points))
+    picture = partial(drawing.forest, columns={"P in 500 s where items come back [items]": rows})
+    note = "Means, of each training; bars: 95 % intervals."
+    path.write_text(drawing.svg_image(picture, 2.9, note), encoding="utf-8")
 
 
 def costs_block(costs: Mapping[str, Any]) -> str:
@@ -336,7 +327,6 @@ def main() -> None:
     clearing, cleared, restocked, realistic, leans, policies, robust, broken = play(
         example(OUT, name) for name in EXAMPLES
     )
-    draw_ladder(restocked, MEDIA / "ladder.svg")
     blocks = {
         "clearing": clearing_block(clearing),
         "paper": paper_block(paper),
@@ -358,6 +348,7 @@ def main() -> None:
         row = (step["microseconds_per_step"], costs["machine"]["processor"])
         write_rows(RESULTS / "cost.csv", COSTS, [row])
     rewrite(PAGE, blocks)
+    draw_ladder(MEDIA / "ladder.svg")
     front_page.main()
 
 

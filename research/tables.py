@@ -1,14 +1,18 @@
 """What the scripts share: studies to play, blocks of a page between markers, tables, CSV files."""
 
 import csv
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.report import section
+from swarm_logistics_env.study.report.curves import Curve
 from swarm_logistics_env.study.report.tables import contacts_text
 from swarm_logistics_env.study.report.write import section_markdown
 from swarm_logistics_env.study.runs.engines import usable_cores
@@ -37,6 +41,26 @@ def rewrite(page: Path, blocks: Mapping[str, str]) -> None:
     """Write other text between the markers of each block of a page."""
     text = with_blocks(page.read_text(encoding="utf-8"), blocks)
     page.write_text(text, encoding="utf-8")
+
+
+def block_rows(page: Path, name: str) -> list[list[str]]:
+    """Return the cells of the table between the markers of a block, without its head."""
+    _, _, remainder = page.read_text(encoding="utf-8").partition(BLOCK.format(name=name))
+    lines = [line for line in remainder.partition(END)[0].splitlines() if line.startswith("| ")]
+    _, _, *rows = ([cell.strip("`") for cell in line[2:-2].split(" | ")] for line in lines)
+    return rows
+
+
+def interval_in(text: str) -> spi.Interval:
+    """Return the interval that a cell of a page begins with, e.g. "28.7 [27.1, 30.3]"."""
+    value, low, high = re.findall(r"-?[\d.]+", text)[:3]
+    return spi.Interval(float(value), float(low), float(high))
+
+
+def curve_of(label: str, places: Sequence[float], texts: Iterable[str]) -> Curve:
+    """Return a curve of the intervals that cells of a page begin with."""
+    y, low, high = np.array([interval_in(text) for text in texts]).T
+    return Curve(label, np.array(places, np.float64), y, low, high)
 
 
 def table(head: Sequence[object], rows: Iterable[Sequence[object]], *lines: str) -> str:

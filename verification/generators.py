@@ -133,6 +133,19 @@ def _near_a_cap(rng: Rng, shape: Shape, p_f: float) -> Pair:
     return p_o, p_new
 
 
+def _tied(rng: Rng, shape: Shape, p_f: float) -> Pair:
+    """Return runs of which four pairs in five are equal, as of two policies that hardly differ."""
+    p_o = rng.poisson(P_O, shape) * 1.0
+    other = rng.choice([-4.0, 4.0], shape) * (rng.random(shape) < 0.2)
+    return p_o, np.maximum(p_o + other + p_f - P_O, 0.0)
+
+
+def _capped(rng: Rng, shape: Shape, p_f: float) -> Pair:
+    """Return runs of which half deliver all items."""
+    p_o, p_new = (np.minimum(rng.poisson(mean / 0.94, shape), mean / 0.94) for mean in (P_O, p_f))
+    return p_o, p_new
+
+
 def _a_fifth_zero(rng: Rng, shape: Shape, p_f: float, by_seed: bool = False) -> Pair:
     """Return runs of which a fifth deliver nothing, in both conditions of a seed or in one."""
     works_without = rng.random(shape) < 0.8
@@ -226,4 +239,9 @@ HELD_OUT: Mapping[str, Model] = {
     "lognormal 1.2 with the fault": Model(partial(_lognormal_fault, sd=1.2), P_O, P_F),
     "lognormal .6 with the fault": Model(partial(_lognormal_fault, sd=0.6), P_O, P_F),
     "2 % stall, P 150": _stalling(0.02, 150.0, 25.0),
+}
+# Of two policies, beside those above.
+OF_POLICIES: Mapping[str, Model] = {
+    "four pairs in five equal": Model(_tied, P_O, P_O),
+    "half deliver all items": Model(_capped, P_O, P_O),
 }

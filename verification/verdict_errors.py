@@ -20,7 +20,7 @@ from swarm_logistics_env.spi.hidden import hidden_of
 from swarm_logistics_env.spi.ratio import Balance, Design, RatioTest, Term, ratio_test
 from swarm_logistics_env.study.questions.specification import looks_up_to
 
-from .generators import CHOSEN_ON, HELD_OUT, LEARNED_P, P_O, Floats, Rng, Shape
+from .generators import CHOSEN_ON, HELD_OUT, LEARNED_P, OF_POLICIES, P_O, Floats, Rng, Shape
 
 STUDIES = 4_000
 TRAINED_STUDIES = 1_000
@@ -33,7 +33,7 @@ Row = dict[str, object]
 
 
 HALVES = {"chosen on": CHOSEN_ON, "held out": HELD_OUT}
-_ALL = {**CHOSEN_ON, **HELD_OUT}
+_ALL = {**CHOSEN_ON, **HELD_OUT, **OF_POLICIES}
 
 
 class World(NamedTuple):
@@ -126,13 +126,17 @@ def wrong_verdicts(
     *,
     paired: bool = True,
     only_seen: bool = False,
+    is_equal: bool = False,
 ) -> Wrong:
     """Return how often a study that runs until it is clear decides at the true value.
 
     It may stop at each look, a number of seeds; one look: a study of so many. `alpha` is over all
-    looks; with `only_seen` stalls that no run showed are left out of account.
+    looks; with `only_seen` stalls that no run showed are left out of account; with `is_equal` P is
+    the same in both conditions, as of two policies of which neither delivers more.
     """
     draw, mean_o, mean_f = _ALL[model]
+    if is_equal:
+        mean_f = mean_o
     rng = np.random.default_rng(looks)
     p_o, p_new = draw(rng, (studies, looks[-1]), mean_f)
     if not paired:  # other seeds, so that nothing hangs together
@@ -250,6 +254,14 @@ def looks_rows() -> Iterator[Row]:
             yield {**row, "supported": wrong.above, "refuted": wrong.below}
 
 
+def policies_rows() -> Iterator[Row]:
+    """Yield how often one of two policies is said to deliver more where both deliver as much."""
+    for model, paired, n in product(_ALL, (True, False), (3, 5, 10, 20, 60)):
+        wrong = wrong_verdicts(model, [n], paired=paired, is_equal=True)
+        row: Row = {"runs": model, "paired": paired, "seeds": n}
+        yield {**row, "supported": wrong.above, "refuted": wrong.below}
+
+
 def equivalence_rows() -> Iterator[Row]:
     """Yield how often P that falls by a tenth is called equivalent, and P that does not change."""
     beyond = "10% stall: beyond the assumption"
@@ -281,6 +293,7 @@ def trainings_rows() -> Iterator[Row]:
 TABLES = {
     "wrong verdicts": verdict_rows,
     "wrong verdicts until clear": looks_rows,
+    "two policies": policies_rows,
     "equivalent": equivalence_rows,
     "supported": power_rows,
     "over trainings": trainings_rows,

@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 
 from research import play_curves
+from research.play_tables import PAGE
+from research.tables import block_rows, curve_of
 from swarm_logistics_env.study import Study
+from tests.conftest import figures_drawn
 
 
 def test_each_point_changes_one_thing_alone_and_items_go_with_robots() -> None:
@@ -26,11 +29,10 @@ def test_each_point_changes_one_thing_alone_and_items_go_with_robots() -> None:
 
 @pytest.mark.daily
 def test_a_table_of_a_curve_has_p_standstills_and_r_at_each_point(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(play_curves, "CURVES", {"robots": (3, 6), "seconds": (4.0,)})
     monkeypatch.setattr(play_curves, "DURATION", 3.0)
-    monkeypatch.setattr(play_curves, "MEDIA", tmp_path)
     study: Study = play_curves.study()
     study.out = None
     study.specification = study.specification.replace(policies=("homing",), seeds=2)
@@ -44,5 +46,15 @@ def test_a_table_of_a_curve_has_p_standstills_and_r_at_each_point(
     assert [row.split(" | ")[1] for row in rows[:3]] == labels
     assert rows[1].startswith("| `homing` | runs that stand still | 100 % |")  # none in 3 s
     assert "FM4 in 8 % of the robots" in rows[-1]
-    play_curves.draw(results)
+
+
+def test_the_picture_shows_what_the_page_prints(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(play_curves, "MEDIA", tmp_path)
+    with figures_drawn("png"):
+        play_curves.draw()
     assert (tmp_path / "curves.png").stat().st_size > 1_000
+    (first, *_) = block_rows(PAGE, "curve_items")
+    drawn = curve_of(first[0], play_curves.ITEMS, first[2:])
+    assert [drawn.label, *drawn.y[:2], drawn.low[0]] == ["swarm-dt", 16.5, 14.6, 13.5]

@@ -172,3 +172,9 @@ def test_more_seeds_find_more(paired: bool) -> None:
     assert power[0] > 0.1
     assert power[-1] > 0.85
     assert share_supported(400, 0.12, 6, 600, paired=paired) > 0.5
+
+
+@pytest.mark.parametrize("model", ["poisson", "four pairs in five equal", "half deliver all items"])
+@pytest.mark.parametrize("n", [3, 10])
+def test_of_two_that_deliver_as_much_none_is_said_to_deliver_more(model: str, n: int) -> None:
+    assert wrong_verdicts(model, [n], studies=1_000, is_equal=True).share < 0.05

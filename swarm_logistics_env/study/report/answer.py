@@ -11,9 +11,7 @@ from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.tasks.task import Case
 from swarm_logistics_env.study.tasks.task_world import counted_in, world_of
-from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import (
@@ -24,8 +22,16 @@ from swarm_logistics_env.study.verdicts.verdict import (
 
 from . import section
 from .answer_notes import notes
-from .policies_compared import between_policies, comparison_in_words, comparison_table
+from .policies_compared import (
+    between_policies,
+    comparison_in_words,
+    factors,
+    subject_of,
+    turns_in_words,
+)
 from .section import Section
+
+_MOST_WITH_SENTENCES = 2  # policies and tasks; more have a table, and sentences together
 
 
 class Line(NamedTuple):
@@ -77,11 +83,15 @@ class SubjectAnswer(NamedTuple):
     Attributes:
         name: the policy; with the task where there are several.
         performance: P where the swarm is as it should be, in words.
+        p: P alone, with its interval.
+        condition: where that is.
         sentences: one on each indicator: how many are decided how, and the worst value.
     """
 
     name: str
     performance: str
+    p: str
+    condition: str
     sentences: tuple[str, ...]
 
 
@@ -90,7 +100,9 @@ class Answer(NamedTuple):
 
     Attributes:
         comparison: by which factor P of two policies differs; empty: they are not compared.
-        compared: the same of more than two, a row each; None: they are not compared.
+        overview: P of each policy and task where there are many, and how that compares; None:
+            there are few, and each has sentences of its own.
+        turns: where the order of more than two policies is the other way round; empty: of fewer.
         scope: how much was asked, of which policies, and over which seeds.
         subjects: what was found of each policy and task.
         lines: the questions.
@@ -99,7 +111,8 @@ class Answer(NamedTuple):
     """
 
     comparison: str
-    compared: Section | None
+    overview: Section | None
+    turns: str
     scope: str
     subjects: tuple[SubjectAnswer, ...]
     lines: tuple[Line, ...]
@@ -107,16 +120,26 @@ class Answer(NamedTuple):
     seeds: str
 
     @property
-    def head(self) -> list[str]:
-        """The answer in a few sentences: what is compared, P, and each indicator."""
+    def opening(self) -> list[str]:
+        """The sentences before the overview: what is compared, and how much was asked."""
         sentences = [self.comparison] if self.comparison else []
-        is_only = len(self.subjects) == 1
-        if not is_only:
-            sentences.append(self.scope)
-        seeds = f"; {self.seeds}" if is_only else ""
+        return sentences if len(self.subjects) == 1 else [*sentences, self.scope]
+
+    @property
+    def summary(self) -> list[str]:
+        """P and each indicator in a few sentences; of many policies together."""
+        if self.overview is not None:
+            return [*filter(None, [self.turns]), *_sentences(self.lines)]
+        seeds = f"; {self.seeds}" if len(self.subjects) == 1 else ""
+        sentences = []
         for subject in self.subjects:
             sentences += [f"{subject.name}: {subject.performance}{seeds}.", *subject.sentences]
         return sentences
+
+    @property
+    def head(self) -> list[str]:
+        """All sentences before the questions."""
+        return [*self.opening, *self.summary]
 
     @property
     def questions(self) -> list[str]:
@@ -163,14 +186,21 @@ def answer(results: StudyResults) -> Answer:
     for name, cell in _sound_cells(results).items():
         of_subject = [line for line in lines if line.subject == name]
         subjects.append(
-            SubjectAnswer(name, _performance(results, cell) + engine, tuple(_sentences(of_subject)))
+            SubjectAnswer(
+                name,
+                _performance(results, cell) + engine,
+                _p_alone(cell),
+                _condition(results, cell),
+                tuple(_sentences(of_subject)),
+            )
         )
     if not subjects:
         policies = section.join_names(results.policies)
-        subjects = [SubjectAnswer(policies, "P: no run has succeeded", ())]
+        subjects = [SubjectAnswer(policies, "P: no run has succeeded", section.NOTHING, "", ())]
     return Answer(
         comparison_in_words(results),
-        comparison_table(results),
+        _overview(results, subjects),
+        turns_in_words(results),
         _scope(results),
         tuple(subjects),
         tuple(lines),
@@ -179,10 +209,22 @@ def answer(results: StudyResults) -> Answer:
     )
 
 
-def subject_of(case: Case, policy: str) -> str:
-    """Return whose swarm a case is about: a policy, and of recorded trials its task."""
-    task = case.scenario.table if isinstance(case.scenario, RecordedScenario) else ""
-    return f"{policy}, {task}" if task else policy
+def _overview(results: StudyResults, subjects: Sequence[SubjectAnswer]) -> Section | None:
+    """Return P of each policy and task, and its factor to the first policy; None: they are few."""
+    if len(subjects) <= _MOST_WITH_SENTENCES:
+        return None
+    conditions = {subject.condition for subject in subjects}
+    columns = [f"[{section.P_LEVEL}]", results.plan.name_of_p]
+    if len(conditions) == 1:
+        columns[1] += f", {subjects[0].condition}"
+        rows = [[subject.name, subject.p] for subject in subjects]
+    else:
+        rows = [[f"{subject.name}, {subject.condition}", subject.p] for subject in subjects]
+    if by_subject := factors(results):
+        columns += ["times the first", ""]
+        for row, subject in zip(rows, subjects):
+            row += by_subject.get(subject.name, ("", ""))
+    return Section("", tuple(columns), tuple(map(tuple, rows)))
 
 
 def _lines(results: StudyResults) -> Iterator[Line]:
@@ -240,7 +282,8 @@ def _sentence(heading: str, lines: Sequence[Line]) -> str:
     value = f"{worst.value} {worst.interval}".rstrip()
     if worst.level not in ("", section.P_LEVEL):
         value += f" at {worst.level}"
-    result = f"{worst.question.partition(' ')[2]}: {value}, {worst.verdict.in_words}"
+    whose = f"{worst.subject}, " if len({line.subject for line in lines}) > 1 else ""
+    result = f"{whose}{worst.question.partition(' ')[2]}: {value}, {worst.verdict.in_words}"
     if len(lines) == 1:
         return f"{indicator}, {result}."
     is_change = worst.verdict.compared.definition.compares == "policy"
@@ -298,21 +341,26 @@ def _unusual_engine(results: StudyResults) -> str:
 def _performance(results: StudyResults, cell: Cell) -> str:
     """Return P of a policy in words, e.g. "P [95 %] = 40.0 [39.5, 40.5] items in 500 s, N = 25"."""
     case = cell.arm.case
+    has_interval = _counts_anything(cell) and cell.mean.low is not None
+    level = f" [{section.P_LEVEL}]" if has_interval else ""
+    performance = f"{results.plan.name_of_p}{level} = {_mean(cell)}"
+    if counted := counted_in(case):
+        performance += f" {counted} in {case.scenario.duration:g} s"
+    return f"{performance}, {_condition(results, cell)}"
+
+
+def _condition(results: StudyResults, cell: Cell) -> str:
+    """Return where P of a policy is told, e.g. "N = 25, no fault"."""
     setting = cell.arm.setting
     task = results.plan.specification.played
-    condition = f"N = {case.scenario.n_robots}"
+    condition = f"N = {cell.arm.case.scenario.n_robots}"
     if setting.kind == "policy":
         condition += f", {cell.table}"
     elif setting.kind != "size":
         condition += f", {setting}"
     if task.name != "warehouse" and not results.plan.origin:
         condition += f", task {task.name}"
-    has_interval = _counts_anything(cell) and cell.mean.low is not None
-    level = f" [{section.P_LEVEL}]" if has_interval else ""
-    performance = f"{results.plan.name_of_p}{level} = {_mean(cell)}"
-    if counted := counted_in(case):
-        performance += f" {counted} in {case.scenario.duration:g} s"
-    return f"{performance}, {condition}"
+    return condition
 
 
 def _counts_anything(cell: Cell) -> bool:
@@ -320,14 +368,23 @@ def _counts_anything(cell: Cell) -> bool:
     return bool(cell.by_seed.any() or cell.arm.case.performance)
 
 
+def _most(cell: Cell) -> str:
+    """Return the upper limit of the mean of runs that delivered nothing."""
+    return f"{-math.log(1.0 - CONFIDENCE) / cell.n_seeds:.2f}"
+
+
+def _p_alone(cell: Cell) -> str:
+    """Return mean P for a table."""
+    return section.mean_p(cell) if _counts_anything(cell) else f"0 (at most {_most(cell)})"
+
+
 def _mean(cell: Cell) -> str:
     """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
     if not _counts_anything(cell):
-        most = -math.log(1.0 - CONFIDENCE) / cell.n_seeds
         reason = f"as none of {cell.n_seeds} runs delivered anything"
         if cell.problem:
             reason += f"; {cell.problem}"
-        return f"0 (at most {most:.2f} at {section.P_LEVEL}, {reason})"
+        return f"0 (at most {_most(cell)} at {section.P_LEVEL}, {reason})"
     mean = section.mean_p(cell)
     if cell.problem:
         mean += f" ({cell.problem} and do not count)"

@@ -12,13 +12,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
-
-from swarm_logistics_env.spi import Interval
-from swarm_logistics_env.study.verdicts.mid_run_faults import RateCurve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,6 +30,12 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # 
 MARKERS = ("o", "s", "^", "D", "v", "P")
 LINES = ("-", "--", "-.", ":")
 WIDTH = 5.2  # inch: still legible at the width of a phone
+_LEGEND_WIDTH = 1.6  # inch, of a column
+_LETTERS_OF_AN_INCH = 16.0  # of a note
+_LINE_HEIGHT = 0.15  # inch, of a note
+_WIDEST = 30.0  # times the smallest P, up to which an axis of P is linear
+_MARGIN = 1.5  # of a logarithmic axis, to both sides
+_FAR = 5.0  # an indicator from which on axes are linear up to 1 alone, and logarithmic beyond
 _STYLE: Any = {  # matplotlib types each of its names
     "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "grid.color": INK,
     "xtick.color": INK, "ytick.color": INK, "axes.facecolor": "none",
@@ -79,33 +83,45 @@ class Images(NamedTuple):
     png: bytes
 
 
-def images(draw: Draw, height: float, style: FigureStyle = PAGE_STYLE) -> Images:
-    """Return a drawing of the given height [inch] in each format; equal ones as equal bytes."""
-    with _canvas(draw, height, style) as canvas:
+def images(draw: Draw, height: float, note: str = "", style: FigureStyle = PAGE_STYLE) -> Images:
+    """Return a drawing in each format; equal ones as equal bytes.
+
+    Args:
+        draw: draws it on an empty canvas.
+        height: without its note [inch].
+        note: what its values, bars and marks are; stands below it.
+        style: its width and letters.
+    """
+    with _canvas(draw, height, note, style) as canvas:
         svg = _file(canvas, "svg")
         canvas.set_layout_engine("none")  # the same layout, which takes long to find
         return Images(svg.decode(), _file(canvas, "pdf"), _file(canvas, "png"))
 
 
-def svg_image(draw: Draw, height: float) -> str:
-    """Return a drawing of the given height [inch] as SVG alone."""
-    with _canvas(draw, height, PAGE_STYLE) as canvas:
+def svg_image(draw: Draw, height: float, note: str = "", style: FigureStyle = PAGE_STYLE) -> str:
+    """Return a drawing as SVG alone; see `images`."""
+    with _canvas(draw, height, note, style) as canvas:
         return _file(canvas, "svg").decode()
 
 
 @contextlib.contextmanager
-def _canvas(draw: Draw, height: float, style: FigureStyle) -> Iterator[Canvas]:
+def _canvas(draw: Draw, height: float, note: str, style: FigureStyle) -> Iterator[Canvas]:
     mpl = _matplotlib()
     from matplotlib.figure import Figure as NewCanvas
 
+    unbroken = note.replace(" %", "\N{NO-BREAK SPACE}%")
+    lines = wrap(unbroken, round(_LETTERS_OF_AN_INCH * style.width / style.scale))
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         mpl.rcParams["font.family"] = style.fonts
         for size in ("font.size", "lines.linewidth", "lines.markersize", "errorbar.capsize"):
             mpl.rcParams[size] *= style.scale
-        canvas = NewCanvas(figsize=(style.width, height * style.scale), layout="constrained")
+        inches = (height + _LINE_HEIGHT * len(lines)) * style.scale
+        canvas = NewCanvas(figsize=(style.width, inches), layout="constrained")
         draw(canvas)
+        if lines:
+            canvas.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize="small")
         yield canvas
 
 
@@ -179,7 +195,7 @@ def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
     for axes, panel in zip(grid[:, 0], panels):
         _panel(axes, panel)
     if len({point.style for point in panels[0].points}) > 1:
-        _legend(canvas, grid[0, 0])
+        add_legend(canvas, grid[0, 0])
     elif not panels[0].title:
         grid[0, 0].set_title(panels[0].points[0].series)
 
@@ -207,6 +223,11 @@ def _panel(axes: Axes, panel: Panel) -> None:
     axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=limits(panel.points))
     if not panel.thresholds:  # P is never below 0
         axes.set_ylim(bottom=0.0)
+        _stretch(axes, panel.points)
+    elif has_far_values(panel.points):
+        axes.set_yscale("symlog", linthresh=1.0)
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.set_ylim(*(_MARGIN * end for end in axes.get_ylim()))
     axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
 
 
@@ -220,6 +241,30 @@ def limits(points: Sequence[Point]) -> tuple[float, float]:
     high = min(max(ends), max(values) + reach)
     margin = 0.06 * max(high - low, 0.5)
     return low - margin, high + margin
+
+
+def _stretch(axes: Axes, points: Sequence[Point]) -> None:
+    """Let the axis of P be logarithmic where small ones would lie on a heap at its foot."""
+    values = [point.value for point in points if point.value is not None]
+    if values and max(values) > _WIDEST * min(values) > 0.0:
+        axes.set_ylim(auto=True)
+        make_logarithmic(axes)
+        axes.set_ylim(bottom=min(values) / 2.0)
+
+
+def make_logarithmic(axes: Axes) -> None:
+    """Let the upright axis be logarithmic, with plain numbers."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axes.set_yscale("log", nonpositive="clip")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def has_far_values(points: Sequence[Point]) -> bool:
+    """Return whether indicators are so large that others would lie on a heap at 0."""
+    return any(abs(point.value) > _FAR for point in points if point.value is not None)
 
 
 _GOLDEN = 0.618034  # spreads any number of dots evenly
@@ -240,8 +285,8 @@ def _dots(axes: Axes, x: float, reach: float, point: Point) -> None:
         )
 
 
-def _mark(axes: Axes, at: float, point: Point, marker: str = "", shrink: float = 1.0) -> None:
-    """Draw a value, if there is one, with its interval: upright, or level with a marker named."""
+def _mark(axes: Axes, at: float, point: Point, *, level: bool = False, shrink: float = 1.0) -> None:
+    """Draw a value, if there is one, with its interval, upright or level."""
     value = point.value
     low = point.low
     high = point.high
@@ -254,11 +299,11 @@ def _mark(axes: Axes, at: float, point: Point, marker: str = "", shrink: float =
         # An infinite end is drawn far outside.
         error = np.clip([[value - low], [high - value]], 0.0, 1e3)
     line, caps, bars = axes.errorbar(
-        value if marker else at,
-        at if marker else value,
-        xerr=error if marker else None,
-        yerr=None if marker else error,
-        fmt=marker or marker_of(point.style),
+        value if level else at,
+        at if level else value,
+        xerr=error if level else None,
+        yerr=None if level else error,
+        fmt=marker_of(point.style),
         color=colour,
         markerfacecolor=colour if point.decided else PAPER,
         markersize=sizes["lines.markersize"] * shrink,
@@ -269,129 +314,54 @@ def _mark(axes: Axes, at: float, point: Point, marker: str = "", shrink: float =
         artist.set_gid(point.link or None)
 
 
-def forest(
-    canvas: Canvas, rows: Sequence[tuple[str, Sequence[Point]]], x_label: str, title: str = ""
-) -> None:
-    """Draw a row for each question: its values with their intervals, from top to bottom.
+Rows: TypeAlias = Sequence[tuple[str, Sequence[Point]]]  # each with its label
+
+
+def forest(canvas: Canvas, columns: Mapping[str, Rows], title: str = "") -> None:
+    """Draw values with their intervals in rows, from top to bottom.
 
     Args:
         canvas: to draw on.
-        rows: the label of each, and its points; a point's `published` is its threshold. A label
-            without points is a heading.
-        x_label: of the axis of the values.
-        title: above the axes.
+        columns: rows by the label of the axis of their values; with the same labels in each column.
+            A point's `published` is its threshold; a label without points is a heading.
+        title: above the first axes.
     """
-    axes = canvas.subplots()
+    grid = canvas.subplots(1, len(columns), squeeze=False, sharey=True)
+    for axes, (x_label, rows) in zip(grid[0], columns.items()):
+        _forest(axes, rows)
+        axes.set_xlabel(x_label)
+    grid[0, 0].set_title(title)
+    grid[0, 0].set_yticks(range(len(rows)), [label for label, _ in rows])
+    grid[0, 0].set_ylim(len(rows) - 0.4, -0.6)
+    if any(len(points) > 1 for _, points in rows):
+        add_legend(canvas, grid[0, 0])
+
+
+def _forest(axes: Axes, rows: Rows) -> None:
     for row, (_, points) in enumerate(rows):
         for index, point in enumerate(points):
             height = row + 0.6 * ((index + 0.5) / len(points) - 0.5)
-            _mark(axes, height, point, MARKERS[index % len(MARKERS)], min(1.0, 4.0 / len(points)))
+            _mark(axes, height, point, level=True, shrink=min(1.0, 4.0 / len(points)))
             if point.published:
                 axes.vlines(point.published, row - 0.4, row + 0.4, color=INK, linewidth=0.8)
     axes.axvline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
-    axes.set_yticks(range(len(rows)), [label for label, _ in rows])
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
-    axes.set(ylim=(len(rows) - 0.4, -0.6), xlabel=x_label, title=title)
-    axes.set_xlim(limits([point for _, points in rows for point in points]))
+    all_points = [point for _, points in rows for point in points]
+    axes.set_xlim(limits(all_points))
+    is_of_indicators = any(point.published is not None for point in all_points)
+    if is_of_indicators and has_far_values(all_points):
+        axes.set_xscale("symlog", linthresh=1.0)
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.set_xlim(*(_MARGIN * end for end in axes.get_xlim()))
 
 
-def trade_off(canvas: Canvas, panels: Mapping[str, Sequence[tuple[Point, Interval]]]) -> None:
-    """Draw values against contacts per robot-minute with their intervals, on one scale.
-
-    Points of a single panel are named by their categories where there is room for the name.
-
-    Args:
-        canvas: to draw on.
-        panels: points, each with its contacts, by the title of their panel.
-    """
-    n_rows = math.ceil(len(panels) / 2)
-    n_columns = min(len(panels), 2)
-    grid = canvas.subplots(n_rows, n_columns, squeeze=False, sharex=True, sharey=True)
-    for axes, (title, points) in zip(grid.flat, panels.items()):
-        for point, contacts in points:
-            if contacts.low is not None and contacts.high is not None:
-                colour = COLOURS[point.style % len(COLOURS)]
-                axes.hlines(point.value or 0.0, contacts.low, contacts.high, color=colour)
-            _mark(axes, contacts.value, point)
-        axes.set_title(title)
-    for axes in grid.flat[len(panels) :]:
-        axes.set_visible(False)
-        grid[-2, -1].tick_params(labelbottom=True)
-    canvas.supxlabel("contacts per robot-minute", fontsize="medium")
-    canvas.supylabel("performance P", fontsize="medium")
-    grid[0, 0].set_ylim(limits([point for points in panels.values() for point, _ in points]))
-    grid[0, 0].set_ylim(bottom=0.0)
-    grid[0, 0].set_xlim(left=0.0)
-    _legend(canvas, grid[0, 0])
-    if len(panels) == 1:  # a panel of several is of one condition, which is its title
-        canvas.draw_without_rendering()  # so that it is known where the points stand
-        _name_points(grid[0, 0], [(c.value, p) for points in panels.values() for p, c in points])
-
-
-def _name_points(axes: Axes, points: Sequence[tuple[float, Point]]) -> None:
-    """Write the category of each point beside it where there is room, of lonely ones first."""
-    from matplotlib.transforms import Bbox
-
-    spots = [(x, point.value or 0.0) for x, point in points]
-    pixels = axes.transData.transform(spots)
-    apart = np.linalg.norm(pixels[:, None] - pixels, axis=2)
-    np.fill_diagonal(apart, np.inf)
-    taken = [Bbox.from_bounds(x - 4.0, y - 4.0, 8.0, 8.0) for x, y in pixels.tolist()]
-    style: Any = {"textcoords": "offset points", "fontsize": "x-small"}
-    style["bbox"] = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
-    for index in np.argsort(-apart.min(axis=1), kind="stable").tolist():
-        for side, beside in (("left", 5.0), ("right", -5.0)):
-            name = points[index][1].category
-            text = axes.annotate(name, spots[index], (beside, 4.0), ha=side, **style)
-            box = text.get_window_extent()
-            is_inside = axes.bbox.x0 < box.x0 and box.x1 < axes.bbox.x1
-            if is_inside and not any(box.overlaps(other) for other in taken):
-                taken.append(box)
-                break
-            text.remove()
-
-
-def rates(
-    canvas: Canvas, panels: Mapping[str, Sequence[RateCurve]], onset: float, y_label: str
-) -> None:
-    """Draw deliveries over time, one panel below the other, on one scale.
-
-    Args:
-        canvas: to draw on.
-        panels: the curves by the title of their panel.
-        onset: when the fault begins [s].
-        y_label: label of the axis of the rates.
-    """
-    grid = canvas.subplots(len(panels), 1, squeeze=False, sharex=True, sharey=True)
-    for axes, (title, curves) in zip(grid[:, 0], panels.items()):
-        for index, curve in enumerate(curves):
-            colour = COLOURS[index % len(COLOURS)]
-            if not np.isnan(curve.low).any():
-                band = curve.seconds, curve.low.clip(0.0), curve.high
-                axes.fill_between(*band, color=colour, alpha=0.16, linewidth=0)
-            axes.plot(
-                curve.seconds,
-                curve.deliveries,
-                LINES[index % len(LINES)],
-                color=colour,
-                label=curve.runs,
-                marker=marker_of(index),
-                markevery=(index * 4, 12),
-            )
-        axes.axvline(onset, color=INK, linewidth=1.0, linestyle=":")
-        axes.set(ylabel=y_label, title=title)
-    grid[-1, 0].set_xlabel("end of the window [s]")
-    _legend(canvas, grid[0, 0])
-    # After the last panel, as this fixes the scale, which all panels share.
-    axes.set_ylim(bottom=0.0)
-
-
-def _legend(canvas: Canvas, axes: Axes) -> None:
+def add_legend(canvas: Canvas, axes: Axes) -> None:
     """Put the legend of one pair of axes above all of them, each series once."""
     handles, labels = axes.get_legend_handles_labels()
     series = dict(zip(labels, handles))
-    canvas.legend(series.values(), series, loc="outside upper left", ncols=min(len(series), 3))
+    n_columns = min(len(series), int(canvas.get_figwidth() / _LEGEND_WIDTH))
+    canvas.legend(series.values(), series, loc="outside upper left", ncols=n_columns)
 
 
 def marker_of(index: int) -> str:

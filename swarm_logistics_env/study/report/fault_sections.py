@@ -19,7 +19,8 @@ from swarm_logistics_env.study.verdicts.mid_run_faults import (
 )
 from swarm_logistics_env.study.verdicts.verdict import UNAFFECTED
 
-from . import drawing, section
+from . import section
+from .curves import Curve, CurvePanel, curves
 from .section import NOTHING, P_LEVEL, Figure, Section, Texts, slug
 
 _SINGLE_TEXT = (
@@ -117,27 +118,36 @@ def _rate_figures(measures: Sequence[Resilience], seeds: str) -> Iterator[Figure
         first = of_mode[0].compared
         setting = first.changed.setting
         window = window_of(first)
-        panels = {
+        by_number = {
             f"m = {measure.compared.changed.setting.value:g}": measure.curves for measure in of_mode
         }
         rows = [
-            (title, curve.runs, *point, CONFIDENCE)
-            for title, curves in panels.items()
-            for curve in curves
+            (number, curve.runs, *point, CONFIDENCE)
+            for number, of_number in by_number.items()
+            for curve in of_number
             for point in zip(*curve[1:])
+        ]
+        panels = [
+            CurvePanel(
+                f"{first.policy}, {number}",
+                "end of the window [s]",
+                [Curve(*curve) for curve in of_number],
+            )
+            for number, of_number in by_number.items()
         ]
         if rows:
             yield Figure(
                 slug("deliveries", first.policy, first.table, setting.name, f"{setting.onset:g}s"),
                 f"{first.policy}, {first.table}, N = {first.n_robots}: deliveries in the trailing "
-                f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s (dotted "
-                f"line). Mean over {seeds} with pointwise {P_LEVEL} t-intervals.",
+                f"{window:g} s around failure mode {setting.name} from {setting.onset:g} s.",
                 pd.DataFrame(rows, columns=["panel", "runs", *RateCurve._fields[1:], "confidence"]),
                 0.6 + 2.3 * len(panels),
                 partial(
-                    drawing.rates,
-                    panels={f"{first.policy}, {title}": panels[title] for title in panels},
-                    onset=setting.onset,
+                    curves,
+                    panels=panels,
                     y_label=f"deliveries in {window:g} s",
+                    onset=setting.onset,
                 ),
+                note=f"Mean over {seeds}; bands: pointwise {P_LEVEL} t-intervals; dotted: the "
+                "fault begins.",
             )

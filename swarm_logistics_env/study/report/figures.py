@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 from more_itertools import map_reduce, unique_everseen
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS, Definition, FactorKind
-from swarm_logistics_env.study.questions.comparison import CONFIDENCE, NO_FAULT
+from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.study.questions.comparison import CONFIDENCE
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
@@ -57,11 +57,11 @@ def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]
     title = results.policies[0] if len(groups) == 1 else ""
     return Figure(
         "answer",
-        f"{answer.scope} Every question with its interval. {_marks(verdicts)}."
-        f"{_note_on_caps(verdicts)}",
+        f"{answer.scope} Every question with its interval.",
         _rows(results, verdicts),
-        1.1 + 0.23 * len(rows),
-        partial(drawing.forest, rows=rows, x_label=forest_label(answer), title=title),
+        0.9 + 0.2 * len(rows),
+        partial(drawing.forest, columns={forest_label(answer): rows}, title=title),
+        note_on_verdicts(results, verdicts),
     )
 
 
@@ -103,14 +103,13 @@ def policies_figure(results: StudyResults) -> Iterator[Figure]:
     columns = ["task", "policy", "condition", "mean", "low", "high", "confidence"]
     yield Figure(
         "policies",
-        f"P of {join_names(policies)} where they are compared: means, bars: {P_LEVEL} intervals. "
-        f"{results.seeds_text.capitalize()}.",
+        f"P of {join_names(policies)} where they are compared.",
         pd.DataFrame(rows, columns=columns),
-        0.5 + 2.7 * len(panels),
+        0.5 + 2.5 * len(panels),
         partial(drawing.intervals, panels=panels),
+        _note_on_means(results),
         title=f"P of {join_names(policies)}",
         panels=panels,
-        level=P_LEVEL,
     )
 
 
@@ -122,69 +121,59 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
         rows = _rows(results, verdicts)
         condition = _condition(table, onset, swarm)
         symbols = [definition.symbol for definition in definitions]
-        has_published = any(verdict.published is not None for verdict in verdicts)
-        crosses = "; crosses: published" if has_published else ""
         policies = join_names(list(dict.fromkeys(v.compared.policy for v in verdicts)))
-        caption = (
-            f"{policies}, {condition}: {_caption(definitions)} "
-            f"{results.seeds_text.capitalize()}. {_marks(verdicts)}{crosses}."
-            f"{_note_on_caps(verdicts)}"
-        )
+        has_published = any(verdict.published is not None for verdict in verdicts)
+        crosses = " Crosses: published." if has_published else ""
         yield Figure(
             slug(*symbols, table, f"{onset:g}s" if onset else ""),
-            caption,
+            f"{policies}, {condition}: {_caption(definitions)}",
             rows,
-            0.5 + 2.5 * len(panels),
+            0.3 + 2.3 * len(panels),
             partial(drawing.intervals, panels=panels),
+            note_on_verdicts(results, verdicts) + crosses,
             title=f"{' and '.join(symbols)}: {condition}",
             panels=panels,
-            level=levels(verdicts),
         )
-
-
-_MOST_PANELS = 12
 
 
 def trade_off_figure(results: StudyResults) -> Iterator[Figure]:
-    """Yield P against contacts, a point a policy, where contacts were counted.
-
-    Each condition has a panel; where they are many, all are in one.
-    """
+    """Yield P beside contacts where these were counted, a row a condition."""
     import pandas as pd
 
-    # A case may stand in several tables.
-    distinct = unique_everseen(results.cells, lambda cell: (cell.policy, cell.arm.case.key))
+    # A case may stand in several tables: under its policy's name, and in the place of another.
+    by_name = sorted(results.cells, key=lambda cell: cell.arm.setting.kind == "policy")
+    distinct = unique_everseen(by_name, lambda cell: cell.arm.case.key)
     cells = [cell for cell in distinct if cell.contacts.value >= 0.0]
     if not cells:
         return
     policies = list(dict.fromkeys(cell.policy for cell in cells))
-    panels: dict[str, list[Cell]] = map_reduce(cells, lambda cell: cell.words)
-    if len(panels) > _MOST_PANELS:
-        panels = {"": cells}
-    points = {
-        title: [(_cell_point(cell, policies), cell.contacts) for cell in of_panel]
-        for title, of_panel in panels.items()
+    by_condition: dict[str, list[Cell]] = map_reduce(cells, lambda cell: cell.words)
+
+    def rows_of(interval_of: Callable[[Cell], Interval]) -> drawing.Rows:
+        return [
+            (words, [_cell_point(cell, interval_of(cell), policies) for cell in of_condition])
+            for words, of_condition in by_condition.items()
+        ]
+
+    columns = {
+        f"performance {results.plan.name_of_p}": rows_of(lambda cell: cell.mean),
+        "contacts per robot-minute": rows_of(lambda cell: cell.contacts),
     }
     rows = [(cell.policy, cell.words, *cell.contacts, *cell.mean, CONFIDENCE) for cell in cells]
-    columns = ["policy", "cell", "contacts", "contacts_low", "contacts_high"]
+    names = ["policy", "cell", "contacts", "contacts_low", "contacts_high"]
     yield Figure(
         "trade-off",
-        f"P against contacts per robot-minute, a point for each policy and condition. Filled: no "
-        f"robot fails; hollow: some do; bars: {P_LEVEL} intervals. "
-        f"{results.seeds_text.capitalize()}.",
-        pd.DataFrame(rows, columns=[*columns, "mean", "low", "high", "confidence"]),
-        0.8 + 1.9 * math.ceil(len(panels) / 2) if len(panels) > 1 else 3.2,
-        partial(drawing.trade_off, panels=points),
-        title="P against contacts",
+        "P and contacts per robot-minute in each condition.",
+        pd.DataFrame(rows, columns=[*names, "mean", "low", "high", "confidence"]),
+        0.8 + (0.1 + 0.1 * len(policies)) * len(by_condition),
+        partial(drawing.forest, columns=columns, title=policies[0] if len(policies) == 1 else ""),
+        _note_on_means(results),
     )
 
 
-def _cell_point(cell: Cell, policies: Sequence[str]) -> Point:
-    """Return mean P of a cell; filled where no robot fails."""
-    setting = cell.arm.setting
-    is_sound = setting.kind != "fault" or setting == NO_FAULT
-    style = policies.index(cell.policy)
-    return Point(cell.policy, style, cell.words, *cell.mean, decided=is_sound)
+def _cell_point(cell: Cell, interval: Interval, policies: Sequence[str]) -> Point:
+    """Return a mean of a cell."""
+    return Point(cell.policy, policies.index(cell.policy), cell.words, *interval, decided=True)
 
 
 def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int], list[Verdict]]:
@@ -195,8 +184,9 @@ def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int]
         swarm = verdict.compared.n_robots if after.kind == "fault" else 0
         return verdict.compared.table, after.kind, after.onset, swarm
 
+    compared = between_policies(results.verdicts)  # P itself is drawn of these
     by_value: dict[tuple[str, ...], list[Verdict]] = map_reduce(
-        results.verdicts,
+        (verdict for verdict in results.verdicts if verdict not in compared),
         lambda verdict: (*verdict.compared.family, verdict.compared.table, verdict.compared.label),
     )
     # The verdict on the lowest threshold shows the value for them all.
@@ -288,16 +278,18 @@ def _rows(results: StudyResults, verdicts: Sequence[Verdict]) -> pd.DataFrame:
 CAPPED = "†: P is capped, every item was delivered in a run."
 
 
-def _marks(verdicts: Sequence[Verdict]) -> str:
+def note_on_verdicts(results: StudyResults, verdicts: Sequence[Verdict]) -> str:
+    """Return what the marks of verdicts mean, and over which seeds they are."""
+    caps = f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
     return (
-        "Filled: the Holm-adjusted verdict is decided; hollow: it is not; bars: "
-        f"{levels(verdicts)} intervals, without an end where they leave the axis; "
-        "dashed: thresholds"
+        f"{results.seeds_text.capitalize()}. Bars: {levels(verdicts)} intervals, without an end "
+        "where they leave the axis; filled: decided by Holm's method, hollow: not; dashed: "
+        f"thresholds.{caps}"
     )
 
 
-def _note_on_caps(verdicts: Sequence[Verdict]) -> str:
-    return f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
+def _note_on_means(results: StudyResults) -> str:
+    return f"Means of {results.seeds_text}; bars: {P_LEVEL} intervals."
 
 
 def _definitions(verdicts: Sequence[Verdict]) -> list[Definition]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from html import escape
@@ -32,10 +33,14 @@ class Findings(StudyResults):
         return f"{title}\n{terminal_answer(self._answer)}"
 
     def _repr_html_(self) -> str:
-        compared = self._answer.compared
-        parts = [html_table(compared)] if compared else []
-        parts += [f"<p>{escape(sentence)}</p>" for sentence in self._answer.head]
-        return "".join([*parts, html_table(self._answer.section)])
+        parts = _paragraphs(self._answer.opening)
+        if self._answer.overview is not None:
+            parts += html_table(self._answer.overview)
+        return parts + _paragraphs(self._answer.summary) + html_table(self._answer.section)
+
+
+def _paragraphs(sentences: Sequence[str]) -> str:
+    return "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
 
 
 def html_table(section: Section) -> str:

@@ -112,7 +112,13 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
 
 
 def _subjects(answer: Answer) -> str:
-    """Return P and indicators of each policy and task, each in a sentence that names it."""
+    """Return P and indicators of each policy and task, each in a sentence that names it.
+
+    Of many P alone, and then each indicator of all together.
+    """
+    if answer.overview is not None:
+        of_each = [f"{subject.name}: {subject.performance}" for subject in answer.subjects]
+        return ". ".join([*of_each, *(sentence.removesuffix(".") for sentence in answer.summary)])
     sentences = []
     for subject in answer.subjects:
         clauses = [subject.performance]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -20,13 +21,12 @@ from .document import Document
 from .drawing import Panel, Point
 from .figures import forest_label
 from .inline_svg import inline
-from .section import P_LEVEL, bracketed, digits_of, ratio, width_of
+from .section import bracketed, digits_of, ratio, width_of
 
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-# Name, drawing, what it shows, and what its marks mean.
-Chart: TypeAlias = tuple[str, str, Sequence[Panel], tuple[str, ...]]
+Chart: TypeAlias = tuple[str, str, Sequence[Panel]]  # name, drawing, and what it shows
 _HEIGHT = 2.9  # inch, of a drawing of P
 _ROW_HEIGHT = 20.0  # px, of the drawing of a line of the answer
 # Of decisions, on light and on dark paper, after Okabe and Ito.
@@ -47,12 +47,10 @@ class View(NamedTuple):
     Attributes:
         name: what it shows.
         svg: the drawing, as a part of the page.
-        legend: what its marks mean.
     """
 
     name: str
     svg: str
-    legend: tuple[str, ...]
 
 
 def html(document: Document, drawings: Mapping[str, str], latex: str) -> str:
@@ -104,20 +102,18 @@ def marked_up(text: str) -> Markup:
 
 def _views(document: Document, drawings: Mapping[str, str]) -> Iterator[View]:
     """Yield P of every policy in the conditions of each table, then the figures of indicators."""
-    bar_and_dot = f"bar: {P_LEVEL} interval", f"dot: {document.runs.dot}, click it"
     charts: list[Chart] = []
     for table, panel in document.runs.panels.items():
-        svg = drawing.svg_image(partial(drawing.intervals, panels=[panel]), _HEIGHT)
-        charts.append((f"P: {table}", svg, [panel], bar_and_dot))
-    for figure in document.figures:
-        if figure.panels:
-            bar = (f"bar: {figure.level} interval",)
-            charts.append((figure.title, drawings[figure.name], figure.panels, bar))
-    for number, (name, svg, panels, marks) in enumerate(charts):
-        points = [point for panel in panels for point in panel.points]
-        has_published = any(point.published is not None for point in points)
-        legend = (*marks, "×: published") if has_published else marks
-        yield View(name, inline(svg, f"v{number}", _titles(panels)), legend)
+        draw = partial(drawing.intervals, panels=[panel])
+        svg = drawing.svg_image(draw, _HEIGHT, document.runs.note)
+        charts.append((f"P: {table}", svg, [panel]))
+    charts += [
+        (figure.title, drawings[figure.name], figure.panels)
+        for figure in document.figures
+        if figure.panels
+    ]
+    for number, (name, svg, panels) in enumerate(charts):
+        yield View(name, inline(svg, f"v{number}", _titles(panels)))
 
 
 def _titles(panels: Sequence[Panel]) -> dict[str, str]:
@@ -136,21 +132,31 @@ def _titles(panels: Sequence[Panel]) -> dict[str, str]:
 
 
 class _Axis(NamedTuple):
-    """The axis of the values, from `low` to `high`."""
+    """The axis of the values, from `low` to `high`; beyond 1 it may be logarithmic."""
 
     low: float
     high: float
+    is_stretched: bool
 
     @property
     def ticks(self) -> list[float]:
-        from matplotlib.ticker import MaxNLocator
+        from matplotlib.ticker import Locator, MaxNLocator, SymmetricalLogLocator
 
-        ticks = MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(self.low, self.high)
+        locator: Locator = MaxNLocator(6, steps=[1, 2, 5, 10])
+        if self.is_stretched:
+            locator = SymmetricalLogLocator(base=10.0, linthresh=1.0)
+        ticks = locator.tick_values(self.low, self.high)
         return [float(tick) for tick in ticks if self.low <= tick <= self.high]
 
     def place(self, value: float) -> str:
         inside = min(max(value, self.low), self.high)
-        return f"{100 * (inside - self.low) / (self.high - self.low):.2f}%"
+        low, at, high = map(self._scaled, (self.low, inside, self.high))
+        return f"{100 * (at - low) / (high - low):.2f}%"
+
+    def _scaled(self, value: float) -> float:
+        if not self.is_stretched or abs(value) <= 1.0:
+            return value
+        return math.copysign(1.0 + math.log10(abs(value)), value)
 
     def upright(self, value: float, top: float, bottom: float, css_class: str) -> str:
         x = self.place(value)
@@ -165,7 +171,7 @@ def _forest(answer: Answer, points: Sequence[Point]) -> tuple[list[str], str]:
     Args:
         points: the value of each line.
     """
-    axis = _Axis(*drawing.limits(points))
+    axis = _Axis(*drawing.limits(points), drawing.has_far_values(points))
     drawn = [_row(axis, point, line.verdict) for point, line in zip(points, answer.lines)]
     numbers = "".join(
         f'{axis.upright(tick, 0, 4, "axis")}<text x="{axis.place(tick)}" y="15">{tick:g}</text>'

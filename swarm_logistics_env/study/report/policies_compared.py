@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self
 
 from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.study.tasks.task import Case
 from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
 from . import section
-from .section import Section
 
 
 def between_policies(verdicts: Iterable[Verdict]) -> list[Verdict]:
@@ -38,16 +37,40 @@ def comparison_in_words(results: StudyResults) -> str:
     return comparison.sentence
 
 
-def comparison_table(results: StudyResults) -> Section | None:
-    """Return a row for each policy that is compared with the first; None: there are not several."""
+def turns_in_words(results: StudyResults) -> str:
+    """Return where each of several policies and the first one stand the other way round.
+
+    Empty: the study does not compare more than two.
+    """
     by_policy = _by_policy(results)
     if len(by_policy) < 2:
-        return None
-    rows = [_Compared.of(results, verdicts) for verdicts in by_policy.values()]
-    condition = rows[0].condition
-    first = rows[0].main.after.name
-    columns = f"P of {first}, {condition}", f"times [{section.P_LEVEL}]", "", "other conditions"
-    return Section("", columns, tuple(row.row for row in rows))
+        return ""
+    compared = {policy: _Compared.of(results, v) for policy, v in by_policy.items()}
+    turned = [f"{policy} at {where}" for policy, c in compared.items() if (where := c.turned)]
+    n_others = sum(len(comparison.elsewhere) for comparison in compared.values())
+    if not turned:
+        return f"In {n_others} comparisons under other conditions no order is shown to turn."
+    return f"The order turns in some of {n_others} comparisons elsewhere: {'; '.join(turned)}."
+
+
+def factors(results: StudyResults) -> dict[str, tuple[str, str]]:
+    """Return how P of each policy, and task, compares with that of the first policy.
+
+    That is: by which factor it is larger, with its interval; and "more", "less", or why it is open.
+    """
+    by_subject = map_reduce(
+        between_policies(results.verdicts),
+        lambda v: subject_of(v.compared.original.case, v.compared.policy),
+    )
+    return {
+        subject: _Compared.of(results, verdicts).factor for subject, verdicts in by_subject.items()
+    }
+
+
+def subject_of(case: Case, policy: str) -> str:
+    """Return whose swarm a case is about: a policy, and of recorded trials its task."""
+    task = case.scenario.table if isinstance(case.scenario, RecordedScenario) else ""
+    return f"{policy}, {task}" if task else policy
 
 
 def condition_of(verdict: Verdict) -> str:
@@ -120,22 +143,32 @@ class _Compared(NamedTuple):
             text = f"P of {first} is {times} that of {second} ({self.condition})"
         else:
             text = (
-                f"Whether P of {first} or of {second} is larger is open: {times} ({self.condition})"
+                f"Whether P of {first} or of {second} is larger is {self.main.in_words}: {times} "
+                f"({self.condition})"
             )
         return f"{text}{_elsewhere(self.elsewhere, self.is_ahead)}."
 
     @property
-    def row(self) -> tuple[str, ...]:
-        """The other policy, the factor, whether that is decided, and the other conditions."""
-        counts = Counter(verdict.on_threshold.adjusted for verdict in self.elsewhere)
-        words = {"supported": "larger", "refuted": "smaller"}
-        others = [f"{count} {words.get(word, word)}" for word, count in counts.items()]
+    def factor(self) -> tuple[str, str]:
+        """The factor of the other policy to the first one, and whether it is decided."""
         times = section.NOTHING
         if self.main.interval is not None:
-            times = section.bracketed(_factor(self.main.interval, inverted=False), 2, [1.0])
+            inverse = _factor(self.main.interval, inverted=True)
+            times = section.bracketed(inverse, 2, [1.0])
+        words = {"supported": "less", "refuted": "more"}
         word = self.main.on_threshold.adjusted
-        name = f"to that of {self.main.compared.policy}"
-        return name, times, words.get(word, word), ", ".join(others)
+        return times, words.get(word, self.main.in_words)
+
+    @property
+    def turned(self) -> str:
+        """Where the order is shown to be the other way round; empty: nowhere."""
+        turned = "refuted" if self.is_ahead else "supported"
+        conditions = [
+            condition_of(verdict).replace(",", "")
+            for verdict in self.elsewhere
+            if verdict.on_threshold.adjusted == turned
+        ]
+        return ", ".join(conditions)
 
 
 def _factor(change: Interval, *, inverted: bool) -> Interval:

@@ -36,13 +36,13 @@ class Figure:
 
     Attributes:
         name: of its files, without ending; letters, digits and hyphens.
-        caption: what it shows and under which conditions, in full.
+        caption: what it shows and under which conditions.
         data: what it shows, one row a point.
-        height: of the drawing [inch]; the width is that of all figures.
+        height: of the drawing without its note [inch]; the width is that of all figures.
         draw: draws it on an empty canvas.
+        note: what values, bars and marks are, and over which seeds; stands in the drawing.
         title: what it shows in a few words.
         panels: the panels that it draws, of which each point can be clicked in the page.
-        level: the level of its intervals.
     """
 
     name: str
@@ -50,9 +50,9 @@ class Figure:
     data: pd.DataFrame
     height: float
     draw: Draw
+    note: str
     title: str = ""
     panels: tuple[Panel, ...] = ()
-    level: str = ""
 
 
 class Sentence(NamedTuple):

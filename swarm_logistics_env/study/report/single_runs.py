@@ -18,7 +18,7 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 
 from .drawing import Panel, Point
 from .figures import X_LABELS
-from .section import Sentence
+from .section import P_LEVEL, Sentence
 
 Json: TypeAlias = dict[str, JsonValue]
 # Mean P over the trainings of every condition, at the seeds drawn, by the key of its case; None: a
@@ -33,12 +33,12 @@ class SingleRuns(NamedTuple):
 
     Attributes:
         panels: P of every policy in the conditions of each table, a dot a run; by the table.
-        dot: what a dot is, e.g. "one seed".
+        note: what the marks of the panels are.
         data: seeds, conditions and questions, as the page's script reads them.
     """
 
     panels: Mapping[str, Panel]
-    dot: str
+    note: str
     data: Json
 
 
@@ -73,7 +73,11 @@ def single_runs(results: StudyResults, sentences: Sequence[Sentence]) -> SingleR
     }
     repeat = "seed" if plan.paired else "trial"
     only = f" of the first {len(seeds):,}" if len(seeds) < len(plan.seeds) else ""
-    return SingleRuns(dict(_performance_panels(results, runs)), f"one {repeat}{only}", data)
+    panels = dict(_performance_panels(results, runs))
+    points = [point for panel in panels.values() for point in panel.points]
+    crosses = "; crosses: published" if any(p.published is not None for p in points) else ""
+    note = f"Means; bars: {P_LEVEL} intervals; dots: one {repeat}{only}, click it{crosses}."
+    return SingleRuns(panels, note, data)
 
 
 def _performance_panels(results: StudyResults, runs: Runs) -> Iterator[tuple[str, Panel]]:

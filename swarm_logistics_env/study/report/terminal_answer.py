@@ -20,10 +20,11 @@ def terminal_answer(answer: Answer, width: int = PLAIN_WIDTH, *, shortens: bool 
         width: of the terminal [characters].
         shortens: whether questions are shortened so that no row is wider.
     """
-    parts = [line for text in answer.head for line in _fold(text, width)]
     widest = width if shortens else None
-    if answer.compared is not None:
-        parts = [*_in_columns([answer.compared.columns, *answer.compared.rows], widest), *parts]
+    parts = _fold_all(answer.opening, width)
+    if answer.overview is not None:
+        parts += _in_columns([answer.overview.columns, *answer.overview.rows], widest)
+    parts += _fold_all(answer.summary, width)
     cells = [("", *answer.columns[1:]), *(answer.row(line, line.question) for line in answer.lines)]
     heading, *rows = _in_columns(cells, widest, right=1)
     parts.append(heading)
@@ -63,6 +64,10 @@ def _shortened(text: str, width: int) -> str:
         return text
     behind = (width - 1) * 3 // 5
     return f"{text[: width - 1 - behind]}…{text[-behind:]}"
+
+
+def _fold_all(texts: Sequence[str], width: int) -> list[str]:
+    return [line for text in texts for line in _fold(text, width)]
 
 
 def _fold(text: str, width: int) -> list[str]:

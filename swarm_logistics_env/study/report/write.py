@@ -44,11 +44,17 @@ def write_document(
     tables |= {f"{pictures.name}/{figure.name}.csv": figure.data for figure in report.figures}
     try:
         pictures.mkdir(parents=True, exist_ok=True)
-        drawings = {figure.name: images(figure.draw, figure.height, style) for figure in figures}
+        drawings = {
+            figure.name: images(figure.draw, figure.height, figure.note, style)
+            for figure in figures
+        }
         if not advice:
             svgs = {name: drawing.svg for name, drawing in drawings.items()}
             if style != PAGE_STYLE:
-                svgs = {figure.name: svg_image(figure.draw, figure.height) for figure in figures}
+                svgs = {
+                    figure.name: svg_image(figure.draw, figure.height, figure.note)
+                    for figure in figures
+                }
             texts["report.html"] = html(report, svgs, texts["tables.tex"])
         for name, table in tables.items():
             write_csv(directory / name, table, StudyError)
@@ -97,9 +103,11 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
     lines = [f"# {document.title}", ""]
     for paragraph in (*document.text, note):
         lines += [_inert(paragraph), ""] if paragraph else []
-    compared = document.answer.compared or Section("")
-    head = compared._replace(title="Answer", lines=tuple(document.answer.head))
-    lines += [section_markdown(head), section_markdown(document.answer.section)]
+    answer = document.answer
+    overview = answer.overview or Section("")
+    opening = Section("Answer", lines=tuple(answer.opening))
+    summary = overview._replace(lines=tuple(answer.summary))
+    lines += map(section_markdown, (opening, summary, answer.section))
     for chapter in document.chapters:
         lines += [f"## {chapter.title}", ""]
         lines += [chapter.text, ""] if chapter.text else []
@@ -114,7 +122,7 @@ def section_markdown(section: Section, *, level: int = 2, pictures: str | None =
     for figure in section.figures:
         if pictures is not None:
             lines += [f"![{figure.name}]({pictures}/{figure.name}.png)", ""]
-        lines += [_inert(figure.caption), ""]
+        lines += [_inert(f"{figure.caption} {figure.note}"), ""]
     if section.sentences:
         for sentence in section.sentences:
             lines += [f"* **{_inert(sentence.head)}** {_inert(sentence.text)}"]

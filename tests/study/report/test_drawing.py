@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.study.report import drawing
 
 DRAW = """
@@ -56,13 +55,7 @@ PANEL = drawing.Panel("P", "P", (POINT,), (1.0,), "N")
     ("draw", "arguments", "mark", "bars"),
     [
         (drawing.intervals, ([PANEL],), (0, 4), [[(0, 3), (0, 6)]]),
-        (drawing.forest, ([("S", [POINT])], "S"), (4, 0), [[(3, 0), (6, 0)]]),
-        (
-            drawing.trade_off,
-            ({"N = 5": [(POINT, Interval(2.0, 1.0, 5.0))]},),
-            (2, 4),
-            [[(1, 4), (5, 4)], [(2, 3), (2, 6)]],
-        ),
+        (drawing.forest, ({"S": [("N = 5", [POINT])]},), (4, 0), [[(3, 0), (6, 0)]]),
     ],
 )
 def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
@@ -78,15 +71,45 @@ def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
     assert [[tuple(end) for end in line] for line in lines] == bars
 
 
-def test_a_lonely_point_has_a_name_and_not_all_on_a_heap_have_one() -> None:
-    contacts = Interval(2.0, 1.0, 5.0)
-    lonely = POINT._replace(category="lonely", value=8.0)
-    on_a_heap = [(POINT._replace(category=name), contacts) for name in "abc"]
+def test_columns_of_a_forest_have_scales_of_their_own_and_one_legend() -> None:
+    other = POINT._replace(series="central", style=1, value=8.0, high=9.0)
+    rows = [("N = 5", [POINT, other])]
     canvas = Figure()
-    drawing.trade_off(canvas, {"": [*on_a_heap, (lonely, Interval(20.0, 19.0, 21.0))]})
-    names = {text.get_text() for text in canvas.axes[0].texts}
-    assert "lonely" in names
-    assert 0 < len(names & set("abc")) < 3
+    drawing.forest(canvas, {"P": rows, "contacts": [("N = 5", [POINT, POINT])]})
+    left, right = canvas.axes
+    assert (left.get_xlabel(), right.get_xlabel()) == ("P", "contacts")
+    assert left.get_xlim()[1] > 9.0 > right.get_xlim()[1]
+    (legend,) = canvas.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["homing", "central"]
+
+
+def drawn_scale(values: list[float], thresholds: tuple[float, ...]) -> str:
+    points = tuple(
+        drawing.Point("homing", 0, f"N = {value:g}", value, value - 1.0, value + 1.0)
+        for value in values
+    )
+    canvas = Figure()
+    drawing.intervals(canvas, [drawing.Panel("", "", points, thresholds, "")])
+    (axes,) = canvas.axes
+    low, high = axes.get_ylim()
+    assert low <= min(values) <= max(values) < high
+    return axes.get_yscale()
+
+
+@pytest.mark.parametrize(
+    ("values", "thresholds", "scale"),
+    [
+        ([10.0, 200.0], (), "linear"),
+        ([2.0, 200.0], (), "log"),  # P of a small swarm and of a large one
+        ([0.0, 200.0], (), "linear"),
+        ([-0.6, 0.0, 1.4], (0.0,), "linear"),
+        ([-0.6, 0.0, 14.0], (0.0,), "symlog"),
+    ],
+)
+def test_a_value_far_from_all_others_leaves_them_apart(
+    values: list[float], thresholds: tuple[float, ...], scale: str
+) -> None:
+    assert drawn_scale(values, thresholds) == scale
 
 
 @pytest.mark.parametrize(

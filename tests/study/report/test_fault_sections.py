@@ -9,13 +9,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from swarm_logistics_env.study.questions.comparison import NO_FAULT, OTHER_BEHAVIOUR, Setting
-from swarm_logistics_env.study.report import drawing
+from swarm_logistics_env.study.report.curves import Curve, CurvePanel, curves
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.write import markdown
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Outcome
 from swarm_logistics_env.study.verdicts.mid_run_faults import (
-    RateCurve,
     Resilience,
     rate_curves,
     resiliences,
@@ -128,19 +127,19 @@ def test_a_null_that_is_missing_or_ran_out_of_items_is_none(repaired: StudyResul
 
 def test_deliveries_over_time_are_rates_of_the_window(repaired: StudyResults) -> None:
     (comparison,) = (c for c in repaired.plan.comparisons if c.indicator == "FT")
-    curves = rate_curves(repaired, comparison)
-    assert [curve.runs for curve in curves] == ["no fault", "removed", "fault"]
+    rates = rate_curves(repaired, comparison)
+    assert [curve.runs for curve in rates] == ["no fault", "removed", "fault"]
     # 0.5 deliveries a second, in 100 s.
     for number, second, expected in ((0, 900.0, 50), (2, 900.0, 20), (2, 1800.0, 50)):
-        curve = curves[number]
+        curve = rates[number]
         (n_deliveries,) = curve.deliveries[curve.seconds == second]
         assert n_deliveries == pytest.approx(expected, abs=6)
     # One scale holds the rates of all panels.
     canvas = Figure()
-    many = [
-        RateCurve(rates.runs, rates.seconds, *(10.0 * x for x in rates[2:])) for rates in curves
-    ]
-    drawing.rates(canvas, {"few": curves, "many": many}, ONSET, "deliveries")
+    few = [Curve(*rate) for rate in rates]
+    many = [Curve(rate.runs, rate.seconds, *(10.0 * x for x in rate[2:])) for rate in rates]
+    panels = [CurvePanel("few", "time [s]", few), CurvePanel("many", "time [s]", many)]
+    curves(canvas, panels, "deliveries", onset=ONSET)
     for axes in canvas.axes:
         assert axes.get_ylim()[1] >= max(curve.high.max() for curve in many)
 

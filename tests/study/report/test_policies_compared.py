@@ -12,7 +12,7 @@ from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
-from swarm_logistics_env.study.report.policies_compared import comparison_in_words, comparison_table
+from swarm_logistics_env.study.report.policies_compared import comparison_in_words
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.tasks.task import Outcome
 from swarm_logistics_env.study.trial_study import judge
@@ -54,15 +54,27 @@ def test_who_is_behind_stands_second_whoever_is_named_first() -> None:
     assert comparison_in_words(judged(study_of("swarm-dt", "homing"), play)) == first
 
 
-def test_three_policies_are_each_compared_with_the_first_and_holm_counts_all_conditions() -> None:
-    results = judged(study_of("homing", "swarm-dt", "random-walk", indicators=["S"]), play)
-    table = comparison_table(results)
-    assert table is not None
-    assert table.columns[0] == "P of homing, N = 25"
-    assert table.rows[0] == ("to that of swarm-dt", "2.00 [2.00, 2.00]", "larger", "1 larger")
-    assert [row[0] for row in table.rows[1:]] == ["to that of random-walk"]
-    text = terminal_answer(answer(results))
-    assert text.startswith("P of homing, N = 25 ")
+def test_three_policies_stand_in_one_table_beside_the_first_and_holm_counts_all_conditions() -> (
+    None
+):
+    fields = {"indicators": ["S", "R"]}
+    results = judged(study_of("homing", "swarm-dt", "random-walk", **fields), play)
+    of_three = answer(results)
+    assert of_three.overview is not None
+    head, *rows = of_three.overview.columns, *of_three.overview.rows
+    assert head == ("[95 %]", "P, N = 25, no fault", "times the first", "")
+    assert rows[0] == ("homing", "209.0 [204.5, 213.5]", "", "")
+    assert rows[1][0] == "swarm-dt"
+    assert rows[1][2:] == ("0.50 [0.50, 0.50]", "less")
+    turns, *indicators = of_three.summary
+    assert turns == (
+        "The order turns in some of 6 comparisons elsewhere: swarm-dt at FM4 m = 3; random-walk at "
+        "FM4 m = 3."
+    )
+    assert [sentence[:14] for sentence in indicators] == ["Scalability S:", "Robustness R: "]
+    assert "(worst homing, FM4, 1 of 25: -0.71 [-0.71, -0.71], refuted)" in indicators[1]
+    text = terminal_answer(of_three)
+    assert max(map(len, text.splitlines())) <= 80
     assert text.count("Holm's method") == 1
     families = {verdict.compared.family for verdict in results.verdicts}
     assert families >= {("swarm-dt", "change"), ("random-walk", "change")}
