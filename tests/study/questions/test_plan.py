@@ -85,7 +85,7 @@ def test_cases_and_runs_are_known_by_content() -> None:
     [
         ({}, "compares nothing"),
         ({"seeds": 0}, "Specification.seeds = 0: should be greater than 0"),
-        ({"first_seed": 2**31}, "first_seed = 2147483648: should be less than or equal to"),
+        ({"first_seed": 2**31}, "first_seed = 2147483648: should be at most 2147483647"),
         ({"indicators": ["Q"]}, "Specification: no indicator 'Q'; known: A, FT, R, S, change"),
         ({"sizes": [{"valeus": [2, 3]}]}, "Sizes has no field 'valeus'; did you mean 'values'?"),
         ({"sizes": [{"values": [5, 5]}]}, "ascending"),
