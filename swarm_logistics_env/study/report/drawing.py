@@ -391,7 +391,8 @@ def _legend(canvas: Canvas, axes: Axes) -> None:
     """Put the legend of one pair of axes above all of them, each series once."""
     handles, labels = axes.get_legend_handles_labels()
     series = dict(zip(labels, handles))
-    canvas.legend(series.values(), series, loc="outside upper left", ncols=min(len(series), 3))
+    most = 2 if max(map(len, series)) > 16 else 3  # three longer names are wider than the figure
+    canvas.legend(series.values(), series, loc="outside upper left", ncols=min(len(series), most))
 
 
 def marker_of(index: int) -> str:

@@ -206,10 +206,10 @@ class Picture:
 
     def _draw_badges(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
         height = max(11, round(1.2 * self._robot_radius))
-        away = round(0.8 * self._robot_radius + 0.3 * height)
         for robot in np.flatnonzero(state.robot_present & state.failed).tolist():
             sprite = sprites.badge(palette.mark(state.failure_modes[robot]), height)
             x, y = robots[robot]
+            away = round(0.8 * self._radii[robot] + 0.3 * height)
             box = sprite.get_rect(center=(x + away, y - away))
             self._canvas.blit(sprite, box.clamp(self._canvas.get_rect()))
 

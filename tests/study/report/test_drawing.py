@@ -78,6 +78,15 @@ def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
     assert [[tuple(end) for end in line] for line in lines] == bars
 
 
+def test_a_legend_of_long_names_is_no_wider_than_its_figure() -> None:
+    names = ("homing+charging", "homing-stock+charging", "ppo-robust+charging")
+    points = [drawing.Point(name, i, "N", 4.0, 3.0, 6.0, True) for i, name in enumerate(names)]
+    canvas = Figure(figsize=(drawing.WIDTH, 3.0), layout="constrained")
+    drawing.intervals(canvas, [drawing.Panel("P", "P", tuple(points), (1.0,), "N")])
+    canvas.draw_without_rendering()
+    assert canvas.legends[0].get_window_extent().x1 <= canvas.bbox.x1
+
+
 def test_a_lonely_point_has_a_name_and_not_all_on_a_heap_have_one() -> None:
     contacts = Interval(2.0, 1.0, 5.0)
     lonely = POINT._replace(category="lonely", value=8.0)

@@ -311,8 +311,9 @@ function drawArena(canvas, number, now, next, share, options) {
   poses.forEach((pose, robot) => {
     const mark = pose && robots[robot] ? robots[robot][2] : "";
     if (mark === "") return;
-    const [x, y] = at(pose), away = 0.8 * radius + 0.3 * tall, size = tall * (0.8 + 0.4 * mark.length), rim = tall * (0.3 + 0.3 * mark.length);
-    stamp(`badge ${mark}`, Math.min(x + away, width - rim), Math.max(y - away, 0.6 * tall), size, (ink, mid) => badge(ink, mid, mid, tall, mark));
+    const [x, y] = at(pose), away = 0.8 * radiusOf(robot) + 0.3 * tall, size = tall * (0.8 + 0.4 * mark.length), rim = tall * (0.3 + 0.3 * mark.length);
+    const beside = x + away + rim - 0.6 * tall;  // a wide badge begins where a narrow one does, or it would cover its robot
+    stamp(`badge ${mark}`, Math.min(beside, width - rim), Math.max(y - away, 0.6 * tall), size, (ink, mid) => badge(ink, mid, mid, tall, mark));
   });
 }
 
