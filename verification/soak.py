@@ -118,7 +118,8 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "speed_mix": rarely((1.0, 0.5, 0.2), (1.0,)),
         "sensing_mix": rarely((1.0, 0.3), (1.0,)),
         "robot_kinds": rarely(
-            f"plain, other robot_radius={0.6 * radius} max_speed=0.2 drive=differential lifts=false",
+            f"plain, other robot_radius={0.6 * radius} max_speed=0.2 drive=differential "
+            "lifts=false",
             "",
         ),
         "memory_size": source.randint(0, 4),

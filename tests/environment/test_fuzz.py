@@ -47,7 +47,7 @@ _OF_KIND: dict[st.SearchStrategy[Any], str] = {
     st.lists(st.floats(0.1, 1.0), min_size=1, max_size=3): "speed_mix sensing_mix",
     st.sampled_from(["holonomic", "differential"]): "drive",
     st.sampled_from(["none", "gossip"]): "relay",
-    st.sampled_from(["", "plain, scout:2 max_speed=0.1 robot_radius=0.1 lifts=false"]): "robot_kinds",
+    st.sampled_from(["", "plain, scout:2 max_speed=0.1 lifts=false"]): "robot_kinds",
     st.sampled_from(["next", "poisson", "bursts", "day", "time,item/0,1/0.2,A"]): "orders",
     st.sampled_from(["oldest", "urgent", "all"]): "announced",
     st.sampled_from([0.02, 0.1, 0.2]): "control_period",

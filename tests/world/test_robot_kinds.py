@@ -98,8 +98,8 @@ def test_kinds_that_cannot_be_are_refused_in_words(kinds: Any, complaint: str) -
 
 def test_each_robot_is_able_to_do_what_its_kind_can_times_its_factors() -> None:
     kinds = (
-        "plain, other robot_radius=0.1 robot_mass=6.0 max_speed=0.5 max_turn_rate=1.0 max_acceleration=2.0 drive=differential "
-        "ranger_range=3.0 view_range=0.5 lifts=false"
+        "plain, other robot_radius=0.1 robot_mass=6.0 max_speed=0.5 max_turn_rate=1.0 "
+        "max_acceleration=2.0 drive=differential ranger_range=3.0 view_range=0.5 lifts=false"
     )
     scenario = Scenario(n_robots=4, n_items=2, speed_mix=(1.0, 1.0, 0.5)).replace(robot_kinds=kinds)
     world = Warehouse(scenario)

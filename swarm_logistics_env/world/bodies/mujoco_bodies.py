@@ -3,8 +3,9 @@
 A differential robot is a chassis with two driven wheels and two casters that slide: it slips where
 friction gives way. Its motors turn it first, and drive it by the torque that is left. A holonomic
 one slides on a plane, pushed and turned by forces, as no wheels of that kind are modelled. All
-outlines are spheres at one height, which meet as discs do, so wheels are as large on all robots. Items are no bodies here: one that is
-carried adds its mass to its robot, and robots drive through free ones.
+outlines are spheres at one height, which meet as discs do, so wheels are as large on all robots.
+Items are no bodies here: one that is carried adds its mass to its robot, and robots drive through
+free ones.
 """
 
 from __future__ import annotations

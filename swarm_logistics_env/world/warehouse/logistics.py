@@ -168,7 +168,7 @@ def unmask_left(world: World) -> None:
 @kernel
 def reach_above(world: World, robot: int) -> float:
     """Return the distance [m] between centres up to which a robot stands above an item."""
-    return world.robots.radius[robot] + world.parameters.item_radius
+    return float(world.robots.radius[robot] + world.parameters.item_radius)
 
 
 @kernel

@@ -20,7 +20,7 @@ def touches_solid(me: int, pose: Pose, world: World) -> bool:
     reach = world.robots.radius[me] + TOUCHING_GAP
     away_x = min(pose.x, parameters.warehouse_width - pose.x)
     away_y = min(pose.y, parameters.warehouse_height - pose.y)
-    touches = min(away_x, away_y) < reach
+    touches = bool(min(away_x, away_y) < reach)
     if world.floor.n_columns > 0:
         touches |= is_near_solid(world.floor, pose.x, pose.y, reach)
     limit = (reach + parameters.obstacle_radius) ** 2

@@ -125,7 +125,9 @@ def test_a_simulation_that_explodes_is_told(
 
 
 @pytest.mark.parametrize("drive", DRIVES)
-@pytest.mark.parametrize(("kinds", "apart"), [("", 0.25), ("plain, small robot_radius=0.06", 0.185)])
+@pytest.mark.parametrize(
+    ("kinds", "apart"), [("", 0.25), ("plain, small robot_radius=0.06", 0.185)]
+)
 def test_two_robots_that_press_together_do_not_enter_each_other(
     drive: str, kinds: str, apart: float
 ) -> None:

@@ -36,6 +36,7 @@ WORLDS = {
     "of three sizes": Scenario(
         n_robots=30, n_items=25, warehouse_width=6.5, warehouse_height=4.0, delivery_width=1.0,
         n_obstacles=2, robot_radius=0.25,
+    ).replace(
         robot_kinds="large, small:2 robot_radius=0.09, middling robot_radius=0.15 robot_mass=9.0",
     ),
     "short-sighted": Scenario(
@@ -174,7 +175,7 @@ class Plain:
         at = state.robot_position[self.me]
         gaps = [*at, *(np.array([s.warehouse_width, s.warehouse_height]) - at)]
         solid = self.items[state.item_covered[self.items] == 0]
-        things = [
+        things: list[tuple[NDArray[np.float64], float | NDArray[np.float64]]] = [
             (state.robot_position[self.others], state.robot_radius[self.others]),
             (state.obstacle_position, s.obstacle_radius),
             (state.item_position[solid[: len(solid) * (state.robot_item[self.me] != NOBODY)]],
