@@ -197,14 +197,14 @@ class Watch:
 
     def _above(self, state: WarehouseState, laden: Flags) -> Flags:
         """Return which items have a robot that is `laden` above them, (I,)."""
-        reach = self.world.scenario.robot_radius + self.world.scenario.item_radius
+        reach = state.robot_radius[:, None] + self.world.scenario.item_radius
         away = _distances(state.robot_position, state.item_position)
         return np.asarray(np.any(laden[:, None] & (away < reach), axis=0))
 
     def _bodies(self) -> None:
         scenario, state = self.world.scenario, self.world.state
-        present, at, radius = state.robot_present, state.robot_position, scenario.robot_radius
-        in_robots = 2.0 * radius - _distances(at, at)
+        present, at, radius = state.robot_present, state.robot_position, state.robot_radius[:, None]
+        in_robots = radius + radius.T - _distances(at, at)
         in_robots[~(present[:, None] & present[None]) | np.eye(len(at), dtype=bool)] = -np.inf
         to_obstacles = _distances(at, state.obstacle_position)
         to_walls = np.hstack([at, self._far - at])

@@ -296,7 +296,7 @@ def _held_inside(moment: State, robot: int, edge: float) -> set[int]:
 
 def _closing(scenario: Scenario, before: State, now: State, robot: int) -> float:
     """Return how fast [m/s] a robot ran into others that it touches now and did not before."""
-    diameter, total = 2.0 * scenario.robot_radius, 0.0
+    total = 0.0
     for other in range(now.n_robots):
         if other == robot or not (now.robot_present[robot] and now.robot_present[other]):
             continue
@@ -304,7 +304,8 @@ def _closing(scenario: Scenario, before: State, now: State, robot: int) -> float
             moment.robot_position[other] - moment.robot_position[robot] for moment in (now, before)
         )
         distance, distance_before = math.hypot(*gap), math.hypot(*gap_before)
-        if distance < diameter <= distance_before:
+        apart = scenario.of_robot(robot).robot_radius + scenario.of_robot(other).robot_radius
+        if distance < apart <= distance_before:
             rate = before.robot_velocity[other] - before.robot_velocity[robot]
             total += max(0.0, -float(gap_before @ rate) / distance_before)
     return total

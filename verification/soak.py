@@ -117,7 +117,11 @@ def _fields(source: random.Random) -> dict[str, Any]:
         "drive": rarely("differential", "holonomic"),
         "speed_mix": rarely((1.0, 0.5, 0.2), (1.0,)),
         "sensing_mix": rarely((1.0, 0.3), (1.0,)),
-        "robot_kinds": rarely("plain, other max_speed=0.2 drive=differential lifts=false", ""),
+        "robot_kinds": rarely(
+            f"plain, other robot_radius={0.6 * radius} max_speed=0.2 drive=differential "
+            "lifts=false",
+            "",
+        ),
         "memory_size": source.randint(0, 4),
         "timer_limit": number(0.5, 20.0),
         "relay": rarely("gossip", "none"),

@@ -130,6 +130,16 @@ GOLDEN |= {
         policy="homing+charging",
         steps=650,
     ),
+    "robots of two sizes": GoldenTrajectory(
+        Scenario(n_robots=16, n_items=20, n_obstacles=2, restock=True, warehouse_width=6.0).replace(
+            robot_radius=0.2,
+            battery=500.0,
+            robot_kinds="porter robot_mass=6.0, runner:3 robot_radius=0.1 robot_mass=1.5",
+        ),
+        (Fault("away", 2, 5.0, 10.0),),
+        policy="homing+charging",
+        steps=300,
+    ),
     "batteries that run empty": _small(
         battery=200.0, position_noise=0.05, sensor_dropout=0.1, message_size=2, steps=300
     ),

@@ -293,9 +293,26 @@ def canonical_json(value: object) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"))
 
 
+# By pydantic's names of problems; numbers are its limits.
+_PLAIN_WORDS = {
+    "tuple_type": "should be a list",
+    "model_type": "should be a table of fields",
+    "string_type": "should be a text",
+    "bool_type": "should be true or false",
+    "bool_parsing": "should be true or false",
+    "float_type": "should be a number",
+    "float_parsing": "should be a number",
+    "int_type": "should be a whole number",
+    "int_parsing": "should be a whole number",
+    "int_from_float": "should be a whole number",
+    "greater_than_equal": "should be at least {ge:.12g}",
+    "less_than_equal": "should be at most {le:.12g}",
+}
+
+
 def _in_plain_words(problem: dict[str, Any]) -> str:
-    if problem["type"] == "tuple_type":
-        return "should be a list"
+    if problem["type"] in _PLAIN_WORDS:
+        return _PLAIN_WORDS[problem["type"]].format(**problem.get("ctx", {}))
     if problem["type"] == "too_short":
         least = problem["ctx"]["min_length"]
         noun = "item" if least == 1 else "items"

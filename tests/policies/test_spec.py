@@ -40,7 +40,7 @@ def test_a_class_is_loaded_by_module_or_the_file_of_this_folder_and_name(own_mod
         ("own_policies:NoPolicy", {}, "NoPolicy object .* should have the methods reset and act"),
         (":Class", {}, "cannot be imported"),
         ("swarm-dt", {"taxis_gian": 1.0}, "no field 'taxis_gian'; did you mean 'taxis_gain'"),
-        ("swarm-dt", {"drop_rate": -1.0}, r"drop_rate = -1.0: should be greater than or equal"),
+        ("swarm-dt", {"drop_rate": -1.0}, r"drop_rate = -1.0: should be at least 0"),
         ("own_policies:Still", {"grip": 1.0}, r"cannot be made: .*'grip'"),
         ("ppo-robust@1", {"gain": 1.0}, r"'ppo-robust@1' cannot be made: .*'gain'"),
         ("swarm-dt=5,homing=5", {}, r"no policy 'swarm-dt=5,homing=5' .*; see examples/mixed_sw"),

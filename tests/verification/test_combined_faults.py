@@ -28,6 +28,7 @@ from verification.invariants import Watch
 from verification.reference import Faults, Planned, Radio, ends, rewards
 
 EXAMPLES = 2000 if settings().max_examples >= 2000 else 15
+KINDS = "plain, other robot_radius=0.08 robot_mass=2.0 max_speed=0.7 lifts=false"
 STEPS = 36  # a radio that is late by 2 s is late by 20 of these
 
 
@@ -76,7 +77,7 @@ def cases(draw: st.DrawFn) -> Case:
         speed_mix=draw(st.sampled_from([(1.0,), (1.0, 0.5)])), heading_drift=0.5,
         sensing_mix=draw(st.sampled_from([(1.0,), (1.0, 0.4)])),
         drive=draw(st.sampled_from(["holonomic", "differential"])),
-        robot_kinds=draw(st.sampled_from(["", "plain, other max_speed=0.7 lifts=false"])),
+        robot_kinds=draw(st.sampled_from(["", KINDS])),
     )  # fmt: skip
     some = st.lists(planned_faults(n), min_size=1, max_size=4).map(tuple)
     planned = draw(some)

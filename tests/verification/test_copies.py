@@ -23,7 +23,10 @@ from verification.trajectories import GROUPS
 
 EXAMPLES = 2000 if settings().max_examples >= 2000 else 5
 STEPS = 1000  # beyond the rebuilding of bodies, which comes after 500 steps
-KINDS = "plain, other max_speed=0.7 max_acceleration=3.0 drive=differential lifts=false"
+KINDS = (
+    "plain, other robot_radius=0.08 robot_mass=2.0 max_speed=0.7 max_acceleration=3.0 "
+    "drive=differential lifts=false"
+)
 Change = tuple[int, Callable[[Warehouse], None]]
 Copy = Callable[[Warehouse], Warehouse]
 

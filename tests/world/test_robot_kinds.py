@@ -74,13 +74,18 @@ def test_a_scenario_without_kinds_is_written_as_before_there_were_any() -> None:
         ("1st:1", r"name = '1st': should be a letter, then letters"),
         ("a:99, b:1", r"n_robots = 25 has no robot of the kind 'b': should be more robots"),
         ("a max_sped=1", r"no field 'max_sped'; did you mean 'max_speed'"),
-        ("a max_speed=-1", r"max_speed = -1: should be greater than or equal to"),
+        ("a max_speed=-1", r"max_speed = -1: should be at least 1e-09"),
         ("a max_speed=9", r"physics_period = 0.02 s lets a robot cross 0.18 m"),
         ("a drive=tracks", r"drive = 'tracks': should be 'holonomic' or 'differential'"),
         ("a max_speed=1 max_speed=2", r"max_speed is set twice: should be set once"),
         ("a b", r"'a b' should be NAME\[:COUNT\] \[FIELD=VALUE"),
         ("a lifts=false", r"lifts = False in every kind: should be True in one of them"),
-        ("a lifts=maybe", r"lifts = 'maybe': should be a valid boolean"),
+        ("a lifts=maybe", r"lifts = 'maybe': should be true or false"),
+        ("a max_speed=fast", r"RobotKind.max_speed = 'fast': should be a number$"),
+        ([{"name": "a", "count": 1.5}], r"RobotKind.count = 1.5: should be a whole number$"),
+        (["a"], r"robot_kinds.0 = 'a': should be a table of fields$"),
+        ("a, b robot_radius=0.2", r"radius = 0.2 m of the kind 'b': should be at most .* 0.125 m"),
+        ("a robot_radius=0.03", r"a robot cross 0.04 m .* robot_radius / max_speed = 0.012 s"),
         ({"name": "a"}, r"should be a list of tables: \[\[robot_kinds\]\] in a TOML file"),
         (3, r"robot_kinds = 3: should be a list"),
     ],
@@ -93,8 +98,8 @@ def test_kinds_that_cannot_be_are_refused_in_words(kinds: Any, complaint: str) -
 
 def test_each_robot_is_able_to_do_what_its_kind_can_times_its_factors() -> None:
     kinds = (
-        "plain, other max_speed=0.5 max_turn_rate=1.0 max_acceleration=2.0 drive=differential "
-        "ranger_range=3.0 view_range=0.5 lifts=false"
+        "plain, other robot_radius=0.1 robot_mass=6.0 max_speed=0.5 max_turn_rate=1.0 "
+        "max_acceleration=2.0 drive=differential ranger_range=3.0 view_range=0.5 lifts=false"
     )
     scenario = Scenario(n_robots=4, n_items=2, speed_mix=(1.0, 1.0, 0.5)).replace(robot_kinds=kinds)
     world = Warehouse(scenario)
@@ -105,7 +110,9 @@ def test_each_robot_is_able_to_do_what_its_kind_can_times_its_factors() -> None:
     assert state.view_range.tolist() == [1.0, 0.5, 1.0, 0.25]
     assert state.lifts.tolist() == [True, False, True, False]
     assert {*scenario.robot_kinds[1].differing, "battery"} == set(KIND_FIELDS)
-    for name in ("max_turn_rate", "max_acceleration", "ranger_range"):
+    for name in (
+        "max_turn_rate", "max_acceleration", "ranger_range", "robot_radius", "robot_mass",
+    ):  # fmt: skip
         of_kind = getattr(scenario.robot_kinds[1], name)
         assert getattr(state, name)[[0, 1]].tolist() == [getattr(scenario, name), of_kind]
     world.change(drive="differential", view_range=2.0)  # of the kinds that do not say otherwise

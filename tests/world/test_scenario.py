@@ -32,7 +32,7 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
 @pytest.mark.parametrize(
     ("fields", "complaint"),
     [
-        ({"n_robots": 0}, "Scenario.n_robots = 0: should be .* equal to 1"),
+        ({"n_robots": 0}, "Scenario.n_robots = 0: should be at least 1"),
         ({"duration": math.nan}, "duration = nan: should be a finite number"),
         ({"relay": "flood"}, "relay = 'flood': should be 'none' or 'gossip'"),
         ({"n_robot": 3}, "no field 'n_robot'; did you mean 'n_robots'?"),
@@ -53,10 +53,10 @@ def test_a_scenario_survives_json_to_the_last_bit(**fields: Any) -> None:
         ({"n_requests": 61}, "n_requests = 61: should be at most n_items = 60"),
         ({"dock_capacity": 10.1}, "dock_capacity = 10.1: should be at most .* 10 per second"),
         # Numbers that no run survives.
-        ({"duration": 1e308}, "duration = 1e.308: should be .* equal to 1000000000"),
+        ({"duration": 1e308}, "duration = 1e.308: should be at most 1000000000"),
         (
             {"obstacle_radius": 1e-300},
-            "obstacle_radius = 1e-300: should be .* to 0.000000001",
+            "obstacle_radius = 1e-300: should be at least 1e-09",
         ),
         ({"physics_period": 1e-8}, "physics steps of a control_period: should be at most 1000"),
     ],

@@ -360,7 +360,10 @@ def add_legend(canvas: Canvas, axes: Axes) -> None:
     """Put the legend of one pair of axes above all of them, each series once."""
     handles, labels = axes.get_legend_handles_labels()
     series = dict(zip(labels, handles))
-    n_columns = min(len(series), int(canvas.get_figwidth() / _LEGEND_WIDTH))
+    width = (
+        _LEGEND_WIDTH if max(map(len, series), default=0) <= 16 else 1.5 * _LEGEND_WIDTH
+    )  # of long names
+    n_columns = max(1, min(len(series), int(canvas.get_figwidth() / width)))
     canvas.legend(series.values(), series, loc="outside upper left", ncols=n_columns)
 
 

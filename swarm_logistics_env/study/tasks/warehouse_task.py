@@ -116,11 +116,15 @@ class WarehouseTask(TaskWorld):
         handling = f" that lift in {scenario.handling_time:g} s" if scenario.handling_time else ""
         floor = f" (floor {scenario.floor})" if scenario.floor else ""
         kinds = f" ({kinds_text(scenario.robot_kinds)})" if scenario.robot_kinds else ""
+        batteries = ""
+        if scenario.battery is not None:
+            n_stations = len(scenario.stations)
+            batteries = f", batteries of {scenario.battery:g} J, charging stations: {n_stations}"
         restock = " that come back" if scenario.restock else ""
         return (
             f"a warehouse of {scenario.warehouse_width:g} m x {scenario.warehouse_height:g} m"
             f"{floor} with {scenario.n_items} items{restock}, robots of {scenario.max_speed:g} m/s"
-            f"{drive}{handling}{kinds}"
+            f"{drive}{handling}{kinds}{batteries}"
         )
 
     def preset_in_words(self, scenario: TaskScenario) -> str:

@@ -7,7 +7,7 @@ import json
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias, get_args
 
 from typer import Option
 
@@ -130,7 +130,14 @@ def changed_fields(changes: Repeated, bodies: str | None) -> dict[str, Any]:
         if name in fields:
             raise ScenarioError(f"--set {change}: {name} is set twice: should be set once")
         fields[name] = _value_of(value.strip())
+        if fields[name] == "none" and _may_be_absent(name):
+            fields[name] = None
     return fields
+
+
+def _may_be_absent(name: str) -> bool:
+    field = Scenario.model_fields.get(name)
+    return field is not None and type(None) in get_args(field.annotation)
 
 
 def _value_of(text: str) -> Any:

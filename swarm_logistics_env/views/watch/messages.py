@@ -42,7 +42,7 @@ _TIMER_STEPS = 8  # shades of the timer's halo
 
 
 def fixed_data(session: Session) -> Message:
-    """Return what holds for a world: colours, failure modes, speeds, policies, plan and kinds."""
+    """Return what holds for a world: colours, modes, speeds, policies, plan, kinds and radii."""
     light = palette.ROBOT_COLOURS | palette.PLAN_COLOURS
     return {
         "colours": {
@@ -59,6 +59,7 @@ def fixed_data(session: Session) -> Message:
         "choices": session.choices,
         "plan": _plan_message(session.scenario),
         "kinds": [kind.name for kind in session.scenario.robot_kinds],
+        "radii": session.scenario.of_kinds("robot_radius"),
     }
 
 

@@ -176,8 +176,9 @@ def _check(placement: Placement) -> None:
         raise BodiesError(
             f"{name}: the DotBots' simulator has no racks or obstacles, so should be an empty room"
         )
-    if abs(scenario.robot_radius - _RADIUS) > 1e-9:
-        raise BodiesError(f"robot_radius = {scenario.robot_radius} m: DotBots have {_RADIUS} m")
+    for radius in scenario.of_kinds("robot_radius"):
+        if abs(radius - _RADIUS) > 1e-9:
+            raise BodiesError(f"robot_radius = {radius} m: DotBots have {_RADIUS} m")
     size = max(scenario.warehouse_width, scenario.warehouse_height)
     if size > _LARGEST:
         raise BodiesError(f"a warehouse of {size} m: for DotBots should be at most {_LARGEST} m")

@@ -3,8 +3,9 @@
 A differential robot is a chassis with two driven wheels and two casters that slide: it slips where
 friction gives way. Its motors turn it first, and drive it by the torque that is left. A holonomic
 one slides on a plane, pushed and turned by forces, as no wheels of that kind are modelled. All
-outlines are spheres at one height, which meet as discs do. Items are no bodies here: one that is
-carried adds its mass to its robot, and robots drive through free ones.
+outlines are spheres at one height, which meet as discs do, so wheels are as large on all robots.
+Items are no bodies here: one that is carried adds its mass to its robot, and robots drive through
+free ones.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.core.errors import BodiesError
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import Scenario, of_first_robots
 
 from .bodies import Orders, Placement, Poses
 
@@ -44,6 +45,7 @@ _OUTLINE_FRICTION = 0.2  # robots on each other and on walls
 # Inertia that a motor adds to its wheel, of a ring of the robot's mass; without, it is unstable.
 _ARMATURE = 0.1
 _ANSWER = 0.05  # [s] in which a wheel comes near its wanted speed
+_TRACK = 1.4  # of a robot's radius, between its wheels
 _WALL = 0.05  # [m] half the thickness of a wall
 # Categories of geoms: outlines meet each other, wheels and casters the floor alone.
 _OUTLINE = 1
@@ -82,6 +84,7 @@ class MujocoBodies:
         self._sliding = np.flatnonzero(slides)  # robots
         self._wheeled = np.flatnonzero(~slides)
         self._limits = scenario.of_robots("max_acceleration")  # [m/s2]
+        self._tracks = _TRACK * scenario.of_robots("robot_radius")[self._wheeled]  # [m]
         self._masses = self._model.body_mass[self._chassis].copy()
         self._is_present = np.ones(scenario.n_robots, np.bool_)
         self._put(placement)
@@ -151,13 +154,12 @@ class MujocoBodies:
 
         With both wheels at their limit, a robot that presses on a wall could not turn.
         """
-        scenario = self._scenario
-        radius = _wheel_radius(scenario)
+        radius = _wheel_radius(self._scenario)
         wheels = self._data.qvel[self._wheels]  # left and right [rad/s]
         left, right = wheels.T
         motion = orders.motion[self._wheeled]
         forward = motion[:, 0] / radius - (right + left) / 2.0
-        turning = 0.5 * _track(scenario) * motion[:, 2] / radius - (right - left) / 2.0
+        turning = 0.5 * self._tracks * motion[:, 2] / radius - (right - left) / 2.0
         greatest = np.minimum(self._limits[self._wheeled], _STRONGEST)
         limit = _ANSWER * greatest / radius  # what takes all the torque
         turning = np.clip(turning, -limit, limit)
@@ -184,12 +186,8 @@ class MujocoBodies:
 
 
 def _wheel_radius(scenario: Scenario) -> float:
-    return 0.25 * scenario.robot_radius
-
-
-def _track(scenario: Scenario) -> float:
-    """Return how far apart the wheels are [m]."""
-    return 1.4 * scenario.robot_radius
+    """Return that of every wheel [m], which fits the smallest robots."""
+    return 0.25 * float(min(scenario.of_kinds("robot_radius")))
 
 
 def _model(placement: Placement, timestep: float) -> Xml.Element:
@@ -203,16 +201,16 @@ def _model(placement: Placement, timestep: float) -> Xml.Element:
     _add_solids(world, placement)
     actuators = Xml.SubElement(root, "actuator")
     scenario = placement.scenario
-    drives = scenario.of_robots("drive").tolist()
-    accelerations = scenario.of_robots("max_acceleration").tolist()
-    for robot, (drive, acceleration) in enumerate(zip(drives, accelerations, strict=True)):
-        body = Xml.SubElement(world, "body", name=f"robot {robot}")
-        if drive == "holonomic":
-            _add_sliding(body, scenario)
+    wheel_radius = _wheel_radius(scenario)
+    of_robots = of_first_robots(scenario)
+    for robot in range(scenario.n_robots):
+        name = f"robot {robot}"
+        body = Xml.SubElement(world, "body", name=name)
+        of_robot = of_robots[robot % len(of_robots)]
+        if of_robot.is_holonomic:
+            _add_sliding(body, of_robot, wheel_radius)
         else:
-            # What both wheels together give a robot [m/s2].
-            greatest = min(acceleration, _STRONGEST)
-            _add_wheeled(body, actuators, scenario, robot, greatest)
+            _add_wheeled(body, actuators, of_robot, name, wheel_radius)
     return root
 
 
@@ -238,24 +236,23 @@ def _add_solids(world: Xml.Element, placement: Placement) -> None:
         _add_geom(world, "sphere", _OUTLINE, (x, y, level), size, _OUTLINE_FRICTION)
 
 
-def _add_sliding(body: Xml.Element, scenario: Scenario) -> None:
-    """Add a disc that slides along x and y and turns."""
+def _add_sliding(body: Xml.Element, scenario: Scenario, level: float) -> None:
+    """Add a disc that slides along x and y, `level` [m] above the floor, and turns."""
     for kind, axis in (("slide", "1 0 0"), ("slide", "0 1 0"), ("hinge", "0 0 1")):
         Xml.SubElement(body, "joint", type=kind, axis=axis)
-    level = (0.0, 0.0, _wheel_radius(scenario))
+    centre = (0.0, 0.0, level)
     size = (scenario.robot_radius,)
-    _add_geom(body, "sphere", _OUTLINE, level, size, _OUTLINE_FRICTION, scenario.robot_mass)
+    _add_geom(body, "sphere", _OUTLINE, centre, size, _OUTLINE_FRICTION, scenario.robot_mass)
 
 
 def _add_wheeled(
-    body: Xml.Element, actuators: Xml.Element, scenario: Scenario, robot: int, greatest: float
+    body: Xml.Element, actuators: Xml.Element, scenario: Scenario, name: str, wheel_radius: float
 ) -> None:
     """Add a chassis, two wheels with a motor each, and two casters without friction.
 
-    `greatest` is its acceleration at most [m/s2].
+    All robots of `scenario` are as that one.
     """
     radius = scenario.robot_radius
-    wheel_radius = _wheel_radius(scenario)
     mass = scenario.robot_mass
     Xml.SubElement(body, "freejoint")
     chassis_mass = mass * (1.0 - 2.0 * _WHEEL_MASS)
@@ -268,11 +265,12 @@ def _add_wheeled(
         )
     # Both wheels together give the robot its greatest acceleration, as long as they do not slip.
     inertia = (0.5 + _ARMATURE) * mass * wheel_radius**2  # that each motor moves
+    greatest = min(scenario.max_acceleration, _STRONGEST)  # [m/s2]
     torque = inertia * greatest / wheel_radius
     gain = inertia / _ANSWER
     for side, left in (("left", 1.0), ("right", -1.0)):
-        wheel = Xml.SubElement(body, "body", pos=f"0 {left * _track(scenario) / 2.0} 0")
-        joint = f"robot {robot} {side}"
+        wheel = Xml.SubElement(body, "body", pos=f"0 {left * _TRACK * radius / 2.0} 0")
+        joint = f"{name} {side}"
         armature = str(_ARMATURE * mass * wheel_radius**2)
         Xml.SubElement(
             wheel, "joint", name=joint, type="hinge", axis="0 1 0", armature=armature

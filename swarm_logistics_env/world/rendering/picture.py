@@ -62,7 +62,8 @@ class Picture:
             self._stamp(sprites.item(self._item_half, False), items[number])
         for carrier in np.flatnonzero(state.carries_requested).tolist():
             if (leader := palette.leader_of(state, scenario, carrier)) != NOBODY:
-                sprites.arrow(self._canvas, robots[carrier], robots[leader], self._robot_radius)
+                reach = self._radii[leader]
+                sprites.arrow(self._canvas, robots[carrier], robots[leader], reach)
         self._canvas.set_clip(None)
         self._draw_robots(state, robots)
         for number in np.flatnonzero(state.item_requested).tolist():
@@ -95,7 +96,8 @@ class Picture:
         self.width = width + width % 2
         self.floor.centerx = self.width // 2
         # Things stay visible in a warehouse that is drawn small.
-        self._robot_radius = max(3.5, scale * scenario.robot_radius)
+        self._radii = np.maximum(3.5, scale * scenario.of_robots("robot_radius")).tolist()
+        self._robot_radius = max(self._radii)
         self._item_half = max(2.0, 0.8 * scale * scenario.item_radius)
         self._obstacle_radius = max(3.0, scale * scenario.obstacle_radius)
         self._caption = self.floor.bottom + margin + self._text_height // 2
@@ -174,7 +176,7 @@ class Picture:
     def _draw_halos(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
         age = state.robot_timer / self._scenario.timer_limit
         for robot in np.flatnonzero(state.robot_present & (age < 1.0)).tolist():
-            sprite = sprites.halo(self._robot_radius, int(age[robot] * sprites.HALOS))
+            sprite = sprites.halo(self._radii[robot], int(age[robot] * sprites.HALOS))
             self._stamp(sprite, robots[robot])
 
     def _draw_robots(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
@@ -184,9 +186,9 @@ class Picture:
             activity = palette.activity(state, robot)
             is_faulty = bool(state.failed[robot])
             if state.robot_kind[robot]:
-                outline = sprites.outline(self._robot_radius, int(state.robot_kind[robot]))
+                outline = sprites.outline(self._radii[robot], int(state.robot_kind[robot]))
                 self._stamp(outline, robots[robot])
-            sprite = sprites.robot(self._robot_radius, activity, headings[robot], is_faulty)
+            sprite = sprites.robot(self._radii[robot], activity, headings[robot], is_faulty)
             self._stamp(sprite, robots[robot])
 
     def _draw_stations(self, state: WarehouseState) -> None:
@@ -200,14 +202,14 @@ class Picture:
             return
         charge = state.robot_charge.tolist()
         for robot in np.flatnonzero(state.robot_present).tolist():
-            sprites.charge_bar(self._canvas, robots[robot], self._robot_radius, charge[robot])
+            sprites.charge_bar(self._canvas, robots[robot], self._radii[robot], charge[robot])
 
     def _draw_badges(self, state: WarehouseState, robots: list[PixelPoint]) -> None:
         height = max(11, round(1.2 * self._robot_radius))
-        away = round(0.8 * self._robot_radius + 0.3 * height)
         for robot in np.flatnonzero(state.robot_present & state.failed).tolist():
             sprite = sprites.badge(palette.mark(state.failure_modes[robot]), height)
             x, y = robots[robot]
+            away = round(0.8 * self._radii[robot] + 0.3 * height)
             box = sprite.get_rect(center=(x + away, y - away))
             self._canvas.blit(sprite, box.clamp(self._canvas.get_rect()))
 

@@ -137,8 +137,11 @@ def _check_reach(scenario: BatteryFields) -> None:
     names = [f" of the kind {kind.name!r}" for kind in scenario.robot_kinds] or [""]
     energies = scenario.of_kinds("battery")
     speeds = scenario.of_kinds("max_speed")
-    for name, energy, speed in zip(names, energies, speeds, strict=True):
-        needed = way * (scenario.driving_energy + scenario.idle_power / speed)
+    radii = scenario.of_kinds("robot_radius")
+    for name, energy, speed, radius in zip(names, energies, speeds, radii, strict=True):
+        # Of smaller robots alone, the stations stand nearer to the wall.
+        farther = _FROM_WALL * (scenario.robot_radius - radius)
+        needed = (way + farther) * (scenario.driving_energy + scenario.idle_power / speed)
         if energy < needed:
             raise ValueError(
                 f"battery = {energy:g} J does not bring a robot{name} the {way:.1f} m from the "

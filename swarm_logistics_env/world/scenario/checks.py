@@ -24,11 +24,23 @@ MOST_SUBSTEPS = 1000
 def check(scenario: ScenarioFields) -> None:
     """Check everything."""
     check_names(scenario.robot_kinds, scenario.n_robots)
+    check_radii(scenario)
     check_periods(scenario)
     check_storage(scenario)
     check_requests(scenario)
     check_orders(scenario)
     check_room(scenario)
+
+
+def check_radii(scenario: ScenarioFields) -> None:
+    """Check that no kind is larger than the robots that everything leaves room for."""
+    for kind in scenario.robot_kinds:
+        if kind.robot_radius is not None and kind.robot_radius > scenario.robot_radius:
+            raise ValueError(
+                f"robot_kinds: robot_radius = {kind.robot_radius:g} m of the kind {kind.name!r}: "
+                f"should be at most the scenario's robot_radius = {scenario.robot_radius:g} m, "
+                "which is that of the largest robots"
+            )
 
 
 def check_periods(scenario: ScenarioFields) -> None:
@@ -49,13 +61,15 @@ def check_periods(scenario: ScenarioFields) -> None:
             f"control_period = {scenario.control_period} s should be a whole multiple of "
             f"physics_period = {scenario.physics_period} s"
         )
-    longest = LONGEST_STRIDE * scenario.robot_radius / scenario.highest_speed
-    if scenario.physics_period > longest * (1.0 + 1e-9):
-        raise ValueError(
-            f"physics_period = {scenario.physics_period} s lets a robot cross "
-            f"{scenario.highest_speed * scenario.physics_period:g} m between two collision checks: "
-            f"should be at most {LONGEST_STRIDE} robot_radius / max_speed = {longest:g} s"
-        )
+    radii = scenario.of_kinds("robot_radius")
+    for radius, speed in zip(radii, scenario.of_kinds("max_speed"), strict=True):
+        longest = LONGEST_STRIDE * radius / speed
+        if scenario.physics_period > longest * (1.0 + 1e-9):
+            raise ValueError(
+                f"physics_period = {scenario.physics_period} s lets a robot cross "
+                f"{speed * scenario.physics_period:g} m between two collision checks: "
+                f"should be at most {LONGEST_STRIDE} robot_radius / max_speed = {longest:g} s"
+            )
     if scenario.duration < scenario.control_period:
         raise ValueError(
             f"duration = {scenario.duration} s should be at least one control_period "

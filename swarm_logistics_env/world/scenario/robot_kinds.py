@@ -46,6 +46,7 @@ class RobotKind(Record):
     Args:
         name: a letter, then letters, digits and _; no role of robots, as faults name both.
         count: robots of this kind in the pattern, 1 to 10,000.
+        robot_radius: at most the scenario's, for which layouts, floor plans and routes leave room.
         lifts: whether its robots lift items.
 
     Raises:
@@ -56,6 +57,8 @@ class RobotKind(Record):
 
     name: str
     count: int = 1
+    robot_radius: Positive | None = None
+    robot_mass: Positive | None = None
     max_speed: Positive | None = None
     max_turn_rate: Positive | None = None
     max_acceleration: Positive | None = None
@@ -103,7 +106,8 @@ def kinds_of(values: object) -> object:
         [4, 1]
     """
     if isinstance(values, str):
-        parts = values.split(",") if values.strip() else []
+        is_any = values.strip() not in ("", "none")  # as it is shown where there are none
+        parts = values.split(",") if is_any else []
         values = [_fields_of(part.strip()) for part in parts]
     if isinstance(values, dict):
         raise ValueError("should be a list of tables: [[robot_kinds]] in a TOML file")
@@ -180,6 +184,7 @@ class OfKinds:
 
     if TYPE_CHECKING:  # or they would stand before the other fields of a scenario
         n_robots: int
+        robot_radius: float
         robot_kinds: tuple[RobotKind, ...]
 
         def replace(self, **fields: Any) -> Self: ...
@@ -241,6 +246,11 @@ class OfKinds:
     def lifts(self) -> bool:
         """Whether robots lift items; a kind may not."""
         return True
+
+    @property
+    def has_smaller_robots(self) -> bool:
+        """Whether the robots of a kind are smaller than `robot_radius`."""
+        return any(radius < self.robot_radius for radius in self.of_kinds("robot_radius"))
 
     @property
     def highest_speed(self) -> float:

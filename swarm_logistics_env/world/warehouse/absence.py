@@ -114,24 +114,24 @@ def free_place(world: World, robot: int) -> tuple[float, float, bool]:
     left_x = world.robots.left_at[robot, 0]
     left_y = world.robots.left_at[robot, 1]
     for ring in range(_RINGS + 1):
-        distance = ring * world.parameters.robot_radius / _RINGS_PER_RADIUS
+        distance = ring * world.robots.radius[robot] / _RINGS_PER_RADIUS
         n_places = max(_PLACES_PER_RING * ring, 1)
         for number in range(n_places):
             angle = 2.0 * math.pi * number / n_places
             x = left_x + distance * math.cos(angle)
             y = left_y + distance * math.sin(angle)
-            if has_room(world, x, y) and is_in_sight(world, left_x, left_y, x, y):
+            if has_room(world, robot, x, y) and is_in_sight(world, left_x, left_y, x, y):
                 return x, y, True
     return left_x, left_y, False
 
 
 @kernel
-def has_room(world: World, x: float, y: float) -> bool:
+def has_room(world: World, robot: int, x: float, y: float) -> bool:
     """Return whether a robot may stand at a point [m]: no robot and nothing solid is there."""
     parameters = world.parameters
     robots = world.robots
     # Bodies rest that deep in what is solid, so that one who stood at a wall may stand there again.
-    radius = parameters.robot_radius - SLOP
+    radius = robots.radius[robot] - SLOP
     aside = min(x, parameters.warehouse_width - x)
     from_sides = min(aside, min(y, parameters.warehouse_height - y))
     if from_sides < radius:
@@ -140,11 +140,11 @@ def has_room(world: World, x: float, y: float) -> bool:
         return False
     if not is_clear(x, y, world.obstacles, radius + parameters.obstacle_radius):
         return False
-    diameter = 2.0 * parameters.robot_radius
     is_free = True
     for other in range(len(robots.present)):
         dx = robots.position[other, 0] - x
         dy = robots.position[other, 1] - y
-        is_near = dx * dx + dy * dy < diameter * diameter
+        apart = robots.radius[robot] + robots.radius[other]
+        is_near = dx * dx + dy * dy < apart * apart
         is_free &= not (is_near and robots.present[other])
     return is_free

@@ -33,7 +33,7 @@ def run_batteries(world: World) -> None:
     """Take out of the batteries what this step used, and charge who stands on a station.
 
     The way is the straight one from where a robot was at the end of the step before. A robot whose
-    centre is within a robot's radius of a station's is on it; two discs cannot both be.
+    centre is within its radius of a station's is on it; two discs cannot both be.
     """
     parameters = world.parameters
     if not parameters.has_batteries:
@@ -50,7 +50,7 @@ def run_batteries(world: World) -> None:
         way_y = robots.position[robot, 1] - position_before[robot, 1]
         square = robots.velocity[robot, 0] ** 2 + robots.velocity[robot, 1] ** 2
         square_before = velocity_before[robot, 0] ** 2 + velocity_before[robot, 1] ** 2
-        kinetic = 0.5 * parameters.robot_mass * max(square - square_before, 0.0)
+        kinetic = 0.5 * robots.mass[robot] * max(square - square_before, 0.0)
         driven = parameters.driving_energy * math.sqrt(way_x * way_x + way_y * way_y)
         if robots.is_empty[robot]:
             driven = kinetic = 0.0  # whoever shoves it pays for that
@@ -73,7 +73,7 @@ def charge(world: World, robot: int) -> None:
             continue
         dx = batteries.station_position[station, 0] - x
         dy = batteries.station_position[station, 1] - y
-        if dx * dx + dy * dy > parameters.robot_radius**2:
+        if dx * dx + dy * dy > world.robots.radius[robot] ** 2:
             continue
         room = world.able.battery[robot] - batteries.energy[robot]
         energy = min(parameters.charging_power * parameters.control_period, room)

@@ -107,15 +107,15 @@ def count_overlap(me: int, other: int, square: float, world: World) -> None:
     `square` [m2] is of the distance between their centres.
     """
     counts = world.contacts
-    diameter = 2.0 * world.parameters.robot_radius
-    if diameter - math.sqrt(square) > DEEP:
+    apart = world.robots.radius[me] + world.robots.radius[other]  # of discs that just touch
+    if apart - math.sqrt(square) > DEEP:
         counts.is_deep[0] = True
     position = counts.position_before
     velocity = counts.velocity_before
     x = position[other, 0] - position[me, 0]
     y = position[other, 1] - position[me, 1]
     square_before = x * x + y * y
-    if square_before < diameter * diameter:
+    if square_before < apart * apart:
         return  # they did before; at the start of an episode, too, where nobody was anywhere
     rate_x = velocity[other, 0] - velocity[me, 0]
     rate_y = velocity[other, 1] - velocity[me, 1]

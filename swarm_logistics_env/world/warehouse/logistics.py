@@ -131,7 +131,7 @@ def mask_below(world: World, robot: int) -> None:
     nearby = world.nearby
     x = world.robots.position[robot, 0]
     y = world.robots.position[robot, 1]
-    n_found = look_around(grid, x, y, reach_of(world), NOBODY, nearby)
+    n_found = look_around(grid, x, y, reach_above(world, robot), NOBODY, nearby)
     for index in range(n_found):
         item = grid.members[nearby.slot[index]]
         if items.status[item] == STORED:
@@ -147,26 +147,28 @@ def unmask_left(world: World) -> None:
     """
     grid = world.item_grid
     nearby = world.nearby
+    farthest = world.parameters.robot_radius + world.parameters.item_radius
     for slot in range(grid.start[-1]):
         item = grid.members[slot]
         if world.items.covered[item] == 0:
             continue
         x = grid.position[0, slot]
         y = grid.position[1, slot]
-        n_found = look_around(world.robot_grid, x, y, reach_of(world), NOBODY, nearby)
+        n_found = look_around(world.robot_grid, x, y, farthest, NOBODY, nearby)
         is_below_laden = False
         for index in range(n_found):
             robot = world.robot_grid.members[nearby.slot[index]]
-            is_below_laden |= world.robots.item[robot] != NOBODY
+            is_above = nearby.square[index] <= reach_above(world, robot) ** 2
+            is_below_laden |= is_above and world.robots.item[robot] != NOBODY
         if not is_below_laden:
             world.items.covered[item] = 0
             collide_with(world.engine, world.engine.item_shapes[item], FREE_ITEM)
 
 
 @kernel
-def reach_of(world: World) -> float:
+def reach_above(world: World, robot: int) -> float:
     """Return the distance [m] between centres up to which a robot stands above an item."""
-    return world.parameters.robot_radius + world.parameters.item_radius
+    return float(world.robots.radius[robot] + world.parameters.item_radius)
 
 
 @kernel

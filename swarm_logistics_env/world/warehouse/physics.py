@@ -69,29 +69,29 @@ def advance(world: World) -> None:
     call_at(engine.functions.cpSpaceSetIterations, (engine.space[0], iterations))
     period = parameters.physics_period
     for _ in range(parameters.n_substeps):
-        push(engine, world.able.max_acceleration, period, parameters.robot_mass)
+        push(engine, world.able.max_acceleration, period, world.robots.mass)
         call_at(engine.functions.cpSpaceStep, (engine.space[0], period))
     read(engine)
 
 
 @engine_kernel
-def push(engine: EngineArrays, most: Numbers, period: float, mass: float) -> None:
+def push(engine: EngineArrays, most: Numbers, period: float, mass: Numbers) -> None:
     """Give every robot the force that changes its velocity as wanted, as far as it can.
 
     Args:
         most: acceleration of each robot (N,) [m/s2].
         period: of a substep [s].
-        mass: of a robot [kg].
+        mass: of each robot (N,) [kg].
     """
     at = engine.body_words
-    mass_per_period = mass / period  # makes a force of a change of velocity
     for robot in range(len(engine.wanted_velocity)):
         body = words_of(engine, robot)
         change_x = engine.wanted_velocity[robot, 0] - body[at.velocity]
         change_y = engine.wanted_velocity[robot, 1] - body[at.velocity + 1]
         change = math.sqrt(change_x * change_x + change_y * change_y)
         greatest = most[robot] * period
-        share = mass_per_period * (1.0 if change <= greatest else greatest / change)
+        # Mass per period makes a force of a change of velocity.
+        share = mass[robot] / period * (1.0 if change <= greatest else greatest / change)
         body[at.force] = share * change_x
         body[at.force + 1] = share * change_y
 
@@ -195,17 +195,16 @@ def build_solids(world: World, static: int) -> None:
 def build_robots(world: World) -> None:
     """Make the robots' bodies, which no contact turns, and their shapes."""
     engine = world.engine
-    parameters = world.parameters
     robots = world.robots
     call = engine.functions
     space = engine.space[0]
     for robot in range(len(robots.item)):
-        body = made_at(call.cpBodyNew, (parameters.robot_mass, math.inf))
+        body = made_at(call.cpBodyNew, (robots.mass[robot], math.inf))
         position = (engine.robot_places[robot, 0], engine.robot_places[robot, 1])
         call_at(call.cpBodySetPosition, (body, position))
         velocity = (robots.velocity[robot, 0], robots.velocity[robot, 1])
         call_at(call.cpBodySetVelocity, (body, velocity))
-        shape = made_at(call.cpCircleShapeNew, (body, parameters.robot_radius, (0.0, 0.0)))
+        shape = made_at(call.cpCircleShapeNew, (body, robots.radius[robot], (0.0, 0.0)))
         kind = EMPTY_ROBOT if robots.item[robot] == NOBODY else LADEN_ROBOT
         collide_with(engine, shape, kind if robots.present[robot] else NO_ONE)
         engine.robot_bodies[robot] = body

@@ -160,6 +160,20 @@ def scan_discs(
             scan_disc(nearby.forward[number], nearby.left[number], square, radius, scan)
 
 
+@kernel
+def scan_robots(pose: Pose, reach: float, world: World, n_found: int, scan: Sensed) -> None:
+    """Do as `scan_discs` with the robots nearby, each of its own radius."""
+    grid = world.robot_grid
+    nearby = world.nearby
+    for index in range(n_found):
+        slot = nearby.slot[index]
+        square = nearby.square[index]
+        radius = world.robots.radius[grid.members[slot]]
+        if square < (reach + radius) ** 2:
+            forward, left = in_frame(pose, grid.position[0, slot], grid.position[1, slot])
+            scan_disc(forward, left, square, radius, scan)
+
+
 @inlined_kernel
 def meet_middle_beams(nearby: Nearby, n_scanned: int, radius: float) -> None:
     """Fill the beams nearest to the centres of discs, and where these meet them [m].

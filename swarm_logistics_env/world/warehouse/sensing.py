@@ -18,7 +18,14 @@ from .demand import is_known_request
 from .grid import look_around
 from .pose import Pose, in_frame
 from .radio import listen
-from .rangers import N_RANGES, full_range, hide_behind_solids, scan_discs, scan_solids
+from .rangers import (
+    N_RANGES,
+    full_range,
+    hide_behind_solids,
+    scan_discs,
+    scan_robots,
+    scan_solids,
+)
 from .sensor_errors import ITEM_SEEN, ROBOT_SEEN, disturb, fail_rangers
 from .structs import NOBODY, Sensed, World
 from .touch import TOUCHING_GAP, touches_items, touches_robots, touches_solid
@@ -52,7 +59,7 @@ def sense(world: World, rows: Sensed) -> int:
         sense_items(me, pose, world, rows[me])
         if reach > 0.0 and world.floor.n_columns > 0:
             hide_behind_solids(scans, full_range(world, me))
-        robots.contact[me] |= touches_solid(pose, world)
+        robots.contact[me] |= touches_solid(me, pose, world)
         feel_itself(me, pose, world, rows[me])
         sense_battery(me, pose, world, rows[me])
         disturb(me, world, rows[me])
@@ -71,7 +78,7 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     parameters = world.parameters
     grid = world.robot_grid
     nearby = world.nearby
-    radius = world.parameters.robot_radius
+    radius = parameters.robot_radius  # of the largest
     ranger_range = able.ranger_range[me]
     view_range = able.view_range[me]
     reach = max(
@@ -82,7 +89,10 @@ def sense_robots(me: int, pose: Pose, world: World, out: Sensed) -> bool:
     robots.contact[me] |= touches
     if ranger_range > 0.0:
         scan = out[row.RANGE_ROBOTS : row.RANGE_ROBOTS + row.N_BEAMS]
-        scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
+        if parameters.has_smaller_robots:
+            scan_robots(pose, ranger_range, world, n_found, scan)
+        else:
+            scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     lowest, timer = listen(me, world, n_found)
     if lowest != NOBODY:
         robots.heard[me] = timer
@@ -105,14 +115,14 @@ def sense_items(me: int, pose: Pose, world: World, out: Sensed) -> None:
     radius = parameters.item_radius
     ranger_range = world.able.ranger_range[me]
     view_range = world.able.view_range[me]
-    touch = parameters.robot_radius + TOUCHING_GAP + radius
+    touch = world.robots.radius[me] + TOUCHING_GAP + radius
     reach = max(ranger_range + radius, view_range, touch)
     n_found = look_around(grid, pose.x, pose.y, reach, NOBODY, nearby)
     if ranger_range > 0.0:
         scan = out[row.RANGE_ITEMS : row.RANGE_ITEMS + row.N_BEAMS]
         scan_discs(pose, ranger_range, radius, grid, nearby, n_found, scan)
     if world.robots.item[me] != NOBODY:
-        world.robots.contact[me] |= touches_items(world, n_found)
+        world.robots.contact[me] |= touches_items(me, world, n_found)
     n_chosen = choose(me, pose, world, grid, n_found, ITEM_SEEN)
     describe_items(me, pose, world, n_chosen, out)
 

@@ -44,6 +44,8 @@ class WarehouseState:
     """
 
     robot_kind: Integers
+    robot_radius: Numbers
+    robot_mass: Numbers
     robot_position: Numbers
     robot_velocity: Numbers
     robot_heading: Numbers
@@ -95,6 +97,8 @@ class WarehouseState:
         self.contacts = blank(ContactCounts, lengths)
         robots.present[:] = True
         robots.kind[:] = scenario.kind_numbers(scenario.n_robots)
+        robots.radius[:] = scenario.of_robots("robot_radius")
+        robots.mass[:] = scenario.of_robots("robot_mass")
         for nobody in (robots.item, robots.memory, robots.last_in_delivery, self.items.carrier):
             nobody[...] = NOBODY
         for silent in (robots.timer, robots.told, robots.heard, robots.told_before):

@@ -39,8 +39,8 @@ class Parameters(NamedTuple):
     warehouse_width: float
     warehouse_height: float
     storage_width: float
-    robot_radius: float
-    robot_mass: float
+    robot_radius: float  # of the largest
+    has_smaller_robots: bool
     item_radius: float
     obstacle_radius: float
     highest_speed: float
@@ -85,6 +85,8 @@ class Robots(NamedTuple):
     """The robots; a row is one robot for good."""
 
     kind: Annotated[Integers, "N"]  # number of its kind, from 0 on; 0 if all are alike
+    radius: Annotated[Numbers, "N"]  # [m]
+    mass: Annotated[Numbers, "N"]  # [kg]
     position: Annotated[Numbers, "N", 2]  # [m]
     velocity: Annotated[Numbers, "N", 2]  # [m/s]
     heading: Annotated[Numbers, "N"]  # [rad] from +x to the left, within +-pi

@@ -85,7 +85,7 @@ def test_cases_and_runs_are_known_by_content() -> None:
     [
         ({}, "compares nothing"),
         ({"seeds": 0}, "Specification.seeds = 0: should be greater than 0"),
-        ({"first_seed": 2**31}, "first_seed = 2147483648: should be less than or equal to"),
+        ({"first_seed": 2**31}, "first_seed = 2147483648: should be at most 2147383648"),
         ({"indicators": ["Q"]}, "Specification: no indicator 'Q'; known: A, FT, R, S, change"),
         ({"sizes": [{"valeus": [2, 3]}]}, "Sizes has no field 'valeus'; did you mean 'values'?"),
         ({"sizes": [{"values": [5, 5]}]}, "ascending"),
@@ -93,7 +93,7 @@ def test_cases_and_runs_are_known_by_content() -> None:
         ({"faults": {"modes": ["FM1"]}}, "list of tables: [[faults]] in a TOML file"),
         ({"faults": [{"modes": ["FM9"]}]}, "no failure mode 'FM9'; did you mean"),
         ({"faults": [{"modes": ["FM1"], "factor": 0.5}]}, "FM1 takes no factor"),
-        ({"faults": [{"modes": ["FM1"], "intermittent": [0.001, 5]}]}, "or equal to 0.01"),
+        ({"faults": [{"modes": ["FM1"], "intermittent": [0.001, 5]}]}, "should be at least 0.01"),
         ({"faults": [{"modes": ["FM1"], "robots": [25]}]}, "no working robot is left"),
         ({"faults": [{"modes": ["FM1"], "onsets": [500]}]}, "or nothing fails"),
         (

@@ -71,6 +71,15 @@ def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
     assert [[tuple(end) for end in line] for line in lines] == bars
 
 
+def test_a_legend_of_long_names_is_no_wider_than_its_figure() -> None:
+    names = ("homing+charging", "homing-stock+charging", "ppo-robust+charging")
+    points = [drawing.Point(name, i, "N", 4.0, 3.0, 6.0, True) for i, name in enumerate(names)]
+    canvas = Figure(figsize=(drawing.WIDTH, 3.0), layout="constrained")
+    drawing.intervals(canvas, [drawing.Panel("P", "P", tuple(points), (1.0,), "N")])
+    canvas.draw_without_rendering()
+    assert canvas.legends[0].get_window_extent().x1 <= canvas.bbox.x1
+
+
 def test_columns_of_a_forest_have_scales_of_their_own_and_one_legend() -> None:
     other = POINT._replace(series="central", style=1, value=8.0, high=9.0)
     rows = [("N = 5", [POINT, other])]

@@ -61,6 +61,8 @@ def test_the_warehouse_is_varied_by_presets_and_its_cases_are_its_own() -> None:
     assert WAREHOUSE.vary(Scenario(), {"preset": "dots"}) == Scenario.preset("dots")
     with pytest.raises(ScenarioError, match="no scenario preset"):
         WAREHOUSE.vary(Scenario(), {"preset": "dot"})
+    words = "max_acceleration=3.0), batteries of 71900 J, charging stations: 4"
+    assert WAREHOUSE.world_in_words(Scenario.preset("day")).endswith(words)
 
 
 def test_covers_all_that_an_episode_loads() -> None:

@@ -177,6 +177,10 @@ def test_a_scenario_is_read_from_a_file(command: Command) -> None:
     options = "--preset realistic --scenario dots.toml --set n_items=8"
     scenario = Scenario.from_json(command(f"list scenario --json {options}"))
     assert scenario == Scenario.preset("dots").replace(n_robots=7, n_items=8)
+    # none is what a field may be without, and a text where it may be that.
+    options = "--preset day --set battery=none --set floor=none --set robot_kinds=none"
+    scenario = Scenario.from_json(command(f"list scenario --json {options} --set relay=none"))
+    assert scenario == Scenario.preset("day").replace(battery=None, floor=None, robot_kinds=())
 
 
 def test_scenario_faults_studies_policies_and_trainings_are_listed(command: Command) -> None:

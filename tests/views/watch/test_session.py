@@ -223,10 +223,11 @@ def test_what_the_selected_robot_senses_is_shown() -> None:
 
 def test_the_kinds_of_robots_are_shown_where_there_are_any() -> None:
     assert frame_message(Session(SMALL))["kinds0"] == []
-    session = Session(SMALL.replace(robot_kinds="lifter:3, scout:1"))
+    session = Session(SMALL.replace(robot_kinds="lifter:3, scout:1 robot_radius=0.1"))
     session.select(2)
     shown = frame_message(session)
     assert shown["fixed"]["kinds"] == ["lifter", "scout"]
+    assert shown["fixed"]["radii"] == (0.125, 0.1)
     assert shown["kinds0"] == session.scenario.kind_numbers(8).tolist()
     assert shown["selected"]["kind"] == ["lifter", "scout"][shown["kinds0"][2]]
 

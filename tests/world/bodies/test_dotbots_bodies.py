@@ -124,6 +124,7 @@ def test_a_robot_that_falls_silent_is_lost() -> None:
         ({"robot_kinds": "plain, ball drive=holonomic"}, "should be differential"),
         ({"robot_kinds": "plain, fast max_speed=0.6"}, "wheel would run at 0.80 m/s"),
         ({"robot_radius": 0.06}, "DotBots have 0.05 m"),
+        ({"robot_kinds": "plain, tiny robot_radius=0.04"}, "robot_radius = 0.04 m: DotBots have"),
         ({"warehouse_width": 70.0}, "should be at most 60.0 m"),
     ],
 )

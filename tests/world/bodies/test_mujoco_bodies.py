@@ -125,12 +125,17 @@ def test_a_simulation_that_explodes_is_told(
 
 
 @pytest.mark.parametrize("drive", DRIVES)
-def test_two_robots_that_press_together_do_not_enter_each_other(drive: str) -> None:
-    bodies = placed(drive, [[4.0, 5.0], [5.0, 5.02]])
+@pytest.mark.parametrize(
+    ("kinds", "apart"), [("", 0.25), ("plain, small robot_radius=0.06", 0.185)]
+)
+def test_two_robots_that_press_together_do_not_enter_each_other(
+    drive: str, kinds: str, apart: float
+) -> None:
+    bodies = placed(drive, [[4.0, 5.0], [5.0, 5.02]], kinds=kinds)
     for _ in range(40):
         poses = bodies.move(orders((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)))
     gap = float(np.linalg.norm(poses.position[0] - poses.position[1]))
-    assert gap > 2 * Scenario().robot_radius - 0.01
+    assert apart - 0.01 < gap < apart + 0.01
 
 
 @pytest.mark.parametrize("drive", DRIVES)

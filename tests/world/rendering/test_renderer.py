@@ -218,6 +218,17 @@ def test_every_request_and_every_robot_that_carries_one_is_plain_to_see() -> Non
     assert min(count(floor, palette.DELIVERING), count(floor, palette.SHUFFLING)) > 50
 
 
+def test_each_robot_is_drawn_as_large_as_it_is() -> None:
+    state, scenario = situation([(2.5, 5.0), (7.5, 5.0)])
+    kinds = "large, small robot_radius=0.25"
+    scenario = scenario.replace(robot_radius=0.5, robot_kinds=kinds, delivery_width=0.5)
+    floor = frame(state, scenario, 800)[:700]  # without the legend
+    searching = np.all(floor == palette.SEARCHING, axis=2)
+    left, right = np.split(searching, [searching.shape[1] // 2], axis=1)
+    assert np.ptp(np.flatnonzero(left.any(axis=0))) == pytest.approx(70, abs=5)
+    assert np.ptp(np.flatnonzero(right.any(axis=0))) == pytest.approx(34, abs=5)
+
+
 def test_the_legend_has_an_obstacle_only_where_there_are_some() -> None:
     for n_obstacles in (0, 3):
         world = Warehouse(Scenario(n_robots=2, n_items=2, n_obstacles=n_obstacles))

@@ -12,6 +12,7 @@ from pymunk._chipmunk_cffi import ffi, lib
 from swarm_logistics_env import Fault, Warehouse
 from swarm_logistics_env.compiler.packing import blank, packed
 from swarm_logistics_env.core.errors import SetupError
+from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.warehouse import physics
 from swarm_logistics_env.world.warehouse.structs import Items
 from tests.world.warehouse.conftest import EAST, FAR, HOLD, OPEN, STAY, WEST, Build, steps
@@ -62,6 +63,27 @@ def test_a_robot_speeds_up_to_its_top_speed_and_stops_again(
     assert world.state.robot_position[0, 0] - start == pytest.approx(top * 0.1, rel=0.01)
     steps(world, STAY, times=needed)
     assert world.state.robot_velocity[0, 0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_robots_of_unlike_sizes_touch_at_their_edges_and_the_heavier_one_gets_its_way(
+    build: Build,
+) -> None:
+    kinds = "heavy robot_mass=6.0, small robot_radius=0.06 robot_mass=2.0"
+    robots = [(4.0, 5.0), (5.0, 5.0)]
+    world = build(robots, [FAR], max_acceleration=1.0, robot_radius=0.25, robot_kinds=kinds)
+    state = world.state
+    while not state.robot_contact.any():
+        assert state.robot_position[1, 0] - state.robot_position[0, 0] > 0.25 + 0.06
+        steps(world, EAST, WEST)
+    assert state.robot_contact.all()
+    before = state.robot_position[:, 0].copy()
+    rows = steps(world, EAST, WEST, times=10)
+    moved = state.robot_position[:, 0] - before
+    assert (moved > 0.2).all()
+    assert state.robot_position[1, 0] - state.robot_position[0, 0] == pytest.approx(0.31, abs=0.01)
+    ahead = rows[[0, 1], [row.RANGE_ROBOTS, row.RANGE_ROBOTS + row.N_BEAMS // 2]]
+    assert ahead.tolist() == pytest.approx([0.25, 0.06], abs=0.01)
+    assert state.contacts.n_contacts[0] == 1
 
 
 def test_a_laden_robot_does_not_drive_through_an_item(build: Build) -> None:

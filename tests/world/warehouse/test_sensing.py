@@ -33,6 +33,12 @@ WORLDS = {
         n_robots=40, n_items=40, warehouse_width=4.6, warehouse_height=3.4, delivery_width=1.0,
         n_obstacles=2, relay="gossip", timer_limit=3.0, memory_size=3, view_range=0.6,
     ),
+    "of three sizes": Scenario(
+        n_robots=30, n_items=25, warehouse_width=6.5, warehouse_height=4.0, delivery_width=1.0,
+        n_obstacles=2, robot_radius=0.25,
+    ).replace(
+        robot_kinds="large, small:2 robot_radius=0.09, middling robot_radius=0.15 robot_mass=9.0",
+    ),
     "short-sighted": Scenario(
         n_robots=20, n_items=20, warehouse_width=4, warehouse_height=3, ranger_range=0.05,
         view_range=0.1, radio_range=0.1, delivery_width=1.0,
@@ -93,7 +99,7 @@ class Plain:
         s, state = self.scenario, self.state
         to_obstacles = to_discs(self.seen(state.obstacle_position), s.obstacle_radius)
         scans = [
-            to_discs(self.seen(state.robot_position[self.others]), s.robot_radius),
+            to_discs(self.seen(state.robot_position[self.others]), state.robot_radius[self.others]),
             np.minimum(self.to_walls(), to_obstacles),
             to_discs(self.seen(state.item_position[self.items]), s.item_radius),
         ]
@@ -169,18 +175,20 @@ class Plain:
         at = state.robot_position[self.me]
         gaps = [*at, *(np.array([s.warehouse_width, s.warehouse_height]) - at)]
         solid = self.items[state.item_covered[self.items] == 0]
-        things = [
-            (state.robot_position[self.others], s.robot_radius),
+        things: list[tuple[NDArray[np.float64], float | NDArray[np.float64]]] = [
+            (state.robot_position[self.others], state.robot_radius[self.others]),
             (state.obstacle_position, s.obstacle_radius),
             (state.item_position[solid[: len(solid) * (state.robot_item[self.me] != NOBODY)]],
              s.item_radius),
         ]  # fmt: skip
         for positions, radius in things:
             gaps += (abs(self.seen(positions)) - radius).tolist()
-        return float(min(gaps)) - s.robot_radius
+        return float(min(gaps)) - float(state.robot_radius[self.me])
 
 
-def to_discs(centres: NDArray[np.complex128], radius: float) -> NDArray[np.float64]:
+def to_discs(
+    centres: NDArray[np.complex128], radius: float | NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return how far each beam from the origin goes until it meets a disc: the quadratic's root."""
     along = (centres[:, None] * BEAMS.conj()).real
     root = along**2 - (abs(centres) ** 2 - radius**2)[:, None]

@@ -246,7 +246,10 @@ function drawArena(canvas, number, now, next, share, options) {
   const { scenario } = now, robots = now[`robots${number}`], requested = now[`requested${number}`];
   const { scale, left, bottom } = placeOf(canvas, scenario);
   const at = ([x, y]) => [left + (scale * x) / 1000, bottom - (scale * y) / 1000];
-  const radius = Math.max(3.5, scale * scenario.robot_radius), half = Math.max(2, 0.8 * scale * scenario.item_radius);
+  const kinds = now[`kinds${number}`] ?? [];  // a recording of a former version has none
+  const radii = fixed.radii ?? [scenario.robot_radius];  // as of `kinds`
+  const radiusOf = (robot) => Math.max(3.5, scale * radii[kinds[robot] ?? 0]);
+  const radius = Math.max(3.5, scale * Math.max(...radii)), half = Math.max(2, 0.8 * scale * scenario.item_radius);
   const poses = posesBetween(now, next, share, number);
   const stamp = (name, x, y, size, draw) => {
     const picture = sprite(name, size, ratio, draw);
@@ -263,19 +266,20 @@ function drawArena(canvas, number, now, next, share, options) {
   pen.globalAlpha = 1;
   poses.forEach((pose, robot) => {
     const age = pose && robots[robot] ? robots[robot][1] : null;
-    if (age !== null) stamp(`halo ${age}`, ...at(pose), 2.6 * radius, (ink, mid) => halo(ink, mid, mid, radius, age / TIMER_STEPS));
+    if (age === null) return;
+    const near = radiusOf(robot);
+    stamp(`halo ${age}`, ...at(pose), 2.6 * near, (ink, mid) => halo(ink, mid, mid, near, age / TIMER_STEPS));
   });
   poses.forEach((pose, robot) => {
     const leader = pose && robots[robot] && robots[robot][3] !== NOBODY ? poses[robots[robot][3]] : null;
     const isCarrier = requested.some(([, , carrier]) => carrier === robot);
-    if (leader && (isCarrier || options.links)) arrow(pen, at(pose), at(leader), radius, isCarrier ? Math.max(2, radius / 3.5) : 1, colours.LINK);
+    if (leader && (isCarrier || options.links)) arrow(pen, at(pose), at(leader), radiusOf(robots[robot][3]), isCarrier ? Math.max(2, radius / 3.5) : 1, colours.LINK);
   });
-  const kinds = now[`kinds${number}`] ?? [];  // a recording of a former version has none
   const watched = options.selected && poses[options.selected.robot];
   if (watched && number === 0) drawBeams(pen, options.selected, watched, at, scale);
   poses.forEach((pose, robot) => {
     if (!pose || !robots[robot]) return;
-    const [activity, , mark] = robots[robot], size = 1.6 * radius + 3;
+    const [activity, , mark] = robots[robot], radius = radiusOf(robot), size = 1.6 * radius + 3;
     const picture = sprite(`${activity} ${mark !== ""}`, size, ratio, (ink, mid) => {
       body(ink, mid, mid, radius, colours[ACTIVITIES[activity]], mark !== "");
       if (activity === "shuffling") item(ink, mid, mid, Math.max(1.5, 0.45 * radius), false);
@@ -288,7 +292,7 @@ function drawArena(canvas, number, now, next, share, options) {
     pen.rotate(pose[2]);
     pen.translate(-x, -y);
   });
-  if (watched) selection(pen, ...at(watched), radius);
+  if (watched) selection(pen, ...at(watched), radiusOf(options.selected.robot));
   const late = new Set(now[`late${number}`]);  // a recording of a former version has none
   for (const [index, request] of requested.entries()) {
     const isCarried = request[2] !== NOBODY && poses[request[2]];
@@ -301,14 +305,15 @@ function drawArena(canvas, number, now, next, share, options) {
   }
   const charge = now[`charge${number}`] ?? [];  // as of `late`
   poses.forEach((pose, robot) => {
-    if (pose && charge.length) chargeBar(pen, ...at(pose), radius, charge[robot]);
+    if (pose && charge.length) chargeBar(pen, ...at(pose), radiusOf(robot), charge[robot]);
   });
   const tall = Math.max(13, 1.2 * radius);
   poses.forEach((pose, robot) => {
     const mark = pose && robots[robot] ? robots[robot][2] : "";
     if (mark === "") return;
-    const [x, y] = at(pose), away = 0.8 * radius + 0.3 * tall, size = tall * (0.8 + 0.4 * mark.length), rim = tall * (0.3 + 0.3 * mark.length);
-    stamp(`badge ${mark}`, Math.min(x + away, width - rim), Math.max(y - away, 0.6 * tall), size, (ink, mid) => badge(ink, mid, mid, tall, mark));
+    const [x, y] = at(pose), away = 0.8 * radiusOf(robot) + 0.3 * tall, size = tall * (0.8 + 0.4 * mark.length), rim = tall * (0.3 + 0.3 * mark.length);
+    const beside = x + away + rim - 0.6 * tall;  // a wide badge begins where a narrow one does, or it would cover its robot
+    stamp(`badge ${mark}`, Math.min(beside, width - rim), Math.max(y - away, 0.6 * tall), size, (ink, mid) => badge(ink, mid, mid, tall, mark));
   });
 }
 
