@@ -26,13 +26,7 @@ author = project_copyright = "swarm-logistics-env contributors"
 version = release = installed_version("swarm-logistics-env")
 html_title = f"{project} {version}"
 
-extensions = [
-    "myst_parser",
-    "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
-    "sphinx_copybutton",
-    "sphinxext.opengraph",
-]
+extensions = ["myst_parser", "sphinx_copybutton", "sphinxext.opengraph"]
 # A command without its prompt; what it prints has no button.
 copybutton_prompt_text = "$ "
 copybutton_selector = "div:not(.highlight-text) > div.highlight > pre"
@@ -53,16 +47,6 @@ html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sphinx = False
 pygments_style = "default"
-
-autodoc_member_order = "bysource"
-autodoc_typehints = "none"  # the signatures hold them
-autodoc_preserve_defaults = True
-autodoc_mock_imports = ["stable_baselines3"]
-napoleon_numpy_docstring = False
-napoleon_use_rtype = False
-napoleon_use_ivar = True
-default_role = "code"  # docstrings mark code with single backticks
-toc_object_entries_show_parents = "hide"
 
 # The pages in the order of the site's menu. They stand here, because GitHub would show a list of
 # contents in a page as it is written.
@@ -108,7 +92,6 @@ def setup(app: Sphinx) -> None:
     app.connect("source-read", add_site_parts)
     renderers = [(partial(formula, display), None) for display in ("inline", "block")]
     app.add_html_math_renderer("mathml", *renderers)
-    app.connect("autodoc-process-docstring", tidy, priority=100)  # before napoleon
 
 
 def add_contents(app: Sphinx, page: str, text: list[str]) -> None:
@@ -137,15 +120,6 @@ def add_site_parts(app: Sphinx, page: str, text: list[str]) -> None:
         text[0] = text[0].replace("<!-- site: replay -->", replay_frame())
     if page == "versions":
         text[0] += f"\n{versions_list()}\n"
-
-
-def tidy(app: Any, what: str, name: Any, obj: Any, options: Any, lines: list[str]) -> None:
-    """Keep docstrings, which are plain text, from being read as more than they say."""
-    # |x| is an absolute value, no substitution.
-    lines[:] = [line.replace("|", r"\|") for line in lines]
-    if what == "property":
-        # What stands before a colon is no type.
-        lines[0] = lines[0].replace(": ", ", ", 1)
 
 
 def formula(display: str, translator: Any, node: Any) -> None:
