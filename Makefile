@@ -191,9 +191,8 @@ ros: $(ROS)/installed
 	$(ROS)/bin/python -m pytest tests/robots/test_ros.py
 	$(ROS)/bin/swarm-logistics ros homing --preset realistic --set duration=20 --loss 0.1 --delay 0.05
 
-# study: autodoc reads the package, and the notebook is run; render: it films. -W: a warning is an error.
+# study: the notebook is run; render: it films. A warning is an error.
 docs: $(DOCS)/installed
-	$(DOCS)/bin/python -m docs.generate
 	$(DOCS)/bin/python -m sphinx --builder html --fail-on-warning --keep-going docs site
 
 # The site with those of former versions (tags v1.0.0 ..) below it, each as its own tree builds it; a release publishes it.

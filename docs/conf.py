@@ -1,5 +1,6 @@
 """Settings of the documentation site: `make docs`. Nothing is fetched when a page is viewed."""
 
+import os
 from functools import partial
 from importlib.metadata import version as installed_version
 from pathlib import Path
@@ -11,9 +12,11 @@ from sphinx.application import Sphinx
 
 from docs.site_parts import (
     ROOT,
+    examples_markdown,
     notebook_markdown,
     replay_frame,
     versions_list,
+    with_example_links,
     with_outside_links,
     write_replay,
 )
@@ -23,7 +26,7 @@ author = project_copyright = "swarm-logistics-env contributors"
 version = release = installed_version("swarm-logistics-env")
 html_title = f"{project} {version}"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
+extensions = ["myst_parser", "sphinx_copybutton", "sphinxext.opengraph"]
 # A command without its prompt; what it prints has no button.
 copybutton_prompt_text = "$ "
 copybutton_selector = "div:not(.highlight-text) > div.highlight > pre"
@@ -31,7 +34,13 @@ myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["media", "releasing.md"]
 html_theme = "furo"
-html_static_path = ["static"]
+# What a search engine and a link to a page show: its title, its first words and a picture.
+ogp_site_url = os.environ.get("SITE_ADDRESS", "")  # the workflow of a release knows it
+ogp_site_name = project
+ogp_image = "_static/watch.png"
+ogp_image_alt = "Two warehouses side by side, one with broken robots, and the deliveries of both"
+ogp_social_cards = {"enable": False}
+html_static_path = ["static", "media/watch.png"]
 html_css_files = ["site.css"]
 html_theme_options = {"navigation_with_keys": True}
 html_math_renderer = "mathml"
@@ -39,20 +48,10 @@ html_copy_source = False
 html_show_sphinx = False
 pygments_style = "default"
 
-autodoc_member_order = "bysource"
-autodoc_typehints = "none"  # the signatures hold them
-autodoc_preserve_defaults = True
-autodoc_mock_imports = ["stable_baselines3"]
-napoleon_numpy_docstring = False
-napoleon_use_rtype = False
-napoleon_use_ivar = True
-default_role = "code"  # docstrings mark code with single backticks
-toc_object_entries_show_parents = "hide"
-
 # The pages in the order of the site's menu. They stand here, because GitHub would show a list of
 # contents in a page as it is written.
 CONTENTS = {
-    "Begin": ("quickstart", "gallery", "notebook"),
+    "Begin": ("quickstart", "examples", "gallery", "notebook"),
     "Train": (
         "training",
         "The environment <environment>",
@@ -93,7 +92,6 @@ def setup(app: Sphinx) -> None:
     app.connect("source-read", add_site_parts)
     renderers = [(partial(formula, display), None) for display in ("inline", "block")]
     app.add_html_math_renderer("mathml", *renderers)
-    app.connect("autodoc-process-docstring", tidy, priority=100)  # before napoleon
 
 
 def add_contents(app: Sphinx, page: str, text: list[str]) -> None:
@@ -112,23 +110,16 @@ def record_replay(app: Sphinx, error: Exception | None) -> None:
 
 def add_site_parts(app: Sphinx, page: str, text: list[str]) -> None:
     """Put into a page what only the site has, and let links out of the pages lead somewhere."""
-    text[0] = with_outside_links(text[0], page)
+    text[0] = with_outside_links(with_example_links(text[0], page), page)
     if page == "notebook":
         notebook = notebook_markdown(ROOT / "examples" / "first_steps.ipynb")
         text[0] = text[0].replace("<!-- site: notebook -->", notebook)
+    if page == "examples":
+        text[0] = text[0].replace("<!-- site: examples -->", examples_markdown())
     if page == "gallery":
         text[0] = text[0].replace("<!-- site: replay -->", replay_frame())
     if page == "versions":
         text[0] += f"\n{versions_list()}\n"
-
-
-def tidy(app: Any, what: str, name: Any, obj: Any, options: Any, lines: list[str]) -> None:
-    """Keep docstrings, which are plain text, from being read as more than they say."""
-    # |x| is an absolute value, no substitution.
-    lines[:] = [line.replace("|", r"\|") for line in lines]
-    if what == "property":
-        # What stands before a colon is no type.
-        lines[0] = lines[0].replace(": ", ", ", 1)
 
 
 def formula(display: str, translator: Any, node: Any) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import numpy as np
+import yaml
 from pydantic_core import PydanticUndefined
 
 from docs.model_cards import model_cards
@@ -331,8 +332,36 @@ def python() -> dict[str, str]:
     return {"python": python_names()}
 
 
+def citation() -> dict[str, str]:
+    """Return how to cite the package and the paper, for BibTeX, as CITATION.cff has it."""
+    package = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    [paper] = package["references"]
+    entries = [
+        bibtex_entry("software", package["title"], package, year=package["date-released"].year),
+        bibtex_entry("misc", "spi", paper, year=paper["year"]),
+    ]
+    return {"cite": "\n".join(["```bibtex", *entries, "```"])}
+
+
+def bibtex_entry(kind: str, key: str, work: Mapping[str, Any], year: int) -> str:
+    """Return a work of CITATION.cff as an entry for BibTeX."""
+    authors = [
+        # In braces of its own a name is not taken apart.
+        f"{{{author['name']}}}"
+        if "name" in author
+        else f"{author['family-names']}, {author['given-names']}"
+        for author in work["authors"]
+    ]
+    values = {"author": " and ".join(authors), "title": f"{{{work['title']}}}", "year": year}
+    values |= {field: work[field] for field in ("version", "doi") if field in work}
+    lines = [f"  {field} = {{{value}}}," for field, value in values.items()]
+    return "\n".join([f"@{kind}{{{key},", *lines, "}"])
+
+
 PAGES = {
     "../CONTRIBUTING": contributing,
+    "../README": citation,
+    "index": citation,
     "environment": environment,
     "indicators": indicators,
     "reference": reference,

@@ -1,4 +1,4 @@
-"""Parts that the site alone has: links out of the pages, the notebook with outputs, a replay."""
+"""Parts that the site alone has: examples, links out of its pages, the notebook, a replay."""
 
 import ast
 import contextlib
@@ -11,6 +11,9 @@ from typing import Any
 
 DOCS = Path(__file__).parent.resolve()
 ROOT = DOCS.parent
+EXAMPLES = ROOT / "examples"
+EXAMPLE_FOLDERS = (EXAMPLES, EXAMPLES / "questions", EXAMPLES / "tasks")
+_LANGUAGES = {".c": "c", ".csv": "text", ".py": "python", ".toml": "toml"}  # of examples
 REPLAY = "replays/fm4.html"  # in the site
 # Where files are that are no page; without it their names stand in the text.
 REPOSITORY = os.environ.get("SITE_REPOSITORY", "")
@@ -40,6 +43,55 @@ def with_outside_links(text: str, page: str) -> str:
         return words if words.startswith("`") or words == name else f"{words} (`{name}`)"
 
     return _LINK.sub(of_the_site, text)
+
+
+def with_example_links(text: str, page: str) -> str:
+    """Return a page whose examples, named as `examples/NAME` or linked, lead to the site's own.
+
+    Args:
+        page: its name without the ending, e.g. "research/tuning".
+    """
+
+    def of_the_site(match: re.Match[str]) -> str:
+        words, target = match.groups()
+        path = ((DOCS / page).parent / target).resolve()
+        is_shown = path in EXAMPLE_FOLDERS or (
+            path.parent in EXAMPLE_FOLDERS and path in example_files(path.parent)
+        )
+        return f"[{words}](#{example_label(path)})" if is_shown else match[0]
+
+    prose_and_code = re.split(r"(^```.*?^```$)", text, flags=re.DOTALL | re.MULTILINE)
+    to_root = os.path.relpath(ROOT, (DOCS / page).parent)
+    for number, part in enumerate(prose_and_code):
+        if not part.startswith("```"):
+            linked = re.sub(r"(?<!\[)(`(examples/[\w/.]+)`)", rf"[\1]({to_root}/\2)", part)
+            prose_and_code[number] = re.sub(r"\[([^\]]+)\]\(([^)#\s]*)\)", of_the_site, linked)
+    return "".join(prose_and_code)
+
+
+def example_files(folder: Path) -> list[Path]:
+    """Return the examples in a folder that the site shows; the notebook has a page of its own."""
+    return sorted(path for path in folder.iterdir() if path.suffix in _LANGUAGES)
+
+
+def example_label(path: Path) -> str:
+    """Return the label of an example on the site, e.g. "examples-wanderer-py"."""
+    return re.sub(r"\W", "-", path.relative_to(ROOT).as_posix())
+
+
+def examples_markdown() -> str:
+    """Return all examples as a part of a page, each below its name, with a link to load it."""
+    parts = []
+    for folder in EXAMPLE_FOLDERS:
+        parts.append(f"({example_label(folder)})=\n## {folder.relative_to(ROOT).as_posix()}")
+        for path in example_files(folder):
+            source = os.path.relpath(path, DOCS)
+            parts += [
+                f"({example_label(path)})=\n### {path.name}",
+                f"{{download}}`load the file <{source}>`",
+                f"```{{literalinclude}} {source}\n:language: {_LANGUAGES[path.suffix]}\n```",
+            ]
+    return "\n\n".join(parts)
 
 
 def notebook_markdown(path: Path) -> str:

@@ -4,6 +4,7 @@ Needs the extra `train`. Robots read and command in the frame of their motion, w
 the size that a network likes: statistics of `VecNormalize` around it make the result worse.
 """
 
+from pathlib import Path
 from typing import Any
 
 import torch
@@ -19,7 +20,7 @@ REWARDS = {
 }  # fmt: skip
 
 
-def main(total_timesteps=500_000, duration=200.0, seed=0):
+def main(total_timesteps=500_000, duration=200.0, seed=0, file="swarm.zip"):
     torch.set_num_threads(1)  # networks this small are slower on several
     scenario = Scenario(n_robots=10, n_items=8, restock=True, duration=duration, **ARENA)
     worlds = SwarmVecEnv(
@@ -32,11 +33,15 @@ def main(total_timesteps=500_000, duration=200.0, seed=0):
     settings = {"n_steps": 64, "batch_size": 1280, "n_epochs": 6, "gamma": 0.98}
     model = PPO("MlpPolicy", worlds, learning_rate=1e-3, seed=seed, device="cpu", **settings)
     model.learn(total_timesteps, callback=LogDeliveries())
+    model.save(file)
+    scenario_file = Path(file).with_suffix(".json")
+    scenario_file.write_text(scenario.to_json())
     learned = policies.of(model, frame=True)  # its most likely action; `judge` plays it as well
     seeds = range(1000, 1003)
     deliveries = [run_episode(scenario, learned, seed).delivered for seed in seeds]
     scripted = [run_episode(scenario, policies.load("homing"), seed).delivered for seed in seeds]
     print(f"P on three new seeds: {deliveries}; homing's on the same: {scripted}")
+    print(f"Judge it: swarm-logistics judge {file} --frame --trust-code --scenario {scenario_file}")
     return deliveries, scripted
 
 

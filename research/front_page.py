@@ -68,7 +68,6 @@ def values(estimates: Sequence[Mapping[str, str]], study: str) -> Rows:
     return rows
 
 
-_INTERVAL = re.compile(r"[-\d.∞]+ \[[^]]+\](?: \(\d+ of \d+ collapsed, at most \d+ %\))?")
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?: %)?")
 _COST = re.compile(r"[\d,]+ µs on one core of .*(?=\.$)")
 
@@ -93,34 +92,44 @@ def with_numbers(
     return text.replace(line, pattern.sub(lambda _: next(remaining), line))
 
 
-# Which policies and which mode are told, the README's sentences decide: after a change, look at the
-# tables.
-def intervals() -> dict[str, list[str]]:
-    """Return the intervals of each finding of the README, by the words that it begins with."""
-
-    def texts(row: Mapping[str, Value], *policies: str) -> list[str]:
-        return [row[policy].text for policy in policies]
-
+# Which policies and which modes are told, the README's sentences decide: after a change, look at
+# the tables.
+def findings() -> str:
+    """Return the table of the README's findings: a row a question, a column a policy."""
     estimates = read("estimates")
     policies = values(estimates, "policies")
     realistic = values(estimates, "realistic")
-    p = realistic["P"]
-    times = values(estimates, "clearing")["no fault"]
-    fm4 = policies["R, FM4, m = 2"]
-    return {
-        "* **Robots that could exist**": [
-            *texts(p, "ppo-robust"),
-            *texts(realistic[SHARE], "ppo-robust"),
-            *texts(realistic["contacts"], "ppo-robust", "homing-stock"),
-            *texts(p, "central-stock"),
-        ],
-        "* **Broken robots there**": texts(fm4, "ppo-delivery", "ppo-robust", "homing-stock"),
-        "* **Worlds that no training met**": third_edition(
-            "ppo-robust, 7 trainings", "site-fidelity", "central-stock"
+    scores = third_edition("ppo-robust, 7 trainings", "site-fidelity", "central-stock")
+    rows: dict[str, tuple[Mapping[str, str], Sequence[str]]] = {
+        "P, items delivered": (texts(realistic["P"]), ["central-stock"]),
+        "P, times that of `homing-stock`": (texts(realistic[SHARE]), []),
+        "contacts a robot-minute": (texts(realistic["contacts"]), []),
+        "R, two deliver nothing (FM4)": (texts(policies["R, FM4, m = 2"]), ["ppo-delivery"]),
+        "score in 24 worlds, times that of `homing-stock`": (
+            dict(zip(("ppo-robust", "site-fidelity", "central-stock"), scores, strict=True)),
+            ["site-fidelity", "central-stock"],
         ),
-        "* **More robots there**": texts(policies["S, N 25 -> 100"], "homing-stock", "ppo-robust"),
-        "* **The paper's warehouse**": texts(times, "ppo-robust", "homing-stock", "swarm-dt"),
+        "S from 25 to 100 robots": (texts(policies["S, N 25 -> 100"]), []),
+        "the paper's warehouse is cleared in [s]": (
+            texts(values(estimates, "clearing")["no fault"]),
+            ["swarm-dt"],
+        ),
     }
+    lines = [
+        (
+            question,
+            by_policy["ppo-robust"],
+            by_policy.get("homing-stock", "1"),
+            ", ".join(f"`{policy}` {by_policy[policy]}" for policy in others),
+        )
+        for question, (by_policy, others) in rows.items()
+    ]
+    return table(("95 % interval", "`ppo-robust`", "`homing-stock`", "others"), lines)
+
+
+def texts(row: Mapping[str, Value]) -> dict[str, str]:
+    """Return the texts of a row by policy."""
+    return {policy: value.text for policy, value in row.items()}
 
 
 def third_edition(*entries: str) -> list[str]:
@@ -131,7 +140,7 @@ def third_edition(*entries: str) -> list[str]:
 
 
 def counts() -> dict[str, list[str]]:
-    """Return the counts below the findings of the README, by the words that each begins with."""
+    """Return the counts of the README's findings, by the words that each line begins with."""
     played = read_tried(RESULTS / "paper_fit" / "claims.csv")
     claims = judged_claims(played)
     words = Counter(claim.word for claim in claims)
@@ -144,7 +153,13 @@ def counts() -> dict[str, list[str]]:
     coverage = section.percent(_coverage_over_trainings())
     return {
         "* **Of ": list(map(str, of_text)),
-        "95 % intervals": [section.P_LEVEL, seeds["realistic"], seeds["policies"], coverage],
+        "95 % intervals": [
+            section.P_LEVEL,
+            seeds["realistic"],
+            seeds["broken"],
+            seeds["policies"],
+            coverage,
+        ],
     }
 
 
@@ -232,9 +247,8 @@ def readme_text() -> str:
     """Return the README as the tables have it, with links to the repository of [project.urls]."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     address = project.get("urls", {}).get("Repository")
-    text = with_blocks(README.read_text(encoding="utf-8"), {"broken": broken()})
-    for beginning, numbers in intervals().items():
-        text = with_numbers(text, beginning, _INTERVAL, numbers)
+    blocks = {"broken": broken(), "findings": findings()}
+    text = with_blocks(README.read_text(encoding="utf-8"), blocks)
     for beginning, numbers in counts().items():
         text = with_numbers(text, beginning, _NUMBER, numbers)
     text = with_numbers(text, "A step of", _COST, [cost()])

@@ -40,6 +40,11 @@ def test_what_the_changelog_does_not_tell_is_not_written(line: str, is_told: boo
     assert api.untold_changes("", line, changelog) == [f"+ {text}" for text in expected]
     assert api.untold_changes(line, "", changelog) == [f"- {text}" for text in expected]
     assert api.untold_changes(line, line, FORMER) == []
+    # After a release, whose section told it, a change has to be told anew.
+    released = changelog.replace("[Unreleased]", "[1.0.0rc1] - 2026-11-29")
+    after_a_release = f"## [Unreleased]\n\n{released}"
+    assert api.untold_changes("", line, after_a_release) == [f"+ {line}"]
+    assert api.untold_changes(line, line, after_a_release) == []
 
 
 def test_a_change_is_refused_until_it_is_told(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from docs import blocks, generate, python_reference
+from docs import blocks, generate, python_reference, site_parts
 from swarm_logistics_env import Scenario, run_episode
 from swarm_logistics_env.study.questions.specification import read_study_file
 from swarm_logistics_env.train.training import load_training
@@ -120,10 +120,28 @@ def test_every_page_of_the_site_is_two_clicks_from_its_first_one_and_in_its_menu
 
     first = linked_from("index.md") & pages.keys()
     second = set().union(*map(linked_from, first))
-    assert pages.keys() - first - second == {"index.md"}
+    assert pages.keys() - first - second - {"index.md"} == set()
     menu = (DOCS / "conf.py").read_text(encoding="utf-8")
     names = {name.removesuffix(".md") for name in pages} - {"index"}
     assert {name for name in names if not re.search(rf'[<"]{re.escape(name)}[>"]', menu)} == set()
+
+
+def test_the_page_of_examples_names_each_and_links_to_them_lead_to_what_the_site_shows() -> None:
+    folders = site_parts.EXAMPLE_FOLDERS
+    files = [path for folder in folders for path in site_parts.example_files(folder)]
+    names = [path.relative_to(ROOT).as_posix() for path in files]
+    assert [name for name in names if f"](../{name})" not in PAGES["examples.md"]] == []
+    labels = re.findall(r"^\((\S+)\)=$", site_parts.examples_markdown(), flags=re.MULTILINE)
+    assert len(labels) == len(files) + len(folders)
+    for path in DOCS.rglob("*.md"):
+        page = path.relative_to(DOCS).with_suffix("").as_posix()
+        text = site_parts.with_example_links(path.read_text(encoding="utf-8"), page)
+        assert set(re.findall(r"\]\(#(examples-[^)]+)\)", text)) <= set(labels)
+    linked = site_parts.with_example_links(
+        "`examples/wanderer.py`, `examples/none.py`", "quickstart"
+    )
+    assert linked.startswith("[`examples/wanderer.py`](#examples-wanderer-py), ")
+    assert linked.endswith("(../examples/none.py)")
 
 
 def run(block: str) -> dict[str, Any]:

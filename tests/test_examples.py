@@ -14,6 +14,7 @@ from swarm_logistics_env import FAILURE_MODES, Scenario, Warehouse, policies
 from swarm_logistics_env.policies import SwarmDT
 from swarm_logistics_env.policies.policy import start
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.views.cli import app
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MIXED = f"{EXAMPLES / 'mixed_swarm.py'}:Mixed"
@@ -39,11 +40,17 @@ def test_the_search_for_constants_ends_with_a_change() -> None:
 
 
 @pytest.mark.daily
-def test_what_stable_baselines3_learns_is_a_policy(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_stable_baselines3_learns_is_a_policy_and_a_file_to_judge(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("stable_baselines3", reason="needs the extra train")
-    learned, scripted = main("ppo_swarm", total_timesteps=5_120, duration=10.0)
-    assert f"P on three new seeds: {learned}" in capsys.readouterr().out
+    file = tmp_path / "swarm.zip"
+    learned, scripted = main("ppo_swarm", total_timesteps=5_120, duration=10.0, file=file)
+    printed = capsys.readouterr().out
+    assert f"P on three new seeds: {learned}" in printed
     assert len(learned) == len(scripted) == 3
+    _, _, command = printed.partition("Judge it: swarm-logistics ")
+    assert app.run([*command.split(), "--seeds", "3", "--out", str(tmp_path / "judged")]) == 0
 
 
 @pytest.mark.daily

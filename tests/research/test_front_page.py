@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -18,28 +17,27 @@ RESULTS = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
 
 def test_readme_says_of_results_what_their_page_says() -> None:
     assert front_page.readme_text() == README, "stale: run `python -m research.front_page`"
-    intervals = [*chain.from_iterable(front_page.intervals().values())]
-    assert len(intervals) >= 6
-    assert all(interval in RESULTS for interval in intervals)
+    intervals = re.findall(r"[-\d.]+ \[[^]]+\](?: \(\d+ of \d+ .+?\))?", front_page.findings())
+    assert len(intervals) >= 16
+    assert [interval for interval in intervals if interval not in RESULTS] == []
     for study in ("policies", "clearing", "leans"):
         rows = front_page.values(front_page.read("estimates"), study).values()
         assert all(value.text in RESULTS for row in rows for value in row.values())
 
 
-def test_readme_calls_undecided_what_its_interval_leaves_open() -> None:
+def test_readme_says_of_an_order_no_more_than_its_interval_shows() -> None:
     estimates = front_page.values(front_page.read("estimates"), "realistic")
-    low, high = estimates[front_page.SHARE]["ppo-robust"].interval[1:]
-    assert low is not None
+    _, _, high = estimates[front_page.SHARE]["ppo-robust"].interval
     assert high is not None
-    assert ("times as much (undecided)" in README) == (low < 1.0 < high)
+    assert ("`ppo-robust` delivers less than `homing-stock`" in README) == (high < 1.0)
 
 
 def test_numbers_go_into_their_sentence_and_nowhere_else() -> None:
-    text = "* **A** has 1.0 [0.5, 1.5] at N = 25.\n* **B** has 2 [1, 3] and 4 [3, 5].\n"
-    pattern = front_page._INTERVAL
-    changed = front_page.with_numbers(text, "* **B**", pattern, ["-6.0 [-7.0, ∞]", "8 [7, 9]"])
-    assert changed == text.replace("2 [1, 3] and 4 [3, 5]", "-6.0 [-7.0, ∞] and 8 [7, 9]")
-    for beginning, numbers in (("* **B**", ["1 [0, 2]"]), ("* **C**", [])):
+    text = "* **A** has 1.5 of 25.\n* **B** has 2 of 4 %.\n"
+    pattern = front_page._NUMBER
+    changed = front_page.with_numbers(text, "* **B**", pattern, ["6.5", "8.1 %"])
+    assert changed == text.replace("2 of 4 %", "6.5 of 8.1 %")
+    for beginning, numbers in (("* **B**", ["1"]), ("* **C**", [])):
         with pytest.raises(SystemExit, match=re.escape(beginning)):
             front_page.with_numbers(text, beginning, pattern, numbers)
 
