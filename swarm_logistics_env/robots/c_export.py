@@ -148,6 +148,10 @@ _HEADER = """\
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
 #define SWARM_ROW {n_columns} /* numbers of a row: what a robot senses */
 #define SWARM_COMMAND {n_commands} /* forward, left, turn, gripper: each from -1 to 1 */
 #define SWARM_PERIOD {period} /* from one step to the next [s] */
@@ -165,6 +169,10 @@ void swarm_reset(swarm_robot *robot, uint64_t seed, uint32_t number);
 /* Fill the command upon a row. If a number in it is none, or is larger than 1e6, that is no row of
  * a robot's: the robot stands, leaves its gripper as it is, and remembers nothing of it. */
 void swarm_step(swarm_robot *robot, const float row[SWARM_ROW], float command[SWARM_COMMAND]);
+
+#ifdef __cplusplus
+}}
+#endif
 
 #endif
 """

@@ -250,16 +250,17 @@ def _problems(
     values = table[:, part.columns]
     is_within = (values >= np.float32(part.low)) & (values <= np.float32(part.high))
     faults = {f"should be within [{part.low:g}, {part.high:g}]": ~is_within}
-    if part.unit == "flag":
+    if part.unit == "flag" and part.used:
         faults["should be 0 or 1"] = is_within & (values != 0) & (values != 1)
         if len(part.columns) > 1 and not part.flag:
             is_behind_gap = values[:, 1:] > values[:, :-1]
             faults["should be 0, as the one before is: the nearest come first"] = np.pad(
                 is_behind_gap, ((0, 0), (1, 0))
             )
-    if part.flag and part.absent is not None:
-        flags = next(other.columns for other in contract.inputs if other.name == part.flag)
-        is_absent = table[:, flags] == 0
+    if part.flag and part.absent is not None and part.used:
+        flag = next(sensed for sensed in contract.inputs if sensed.name == part.flag)
+        # A robot may leave out a flag that the policy does not use.
+        is_absent = (table[:, flag.columns] == 0) & flag.used
         faults[f"should be {part.absent:g}, as {part.flag} is 0"] = (
             is_within & is_absent & (values != np.float32(part.absent))
         )

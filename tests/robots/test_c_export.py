@@ -183,6 +183,13 @@ def test_it_compiles_without_a_warning_and_takes_little(name: str, tmp_path: Pat
     part = tmp_path / "part.o"
     subprocess.run(["gcc", "-std=c99", "-c", str(files.source), "-o", str(part)], check=True)
     names = subprocess.run(["nm", "-u", str(part)], capture_output=True, text=True, check=True)
+    if shutil.which("g++"):
+        program = tmp_path / "main.cpp"
+        program.write_text(
+            '#include "robot.h"\nint main() { swarm_robot robot; swarm_reset(&robot, 1, 0); }\n'
+        )
+        words = ["g++", str(program), str(part), "-lm", "-o", str(tmp_path / "main")]
+        subprocess.run(words, check=True)
     # Of floats, and what compilers use of their own accord: no heap, no files.
     assert re.fullmatch(
         r"(\s*U (\w+f|mem\w+|__stack_chk_fail|_GLOBAL_OFFSET_TABLE_)\n)+", names.stdout

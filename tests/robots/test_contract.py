@@ -118,19 +118,29 @@ def log() -> NDArray[np.float32]:
         ("carrying_requested", 0, 1.0, "should be 0, as carrying is 0"),
         ("item_x", 0, 0.3, r"item_x in column 49 = 0.3: should be 0, as item_present is 0"),
         ("item_present", 1, 1.0, "should be 0, as the one before is: the nearest come first"),
-        ("lowest_timer", 0, 1.0, "should be 0, as lowest_timer_present is 0"),
         ("timer", 0, 1.0, "timer in column 136 = 1: should be 3, as timer_runs is 0"),
     ],
 )
 def test_the_row_of_a_log_that_cannot_be_is_named(
     name: str, number: int, value: float, words: str
 ) -> None:
-    contract = contract_of(load("swarm-dt"), NOISY)
+    contract = contract_of(load("ppo-robust"), NOISY)
     rows = log()
     check_rows(contract, rows)
     unflatten(rows, NOISY)[name][[7, 4], number] = value
     with pytest.raises(RobotError, match=f"row 4: .*{words}"):
         check_rows(contract, rows)
+
+
+def test_what_is_not_used_may_hold_any_number_within_its_limits() -> None:
+    contract = contract_of(load("homing"), NOISY)
+    rows = log()
+    unused = [part for part in contract.inputs if not part.used]
+    assert "neighbour_present" in {part.name for part in unused}
+    for part in unused:
+        rows[:, part.columns] = 0.25 * part.low + 0.75 * part.high
+    unflatten(rows, NOISY)["neighbour_x"][:, 0] = 0.8  # though its flag says nothing
+    check_rows(contract, rows)
 
 
 def test_a_log_of_another_width_is_refused() -> None:
