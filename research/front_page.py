@@ -115,7 +115,7 @@ def intervals() -> dict[str, list[str]]:
             *texts(p, "central-stock"),
         ],
         "* **Broken robots there**": texts(fm4, "ppo-delivery", "ppo-robust", "homing-stock"),
-        "* **Worlds that no training met**": third_edition(
+        "* **Worlds drawn at random**": third_edition(
             "ppo-robust, 7 trainings", "site-fidelity", "central-stock"
         ),
         "* **More robots there**": texts(policies["S, N 25 -> 100"], "homing-stock", "ppo-robust"),
