@@ -46,7 +46,7 @@ REWARDS = {
 AGENT_STEPS = {"small": 2_000_000, "paper": 4_000_000}
 N_WORLDS = {"small": 12, "paper": 5}
 
-SEEDS = range(700_000, 700_020)  # of the row: no training and no curve has them
+SEEDS = range(700_000, 700_020)  # of the row: no training has them
 CURVE_SEEDS = range(600_000, 600_004)
 POINTS = 16  # of a curve
 MODES = ("FM1", "FM2", "FM3", "FM4", "FM4_jam")  # that the recipe `robust` trains with

@@ -110,7 +110,7 @@ def findings() -> str:
             ["site-fidelity", "central-stock"],
         ),
         "S from 25 to 100 robots": (texts(policies["S, N 25 -> 100"]), []),
-        "the paper's warehouse is cleared in [s]": (
+        "the paper's warehouse is cleared in a median of [s]": (
             texts(values(estimates, "clearing")["no fault"]),
             ["swarm-dt"],
         ),

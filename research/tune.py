@@ -1,4 +1,4 @@
-"""One declared search over the parameters of every script: `make tune MINUTES=60`.
+"""One declared search over the parameters of three scripts: `make tune MINUTES=60`.
 
 It writes docs/research/tuning.md, and every set that was played into docs/results/tune.
 
@@ -217,9 +217,9 @@ def publish(out: Path) -> None:
     n_sets = {script: len(read_tried(RESULTS / f"{script}.csv", script)) for script in SCRIPTS}
     gain_rows = [(world, *(row[script] for script in SCRIPTS)) for world, row in gains.items()]
     heads = [f"`{script}`, {n_sets[script]} sets" for script in SCRIPTS]
-    line = f"{CONFIRMED} fresh seeds; geometric means of P over that of the shipped set, 95 %."
+    line = f"{CONFIRMED} fresh seeds; geometric means of P over that of the set before, 95 %."
     blocks = {
-        "tuned values": table(("script", "parameter", "shipped", "searched"), value_rows),
+        "tuned values": table(("script", "parameter", "before", "found"), value_rows),
         "tuned gains": table(("change of P [%]", *heads), gain_rows, line),
     }
     rewrite(PAGE, blocks)
