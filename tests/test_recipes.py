@@ -76,6 +76,7 @@ def kept(p_o, p_f, **asked):
             symbol="K", heading="performance kept K", compares="fault", function=kept,
             performances={"p_o": "P_o", "p_f": "P_F"}, arguments=lambda _: {},
             adjectives={0.0: "alive"},
+            at_zero="K = 0: nothing is kept",
         ),
 ### A kind of trial files NAME=log_lines
 @ study/trials/readers/log_lines.py

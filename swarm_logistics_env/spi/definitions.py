@@ -182,6 +182,7 @@ class Definition:
         function: from performances over seeds to an `Estimate`.
         arguments: the function's further arguments, from what differs.
         adjectives: threshold to what a swarm above it is called.
+        at_zero: what it means that the indicator is 0, for a reader who knows none of them.
     """
 
     symbol: str
@@ -191,6 +192,7 @@ class Definition:
     function: Callable[..., Estimate]
     arguments: Callable[[Change], dict[str, Any]]
     adjectives: Mapping[float, str]
+    at_zero: str
 
     @property
     def needs_removed(self) -> bool:
@@ -241,6 +243,7 @@ DEFINITIONS: dict[str, Definition] = {
             function=scalability,
             arguments=lambda c: {"n": int(c.before), "m": int(c.after - c.before)},
             adjectives={0.0: "scalable", 1.0: "superlinear"},
+            at_zero="S = 0: more robots bring no more, 1: in proportion",
         ),
         Definition(
             symbol="FT",
@@ -250,6 +253,7 @@ DEFINITIONS: dict[str, Definition] = {
             function=fault_tolerance,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "tolerant"},
+            at_zero="FT = 0: faulty robots are worth no more than absent ones",
         ),
         Definition(
             symbol="R",
@@ -259,6 +263,7 @@ DEFINITIONS: dict[str, Definition] = {
             function=robustness,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "robust"},
+            at_zero="R = 0: P falls by the share of robots that are faulty",
         ),
         Definition(
             symbol="A",
@@ -268,6 +273,7 @@ DEFINITIONS: dict[str, Definition] = {
             function=adaptability,
             arguments=lambda c: {"x_o": c.before, "x_new": c.after},
             adjectives={0.0: "adaptable", 1.0: "P has grown"},
+            at_zero="A = 0: P falls by the share of the change, 1: not at all",
         ),
         Definition(
             symbol="change",
@@ -277,6 +283,7 @@ DEFINITIONS: dict[str, Definition] = {
             function=relative_change,
             arguments=lambda _: {},
             adjectives={},
+            at_zero="change = 0: P is the same, -0.5: half",
         ),
     )
 }

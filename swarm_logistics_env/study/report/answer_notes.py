@@ -20,7 +20,8 @@ _FEW_ITEMS = 1.0  # in a run, of which shares say little
 _MOST_CONDITIONS = 2  # that a note of the answer names
 # What the words of verdicts mean: those that stand in an answer, in this order.
 _MEANINGS = {
-    "decided": "supported: above 0 (good), refuted: below",
+    "decided": "supported: above 0, refuted: below",
+    "compared": "more, less: of P after the change",
     "open": "open: undecided",
     "margin": "< {margin}: P changes by less than that, or P_F and P_S of FT differ by less",
     "stalls": "stalls: so few runs may hide stalled ones",
@@ -41,13 +42,15 @@ def notes(results: StudyResults) -> str:
 
 
 def meanings(verdicts: Iterable[Verdict]) -> str:
-    """Return what the words mean that `Verdict.in_words` has for these verdicts."""
+    """Return what 0 means of these indicators, and the words that `Verdict.in_words` has."""
     words: set[str] = set()
+    zeros: dict[str, None] = {}
     margin = ""
     for verdict in verdicts:
+        zeros[verdict.compared.definition.at_zero] = None
         word = verdict.on_property.adjusted
         if word in ("supported", "refuted"):
-            words.add("decided")
+            words.add("compared" if verdict.compares_policies else "decided")
             if "assumes_normal" in verdict.flags:
                 words.add("provisional")
         elif word == UNTESTABLE:
@@ -59,9 +62,10 @@ def meanings(verdicts: Iterable[Verdict]) -> str:
                 margin = f"{100 * verdict.margin:.3g} %"
             else:
                 words.add(verdict.reason)
-    return "; ".join(
+    of_words = (
         meaning.format(margin=margin) for word, meaning in _MEANINGS.items() if word in words
     )
+    return "; ".join([*zeros, *of_words])
 
 
 def _notes_that_apply(results: StudyResults) -> Iterator[str]:
@@ -104,7 +108,7 @@ def _notes_that_apply(results: StudyResults) -> Iterator[str]:
         yield f"runs collapse {words}"
     if results.untestable:
         words = untestable_in_words(results.untestable, names_policies=len(results.policies) > 1)
-        yield f"two phases untestable: {words}"
+        yield f"whether runs collapsed cannot be tested: {words}"
     if needs := more_seeds(results).words:
         yield needs
     claims_of_text = results.reference.claims if results.reference else {}

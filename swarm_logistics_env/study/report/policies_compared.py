@@ -18,11 +18,7 @@ from . import section
 
 def between_policies(verdicts: Iterable[Verdict]) -> list[Verdict]:
     """Return the verdicts on P of a policy and of the first one; a claimed ablation is none."""
-    return [
-        verdict
-        for verdict in verdicts
-        if verdict.compared.definition.compares == "policy" and verdict.compared.claim is None
-    ]
+    return [verdict for verdict in verdicts if verdict.compares_policies]
 
 
 def comparison_in_words(results: StudyResults) -> str:
@@ -197,6 +193,12 @@ def _elsewhere(verdicts: Sequence[Verdict], is_ahead: bool) -> str:
     text = ""
     if n_same := len(by_word.pop(alike, ())):
         text += f"; so in {n_same} of {len(verdicts)} other conditions"
+        of_alike = [v.interval for v in verdicts if v.on_threshold.adjusted == alike]
+        values = [_factor(change, inverted=not is_ahead).value for change in of_alike if change]
+        least = section.fixed(min(values), 2, [1.0])
+        most = section.fixed(max(values), 2, [1.0])
+        if least != most:
+            text += f" ({least} to {most} times)"
     if turned in by_word:
         text += f"; the other way round: {', '.join(by_word.pop(turned))}"
     undecided = [condition for conditions in by_word.values() for condition in conditions]

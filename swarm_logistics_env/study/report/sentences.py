@@ -13,6 +13,7 @@ from swarm_logistics_env.study.questions.comparison import Family
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
+from .policies_compared import subject_of
 from .section import SATURATED, Section, Sentence, bracketed, fixed, limits, percent
 
 # What limits a verdict, by the flag of its estimate.
@@ -63,7 +64,8 @@ def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
     swarm = f", N = {comparison.n_robots}"
     if comparison.original.setting.kind in ("size", "policy"):
         swarm = ""
-    head = f"{comparison.policy}, {verdict.property_name}? {comparison.label}{swarm}."
+    subject = subject_of(comparison.original.case, comparison.policy)
+    head = f"{subject}, {verdict.property_name}? {comparison.label}{swarm}."
     text = " ".join(_parts(results, verdict))
     return Sentence(head, text, verdict.conclusion, verdict.in_words)
 
@@ -92,9 +94,11 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[str]:
         plain, adjusted = verdict.on_property
         # One seed gives no p, and Holm's placeholder of 1 says nothing.
         p_adjusted = None if estimate.p_value is None else verdict.p_adjusted
-        yield (
-            f"Unadjusted: {plain}{_p(estimate.p_seen)}; Holm-adjusted: {adjusted}{_p(p_adjusted)}."
-        )
+        # Holm's method begins with the p that holds for stalled runs, too.
+        alone = _p(estimate.p_seen)
+        if _p(estimate.p_value) != alone:
+            alone += f"{_p(estimate.p_value)} if some stall"
+        yield f"Alone: {plain}{alone}; by Holm's method: {adjusted}{_p(p_adjusted)}."
     if verdict.on_claim is not None:
         plain, adjusted = verdict.on_claim
         words = plain if plain == adjusted else f"{plain}, {adjusted} under Holm"
@@ -154,7 +158,7 @@ def _change(change: Estimate, margin: float) -> str:
 
 
 def _p(p: float | None) -> str:
-    """Return a p-value in brackets, e.g. " (p = 0.013)"; empty: there is none."""
+    """Return a p-value behind a comma, e.g. ", p = 0.013"; empty: there is none."""
     if p is None:
         return ""
-    return " (p < 0.001)" if p < 0.001 else f" (p = {p:.3f})"
+    return ", p < 0.001" if p < 0.001 else f", p = {p:.3f}"

@@ -210,14 +210,22 @@ class Verdict:
 
         Below ten paired seeds a decision assumes normal differences, which "n < 10" says.
         """
-        word = self.on_property.adjusted
+        word: str = self.on_property.adjusted
+        is_decided = word in DECIDED
+        if self.compares_policies:
+            word = {"supported": "more", "refuted": "less"}.get(word, word)
         if self.estimate is None and str(self.problem).endswith(" missing"):
             return "not played"
         if self.conclusion == "equivalent":
             return f"{word}, < {100 * self.margin:.3g} %"
-        if word in DECIDED and "assumes_normal" in self.flags:
+        if is_decided and "assumes_normal" in self.flags:
             return f"{word}, n < {SEEDS_OF_HEADLINE}"
         return f"{word}, {self.reason}" if self.reason else word
+
+    @property
+    def compares_policies(self) -> bool:
+        """Whether it is on P of a policy and of the first one; a claimed ablation is none."""
+        return self.compared.definition.compares == "policy" and self.compared.claim is None
 
     @property
     def equivalence_name(self) -> str | None:

@@ -116,7 +116,7 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     latex, reason = latex_tables(document(few).paper), "so few runs may hide stalled ones"
     (row,) = rows_of(latex, "tab:homing-indicators")
     assert row.endswith("open, stalls \\\\")
-    assert f"Open: undecided; stalls: {reason}. Verdicts are" in latex
+    assert f"open: undecided; stalls: {reason}. Verdicts are" in latex
     assert "FM1, 2 of 25: -0.08 [-0.12, -0.03], open, stalls. " in in_a_sentence(few, answer(few))
     assert "xploratory" not in latex + in_a_sentence(few, answer(few))
     undeclared = replace(few, exploratory=True)

@@ -108,8 +108,8 @@ def test_every_verdict_quotes_seeds_interval_and_what_it_rests_on(few: StudyResu
         assert test.estimate is not None
         words = sentence(few, test).text
         assert f"95 % interval {limits(test.estimate, 3)} over 4 paired seeds (0 to 3)" in words
-        assert ("Unadjusted: " in words) != test.estimate.untestable
-        assert ("Holm-adjusted: " in words) != test.estimate.untestable
+        assert ("Alone: " in words) != test.estimate.untestable
+        assert ("by Holm's method: " in words) != test.estimate.untestable
         assert ("†" in words) == test.saturated
     text = markdown(document(paper(unaffected=frozenset({"FM2"}))))
     assert re.search(
@@ -131,6 +131,6 @@ def test_without_the_extra_the_markdown_still_comes_and_one_seed_gives_values_al
     text = (tmp_path / "report.md").read_text()
     assert f"need {package}: pip install -c constraints.txt -e" in text
     assert "![" not in text
-    assert "S = 0.611 (no interval) over one seed (0). Unadjusted: open; Holm-adj" in text
+    assert "S = 0.611 (no interval) over one seed (0). Alone: open; by Holm" in text
     with (tmp_path / "claims.csv").open(newline="") as file:
         assert {row["verdict"] for row in csv.DictReader(file)} == {"open", "untestable"}

@@ -87,6 +87,7 @@ def test_counts_too_small_for_phases_are_untestable_in_answer_and_table() -> Non
     frame = pd.DataFrame({"robots": [4, 8] * 20, "delivered": p})
     results = judge(frame)
     reason = "counts are too small: fewer than 5 steps from least to most"
-    assert f"two phases untestable: N = 4 and 1 condition more ({reason})" in answer(results).notes
+    words = f"whether runs collapsed cannot be tested: N = 4 and 1 condition more ({reason})"
+    assert words in answer(results).notes
     assert {*results.cell_table["phases_untestable"]} == {reason}
     assert results.collapses == ()
