@@ -1,9 +1,10 @@
 """Does a study say the same if the files of C play it? `python -m research.play_c [SEEDS]`.
 
 Plays policies and the C that is made of them on the same seeds, as examples/broken_robots.toml
-does: without a fault, and with two broken robots of 25. It prints of each condition P of both, the
-test of equivalence of P within 5 %, and the word on R of both. What is played stays in results/c,
-and the same command goes on after an interruption. 20 seeds take about 20 minutes of a core.
+does: without a fault, and with two broken robots of 25. It writes into docs/c.md of each condition
+P of both, the test of equivalence of P within 5 %, and the word on R of both. What is played stays
+in results/c, and the same command goes on after an interruption. 20 seeds take about 20 minutes of
+a core.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import sys
 from collections.abc import Iterator
 
 from research.play_bodies import cells_of, verdicts_of
-from research.tables import ROOT, play, table
+from research.tables import ROOT, play, rewrite, table
 from swarm_logistics_env import policies, spi
 from swarm_logistics_env.robots.c_export import write_c
 from swarm_logistics_env.spi import Interval
@@ -22,6 +23,7 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.world.scenario import Scenario
 
 OUT = ROOT / "results" / "c"
+PAGE = ROOT / "docs" / "c.md"
 NAMES = ("swarm-dt", "homing", "homing-stock", "ppo-robust")
 SCENARIO = Scenario.preset("realistic").replace(restock=True)
 MARGIN = 0.05
@@ -72,7 +74,8 @@ def main() -> None:
         )
     )
     heading = ("policy", "condition", "in Python", "in C", "change of P", "within 5 %, or the word")
-    print(table(heading, rows_of(in_python, in_c), f"{n_seeds} seeds from 20,000 on."))
+    line = f"{n_seeds} seeds from 20,000 on; `realistic` with `restock`, 25 robots, 60 items."
+    rewrite(PAGE, {"closed loop": table(heading, rows_of(in_python, in_c), line)})
 
 
 if __name__ == "__main__":
