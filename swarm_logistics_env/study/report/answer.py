@@ -42,12 +42,14 @@ class Line(NamedTuple):
         question: indicator and what is changed, e.g. "R FM4, 1 of 25".
         verdict: on it.
         number: the index of the verdict among those of the study.
+        p: mean P before and after, of FT without the robots and with them; empty: not played.
     """
 
     subject: str
     question: str
     verdict: Verdict
     number: int
+    p: str = ""
 
     @property
     def value(self) -> str:
@@ -233,17 +235,25 @@ def _lines(results: StudyResults) -> Iterator[Line]:
     for number, verdict in enumerate(results.verdicts):
         comparison = verdict.compared
         subject = subject_of(comparison.original.case, comparison.policy)
-        lines.append(Line(subject, section.question_of(verdict), verdict, number))
+        question = section.question_of(verdict)
+        if verdict.compares_policies:
+            subject = f"{verdict.after.name} against {subject}"
+            question = f"P of {verdict.after.name}, {verdict.after.condition}"
+        cells = results.cells_of(comparison)
+        arms = (comparison.removed or comparison.original, comparison.changed)
+        means = [cells[arm].mean.value for arm in arms if cells[arm].n_seeds]
+        p = f"P {means[0]:.3g}→{means[1]:.3g}" if len(means) == len(arms) else ""
+        lines.append(Line(subject, question, verdict, number, p))
     # Recorded trials may ask one question in several tables, at other values of a parameter.
     counts = Counter((line.subject, line.question) for line in lines)
-    indicators = list(DEFINITIONS)
     policies = results.policies
     subjects = list(dict.fromkeys(line.subject for line in lines))
     lines.sort(
         key=lambda line: (
+            not line.verdict.compares_policies,
             policies.index(line.verdict.compared.policy),
             subjects.index(line.subject),
-            indicators.index(line.verdict.compared.indicator),
+            [*DEFINITIONS].index(line.verdict.compared.indicator),
         )
     )
     for line in lines:
@@ -274,16 +284,16 @@ def _sentence(heading: str, lines: Sequence[Line]) -> str:
     )
     indicator = f"{heading[0].upper()}{heading[1:]}"
     tested = [line for line in lines if line.interval and line.verdict.conclusion != UNTESTABLE]
-    with_value = [line for line in lines if line.verdict.value is not None]
-    candidates = tested or with_value
+    candidates = tested or [line for line in lines if line.verdict.value is not None]
     if not candidates:
         return f"{indicator}: {counts}."
     worst = min(candidates, key=lambda line: line.verdict.value or 0.0)
-    value = f"{worst.value} {worst.interval}".rstrip()
+    value = f"{worst.verdict.compared.indicator} {worst.value} {worst.interval}".rstrip()
     if worst.level not in ("", section.P_LEVEL):
         value += f" at {worst.level}"
     whose = f"{worst.subject}, " if len({line.subject for line in lines}) > 1 else ""
-    result = f"{whose}{worst.question.partition(' ')[2]}: {value}, {worst.verdict.in_words}"
+    parts = ", ".join(filter(None, [worst.p, value, worst.verdict.in_words]))
+    result = f"{whose}{worst.question.partition(' ')[2]}: {parts}"
     if len(lines) == 1:
         return f"{indicator}, {result}."
     is_change = worst.verdict.compared.definition.compares == "policy"
@@ -368,14 +378,11 @@ def _counts_anything(cell: Cell) -> bool:
     return bool(cell.by_seed.any() or cell.arm.case.performance)
 
 
-def _most(cell: Cell) -> str:
-    """Return the upper limit of the mean of runs that delivered nothing."""
-    return f"{-math.log(1.0 - CONFIDENCE) / cell.n_seeds:.2f}"
-
-
 def _p_alone(cell: Cell) -> str:
     """Return mean P for a table."""
-    return section.mean_p(cell) if _counts_anything(cell) else f"0 (at most {_most(cell)})"
+    if _counts_anything(cell):
+        return section.mean_p(cell)
+    return f"0 (at most {-math.log(1.0 - CONFIDENCE) / cell.n_seeds:.2f})"
 
 
 def _mean(cell: Cell) -> str:
@@ -384,7 +391,7 @@ def _mean(cell: Cell) -> str:
         reason = f"as none of {cell.n_seeds} runs delivered anything"
         if cell.problem:
             reason += f"; {cell.problem}"
-        return f"0 (at most {_most(cell)} at {section.P_LEVEL}, {reason})"
+        return f"{_p_alone(cell).removesuffix(')')} at {section.P_LEVEL}, {reason})"
     mean = section.mean_p(cell)
     if cell.problem:
         mean += f" ({cell.problem} and do not count)"

@@ -21,7 +21,7 @@ _MOST_CONDITIONS = 2  # that a note of the answer names
 # What the words of verdicts mean: those that stand in an answer, in this order.
 _MEANINGS = {
     "decided": "supported: above 0, refuted: below",
-    "compared": "more, less: of P after the change",
+    "compared": "more, less: of P than the policy behind 'against'",
     "open": "open: undecided",
     "margin": "< {margin}: P changes by less than that, or P_F and P_S of FT differ by less",
     "stalls": "stalls: so few runs may hide stalled ones",

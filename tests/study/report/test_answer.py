@@ -52,7 +52,10 @@ def test_the_head_says_p_and_each_indicator_with_its_worst_value(stopped: StudyR
     assert " items in 500 s, N = 25, no fault; 60 paired seeds (0 to 59)." in performance
     worst = min(stopped.verdicts, key=lambda verdict: verdict.value or 0.0)
     level = percent(worst.level or 0.0)
-    assert f"(worst FM4, 1 of 25: {worst.value:.2f} [" in robustness
+    cells = stopped.cells_of(worst.compared)
+    before, after = (cells[arm].mean.value for arm in worst.compared.arms)
+    p = f"P {before:.3g}→{after:.3g}"
+    assert f"(worst FM4, 1 of 25: {p}, R {worst.value:.2f} [" in robustness
     assert robustness.startswith("Robustness R: ")
     assert robustness.endswith(f" at {level}, refuted).")
 

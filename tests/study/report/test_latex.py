@@ -117,7 +117,8 @@ def test_a_row_that_is_open_beside_its_interval_says_why_in_a_paper_too() -> Non
     (row,) = rows_of(latex, "tab:homing-indicators")
     assert row.endswith("open, stalls \\\\")
     assert f"open: undecided; stalls: {reason}. Verdicts are" in latex
-    assert "FM1, 2 of 25: -0.08 [-0.12, -0.03], open, stalls. " in in_a_sentence(few, answer(few))
+    words = "FM1, 2 of 25: P 41.2→34.7, R -0.08 [-0.12, -0.03], open, stalls. "
+    assert words in in_a_sentence(few, answer(few))
     assert "xploratory" not in latex + in_a_sentence(few, answer(few))
     undeclared = replace(few, exploratory=True)
     words = "xploratory: over other seeds or P than were declared before the first run."

@@ -72,7 +72,9 @@ def test_three_policies_stand_in_one_table_beside_the_first_and_holm_counts_all_
         "FM4 m = 3."
     )
     assert [sentence[:14] for sentence in indicators] == ["Scalability S:", "Robustness R: "]
-    assert "(worst homing, FM4, 1 of 25: -0.71 [-0.71, -0.71], refuted)" in indicators[1]
+    assert (
+        "(worst homing, FM4, 1 of 25: P 209→52, R -0.71 [-0.71, -0.71], refuted)" in indicators[1]
+    )
     text = terminal_answer(of_three)
     assert max(map(len, text.splitlines())) <= 80
     assert text.count("Holm's method") == 1

@@ -103,7 +103,7 @@ def test_every_surface_names_the_level_that_it_prints(
         assert re.search(rf"^{question}, 1 of 25 & .* & .?{level}.? & ", tex, re.MULTILINE)
     assert "| question | value | interval | level | verdict |" in surfaces["report"]
     assert f"{levels(stopped.verdicts)} intervals" in surfaces["figures"]
-    worst = f": -0.55 [-0.67, -0.37] at {level_by_question['R FM4']}, refuted"
+    worst = f", R -0.55 [-0.67, -0.37] at {level_by_question['R FM4']}, refuted"
     assert worst in surfaces["sentence"]
     assert "bars: 95 % intervals" in full_document.runs.note
     for file, column in (("claims", "confidence"), ("figures/answer", "confidence")):
@@ -143,7 +143,7 @@ def test_a_paper_is_told_conditions_seeds_and_why_each_question_was_played_no_fu
     world = "a warehouse of 10 m x 10 m with 60 items, robots of 2 m/s"
     how = "(preset paper, engine chipmunk), 60 paired seeds (0 to 59)"
     assert sentence.startswith(f"swarm-dt in {world} {how}. swarm-dt: P [95 %] = ")
-    assert "; robustness R: 1 refuted, 1 open (worst FM4, 1 of 25: -0.55 [" in sentence
+    assert "; robustness R: 1 refuted, 1 open (worst FM4, 1 of 25: P 39→15.4, R -0.55 [" in sentence
     assert sentence.endswith(
         "looked at after 10, 20, 30, 40, 50 and 60 seeds: of 2 questions 1 stopped where clear, "
         "1 after all 60 seeds."
