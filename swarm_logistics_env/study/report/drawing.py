@@ -246,10 +246,18 @@ def limits(points: Sequence[Point]) -> tuple[float, float]:
 def _stretch(axes: Axes, points: Sequence[Point]) -> None:
     """Let the axis of P be logarithmic where small ones would lie on a heap at its foot."""
     values = [point.value for point in points if point.value is not None]
-    if values and max(values) > _WIDEST * min(values) > 0.0:
-        axes.set_ylim(auto=True)
-        make_logarithmic(axes)
-        axes.set_ylim(bottom=min(values) / 2.0)
+    if not (values and max(values) > _WIDEST * min(values) > 0.0):
+        return
+    values += [p for point in points for p in point.runs if p is not None]
+    lowest = min(p for p in values if p > 0.0)
+    axes.set_ylim(auto=True)
+    make_logarithmic(axes)
+    if lowest == min(values):
+        axes.set_ylim(bottom=lowest / 2.0)
+    else:  # a run of 0 has no place on a logarithmic axis
+        axes.set_yscale("symlog", linthresh=lowest)
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.set_ylim(bottom=0.0)
 
 
 def make_logarithmic(axes: Axes) -> None:

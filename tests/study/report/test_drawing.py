@@ -5,12 +5,14 @@ import subprocess
 import sys
 from collections.abc import Callable
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from swarm_logistics_env.study.report import drawing
+from tests.conftest import figures_drawn
 
 DRAW = """
 import os
@@ -119,6 +121,18 @@ def test_a_value_far_from_all_others_leaves_them_apart(
     values: list[float], thresholds: tuple[float, ...], scale: str
 ) -> None:
     assert drawn_scale(values, thresholds) == scale
+
+
+def test_a_run_of_0_has_its_dot_where_the_others_are_far_apart() -> None:
+    points = (
+        POINT._replace(category="a", value=2.0, low=1.0, high=3.0, runs=(0.0, 4.0), link="a"),
+        POINT._replace(category="b", value=200.0, low=190.0, high=210.0, link="b"),
+    )
+    panel = drawing.Panel("", "", points, (), "")
+    with figures_drawn("svg"):
+        svg = drawing.svg_image(lambda canvas: drawing.intervals(canvas, [panel]), 3.0)
+    (dots,) = ElementTree.fromstring(svg).iterfind(".//*[@id='a-seeds-0-1']")
+    assert len(list(dots.iterfind(".//{*}use"))) == 2
 
 
 @pytest.mark.parametrize(
