@@ -79,6 +79,14 @@ def measure(weight: float, seed: int) -> Measured:
     return Measured(float(np.mean(p)), float(np.mean(p_broken)), r)
 
 
+def mean(values: NDArray[np.float64]) -> Interval:
+    """Return the mean over trainings with Student's interval of 95 %."""
+    from scipy.stats import ttest_1samp
+
+    limits = ttest_1samp(values, 0.0).confidence_interval(0.95)
+    return Interval(float(values.mean()), float(limits.low), float(limits.high))
+
+
 def difference(new: NDArray[np.float64], old: NDArray[np.float64]) -> Interval:
     """Return the difference of two means over trainings, with Welch's interval of 95 %."""
     from scipy.stats import ttest_ind
@@ -91,12 +99,12 @@ def rows_of(columns: dict[float, NDArray[np.float64]]) -> Iterator[tuple[str, ..
     """Yield a row of each weight; columns are (trainings, 3), as in `Measured`."""
     without = columns[0.0]
     for weight, measured in columns.items():
-        means = [spi.mean_interval(measured[:, column]) for column in range(3)]
+        means = [mean(measured[:, column]) for column in range(3)]
         changes = [difference(measured[:, column], without[:, column]) for column in (0, 2)]
         changed = [section.bracketed(change, digits) for change, digits in zip(changes, (1, 2))]
         yield (
             "without R" if weight == 0.0 else f"R, weight {weight:g}",
-            *(section.bracketed(mean, digits) for mean, digits in zip(means, (1, 1, 2))),
+            *(section.bracketed(interval, digits) for interval, digits in zip(means, (1, 1, 2))),
             *([section.NOTHING] * 2 if weight == 0.0 else changed),
         )
 
