@@ -24,7 +24,7 @@ from swarm_logistics_env.policies.row_policy import OF_BATTERY, RowPolicy, check
 from swarm_logistics_env.world import observations as row
 from swarm_logistics_env.world.motion.memory import BODY, MEMORY, N_COLUMNS, bodies_of, length_of
 from swarm_logistics_env.world.motion.steering import set_velocity, steer
-from swarm_logistics_env.world.scenario import Scenario
+from swarm_logistics_env.world.scenario import Scenario, of_first_robots
 
 SUFFIX = "+charging"  # of a policy's name
 AT = 0.3
@@ -45,7 +45,7 @@ def drive_to_charge(
     side: NDArray[np.float64],
     in_vain: NDArray[np.float64],
     bodies: NDArray[np.float64],
-    diameter: float,
+    radii: NDArray[np.float64],
     period: float,
     commands: NDArray[np.float64],
 ) -> None:
@@ -59,7 +59,7 @@ def drive_to_charge(
         in_vain: for how long each stood on a station that did not charge it [s], (N,); below 0: it
             looks for another one for so long.
         bodies: memories (N, N_COLUMNS), of which the bodies are read.
-        diameter: of a robot [m].
+        radii: of the robots (N,) [m].
     """
     for robot in range(len(rows)):
         if not needs_charge[robot]:
@@ -76,7 +76,7 @@ def drive_to_charge(
             in_vain[robot] = 0.0
             set_velocity(0.0, 0.0, 0.0, gripper, command)
             continue
-        station = free_station(sensed, battery + row.BATTERY.stations, diameter)
+        station = free_station(sensed, battery + row.BATTERY.stations, radii[robot])
         if in_vain[robot] < 0.0:
             in_vain[robot] += period
             station = -1
@@ -87,7 +87,7 @@ def drive_to_charge(
             top_speed = float(body[MEMORY.top_speed])
             set_velocity(x, y, min(1.0, way / (2.0 * period * top_speed)), gripper, command)
             steer(body, command)
-            in_vain[robot] += period if way < 0.5 * diameter else 0.0
+            in_vain[robot] += period if way < radii[robot] else 0.0
             if in_vain[robot] > _PATIENCE:
                 in_vain[robot] = -_TURNED_AWAY
         elif is_inside:
@@ -98,7 +98,7 @@ def drive_to_charge(
 
 
 @kernel
-def free_station(sensed: NDArray[np.float32], first: int, diameter: float) -> int:
+def free_station(sensed: NDArray[np.float32], first: int, radius: float) -> int:
     """Return the column of the nearest station in view on which no robot is seen; -1: none."""
     for rank in range(row.N_STATIONS_IN_VIEW):
         station = first + rank * row.STATION_WIDTH
@@ -110,7 +110,7 @@ def free_station(sensed: NDArray[np.float32], first: int, diameter: float) -> in
             x = sensed[start + row.NEIGHBOUR.x] - sensed[station + row.STATION.x]
             y = sensed[start + row.NEIGHBOUR.y] - sensed[station + row.STATION.y]
             is_there = sensed[start + row.NEIGHBOUR.present] > 0.5
-            is_free &= not (is_there and length_of(x, y) < 0.5 * diameter)
+            is_free &= not (is_there and length_of(x, y) < radius)
         if is_free:
             return station
     return -1
@@ -171,6 +171,7 @@ class Charging(RowPolicy, Holding):
         self.stream = getattr(policy, "stream", "charging")
         self._has_battery = False
         self._bodies_of_kinds = np.zeros((1, BODY.stop - BODY.start))
+        self._radii_of_kinds = np.zeros(1)
         self._set_robots(0)
 
     def __repr__(self) -> str:
@@ -195,7 +196,7 @@ class Charging(RowPolicy, Holding):
             configure(scenario)
         self._has_battery = scenario.battery is not None
         self._period = scenario.control_period
-        self._diameter = 2.0 * scenario.robot_radius
+        self._radii_of_kinds = np.array([body.robot_radius for body in of_first_robots(scenario)])
         self._bodies_of_kinds = bodies_of(scenario)
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
@@ -214,6 +215,7 @@ class Charging(RowPolicy, Holding):
         self._side = np.ones(n_robots)
         self._in_vain = np.zeros(n_robots)
         self._bodies = np.zeros((n_robots, N_COLUMNS))
+        self._radii = np.resize(self._radii_of_kinds, n_robots)
         self._bodies[:, BODY] = np.resize(self._bodies_of_kinds, (n_robots, BODY.stop - BODY.start))
 
     def memories(self) -> dict[str, NDArray[Any]]:
@@ -245,7 +247,7 @@ class Charging(RowPolicy, Holding):
         commands = np.array(self.policy.act(rows), np.float64)
         drive_to_charge(
             observations, self._needs_charge, self._side, self._in_vain, self._bodies,
-            self._diameter, self._period, commands,
+            self._radii, self._period, commands,
         )  # fmt: skip
         return commands
 
