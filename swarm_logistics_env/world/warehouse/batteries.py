@@ -90,7 +90,8 @@ def sense_battery(me: int, pose: Pose, world: World, out: Sensed) -> None:
     batteries = world.batteries
     first = len(out) - row.N_BATTERY_COLUMNS
     holds = world.able.battery[me]
-    out[first + row.BATTERY.charge] = batteries.energy[me] / holds if holds > 0.0 else 0.0
+    # A cell that fades may hold less by now than it was charged to in this step.
+    out[first + row.BATTERY.charge] = min(batteries.energy[me] / holds, 1.0) if holds > 0.0 else 0.0
     out[first + row.BATTERY.charging] = 1.0 if batteries.station[me] != NOBODY else 0.0
     farther_than = -1.0
     for rank in range(row.N_STATIONS_IN_VIEW):
