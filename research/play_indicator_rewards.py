@@ -1,9 +1,10 @@
 """What R in the reward buys: `python -m research.play_indicator_rewards` (40 minutes of a core).
 
-Trains ten robots in the small warehouse, every other episode with two robots that hold what they
-grip for good (FM4), by one recipe with several weights of R, and by the same recipe without. R is
-relative to running means of the policy that learns. It writes a block of docs/training.md. What is
-trained stays in results/indicator_rewards, and the same command goes on after an interruption.
+Trains ten robots in the small warehouse, every other episode with two robots whose entering the
+delivery area delivers nothing (FM4), by one recipe with several weights of R, and by the same
+recipe without. R is relative to running means of the policy that learns. It writes a block of
+docs/training.md. What is trained stays in results/indicator_rewards, and the same command goes on
+after an interruption.
 
 Declared before the first training: R is bought where the 95 % interval of the difference of R over
 trainings (Welch's) to the recipe without it is above 0, and P is paid for it where that of P is

@@ -182,12 +182,13 @@ class Training(Part):
 
     def smallest_alike(self, scenario: Scenario) -> Scenario:
         """Return the smallest of the worlds' scenarios that differ from one in `n_robots` alone."""
-        sizes = [
-            alike.n_robots
-            for _, alike in self.each_world
-            if alike == scenario.replace(n_robots=alike.n_robots)
+        fields = scenario.model_dump(exclude={"n_robots"})
+        alike = [
+            of_world
+            for _, of_world in self.each_world
+            if of_world.model_dump(exclude={"n_robots"}) == fields
         ]
-        return scenario.replace(n_robots=min(sizes))
+        return min(alike, key=lambda of_world: of_world.n_robots)
 
     @property
     def evaluation_scenario(self) -> Scenario:

@@ -98,6 +98,13 @@ def test_indicators_are_relative_to_what_was_measured_in_worlds_that_are_alike(s
     assert {condition.n_robots for condition in apart.measured.conditions} == {4}
 
 
+def test_a_large_swarm_may_learn_beside_a_room_in_which_it_has_no_place(small: Any) -> None:
+    hall = {"n_robots": 300, "scenario": {"warehouse_width": 30.0, "warehouse_height": 30.0}}
+    indicators = {"weights": {"R": 1.0}, "references": 9.0}
+    training = small(worlds=[{"n_robots": 2}, hall], indicators=indicators)
+    assert make_worlds(training).num_envs == 302
+
+
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:
     view = NetworkView(small())
     view.seed(0)
