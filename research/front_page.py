@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from research.fit_paper import read_tried
 from research.play_claims import judged_claims, runs_a_cell
 from research.play_paper_fit import by_set
-from research.tables import ROOT, block_rows, read_rows, table, with_blocks
+from research.tables import ROOT, read_rows, table, with_blocks
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.study.report import drawing, section
 
@@ -92,53 +92,6 @@ def with_numbers(
     return text.replace(line, pattern.sub(lambda _: next(remaining), line))
 
 
-# Which policies and which modes are told, the README's sentences decide: after a change, look at
-# the tables.
-def findings() -> str:
-    """Return the table of the README's findings: a row a question, a column a policy."""
-    estimates = read("estimates")
-    policies = values(estimates, "policies")
-    realistic = values(estimates, "realistic")
-    scores = third_edition("ppo-robust, 7 trainings", "site-fidelity", "central-stock")
-    rows: dict[str, tuple[Mapping[str, str], Sequence[str]]] = {
-        "P, items delivered": (texts(realistic["P"]), ["central-stock"]),
-        "P, times that of `homing-stock`": (texts(realistic[SHARE]), []),
-        "contacts a robot-minute": (texts(realistic["contacts"]), []),
-        "R, two deliver nothing (FM4)": (texts(policies["R, FM4, m = 2"]), ["ppo-delivery"]),
-        "score in 24 worlds, times that of `homing-stock`": (
-            dict(zip(("ppo-robust", "site-fidelity", "central-stock"), scores, strict=True)),
-            ["site-fidelity", "central-stock"],
-        ),
-        "S from 25 to 100 robots": (texts(policies["S, N 25 -> 100"]), []),
-        "the paper's warehouse is cleared in a median of [s]": (
-            texts(values(estimates, "clearing")["no fault"]),
-            ["swarm-dt"],
-        ),
-    }
-    lines = [
-        (
-            question,
-            by_policy["ppo-robust"],
-            by_policy.get("homing-stock", "1"),
-            ", ".join(f"`{policy}` {by_policy[policy]}" for policy in others),
-        )
-        for question, (by_policy, others) in rows.items()
-    ]
-    return table(("95 % interval", "`ppo-robust`", "`homing-stock`", "others"), lines)
-
-
-def texts(row: Mapping[str, Value]) -> dict[str, str]:
-    """Return the texts of a row by policy."""
-    return {policy: value.text for policy, value in row.items()}
-
-
-def third_edition(*entries: str) -> list[str]:
-    """Return the scores of entries of the benchmark as docs/results.md has them."""
-    rows = block_rows(ROOT / "docs" / "results.md", "benchmark")
-    scores = {cells[0]: cells[1] for cells in rows}
-    return [scores[entry] for entry in entries]
-
-
 def counts() -> dict[str, list[str]]:
     """Return the counts of the README's findings, by the words that each line begins with."""
     played = read_tried(RESULTS / "paper_fit" / "claims.csv")
@@ -150,31 +103,13 @@ def counts() -> dict[str, list[str]]:
         least_runs, len(by_set(played)),
     )  # fmt: skip
     seeds = {line["study"]: line["seeds"] for line in read("estimates")}
-    coverage = section.percent(_coverage_over_trainings())
     return {
-        "* **Of ": list(map(str, of_text)),
-        "95 % intervals": [
-            section.P_LEVEL,
-            seeds["realistic"],
-            seeds["broken"],
-            seeds["policies"],
-            coverage,
-        ],
+        "**Of ": list(map(str, of_text)),
+        "95 % intervals": [section.P_LEVEL, seeds["broken"]],
     }
 
 
-def _coverage_over_trainings() -> float:
-    """Return how often an interval of R over seven trainings holds R if one in ten collapses."""
-    (row,) = (
-        row
-        for row in read("verdict_errors")
-        if row["world"] == "1 in 10 collapses"
-        and (row["trainings"], row["seeds"]) == ("7.000", "20.000")
-    )
-    return float(row["coverage"])
-
-
-# How each policy of the first table came about.
+# How each policy of the first table came about. Which conditions are told, the README decides.
 _POLICIES = {
     "swarm-dt": "the paper's",
     "homing-stock": "a script",
@@ -247,8 +182,7 @@ def readme_text() -> str:
     """Return the README as the tables have it, with links to the repository of [project.urls]."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     address = project.get("urls", {}).get("Repository")
-    blocks = {"broken": broken(), "findings": findings()}
-    text = with_blocks(README.read_text(encoding="utf-8"), blocks)
+    text = with_blocks(README.read_text(encoding="utf-8"), {"broken": broken()})
     for beginning, numbers in counts().items():
         text = with_numbers(text, beginning, _NUMBER, numbers)
     text = with_numbers(text, "A step of", _COST, [cost()])
