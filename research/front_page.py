@@ -120,7 +120,7 @@ _CONDITIONS = {
     "no fault": "no fault",
     "FM1, m = 2": "two mislead the others (FM1)",
     "FM4, m = 2": "two deliver nothing (FM4)",
-    "FM4_jam, m = 2": "nor let go of the item (FM4_jam)",
+    "FM4_jam, m = 2": "two deliver nothing and hold on to the item (FM4_jam)",
     "contacts, no fault": "contacts a robot-minute, no fault",
 }
 
