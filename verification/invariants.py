@@ -138,9 +138,10 @@ class Watch:
         state, scenario = self.world.state, self.world.scenario
         orders, before = state.orders, self._before.orders
         n_open = int((state.open_requests != NOBODY).sum())
-        n_closed = state.delivered + orders.n_put_back.item()
-        n_gone = orders.n_asked.item() - n_open - n_closed  # for an item that left with another
-        self._demand(n_gone == 0 or (n_gone > 0 and not scenario.restock), "a request is lost")
+        n_gone = _unserved(state) - _unserved(self._before)
+        # Where items do not come back, an item leaves with all requests for it.
+        may_leave = not (scenario.restock and self._scenario.restock)
+        self._demand(n_gone == 0 or (n_gone > 0 and may_leave), "a request is lost")
         asked = orders.open[:n_open, ASKED]
         self._demand(asked <= state.time + 1e-6, "something is asked for before its time")
         self._demand(orders.open[:n_open, CAME] <= asked + 1e-6, "asked for before it came")
@@ -348,3 +349,9 @@ def _lack(modes: Names, what: str) -> Flags:
     return np.array(
         [not all(getattr(failure_mode(name), what) for name in names) for names in modes], np.bool_
     )
+
+
+def _unserved(state: WarehouseState) -> int:
+    """Return how many requests are closed that were neither delivered nor put back."""
+    n_open = int((state.open_requests != NOBODY).sum())
+    return state.orders.n_asked.item() - n_open - state.delivered - state.orders.n_put_back.item()
