@@ -87,10 +87,15 @@ def lifted_in_fm2(state: Any) -> None:
     state.robot_item[1], state.item_status[free], state.item_carrier[free] = free, 1, 1
 
 
+def asked_less(state: Any) -> None:
+    state.orders.n_asked[...] -= 1
+
+
 SPOILT: list[tuple[str, Spoil]] = [
     ("two robots carry one item", two_hands),
     ("an item is carried by nobody", put("item_status", slice(None), DELIVERED)),
     ("nothing is asked for", put("open_requests", 0, NOBODY)),
+    ("a request is lost", asked_less),
     ("overlap by", put("robot_position", (0, 0), 0.01)),
     ("overlap by nan", put("robot_position", 0, np.nan)),
     (r"robot_timer leaves \[0, 10\)", put("robot_timer", 0, 10.0)),
