@@ -253,7 +253,7 @@ DEFINITIONS: dict[str, Definition] = {
             function=fault_tolerance,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "tolerant"},
-            at_zero="FT = 0: faulty robots are worth no more than absent ones",
+            at_zero="FT = 0: P is as if the faulty robots were absent",
         ),
         Definition(
             symbol="R",

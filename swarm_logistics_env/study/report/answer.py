@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -10,9 +9,6 @@ from typing import NamedTuple
 from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.definitions import DEFINITIONS
-from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.tasks.task_world import counted_in, world_of
-from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import (
     UNAFFECTED,
@@ -22,6 +18,13 @@ from swarm_logistics_env.study.verdicts.verdict import (
 
 from . import section
 from .answer_notes import notes
+from .performances import (
+    condition_in_words,
+    p_alone,
+    performance_in_words,
+    sound_cells_of,
+    unusual_engine,
+)
 from .policies_compared import (
     between_policies,
     comparison_in_words,
@@ -32,6 +35,7 @@ from .policies_compared import (
 from .section import Section
 
 _MOST_WITH_SENTENCES = 2  # policies and tasks; more have a table, and sentences together
+_MOST_NAMED = 3  # questions that are decided alike, in a sentence
 
 
 class Line(NamedTuple):
@@ -50,6 +54,11 @@ class Line(NamedTuple):
     verdict: Verdict
     number: int
     p: str = ""
+
+    def name(self, *, with_subject: bool) -> str:
+        """Return the question without its indicator, perhaps with whose swarm it is about."""
+        name = self.question.partition(" ")[2]
+        return f"{self.subject}: {name}" if with_subject else name
 
     @property
     def value(self) -> str:
@@ -108,8 +117,9 @@ class Answer(NamedTuple):
         scope: how much was asked, of which policies, and over which seeds.
         subjects: what was found of each policy and task.
         lines: the questions.
-        notes: what the words of the verdicts mean, and what is still open.
+        notes: what the words of the verdicts mean, and what is still open, a line each.
         seeds: over which everything is.
+        level: of the intervals, as a heading says; a line with another one says its own.
     """
 
     comparison: str
@@ -118,8 +128,9 @@ class Answer(NamedTuple):
     scope: str
     subjects: tuple[SubjectAnswer, ...]
     lines: tuple[Line, ...]
-    notes: str
+    notes: tuple[str, ...]
     seeds: str
+    level: str
 
     @property
     def opening(self) -> list[str]:
@@ -131,7 +142,7 @@ class Answer(NamedTuple):
     def summary(self) -> list[str]:
         """P and each indicator in a few sentences; of many policies together."""
         if self.overview is not None:
-            return [*filter(None, [self.turns]), *_sentences(self.lines)]
+            return [*filter(None, [self.turns]), *_sentences(self.lines, self.level)]
         seeds = f"; {self.seeds}" if len(self.subjects) == 1 else ""
         sentences = []
         for subject in self.subjects:
@@ -156,44 +167,41 @@ class Answer(NamedTuple):
         return map_reduce(self.lines, lambda line: line.subject)
 
     @property
-    def level(self) -> str:
-        """The level of all intervals, for a heading; empty: they differ, and each row says its."""
-        levels = {line.level for line in self.lines} - {""}
-        return "" if len(levels) > 1 else next(iter(levels), section.P_LEVEL)
-
-    @property
     def columns(self) -> tuple[str, ...]:
         """The headings of the columns of `row`."""
-        if self.level:
-            return "question", "value", f"{self.level} interval", "verdict"
-        return "question", "value", "interval", "level", "verdict"
+        return "question", "value", f"{self.level} interval", "verdict"
 
     def row(self, line: Line, question: str) -> tuple[str, ...]:
         """Return a line of the answer in columns; its question may be shortened before."""
-        levels = () if self.level else (line.level,)
-        return question, line.value, line.interval, *levels, line.verdict.in_words
+        return question, line.value, self.interval(line), line.verdict.in_words
+
+    def interval(self, line: Line) -> str:
+        """Return the interval of a line, with its level if that is another one than most have."""
+        level = line.level if line.level != self.level else ""
+        return f"{line.interval} {level}".strip()
 
     @property
     def section(self) -> Section:
         """The lines as a table."""
         rows = tuple(map(self.row, self.lines, self.questions))
-        return Section("", self.columns, rows, (self.notes,))
+        return Section("", self.columns, rows, self.notes)
 
 
 def answer(results: StudyResults) -> Answer:
     """Return what a study found."""
     lines = list(_lines(results))
-    engine = _unusual_engine(results)
+    level = _common_level(lines)
+    engine = unusual_engine(results)
     subjects = []
-    for name, cell in _sound_cells(results).items():
+    for name, cell in sound_cells_of(results).items():
         of_subject = [line for line in lines if line.subject == name]
         subjects.append(
             SubjectAnswer(
                 name,
-                _performance(results, cell) + engine,
-                _p_alone(cell),
-                _condition(results, cell),
-                tuple(_sentences(of_subject)),
+                performance_in_words(results, cell) + engine,
+                p_alone(cell),
+                condition_in_words(results, cell),
+                tuple(_sentences(of_subject, level)),
             )
         )
     if not subjects:
@@ -206,9 +214,16 @@ def answer(results: StudyResults) -> Answer:
         _scope(results),
         tuple(subjects),
         tuple(lines),
-        notes(results),
+        notes(results, level),
         results.seeds_text,
+        level,
     )
+
+
+def _common_level(lines: Sequence[Line]) -> str:
+    """Return the level that most intervals have."""
+    levels = Counter(line.level for line in lines if line.level)
+    return levels.most_common(1)[0][0] if levels else section.P_LEVEL
 
 
 def _overview(results: StudyResults, subjects: Sequence[SubjectAnswer]) -> Section | None:
@@ -239,10 +254,7 @@ def _lines(results: StudyResults) -> Iterator[Line]:
         if verdict.compares_policies:
             subject = f"{verdict.after.name} against {subject}"
             question = f"P of {verdict.after.name}, {verdict.after.condition}"
-        cells = results.cells_of(comparison)
-        arms = (comparison.removed or comparison.original, comparison.changed)
-        means = [cells[arm].mean.value for arm in arms if cells[arm].n_seeds]
-        p = f"P {means[0]:.3g}→{means[1]:.3g}" if len(means) == len(arms) else ""
+        p = _p_before_and_after(results, verdict)
         lines.append(Line(subject, question, verdict, number, p))
     # Recorded trials may ask one question in several tables, at other values of a parameter.
     counts = Counter((line.subject, line.question) for line in lines)
@@ -265,7 +277,23 @@ def _lines(results: StudyResults) -> Iterator[Line]:
             yield line
 
 
-def _sentences(lines: Sequence[Line]) -> Iterator[str]:
+def _p_before_and_after(results: StudyResults, verdict: Verdict) -> str:
+    """Return the means of P that a value comes of, over its seeds; empty: not played."""
+    comparison = verdict.compared
+    estimate = verdict.estimate
+    cells = results.cells_of(comparison)
+    arms = (comparison.removed or comparison.original, comparison.changed)
+    if not all(cells[arm].n_seeds for arm in arms):
+        return ""
+    # Until it is clear, conditions may be played further than this question looks.
+    n_seeds = estimate.n_seeds if estimate and estimate.paired else None
+    before, after = (f"{cells[arm].by_seed[..., :n_seeds].mean():.3g}" for arm in arms)
+    if comparison.removed:
+        return f"P without them {before}, with them {after}"
+    return f"P {before}→{after}"
+
+
+def _sentences(lines: Sequence[Line], level: str) -> Iterator[str]:
     """Yield a sentence on each indicator; policies side by side have their own."""
     by_indicator: dict[str, list[Line]] = map_reduce(
         lines, lambda line: line.verdict.compared.indicator
@@ -274,31 +302,47 @@ def _sentences(lines: Sequence[Line]) -> Iterator[str]:
         compared = between_policies([line.verdict for line in alike])
         questions = [line for line in alike if line.verdict not in compared]
         if questions:
-            yield _sentence(DEFINITIONS[indicator].heading, questions)
+            yield _sentence(DEFINITIONS[indicator].heading, questions, level)
 
 
-def _sentence(heading: str, lines: Sequence[Line]) -> str:
-    """Return how many questions on an indicator are decided how, and which value is lowest."""
-    counts = section.count_words(
-        section.word_to_count(line.verdict, line.verdict.on_property.adjusted) for line in lines
-    )
+def _sentence(heading: str, lines: Sequence[Line], level: str) -> str:
+    """Return which questions on an indicator are decided how, and which value is lowest.
+
+    Args:
+        level: of intervals that do not say theirs.
+    """
+    names_subjects = len({line.subject for line in lines}) > 1
+    counts = ", ".join(_counts(lines, names_subjects=names_subjects))
     indicator = f"{heading[0].upper()}{heading[1:]}"
     tested = [line for line in lines if line.interval and line.verdict.conclusion != UNTESTABLE]
     candidates = tested or [line for line in lines if line.verdict.value is not None]
     if not candidates:
         return f"{indicator}: {counts}."
-    worst = min(candidates, key=lambda line: line.verdict.value or 0.0)
-    value = f"{worst.verdict.compared.indicator} {worst.value} {worst.interval}".rstrip()
-    if worst.level not in ("", section.P_LEVEL):
-        value += f" at {worst.level}"
-    whose = f"{worst.subject}, " if len({line.subject for line in lines}) > 1 else ""
-    parts = ", ".join(filter(None, [worst.p, value, worst.verdict.in_words]))
-    result = f"{whose}{worst.question.partition(' ')[2]}: {parts}"
+    lowest = min(candidates, key=lambda line: line.verdict.value or 0.0)
+    value = f"{lowest.verdict.compared.indicator} {lowest.value} {lowest.interval}".rstrip()
+    if lowest.level not in ("", level):
+        value += f" at {lowest.level}"
+    parts = ", ".join(filter(None, [lowest.p, value, lowest.verdict.in_words]))
+    result = f"{lowest.name(with_subject=names_subjects)}: {parts}"
     if len(lines) == 1:
         return f"{indicator}, {result}."
-    is_change = worst.verdict.compared.definition.compares == "policy"
-    extreme = "lowest" if is_change else "worst"
-    return f"{indicator}: {counts} ({extreme} {result})."
+    return f"{indicator}: {counts}; lowest {result}."
+
+
+def _counts(lines: Sequence[Line], *, names_subjects: bool) -> Iterator[str]:
+    """Yield how many questions have each word; which, where they are decided and few."""
+    by_word: dict[str, list[Line]] = map_reduce(
+        lines,
+        lambda line: section.word_to_count(line.verdict, line.verdict.on_property.adjusted),
+    )
+    for word in sorted(by_word, key=section.rank_of_word):
+        alike = by_word[word]
+        names = [line.name(with_subject=names_subjects) for line in alike]
+        decision, _, provisional = word.removesuffix(")").partition(" (")
+        is_named = decision in ("supported", "refuted") and len(lines) > 1
+        of_which = names if is_named and len(names) <= _MOST_NAMED else []
+        details = "; ".join(filter(None, [provisional, *of_which]))
+        yield f"{len(alike)} {decision} ({details})" if details else f"{len(alike)} {decision}"
 
 
 def _scope(results: StudyResults) -> str:
@@ -312,89 +356,3 @@ def _scope(results: StudyResults) -> str:
         seeds = f"up to {seeds}"
     questions = section.plural(len(results.verdicts), "question")
     return f"{results.plan.specification.name}: {questions}, {policies_text}, {seeds}."
-
-
-def _sound_cells(results: StudyResults) -> dict[str, Cell]:
-    """Return the cell of each policy and task where the swarm is as it should be."""
-    played = [cell for cell in results.cells if cell.n_seeds]
-    conditions = [cell for cell in played if cell.arm.setting.kind != "policy"]
-    sound_cells: dict[str, Cell] = {}
-    by_subject: dict[str, list[Cell]] = map_reduce(
-        conditions, lambda cell: subject_of(cell.arm.case, cell.policy)
-    )
-    for subject, cells in by_subject.items():
-        # Where the swarm is as it should be, or else in the first condition.
-        sound = [c for c in cells if c.arm.setting.kind == "fault" and not c.arm.setting.value]
-        sound_cells[subject] = (sound or cells)[0]
-    if not conditions:  # policies alone are compared: in the first table
-        for cell in played:
-            if cell.table == played[0].table:
-                sound_cells.setdefault(cell.arm.setting.name, cell)
-    judged = results.policies
-
-    def place(subject: str) -> int:
-        # A policy that others are compared with stands behind them.
-        policy = sound_cells[subject].arm.case.policy.title
-        return judged.index(policy) if policy in judged else len(judged)
-
-    return {subject: sound_cells[subject] for subject in sorted(sound_cells, key=place)}
-
-
-def _unusual_engine(results: StudyResults) -> str:
-    """Return what moves the bodies, behind a comma; empty: what usually does."""
-    task = results.plan.specification.played
-    world = world_of(task)
-    engine = world.engine(results.plan.specification.scenario)
-    return "" if engine == world.engine(task.default) else f", engine {engine}"
-
-
-def _performance(results: StudyResults, cell: Cell) -> str:
-    """Return P of a policy in words, e.g. "P [95 %] = 40.0 [39.5, 40.5] items in 500 s, N = 25"."""
-    case = cell.arm.case
-    has_interval = _counts_anything(cell) and cell.mean.low is not None
-    level = f" [{section.P_LEVEL}]" if has_interval else ""
-    performance = f"{results.plan.name_of_p}{level} = {_mean(cell)}"
-    if counted := counted_in(case):
-        performance += f" {counted} in {case.scenario.duration:g} s"
-    return f"{performance}, {_condition(results, cell)}"
-
-
-def _condition(results: StudyResults, cell: Cell) -> str:
-    """Return where P of a policy is told, e.g. "N = 25, no fault"."""
-    setting = cell.arm.setting
-    task = results.plan.specification.played
-    condition = f"N = {cell.arm.case.scenario.n_robots}"
-    if setting.kind == "policy":
-        condition += f", {cell.table}"
-    elif setting.kind != "size":
-        condition += f", {setting}"
-    if task.name != "warehouse" and not results.plan.origin:
-        condition += f", task {task.name}"
-    return condition
-
-
-def _counts_anything(cell: Cell) -> bool:
-    """Return whether something was delivered, or P is another measure, of which 0 tells as much."""
-    return bool(cell.by_seed.any() or cell.arm.case.performance)
-
-
-def _p_alone(cell: Cell) -> str:
-    """Return mean P for a table."""
-    if _counts_anything(cell):
-        return section.mean_p(cell)
-    return f"0 (at most {-math.log(1.0 - CONFIDENCE) / cell.n_seeds:.2f})"
-
-
-def _mean(cell: Cell) -> str:
-    """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
-    if not _counts_anything(cell):
-        reason = f"as none of {cell.n_seeds} runs delivered anything"
-        if cell.problem:
-            reason += f"; {cell.problem}"
-        return f"{_p_alone(cell).removesuffix(')')} at {section.P_LEVEL}, {reason})"
-    mean = section.mean_p(cell)
-    if cell.problem:
-        mean += f" ({cell.problem} and do not count)"
-    if any(outcome.all_delivered for outcome in cell.outcomes):
-        mean += f", all items after {section.time_to_clear(cell)} s"
-    return mean

@@ -20,13 +20,13 @@ _FEW_ITEMS = 1.0  # in a run, of which shares say little
 _MOST_CONDITIONS = 2  # that a note of the answer names
 # What the words of verdicts mean: those that stand in an answer, in this order.
 _MEANINGS = {
-    "decided": "supported: above 0, refuted: below",
+    "decided": "supported: above 0; refuted: below 0",
     "compared": "more, less: of P than the policy behind 'against'",
-    "open": "open: undecided",
+    "open": "open: neither an effect is shown nor that there is none",
     "margin": "< {margin}: P changes by less than that, or P_F and P_S of FT differ by less",
-    "stalls": "stalls: so few runs may hide stalled ones",
-    "trainings": "trainings: so few may hide collapses",
-    "Holm": "Holm: decided alone, not among all questions on the indicator",
+    "stalls": "stalls: a run that stalls, which so few may hide, could turn it",
+    "trainings": "trainings: one that collapses, which so few may hide, could turn it",
+    "Holm": "Holm: clear if nothing else were asked, not among all questions on the indicator",
     "provisional": f"n < {SEEDS_OF_HEADLINE}: provisional",
     "unaffected": "unaffected: the same runs",
     "cannot_fail": "untestable, never < 0: as P cannot be",
@@ -35,13 +35,40 @@ _MEANINGS = {
 }
 
 
-def notes(results: StudyResults) -> str:
-    """Return the notes on the answer of a study, in one line."""
-    line = "; ".join(_notes_that_apply(results))
-    return f"{line[:1].upper()}{line[1:]}."
+def notes(results: StudyResults, level: str) -> tuple[str, ...]:
+    """Return the notes on the answer of a study, a line each.
+
+    Args:
+        level: of most intervals.
+    """
+    lines = [*meanings(results.verdicts)]
+    if lines:
+        lines.append(_method(results, level))
+    rest = "; ".join(_notes_that_apply(results))
+    lines.append(f"{rest[:1].upper()}{rest[1:]}" if rest else "")
+    lines.append(_modes(results))
+    return tuple(f"{line}." for line in lines if line)
 
 
-def meanings(verdicts: Iterable[Verdict]) -> str:
+def _method(results: StudyResults, level: str) -> str:
+    """Return how verdicts are adjusted, and why intervals are wider than usual ones."""
+    method = "Verdicts are by Holm's method over all questions on an indicator of one policy"
+    if level == section.P_LEVEL or not results.looks:
+        return method
+    n_looks = len(results.looks)
+    return f"{method}; intervals are wider than of a single look, as up to {n_looks} are taken"
+
+
+def _modes(results: StudyResults) -> str:
+    """Return what robots do in the failure modes of the study; empty: none is described."""
+    faults = [verdict.after.name for verdict in results.verdicts if verdict.after.kind == "fault"]
+    modes = {mode for fault in faults for mode in fault.split("+")}
+    described = results.plan.specification.played.failure_modes
+    texts = [f"{mode}: {text}" for mode, text in described.items() if mode in modes]
+    return f"A faulty robot: {'; '.join(texts)}" if texts else ""
+
+
+def meanings(verdicts: Iterable[Verdict]) -> list[str]:
     """Return what 0 means of these indicators, and the words that `Verdict.in_words` has."""
     words: set[str] = set()
     zeros: dict[str, None] = {}
@@ -65,15 +92,12 @@ def meanings(verdicts: Iterable[Verdict]) -> str:
     of_words = (
         meaning.format(margin=margin) for word, meaning in _MEANINGS.items() if word in words
     )
-    return "; ".join([*zeros, *of_words])
+    return [*zeros, *of_words]
 
 
 def _notes_that_apply(results: StudyResults) -> Iterator[str]:
     """Yield how to read the answer of a study, and what limits it."""
     verdicts = results.verdicts
-    if words := meanings(verdicts):
-        yield words
-        yield "by Holm's method over all questions on an indicator of one policy"
     problems = {
         verdict.problem or "other questions on the indicator lack runs": None
         for verdict in verdicts

@@ -243,6 +243,14 @@ def limits(points: Sequence[Point]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
+def cuts_intervals(points: Sequence[Point]) -> bool:
+    """Return whether an interval ends beyond the axis that shows these values."""
+    low, high = limits(points)
+    lows = [point.low for point in points if point.low is not None]
+    highs = [point.high for point in points if point.high is not None]
+    return min(lows, default=low) < low or max(highs, default=high) > high
+
+
 def _stretch(axes: Axes, points: Sequence[Point]) -> None:
     """Let the axis of P be logarithmic where small ones would lie on a heap at its foot."""
     values = [point.value for point in points if point.value is not None]
@@ -365,9 +373,16 @@ def _forest(axes: Axes, rows: Rows) -> None:
 
 
 def add_legend(canvas: Canvas, axes: Axes) -> None:
-    """Put the legend of one pair of axes above all of them, each series once."""
-    handles, labels = axes.get_legend_handles_labels()
-    series = dict(zip(labels, handles))
+    """Put the legend of one pair of axes above all of them, each series once, its mark filled."""
+    from matplotlib.container import ErrorbarContainer
+    from matplotlib.lines import Line2D
+
+    series: dict[str, Any] = {}
+    for handle, label in zip(*axes.get_legend_handles_labels()):
+        if isinstance(handle, ErrorbarContainer):
+            mark = handle.lines[0]
+            handle = Line2D([], [], color=mark.get_color(), marker=mark.get_marker(), linestyle="")
+        series[label] = handle
     width = (
         _LEGEND_WIDTH if max(map(len, series), default=0) <= 16 else 1.5 * _LEGEND_WIDTH
     )  # of long names

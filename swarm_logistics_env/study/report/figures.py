@@ -255,9 +255,12 @@ def _point(
 ) -> Point:
     policy = verdict.compared.policy
     value, low, high = verdict.interval or (None, None, None)
+    # What stands between two policies has the colour of neither.
+    is_of_two = verdict.compares_policies
+    style = len(results.policies) if is_of_two else results.policies.index(policy)
     return Point(
         policy,
-        results.policies.index(policy),
+        style,
         category,
         value,
         low,
@@ -281,10 +284,12 @@ CAPPED = "†: P is capped, every item was delivered in a run."
 def note_on_verdicts(results: StudyResults, verdicts: Sequence[Verdict]) -> str:
     """Return what the marks of verdicts mean, and over which seeds they are."""
     caps = f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
+    points = [_point(results, verdict, "", None) for verdict in verdicts]
+    cut = ", without an end where they leave the axis" if drawing.cuts_intervals(points) else ""
     return (
-        f"{results.seeds_text.capitalize()}. Bars: {levels(verdicts)} intervals, without an end "
-        "where they leave the axis; filled: decided by Holm's method, hollow: not; dashed: "
-        f"thresholds.{caps}"
+        f"{results.seeds_text.capitalize()}. Bars: {levels(verdicts)} intervals{cut}; filled: "
+        "decided by Holm's method; hollow: open, even where the bar lies beside a threshold; "
+        f"dashed: thresholds.{caps}"
     )
 
 

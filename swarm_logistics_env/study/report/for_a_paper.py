@@ -24,7 +24,7 @@ _EXPLORATORY = "exploratory: over other seeds or P than were declared before the
 # Why questions of a study that runs until it is clear were played no further, by `stop_of`.
 _STOPS = {
     "clear": "{count} stopped where clear",
-    "hardly": "{count} as the rest of {most} seeds would decide them with a chance below {chance}",
+    "hardly": "{count} early, as {most} seeds would decide them with a chance below {chance}",
     "margin": "{count} as P changes by less than {margin} of P_o",
     "untestable": "{count} as they cannot be tested",
     "most": "{count} after all {most} seeds",
@@ -68,7 +68,7 @@ def _answer_tables(answer: Answer) -> Iterator[Section]:
         symbols = dict.fromkeys(line.verdict.compared.indicator for line in lines)
         names = [DEFINITIONS[symbol].heading for symbol in DEFINITIONS if symbol in symbols]
         text = section.join_names(names)
-        words = meanings(line.verdict for line in lines)
+        words = "; ".join(meanings(line.verdict for line in lines))
         captions = (performances.get(subject, ""), text, words)
         sentences = tuple(f"{text[0].upper()}{text[1:]}." for text in captions if text)
         yield Section(f"{subject}: indicators", answer.columns, rows, (*sentences, HOLM))
@@ -102,6 +102,8 @@ def in_a_sentence(results: StudyResults, answer: Answer) -> str:
         "Verdicts by Holm's method over all questions on an indicator of one policy, "
         f"{section.percent(1.0 - CONFIDENCE)} error"
     )
+    if answer.level != section.P_LEVEL:
+        method += f"; intervals of indicators of {answer.level} unless said otherwise"
     if results.looks:
         looks = section.join_names([*map(str, results.looks)])
         questions = section.plural(len(results.verdicts), "question")

@@ -19,7 +19,6 @@ from . import drawing
 from .answer import Answer
 from .document import Document
 from .drawing import Panel, Point
-from .figures import forest_label
 from .inline_svg import inline
 from .section import bracketed, digits_of, ratio, width_of
 
@@ -164,7 +163,7 @@ class _Axis(NamedTuple):
 
 
 def _forest(answer: Answer, points: Sequence[Point]) -> tuple[list[str], str]:
-    """Return a drawing of each line of the answer, and their axis with its numbers and title.
+    """Return a drawing of each line of the answer, and their axis with its numbers.
 
     Places along the axis are in percent: a drawing fits any width, and its marks keep their shape.
 
@@ -174,12 +173,11 @@ def _forest(answer: Answer, points: Sequence[Point]) -> tuple[list[str], str]:
     axis = _Axis(*drawing.limits(points), drawing.has_far_values(points))
     drawn = [_row(axis, point, line.verdict) for point, line in zip(points, answer.lines)]
     numbers = "".join(
-        f'{axis.upright(tick, 0, 4, "axis")}<text x="{axis.place(tick)}" y="15">{tick:g}</text>'
+        f'{axis.upright(tick, 14, 18, "axis")}<text x="{axis.place(tick)}" y="11">{tick:g}</text>'
         for tick in axis.ticks
     ).replace(">-", ">\N{MINUS SIGN}")
-    numbers += f'<text x="50%" y="30">{escape(forest_label(answer))}</text>'
-    line = '<line class="axis" x1="0" x2="100%" y1="0.5" y2="0.5"/>'
-    return drawn, f'<svg height="34">{line}{numbers}</svg>'
+    line = '<line class="axis" x1="0" x2="100%" y1="17.5" y2="17.5"/>'
+    return drawn, f'<svg height="18" aria-hidden="true">{line}{numbers}</svg>'
 
 
 def _row(axis: _Axis, point: Point, verdict: Verdict) -> str:

@@ -22,7 +22,7 @@ def between_policies(verdicts: Iterable[Verdict]) -> list[Verdict]:
 
 
 def comparison_in_words(results: StudyResults) -> str:
-    """Return by which factor P of one of two policies is larger than that of the other.
+    """Return by which factor P of the first of two policies differs from that of the other.
 
     Empty: the study does not compare two.
     """
@@ -123,7 +123,7 @@ class _Compared(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """By which factor P is larger, and where the order turns; the larger one stands first."""
+        """By which factor P of the first policy differs, as the table says, and where it turns."""
         first = self.main.after.name
         second = self.main.compared.policy
         if self.main.interval is None:
@@ -131,10 +131,7 @@ class _Compared(NamedTuple):
                 f"P of {first} and of {second} cannot be compared: {self.main.problem} "
                 f"({self.condition})"
             )
-        if not self.is_ahead:
-            first, second = second, first
-        factor = _factor(self.main.interval, inverted=not self.is_ahead)
-        times = f"{section.bracketed(factor, 2, [1.0])} times"
+        times = f"{section.bracketed(_factor(self.main.interval), 2, [1.0])} times"
         if self.main.on_threshold.adjusted in ("supported", "refuted"):
             text = f"P of {first} is {times} that of {second} ({self.condition})"
         else:
@@ -149,8 +146,7 @@ class _Compared(NamedTuple):
         """The factor of the other policy to the first one, and whether it is decided."""
         times = section.NOTHING
         if self.main.interval is not None:
-            inverse = _factor(self.main.interval, inverted=True)
-            times = section.bracketed(inverse, 2, [1.0])
+            times = section.bracketed(_inverse(_factor(self.main.interval)), 2, [1.0])
         words = {"supported": "less", "refuted": "more"}
         word = self.main.on_threshold.adjusted
         return times, words.get(word, self.main.in_words)
@@ -167,14 +163,16 @@ class _Compared(NamedTuple):
         return ", ".join(conditions)
 
 
-def _factor(change: Interval, *, inverted: bool) -> Interval:
-    """Return a relative change as a factor of P, or as that of the other policy."""
-    value, low, high = (None if end is None else 1.0 + end for end in change)
-    assert value is not None
-    if not inverted:
-        return Interval(value, low, high)
-    low, high = (None if end is None else 1.0 / max(end, 1e-9) for end in (high, low))
-    return Interval(1.0 / max(value, 1e-9), low, high)
+def _factor(change: Interval) -> Interval:
+    """Return a relative change as a factor of P."""
+    low, high = (None if end is None else 1.0 + end for end in (change.low, change.high))
+    return Interval(1.0 + change.value, low, high)
+
+
+def _inverse(factor: Interval) -> Interval:
+    """Return a factor of P as that of the other policy."""
+    low, high = (None if end is None else 1.0 / max(end, 1e-9) for end in (factor.high, factor.low))
+    return Interval(1.0 / max(factor.value, 1e-9), low, high)
 
 
 def _elsewhere(verdicts: Sequence[Verdict], is_ahead: bool) -> str:
@@ -192,9 +190,10 @@ def _elsewhere(verdicts: Sequence[Verdict], is_ahead: bool) -> str:
     )
     text = ""
     if n_same := len(by_word.pop(alike, ())):
-        text += f"; so in {n_same} of {len(verdicts)} other conditions"
+        word = "more" if is_ahead else "less"
+        text += f"; also {word} in {n_same} of {len(verdicts)} other conditions"
         of_alike = [v.interval for v in verdicts if v.on_threshold.adjusted == alike]
-        values = [_factor(change, inverted=not is_ahead).value for change in of_alike if change]
+        values = [_factor(change).value for change in of_alike if change]
         least = section.fixed(min(values), 2, [1.0])
         most = section.fixed(max(values), 2, [1.0])
         if least != most:

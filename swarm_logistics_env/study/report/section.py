@@ -235,8 +235,12 @@ def word_to_count(verdict: Verdict, word: str) -> str:
 def count_words(words: Iterable[str]) -> str:
     """Return how many of each word, e.g. "7 supported, 1 refuted"."""
     counts = Counter(words)
-    ordered = sorted(counts, key=lambda word: WORDS.index(word.partition(" ")[0]))
-    return ", ".join(f"{counts[word]} {word}" for word in ordered)
+    return ", ".join(f"{counts[word]} {word}" for word in sorted(counts, key=rank_of_word))
+
+
+def rank_of_word(word: str) -> int:
+    """Return where a word of `word_to_count` stands among those that are counted."""
+    return WORDS.index(word.partition(" ")[0])
 
 
 def join_names(names: Sequence[str]) -> str:

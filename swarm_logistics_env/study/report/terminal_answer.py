@@ -33,7 +33,7 @@ def terminal_answer(answer: Answer, width: int = PLAIN_WIDTH, *, shortens: bool 
         if len(groups) > 1 and line is groups[line.subject][0]:
             parts.append(f"{line.subject}:")
         parts.append(row)
-    return "\n".join([*parts, *_fold(answer.notes, width)])
+    return "\n".join([*parts, *_fold_all(answer.notes, width)])
 
 
 def _in_columns(

@@ -100,9 +100,6 @@ def show_report(
     else:
         echo(f"Figure: {out / 'figures' / 'answer.svg'}")
         echo(f"Tables: {out / 'tables.tex'}")
-    names_modes = any(verdict.after.kind == "fault" for verdict in results.verdicts)
-    if names_modes and "FM1" in results.plan.specification.played.failure_modes:
-        echo("Failure modes: swarm-logistics list faults")
     if is_finished and any(verdict.estimate for verdict in results.verdicts):
         say(f"For a paper: {plain(in_a_sentence(results, report.answer))}")
 

@@ -90,18 +90,24 @@ def test_every_surface_names_the_level_that_it_prints(
     tex = surfaces["tables"].replace("$", "")
     for name, text in surfaces.items():
         assert "95 %" not in re.sub(ALWAYS_95, "", text), name
-    # Where levels differ, each stands in the row of its interval, in every table.
+    # Where levels differ, that of most stands in the heading, the others in their rows.
+    most = answer(stopped).level
+    assert most in level_by_question.values()
+    heading = f"| question | value | {most} interval | verdict |"
+    assert heading in surfaces["report"]
+    assert f">value [{most}]<" in page
+    assert re.search(rf"{most} interval +verdict", surfaces["terminal"])
     for question, level in level_by_question.items():
         (row,) = re.findall(rf"^{question}, .*$", surfaces["terminal"], re.MULTILINE)
-        assert re.search(rf"\]\s+{level}  \w", row)
+        own = "" if level == most else f" {level}"
+        assert re.search(rf"\]{own}  +\w", row)
         assert f", {level} interval [" in surfaces["report"]
         assert re.search(
-            rf"^\| {question}, 1 of 25 \| .*\] \| {level} \|", surfaces["report"], re.MULTILINE
+            rf"^\| {question}, 1 of 25 \| .*\]{own} \|", surfaces["report"], re.MULTILINE
         )
         assert re.search(rf"\| {question[2:]}, m = 1 \|.*\| {level} \|", surfaces["report"])
-        assert f'<td class="level">{level}</td>' in page
-        assert re.search(rf"^{question}, 1 of 25 & .* & .?{level}.? & ", tex, re.MULTILINE)
-    assert "| question | value | interval | level | verdict |" in surfaces["report"]
+        assert re.search(rf'{question}, 1 of 25</th><td class="number">.*\]{own}</td>', page)
+        assert re.search(rf"^{question}, 1 of 25 & .*\]{own}.? & ", tex, re.MULTILINE)
     assert f"{levels(stopped.verdicts)} intervals" in surfaces["figures"]
     worst = f", R -0.55 [-0.67, -0.37] at {level_by_question['R FM4']}, refuted"
     assert worst in surfaces["sentence"]
@@ -143,7 +149,7 @@ def test_a_paper_is_told_conditions_seeds_and_why_each_question_was_played_no_fu
     world = "a warehouse of 10 m x 10 m with 60 items, robots of 2 m/s"
     how = "(preset paper, engine chipmunk), 60 paired seeds (0 to 59)"
     assert sentence.startswith(f"swarm-dt in {world} {how}. swarm-dt: P [95 %] = ")
-    assert "; robustness R: 1 refuted, 1 open (worst FM4, 1 of 25: P 39→15.4, R -0.55 [" in sentence
+    assert "; robustness R: 1 refuted (FM4, 1 of 25), 1 open; lowest FM4, 1 of 25: P 3" in sentence
     assert sentence.endswith(
         "looked at after 10, 20, 30, 40, 50 and 60 seeds: of 2 questions 1 stopped where clear, "
         "1 after all 60 seeds."

@@ -50,11 +50,11 @@ def test_terminal_pipe_and_file_have_the_same_content_and_no_row_is_folded(
         assert width is None or max(map(len, text.splitlines())) <= width
         unfolded = " ".join(text.split())
         study_answer = report.answer
-        for sentence in (*study_answer.head, study_answer.notes):
+        for sentence in (*study_answer.head, *study_answer.notes):
             assert sentence in unfolded
         rows = text.splitlines()
         for line in study_answer.lines:
-            numbers = "  ".join(filter(None, [line.value, line.interval]))
+            numbers = "  ".join(filter(None, [line.value, study_answer.interval(line)]))
             ends = rf"^.*{re.escape(numbers)} .*{re.escape(line.verdict.in_words)}$"
             shown = [row for row in rows if re.fullmatch(ends, row)]
             # A narrow terminal has room for the ends of a question alone.
