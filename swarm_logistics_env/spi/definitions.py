@@ -263,7 +263,7 @@ DEFINITIONS: dict[str, Definition] = {
             function=robustness,
             arguments=lambda c: {"n": c.n_robots, "m": int(c.after)},
             adjectives={0.0: "robust"},
-            at_zero="R = 0: P falls by the share of robots that are faulty",
+            at_zero="R = 0: P falls by the share of robots that are faulty, m/N: not at all",
         ),
         Definition(
             symbol="A",

@@ -29,6 +29,7 @@ from .policies_compared import (
     between_policies,
     comparison_in_words,
     factors,
+    has_no_name,
     subject_of,
     turns_in_words,
 )
@@ -249,7 +250,7 @@ def _lines(results: StudyResults) -> Iterator[Line]:
     lines = []
     for number, verdict in enumerate(results.verdicts):
         comparison = verdict.compared
-        subject = subject_of(comparison.original.case, comparison.policy)
+        subject = subject_of(results, comparison.original.case, comparison.policy)
         question = section.question_of(verdict)
         if verdict.compares_policies:
             subject = f"{verdict.after.name} against {subject}"
@@ -288,9 +289,10 @@ def _p_before_and_after(results: StudyResults, verdict: Verdict) -> str:
     # Until it is clear, conditions may be played further than this question looks.
     n_seeds = estimate.n_seeds if estimate and estimate.paired else None
     before, after = (f"{cells[arm].by_seed[..., :n_seeds].mean():.3g}" for arm in arms)
+    seeds = f" ({n_seeds} seeds)" if results.looks and n_seeds else ""
     if comparison.removed:
-        return f"P without them {before}, with them {after}"
-    return f"P {before}→{after}"
+        return f"P without them {before}, with them {after}{seeds}"
+    return f"P {before}→{after}{seeds}"
 
 
 def _sentences(lines: Sequence[Line], level: str) -> Iterator[str]:
@@ -326,7 +328,7 @@ def _sentence(heading: str, lines: Sequence[Line], level: str) -> str:
     result = f"{lowest.name(with_subject=names_subjects)}: {parts}"
     if len(lines) == 1:
         return f"{indicator}, {result}."
-    return f"{indicator}: {counts}; lowest {result}."
+    return f"{indicator}: {counts}; lowest at {result}."
 
 
 def _counts(lines: Sequence[Line], *, names_subjects: bool) -> Iterator[str]:
@@ -349,7 +351,7 @@ def _scope(results: StudyResults) -> str:
     policies = results.policies
     origin = results.plan.origin
     policies_text = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
-    if origin and policies == (results.plan.specification.name,):  # nobody named it
+    if origin and has_no_name(results):
         policies_text = f"trials of {origin.file}"
     seeds = results.seeds_text.split(" (")[0]
     if any(cell.problem for cell in results.cells):

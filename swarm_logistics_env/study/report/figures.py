@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 from . import drawing
 from .answer import Answer
 from .drawing import Panel, Point
-from .policies_compared import between_policies, condition_of
+from .policies_compared import between_policies, condition_of, has_no_name
 from .section import P_LEVEL, Figure, join_names, levels, slug
 
 if TYPE_CHECKING:
@@ -117,11 +118,15 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
     """Yield S per step, FT and R per mode and m, A per value, and P without a part."""
     for (table, _, onset, swarm), verdicts in _by_figure(results).items():
         definitions = _definitions(verdicts)
-        panels = tuple(_panel(results, verdicts, definition) for definition in definitions)
+        panels = [_panel(results, verdicts, definition) for definition in definitions]
         rows = _rows(results, verdicts)
         condition = _condition(table, onset, swarm)
         symbols = [definition.symbol for definition in definitions]
-        policies = join_names(list(dict.fromkeys(v.compared.policy for v in verdicts)))
+        names = list(dict.fromkeys(v.compared.policy for v in verdicts))
+        policies = join_names(names)
+        is_of_one = len(names) == 1 and not has_no_name(results)
+        first_title = f"{policies}: {condition}" if is_of_one else condition
+        panels[0] = replace(panels[0], title=first_title)
         has_published = any(verdict.published is not None for verdict in verdicts)
         crosses = " Crosses: published." if has_published else ""
         yield Figure(
@@ -132,7 +137,7 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
             partial(drawing.intervals, panels=panels),
             note_on_verdicts(results, verdicts) + crosses,
             title=f"{' and '.join(symbols)}: {condition}",
-            panels=panels,
+            panels=tuple(panels),
         )
 
 

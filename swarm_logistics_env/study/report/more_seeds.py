@@ -17,7 +17,7 @@ EFFECT = 0.1  # the smallest for which more seeds are worth while
 _MOST_NAMED = 3  # questions
 # What questions need, by the case that applies to them.
 _NEEDS = {
-    "within_reach": "{count} open may be decided by {n_seeds} new {runs}",
+    "within_reach": "{count} open: {n_seeds} new {runs} might decide them",
     "beyond": "{count} open need more than {reach} {runs} ({named})",
     "none": "{count} open: no number in reach will do ({named})",
     "small": f"{{count}} open of an effect below {EFFECT:g}, for which more are not worth while",

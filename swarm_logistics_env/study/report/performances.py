@@ -21,7 +21,7 @@ def sound_cells_of(results: StudyResults) -> dict[str, Cell]:
     conditions = [cell for cell in played if cell.arm.setting.kind != "policy"]
     sound_cells: dict[str, Cell] = {}
     by_subject: dict[str, list[Cell]] = map_reduce(
-        conditions, lambda cell: subject_of(cell.arm.case, cell.policy)
+        conditions, lambda cell: subject_of(results, cell.arm.case, cell.policy)
     )
     for subject, cells in by_subject.items():
         # Where the swarm is as it should be, or else in the first condition.

@@ -8,6 +8,7 @@ from typing import NamedTuple, Self
 from more_itertools import map_reduce
 
 from swarm_logistics_env.spi.summaries import Interval
+from swarm_logistics_env.study.questions.comparison import CONFIDENCE
 from swarm_logistics_env.study.tasks.task import Case
 from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -56,17 +57,24 @@ def factors(results: StudyResults) -> dict[str, tuple[str, str]]:
     """
     by_subject = map_reduce(
         between_policies(results.verdicts),
-        lambda v: subject_of(v.compared.original.case, v.compared.policy),
+        lambda v: subject_of(results, v.compared.original.case, v.compared.policy),
     )
     return {
         subject: _Compared.of(results, verdicts).factor for subject, verdicts in by_subject.items()
     }
 
 
-def subject_of(case: Case, policy: str) -> str:
+def subject_of(results: StudyResults, case: Case, policy: str) -> str:
     """Return whose swarm a case is about: a policy, and of recorded trials its task."""
     task = case.scenario.table if isinstance(case.scenario, RecordedScenario) else ""
-    return f"{policy}, {task}" if task else policy
+    names = [] if task and has_no_name(results) else [policy]
+    return ", ".join([*names, task] if task else names)
+
+
+def has_no_name(results: StudyResults) -> bool:
+    """Return whether recorded trials name no policy, so that it is called as their file."""
+    plan = results.plan
+    return bool(plan.origin) and results.policies == (plan.specification.name,)
 
 
 def condition_of(verdict: Verdict) -> str:
@@ -132,12 +140,14 @@ class _Compared(NamedTuple):
                 f"({self.condition})"
             )
         times = f"{section.bracketed(_factor(self.main.interval), 2, [1.0])} times"
+        level = section.percent(self.main.level or CONFIDENCE)
+        condition = self.condition if level == section.P_LEVEL else f"{self.condition}, {level}"
         if self.main.on_threshold.adjusted in ("supported", "refuted"):
-            text = f"P of {first} is {times} that of {second} ({self.condition})"
+            text = f"P of {first} is {times} that of {second} ({condition})"
         else:
             text = (
                 f"Whether P of {first} or of {second} is larger is {self.main.in_words}: {times} "
-                f"({self.condition})"
+                f"({condition})"
             )
         return f"{text}{_elsewhere(self.elsewhere, self.is_ahead)}."
 

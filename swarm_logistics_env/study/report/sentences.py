@@ -64,7 +64,7 @@ def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
     swarm = f", N = {comparison.n_robots}"
     if comparison.original.setting.kind in ("size", "policy"):
         swarm = ""
-    subject = subject_of(comparison.original.case, comparison.policy)
+    subject = subject_of(results, comparison.original.case, comparison.policy)
     head = f"{subject}, {verdict.property_name}? {comparison.label}{swarm}."
     text = " ".join(_parts(results, verdict))
     return Sentence(head, text, verdict.conclusion, verdict.in_words)
@@ -97,7 +97,7 @@ def _parts(results: StudyResults, verdict: Verdict) -> Iterator[str]:
         # Holm's method begins with the p that holds for stalled runs, too.
         alone = _p(estimate.p_seen)
         if _p(estimate.p_value) != alone:
-            alone += f"{_p(estimate.p_value)} if some stall"
+            alone += f"{_p(estimate.p_value)} if some stall, which counts"
         yield f"Alone: {plain}{alone}; by Holm's method: {adjusted}{_p(p_adjusted)}."
     if verdict.on_claim is not None:
         plain, adjusted = verdict.on_claim

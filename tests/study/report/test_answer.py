@@ -59,7 +59,7 @@ def test_the_head_says_p_and_each_indicator_with_its_worst_value(stopped: StudyR
     assert n_seeds < max(cell.n_seeds for cell in cells.values())
     assert lowest.value == pytest.approx(after / before - (1.0 - 1 / 25))
     p = f"P {before:.3g}→{after:.3g}"
-    assert f"; lowest FM4, 1 of 25: {p}, R {lowest.value:.2f} [" in robustness
+    assert f"; lowest at FM4, 1 of 25: {p} ({n_seeds} seeds), R {lowest.value:.2f} [" in robustness
     assert robustness.startswith("Robustness R: 2 refuted (FM3, 1 of 25; FM4, 1 of 25), 1 open; ")
     level = percent(lowest.level or 0.0)
     assert answer(stopped).level != level
@@ -70,7 +70,7 @@ def test_what_is_open_is_told_how_many_seeds_it_needs(stopped: StudyResults) -> 
     needs = more_seeds(stopped)
     assert f"{needs.words}." in answer(stopped).notes
     open_ones = [v for v in stopped.verdicts if v.on_property.adjusted == "open" and v.estimate]
-    assert sum(map(int, re.findall(r"(\d+) open ", needs.words))) == len(open_ones)
+    assert sum(map(int, re.findall(r"(\d+) open\b", needs.words))) == len(open_ones)
     of_paper = paper(seeds=12)
     for verdict in of_paper.verdicts:
         assert verdict.estimate is not None

@@ -77,7 +77,7 @@ def test_three_policies_stand_in_one_table_beside_the_first_and_holm_counts_all_
     )
     assert [sentence[:14] for sentence in indicators] == ["Scalability S:", "Robustness R: "]
     assert indicators[1].endswith(
-        "; lowest homing: FM4, 1 of 25: P 209→52, R -0.71 [-0.71, -0.71], refuted."
+        "; lowest at homing: FM4, 1 of 25: P 209→52, R -0.71 [-0.71, -0.71], refuted."
     )
     text = terminal_answer(of_three)
     assert max(map(len, text.splitlines())) <= 80

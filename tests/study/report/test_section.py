@@ -149,7 +149,9 @@ def test_a_paper_is_told_conditions_seeds_and_why_each_question_was_played_no_fu
     world = "a warehouse of 10 m x 10 m with 60 items, robots of 2 m/s"
     how = "(preset paper, engine chipmunk), 60 paired seeds (0 to 59)"
     assert sentence.startswith(f"swarm-dt in {world} {how}. swarm-dt: P [95 %] = ")
-    assert "; robustness R: 1 refuted (FM4, 1 of 25), 1 open; lowest FM4, 1 of 25: P 3" in sentence
+    assert (
+        "; robustness R: 1 refuted (FM4, 1 of 25), 1 open; lowest at FM4, 1 of 25: P 3" in sentence
+    )
     assert sentence.endswith(
         "looked at after 10, 20, 30, 40, 50 and 60 seeds: of 2 questions 1 stopped where clear, "
         "1 after all 60 seeds."
