@@ -99,7 +99,7 @@ def counts() -> dict[str, list[str]]:
     words = Counter(claim.word for claim in claims)
     least_runs, _ = runs_a_cell(played)
     of_text = (
-        len(claims), words["cannot fail"], words["holds"], words["fails"], words["open"],
+        len(claims), words["holds"], words["fails"], words["open"], words["cannot fail"],
         least_runs, len(by_set(played)),
     )  # fmt: skip
     seeds = {line["study"]: line["seeds"] for line in read("estimates")}
