@@ -81,9 +81,8 @@ def rows_on_other_seeds(sources: dict[str, Path]) -> Iterator[tuple[str, ...]]:
                 for policy in (name, f"c:{source}")
             )
             equivalence = spi.equivalence(in_python, in_c, margin=MARGIN)
-            p = (
-                section.bracketed(spi.mean_interval(of, CONFIDENCE), 1) for of in (in_python, in_c)
-            )
+            means = [spi.mean_interval(p, CONFIDENCE) for p in (in_python, in_c)]
+            p = (section.bracketed(mean, 1) for mean in means)
             yield name, *p, _change(equivalence), equivalence.verdict
 
 

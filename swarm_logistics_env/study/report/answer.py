@@ -287,9 +287,9 @@ def _p_before_and_after(results: StudyResults, verdict: Verdict) -> str:
     if not all(cells[arm].n_seeds for arm in arms):
         return ""
     # Until it is clear, conditions may be played further than this question looks.
-    n_seeds = estimate.n_seeds if estimate and estimate.paired else None
+    n_seeds = estimate.n_seeds if estimate and results.looks else None
     before, after = (f"{cells[arm].by_seed[..., :n_seeds].mean():.3g}" for arm in arms)
-    seeds = f" ({n_seeds} seeds)" if results.looks and n_seeds else ""
+    seeds = f" ({n_seeds} seeds)" if n_seeds else ""
     if comparison.removed:
         return f"P without them {before}, with them {after}{seeds}"
     return f"P {before}→{after}{seeds}"

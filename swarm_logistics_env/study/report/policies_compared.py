@@ -67,8 +67,9 @@ def factors(results: StudyResults) -> dict[str, tuple[str, str]]:
 def subject_of(results: StudyResults, case: Case, policy: str) -> str:
     """Return whose swarm a case is about: a policy, and of recorded trials its task."""
     task = case.scenario.table if isinstance(case.scenario, RecordedScenario) else ""
-    names = [] if task and has_no_name(results) else [policy]
-    return ", ".join([*names, task] if task else names)
+    if task and has_no_name(results):
+        return task
+    return f"{policy}, {task}" if task else policy
 
 
 def has_no_name(results: StudyResults) -> bool:
