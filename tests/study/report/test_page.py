@@ -311,6 +311,15 @@ def test_answer_and_comparison_stand_on_the_first_screen_and_a_click_shows_the_q
         assert head == made.data["questions"][question]["head"]
         lines = browser.value("document.querySelectorAll('#slopes polyline.thin').length")
         assert lines == len(made.data["seeds"])
+        # The switch leaves what is decided, or cannot be.
+        browser.value("document.querySelector('.questions input').click()")
+        rows = "[...document.querySelectorAll('.answer tr[data-question]')]"
+        shown = (
+            f"{rows}.filter((row) => row.offsetParent).map((row) => row.dataset.question).join()"
+        )
+        decided = [n for n, v in enumerate(made.found.verdicts) if v.conclusion != "open"]
+        assert sorted(filter(None, browser.value(shown).split(","))) == sorted(map(str, decided))
+        assert len(decided) < len(made.found.verdicts)
         assert browser.console == []
     finally:
         browser.close()

@@ -55,7 +55,7 @@ def test_a_study_judges_all_trainings_together(recipe: str, tmp_path: Path) -> N
     assert collapsed is not None
     assert collapsed.of == 5
     assert f"[{expected.low:.3f}, {expected.high:.3f}] ({collapsed})" in page
-    assert f"of the trainings at worst {collapsed}" in page
+    assert f"f the trainings at worst {collapsed}" in page
     with pytest.raises(StudyError, match="--all-seeds"):
         Study(until_clear=True, **fields).plan()
 

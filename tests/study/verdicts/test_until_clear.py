@@ -75,7 +75,7 @@ def test_what_cannot_fail_is_played_to_the_first_look_alone() -> None:
     assert (half.conclusion, half.p_adjusted is None) == ("supported", False)
     study_answer = answer(study.findings())
     assert study_answer.lines[0].verdict.in_words == "untestable, never < 0"
-    assert "untestable, never < 0: as P cannot be" in study_answer.notes
+    assert "untestable, never < 0: as P cannot be." in study_answer.notes
     text = sentence(study.findings(), doubled).text
     assert "it cannot lie below the threshold, so it is not tested" in text
     assert "djusted" not in text
