@@ -92,11 +92,11 @@ tune: $(FIT)/installed
 tables: $(STUDY)/installed
 	$(STUDY)/bin/python -m research.play_tables
 
-# Kernels are compiled beside mypy: two workers that begin with tests would compile each of them twice.
+# Kernels of steps and of networks are compiled beside mypy: two workers that begin with tests would compile each of them twice.
 test: lint
 	$(DEV)/bin/mypy & types=$$!; \
 	$(DEV)/bin/python -m verification.trajectories && \
-	$(DEV)/bin/python -m verification.kernels && wait $$types
+	$(DEV)/bin/swarm-logistics run --policy ppo-robust --set duration=5 && wait $$types
 	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup -m "not daily" --cov --cov-report=
 	$(DEV)/bin/python -m coverage report --fail-under=94
 
