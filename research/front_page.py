@@ -1,4 +1,4 @@
-"""Writes the README's numbers from the CSV files in docs/results, and draws their picture.
+"""Writes the README's numbers from the CSV files in docs/results, and draws the picture of results.
 
 `python -m research.front_page`; `make tables`, which writes these files, calls it. Nothing is
 played. The sentences stand in the README alone; here are the numbers of each in their order.

@@ -261,8 +261,9 @@ def _point(
     policy = verdict.compared.policy
     value, low, high = verdict.interval or (None, None, None)
     # What stands between two policies has the colour of neither.
-    is_of_two = verdict.compares_policies
-    style = len(results.policies) if is_of_two else results.policies.index(policy)
+    style = results.policies.index(policy)
+    if verdict.compares_policies:
+        style = len(results.policies)
     return Point(
         policy,
         style,

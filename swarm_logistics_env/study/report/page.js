@@ -152,10 +152,10 @@ function showRun() {
   const seed = data.seeds[chosen.seed], container = at("run");
   container.hidden = !data.paired;  // unpaired trials have nothing in common but their place
   const isPlayed = Object.values(data.conditions).some((condition) => condition.command);  // not recorded
-  const nothing = isPlayed ? ". No command plays this run." : "";
+  const withoutCommand = isPlayed ? ". No command plays this run." : "";
   const runs = chosen.arms.map(([symbol, name, condition]) => {
     const { p, command } = data.conditions[condition];
-    const shown = command ? `<code>${unbroken(`${escaped(command)} --seed ${seed}`)}</code>` : nothing;
+    const shown = command ? `<code>${unbroken(`${escaped(command)} --seed ${seed}`)}</code>` : withoutCommand;
     return `${escaped(symbol)}, ${escaped(name)}: P = ${p[chosen.seed] ?? "no run"}${shown}`;
   });
   container.innerHTML = `<b>Seed ${seed}</b><br>${runs[1]}${runs[0] === runs[1] ? "" : `<br>${runs[0]}`}`;
