@@ -1,11 +1,13 @@
 """Does a study say the same if the files of C play it? `python -m research.play_c [SEEDS]`.
 
 Plays policies and the C that is made of them on the same seeds, as examples/broken_robots.toml
-does: without a fault, and with two broken robots of 25. It writes into docs/c.md of each condition
-P of both, the test of equivalence of P within 5 %, and the word on R of both. What is played stays
-in results/c, and the same command goes on after an interruption. Then it plays 160 other seeds
-without a fault, which were declared after 80 seeds had left two of four such P open by less than a
-percent; these are not stored. 80 seeds and these take about 45 minutes of a core.
+does: without a fault, and with two broken robots of 25. The C in `double` plays that study's 20
+seeds; the C in `float`, which plays other runs, SEEDS of them, 80 if not told. It writes into
+docs/c.md of each condition P of both, how many runs are the same to the bit or else the test of
+equivalence of P within 5 %, and the word on R of both. What is played stays in results/c, and the
+same command goes on after an interruption. Then it plays 160 other seeds without a fault, which
+were declared after 80 seeds had left two of four such P open by less than a percent; these are not
+stored. All take about an hour of a core.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import numpy as np
 
 from research.play_bodies import cells_of, verdicts_of
 from research.search_again import delivered
-from research.tables import ROOT, play, rewrite, table
+from research.tables import ROOT, play, rewrite, seeds_from, table
 from swarm_logistics_env import policies, spi
 from swarm_logistics_env.robots.c_export import write_c
 from swarm_logistics_env.spi import Interval
@@ -36,6 +38,7 @@ PAGE = ROOT / "docs" / "c.md"
 NAMES = ("swarm-dt", "homing", "homing-stock", "ppo-robust")
 SCENARIO = Scenario.preset("realistic").replace(restock=True)
 MARGIN = 0.05
+N_SEEDS_IN_DOUBLE = 20  # as in examples/broken_robots.toml
 OTHER_SEEDS = range(21_000, 21_160)
 
 
@@ -53,6 +56,24 @@ def study_of(names: dict[str, str], label: str, n_seeds: int) -> Study:
     )
 
 
+def rows_in_double(in_python: StudyResults, in_c: StudyResults) -> Iterator[tuple[str, ...]]:
+    """Yield P and R of both and how many runs are the same, of each policy and condition."""
+    cells = cells_of(in_c)
+    verdicts = [verdicts_of(results) for results in (in_python, in_c)]
+    for (policy, condition), cell in cells_of(in_python).items():
+        other = cells[policy, condition]
+        pairs = list(zip(cell.outcomes, other.outcomes, strict=True))
+        n_equal = sum(outcome.digest == of_c.digest for outcome, of_c in pairs)
+        p = (section.mean_p(cell), section.mean_p(other))
+        words = (
+            f"{section.ratio(of[policy, condition])}, {of[policy, condition].conclusion}"
+            if (policy, condition) in of
+            else ""
+            for of in verdicts
+        )
+        yield policy, condition, *p, *words, f"{n_equal} of {len(pairs)}"
+
+
 def rows_of(in_python: StudyResults, in_c: StudyResults) -> Iterator[tuple[str, ...]]:
     """Yield what both say of each policy and condition."""
     cells = cells_of(in_c)
@@ -66,6 +87,19 @@ def rows_of(in_python: StudyResults, in_c: StudyResults) -> Iterator[tuple[str, 
         both = (verdict, verdicts[key])
         words = " and ".join(sorted({str(word.conclusion) for word in both}))
         yield key[0], f"R, {key[1]}", *map(section.ratio, both), "", words
+
+
+def _block_in_double(in_python: StudyResults, in_c: StudyResults) -> str:
+    heading = ("policy", "condition", "P in Python", "P in C", "R in Python", "R in C", "same runs")
+    line = f"{seeds_from(in_c)}; `realistic` with `restock`, 25 robots, 60 items; `-DSWARM_DOUBLE`."
+    return table(heading, rows_in_double(in_python, in_c), line)
+
+
+def in_double(source: Path) -> Path:
+    """Write a file of C that is another one in `double`, beside it."""
+    path = source.with_name(f"{source.stem}-double.c")
+    path.write_text(f'#define SWARM_DOUBLE\n#include "{source.name}"\n', encoding="utf-8")
+    return path
 
 
 def rows_on_other_seeds(sources: dict[str, Path]) -> Iterator[tuple[str, ...]]:
@@ -96,12 +130,17 @@ def main() -> None:
     OUT.mkdir(parents=True, exist_ok=True)
     files = {name: write_c(policies.load(name), SCENARIO, OUT / f"{name}.c") for name in NAMES}
     sources = {name: written.source for name, written in files.items()}
+    python_names = dict(zip(NAMES, NAMES, strict=True))
+    double_names = {name: f"c:{in_double(source)}" for name, source in sources.items()}
+    in_python, in_c = play(
+        study_of(names, label, N_SEEDS_IN_DOUBLE)
+        for label, names in (("python", python_names), ("double", double_names))
+    )
+    rewrite(PAGE, {"in double": _block_in_double(in_python, in_c)})
+    float_names = {name: f"c:{source}" for name, source in sources.items()}
     in_python, in_c = play(
         study_of(names, label, n_seeds)
-        for label, names in (
-            ("python", dict(zip(NAMES, NAMES, strict=True))),
-            ("c", {name: f"c:{source}" for name, source in sources.items()}),
-        )
+        for label, names in (("python", python_names), ("c", float_names))
     )
     heading = ("policy", "condition", "in Python", "in C", "change of P", "within 5 %, or the word")
     line = f"{n_seeds} seeds from 20,000 on; `realistic` with `restock`, 25 robots, 60 items."

@@ -27,7 +27,7 @@ from swarm_logistics_env.world.scenario import Scenario
 
 PREFIX = "c:"
 # As the host in c_host/host.c has them.
-_FACTS = struct.Struct("QQQd64s")
+_FACTS = struct.Struct("QQQQd64s")
 _REQUEST = struct.Struct("IIQ")
 _RESET = 0
 _STEP = 1
@@ -46,6 +46,7 @@ class _Facts(NamedTuple):
         robot_size: bytes that a robot keeps.
         row: numbers that it reads.
         command: numbers that it commands.
+        number: `float` or `double`, what these numbers are.
         period: control period that it is made for [s]; 0: any.
         stream: purpose of its random numbers.
     """
@@ -53,6 +54,7 @@ class _Facts(NamedTuple):
     robot_size: int
     row: int
     command: int
+    number: np.dtype[Any]
     period: float
     stream: str
 
@@ -83,9 +85,12 @@ class _Server:
         self._requests = process.stdin
         self._answers = process.stdout
         self._finalizer = weakref.finalize(self, _end, process)
-        size, width, n_commands, period, stream = _FACTS.unpack(self._read(_FACTS.size))
+        size, width, n_commands, number_size, period, stream = _FACTS.unpack(
+            self._read(_FACTS.size)
+        )
         purpose = stream.rstrip(b"\0").decode(errors="replace")
-        self.facts = _Facts(size, width, n_commands, period, purpose)
+        number = np.dtype(f"f{number_size}")
+        self.facts = _Facts(size, width, n_commands, number, period, purpose)
 
     def ask(self, request: bytes, length: int) -> bytes:
         """Return the answer to a request, of so many bytes.
@@ -197,10 +202,11 @@ class CFile(Holding):
                 or the controller's process ended.
         """
         n_bytes = len(self._robots)
-        length = n_bytes + 4 * self._n_robots * self._facts.command
+        number = self._facts.number
+        length = n_bytes + number.itemsize * self._n_robots * self._facts.command
         answer = self._ask(self._request(_STEP, observations), length)
         self._robots = answer[:n_bytes]
-        commands = np.frombuffer(answer, np.float32, offset=n_bytes)
+        commands = np.frombuffer(answer, number, offset=n_bytes)
         return commands.reshape(self._n_robots, self._facts.command).astype(np.float64)
 
     def seconds_of_step(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -2,8 +2,8 @@
 
 The file is made of the kernels that decide in Python, so it does what they do, with `float` for
 their `double`: only what a robot remembers for minutes stays of double precision. Compiled with
-SWARM_DOUBLE defined, all that is double in Python is double. It takes no memory but a structure of
-fixed size, and needs math.h alone.
+SWARM_DOUBLE defined, all that is double in Python is double, so a run of it is the run in Python,
+bit for bit. It takes no memory but a structure of fixed size, and needs math.h alone.
 """
 
 from __future__ import annotations
@@ -154,6 +154,11 @@ extern "C" {{
 
 #define SWARM_ROW {n_columns} /* numbers of a row: what a robot senses */
 #define SWARM_COMMAND {n_commands} /* forward, left, turn, gripper: each from -1 to 1 */
+#ifdef SWARM_DOUBLE
+#define SWARM_NUMBER double /* of a command; decided to the bit as in simulation */
+#else
+#define SWARM_NUMBER float /* of a command */
+#endif
 #define SWARM_PERIOD {period} /* from one step to the next [s] */
 #define SWARM_STREAM "{stream}" /* which random numbers of the simulator these are */
 
@@ -168,7 +173,8 @@ void swarm_reset(swarm_robot *robot, uint64_t seed, uint32_t number);
 
 /* Fill the command upon a row. If a number in it is none, or is larger than 1e6, that is no row of
  * a robot's: the robot stands, leaves its gripper as it is, and remembers nothing of it. */
-void swarm_step(swarm_robot *robot, const float row[SWARM_ROW], float command[SWARM_COMMAND]);
+void swarm_step(swarm_robot *robot, const float row[SWARM_ROW],
+                SWARM_NUMBER command[SWARM_COMMAND]);
 
 #ifdef __cplusplus
 }}
@@ -193,12 +199,13 @@ void swarm_reset(swarm_robot *robot, uint64_t seed, uint32_t number) {{
 {begin}
 }}
 
-void swarm_step(swarm_robot *robot, const float row[SWARM_ROW], float command[SWARM_COMMAND]) {{
+void swarm_step(swarm_robot *robot, const float row[SWARM_ROW],
+                SWARM_NUMBER command[SWARM_COMMAND]) {{
     for (int32_t column = 0; column < SWARM_ROW; column++) {{
         /* Written so that what is no number fails, too. */
         if (!(fabsf(row[column]) <= 1e6f)) {{
             for (int32_t part = 0; part < SWARM_COMMAND; part++) {{
-                command[part] = 0.0f;
+                command[part] = 0;
             }}
             return;
         }}
@@ -206,7 +213,7 @@ void swarm_step(swarm_robot *robot, const float row[SWARM_ROW], float command[SW
     real driven[SWARM_COMMAND];
     {call}
     for (int32_t part = 0; part < SWARM_COMMAND; part++) {{
-        command[part] = (float)driven[part];
+        command[part] = driven[part];
     }}
 }}
 """

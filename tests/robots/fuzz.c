@@ -38,7 +38,7 @@ int main(int argc, char **argv) {
     const long n_steps = argc > 1 ? atol(argv[1]) : 1000;
     swarm_robot robot;
     float row[SWARM_ROW];
-    float command[SWARM_COMMAND];
+    SWARM_NUMBER command[SWARM_COMMAND];
     for (long step = 0; step < n_steps; step++) {
         if (step % 5000 == 0) {
             swarm_reset(&robot, next_number(), (uint32_t)step);

@@ -8,6 +8,9 @@
 #ifndef SWARM_COMMAND
 #define SWARM_COMMAND 4
 #endif
+#ifndef SWARM_NUMBER
+#define SWARM_NUMBER float
+#endif
 #ifndef SWARM_PERIOD
 #define SWARM_PERIOD 0.0
 #endif
@@ -31,6 +34,10 @@ size_t host_command(void) {
     return SWARM_COMMAND;
 }
 
+size_t host_number_size(void) {
+    return sizeof(SWARM_NUMBER);
+}
+
 double host_period(void) {
     return (double)SWARM_PERIOD;
 }
@@ -43,8 +50,8 @@ void host_reset(void *robot, uint64_t seed, uint32_t number) {
     swarm_reset((swarm_robot *)robot, seed, number);
 }
 
-void host_step(void *robot, const float *row, float *command) {
-    swarm_step((swarm_robot *)robot, row, command);
+void host_step(void *robot, const float *row, void *command) {
+    swarm_step((swarm_robot *)robot, row, (SWARM_NUMBER *)command);
 }
 
 #ifdef __cplusplus

@@ -1,7 +1,7 @@
 /* A program that lets a controller decide for the robots that come in, and keeps none of them.
  *
- * It tells the sizes of a robot, a row and a command, the period and the stream. Then it reads
- * requests until its input ends: what to do, for how many robots, and the seed.
+ * It tells the sizes of a robot, a row, a command and its numbers, the period and the stream. Then
+ * it reads requests until its input ends: what to do, for how many robots, and the seed.
  *
  * To reset: it answers with the robots. To step: robots and rows follow; it answers with the robots
  * and their commands. To time: the same follow; it answers with the seconds of each robot's step,
@@ -28,10 +28,11 @@
 size_t host_robot_size(void);
 size_t host_row(void);
 size_t host_command(void);
+size_t host_number_size(void);
 double host_period(void);
 const char *host_stream(void);
 void host_reset(void *robot, uint64_t seed, uint32_t number);
-void host_step(void *robot, const float *row, float *command);
+void host_step(void *robot, const float *row, void *command);
 
 #define LONGEST 60 /* [s] that an answer may take: a controller that never ends is ended */
 
@@ -49,6 +50,7 @@ typedef struct {
     uint64_t robot_size;
     uint64_t row;
     uint64_t command;
+    uint64_t number_size;
     double period;
     char stream[64];
 } facts_of_controller;
@@ -69,7 +71,7 @@ static void read_into(void *room, size_t count, size_t size) {
     }
 }
 
-static double seconds_of_step(const void *robot, const float *row, float *command, void *copy) {
+static double seconds_of_step(const void *robot, const float *row, void *command, void *copy) {
     double least = 0.0;
     for (int time = 0; time < N_TIMES; time++) {
         struct timespec start, end;
@@ -86,9 +88,10 @@ static double seconds_of_step(const void *robot, const float *row, float *comman
 
 static void answer(FILE *answers, const request_of_host *request) {
     const size_t n = request->n_robots;
+    const size_t command_size = host_command() * host_number_size();
     char *robots = room_for(n, host_robot_size());
     float *rows = room_for(n, host_row() * sizeof(float));
-    float *commands = room_for(n, host_command() * sizeof(float));
+    char *commands = room_for(n, command_size);
     double *seconds = room_for(n, sizeof(double));
     char *copy = room_for(1, host_robot_size());
     if (request->what != RESET) {
@@ -98,7 +101,7 @@ static void answer(FILE *answers, const request_of_host *request) {
     for (size_t number = 0; number < n; number++) {
         void *robot = robots + number * host_robot_size();
         const float *row = rows + number * host_row();
-        float *command = commands + number * host_command();
+        void *command = commands + number * command_size;
         if (request->what == RESET) {
             host_reset(robot, request->seed, (uint32_t)number);
         } else if (request->what == STEP) {
@@ -113,7 +116,7 @@ static void answer(FILE *answers, const request_of_host *request) {
         fwrite(robots, host_robot_size(), n, answers);
     }
     if (request->what == STEP) {
-        fwrite(commands, host_command() * sizeof(float), n, answers);
+        fwrite(commands, command_size, n, answers);
     }
     fflush(answers);
     free(copy);
@@ -138,6 +141,7 @@ int main(void) {
     facts.robot_size = host_robot_size();
     facts.row = host_row();
     facts.command = host_command();
+    facts.number_size = host_number_size();
     facts.period = host_period();
     strncpy(facts.stream, host_stream(), sizeof facts.stream - 1);
     fwrite(&facts, sizeof facts, 1, answers);
