@@ -60,6 +60,8 @@ def figures_drawn(*formats: str) -> Iterator[None]:
 
 
 ROOT = Path(__file__).parents[1]
+# Where it is recorded which tests run which lines, see verification/mutants/reached.py.
+MEASURES_ALL = "MEASURE_ALL_TESTS" in os.environ
 PACKAGE = Path(swarm_logistics_env.__file__).parent
 # Beside an installed package (`make test-lowest`) there is no source tree to read.
 if not (ROOT / "swarm_logistics_env").is_dir():
@@ -84,14 +86,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
     """Measure coverage with tests that mirror the package alone: measured ones are slower."""
-    with contextlib.nullcontext() if mirrors(item.path) else _uncovered():
+    measured = MEASURES_ALL or mirrors(item.path)
+    with contextlib.nullcontext() if measured else _uncovered():
         return (yield)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     """Measure the fixtures of a test that is marked `unmeasured`, but not the test."""
-    measured = item.get_closest_marker("unmeasured") is None
+    measured = MEASURES_ALL or item.get_closest_marker("unmeasured") is None
     with contextlib.nullcontext() if measured else _uncovered():
         return (yield)
 

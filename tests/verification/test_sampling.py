@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from coverage import CoverageData
 
-from verification.mutants import copies, sampling
+from verification.mutants import copies, reached, sampling
 from verification.mutants.mutation import PACKAGE, ROOT, read_equal
 from verification.mutants.nearest import Nearest
 from verification.mutants.places import find_places, required_parameters
@@ -124,6 +125,36 @@ def test_nearest_tests_follow_a_folder_that_is_renamed(tree: Path) -> None:
     assert Nearest(tree).of("new/sizes.py")[:2] == expected
 
 
+def test_tests_that_run_a_line_come_first_the_quickest_before_the_others(
+    tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seconds = {"test_slow": 9.0, "test_three[3]": 2.0, "test_quick": 1.0}
+
+    def record(copy: Path, folder: Path, n_workers: int) -> None:
+        """Write what a run of pytest would."""
+        data = CoverageData(str(folder / "reached.coverage"))
+        for name in seconds:
+            data.set_context(f"{MIRROR}::{name}|run")
+            data.add_lines({str(copy / PACKAGE / "old/sizes.py"): [5]})
+        data.write()
+        cases = [
+            f'<testcase classname="tests.old.test_sizes" name="{name}" time="{time}" />'
+            for name, time in seconds.items()
+        ]
+        (folder / "reached.xml").write_text(f"<suite>{''.join(cases)}</suite>")
+
+    monkeypatch.setattr(reached, "_record", record)
+    of_tree = reached.Reached(tree, tmp_path, 1)
+    in_order = [f"{MIRROR}::{name}" for name in ("test_quick", "test_three[3]", "test_slow")]
+    assert of_tree.of("old/sizes.py", [5, 6], seconds=99.0) == in_order
+    assert of_tree.of("old/sizes.py", [5], seconds=4.0) == in_order[:2]
+    assert of_tree.of("old/sizes.py", [9], seconds=99.0) == []
+    monkeypatch.setattr(reached, "_record", None)  # it is made once for a tree
+    package = sampling.Package(tree, ["sizes"], reached.Reached(tree, tmp_path, 1))
+    first = {fault.line: fault.tests[0] for fault in sampling.draw(package, 0)}
+    assert first == {5: in_order[0], 9: MIRROR}
+
+
 def test_faults_are_those_of_their_seed_and_change_the_code(tree: Path) -> None:
     package = sampling.Package(tree)
     faults = list(sampling.draw(package, 3))
@@ -146,7 +177,8 @@ def test_shares_and_survivors_are_told(
 
     monkeypatch.setattr(sampling, "run_tests", run_tests)
     borrowed = copies.Copies(1, tree, tree.parent / "copies")
-    assert sampling.measure_sample(99, 0, ["sizes"], borrowed, 1, 60.0, tree) == 0
+    package = sampling.Package(tree, ["sizes"])
+    assert sampling.measure_sample(99, 0, package, borrowed, 1, 60.0) == 0
     *_, total, first, second, third, _, _ = capsys.readouterr().out.splitlines()
     assert total == "all: 3 of 6 survive, 50.0% [18.8%, 81.2%]"
     assert first.startswith("SURVIVES old/sizes.py:9 1.0 -> ")

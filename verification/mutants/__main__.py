@@ -15,8 +15,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from .copies import COPIES, Copies, run_tests, written
-from .mutation import PACKAGE, Mutant, mutated, read_mutants
-from .sampling import measure_sample
+from .mutation import PACKAGE, ROOT, Mutant, mutated, read_mutants
+from .reached import Reached
+from .sampling import Package, measure_sample
 
 LONGEST = 240.0  # [s]; what takes longer hangs, so it is caught
 
@@ -85,8 +86,11 @@ def main(arguments: Sequence[str]) -> int:
     if options.sample is None:
         return make_listed(options.words, options.workers)
     copies = Copies(options.workers, folder=COPIES / "sample")
+    with copies.borrow() as copy:
+        reached = Reached(copy, copy.parent, options.workers)
+    package = Package(ROOT, options.words, reached)
     return measure_sample(
-        options.sample, options.seed, options.words, copies, options.workers, options.seconds
+        options.sample, options.seed, package, copies, options.workers, options.seconds
     )
 
 

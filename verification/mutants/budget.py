@@ -19,9 +19,12 @@ class _Budget:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put the tests of the file that was named first before the others, and start the clock."""
-    paths = [config.rootpath / name.partition("::")[0] for name in config.args]
-    items.sort(key=lambda item: paths.index(item.path))
+    """Put tests in the order in which they, or else their files, were named; start the clock."""
+    ranks = {name: rank for rank, name in reversed([*enumerate(config.args)])}
+    tests = {item.nodeid: item for item in items}  # one that was named twice runs once
+    files = {name: name.partition("::")[0] for name in tests}
+    ranked = sorted(tests, key=lambda name: ranks.get(name, ranks.get(files[name], len(ranks))))
+    items[:] = [tests[name] for name in ranked]
     _Budget.end = _seconds() + float(os.environ[SECONDS])
     # One test that never ends costs no more than all others.
     most = round(2.0 * _Budget.end) + 60

@@ -1,7 +1,8 @@
 """The tests nearest to a module, by names alone, so that a folder that is renamed needs no edit.
 
 First the mirror (`tests/a/test_b.py` of `a/b.py`), then tests that import the module or what it
-defines, then the mirrors of the modules that import it, then the tests of its folder.
+defines, then the mirrors of the modules that import it, or where one has none those that begin as
+its name does, then the tests of its folder.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class Nearest:
         candidates = [
             self._mirror(module),
             *sorted(importing, key=lambda test: test.parent != folder),
-            *(self._mirror(user) for user in users),
+            *(test for user in users for test in self._mirrors(user)),
             *(test for test in ranked if test.parent == folder),
         ]
         tests = dict.fromkeys(test for test in candidates if test in self._tests)
@@ -90,6 +91,15 @@ class Nearest:
     def _mirror(self, module: str) -> Path:
         path = self._paths[module].relative_to(self._root / PACKAGE)
         return self._root / "tests" / path.with_name(f"test_{path.name}")
+
+    def _mirrors(self, module: str) -> list[Path]:
+        """Return the mirror of a module, or else the tests of its folder that are called alike."""
+        mirror = self._mirror(module)
+        if mirror in self._tests:
+            return [mirror]
+        first_letters = mirror.stem[: len("test_") + 4]
+        alike = [test for test in self._tests if test.stem.startswith(first_letters)]
+        return [test for test in alike if test.parent == mirror.parent]
 
     def _reached_from(self, script: Path) -> set[str]:
         """Return the modules that a script imports, and those that these import, and so on."""

@@ -1,4 +1,7 @@
-"""Faults drawn over the whole package, and the share of them that no near test catches."""
+"""Faults drawn over the whole package, and the share of them that no near test catches.
+
+Near are the tests that run the line, where a record says which do, and those of near files.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +21,12 @@ from scipy import stats
 
 from . import budget
 from .copies import NO_END, NO_IMPORT, Copies, run_tests, written
-from .mutation import PACKAGE, ROOT, read_equal, replaced
+from .mutation import PACKAGE, read_equal, replaced
 from .nearest import Nearest
-from .places import find_places, is_kernel, required_parameters
+from .places import Place, find_places, is_kernel, required_parameters
+from .reached import Reached
 
+SECONDS_OF_REACHING = 40.0  # of the tests that run a line; the nearest follow
 LONGEST = 900.0  # [s] of the clock after which the tests of a fault are stopped
 # What worlds and policies do, to the bit: asked of faults in them that no nearer test catches.
 _TRAJECTORIES = "tests/verification/test_trajectories.py"
@@ -58,9 +63,18 @@ class Fault(NamedTuple):
 
 
 class Package:
-    """The sources of the package, in which faults are drawn."""
+    """The sources of the package, in which faults are drawn.
 
-    def __init__(self, root: Path, words: Sequence[str] = ()) -> None:
+    Args:
+        root: of the tree.
+        words: a file counts if its path holds one of these; none: all files.
+        reached: which tests run which lines; None: nearest are tests by their names alone.
+    """
+
+    def __init__(
+        self, root: Path, words: Sequence[str] = (), reached: Reached | None = None
+    ) -> None:
+        self._reached = reached
         folder = root / PACKAGE
         paths = {str(path.relative_to(folder)): path for path in sorted(folder.rglob("*.py"))}
         self._sources = {file: path.read_text(encoding="utf-8") for file, path in paths.items()}
@@ -95,11 +109,20 @@ class Package:
             after=shown(new),
             text=source.splitlines()[place.node.lineno - 1].strip(),
             source=replaced(tree, place.node, new),
-            tests=tuple(self._nearest.of(file)),
+            tests=self._tests(file, place),
             interpreted=is_read_by_kernels,
             compiles_anew=file in self._compiler and not is_read_by_kernels,
             is_played=self._nearest.is_played(file),
         )
+
+    def _tests(self, file: str, place: Place) -> tuple[str, ...]:
+        """Return the tests that run a place, the quickest first, then the nearest files."""
+        nearest = self._nearest.of(file)
+        if self._reached is None or place.is_outside_functions:
+            return tuple(nearest)
+        node = place.node.test if isinstance(place.node, ast.If) else place.node
+        lines = range(node.lineno, (node.end_lineno or node.lineno) + 1)
+        return (*self._reached.of(file, lines, SECONDS_OF_REACHING), *nearest)
 
 
 def draw(package: Package, seed: int) -> Iterable[Fault]:
@@ -115,20 +138,19 @@ def draw(package: Package, seed: int) -> Iterable[Fault]:
 def measure_sample(
     count: int,
     seed: int,
-    words: Sequence[str],
+    package: Package,
     copies: Copies,
     n_workers: int,
     seconds: float,
-    root: Path = ROOT,
 ) -> int:
-    """Make `count` faults in files whose paths hold one of these words; print what survives.
+    """Make `count` faults at places of a package; print what survives.
 
     `seconds`: of a core, after which no further test of a fault begins. Returns 2 if a test that
     caught faults also fails without one, else 0.
     """
     start = time.monotonic()
     os.environ[budget.SECONDS] = str(seconds)
-    faults = iter(draw(Package(root, words), seed))
+    faults = iter(draw(package, seed))
     results: list[tuple[Fault, str]] = []
     n_not_imported = 0
     ends: dict[tuple[str, ...], str] = {}
