@@ -7,16 +7,17 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 
 from .mutation import ROOT
 
 COPIES = ROOT / "build" / "mutants"  # kept, with their compiled kernels; one for each worker
-LEFT_OUT = shutil.ignore_patterns(
-    ".git", ".venv*", "results", "build", "dist", "*.egg-info", "__pycache__", ".*_cache",
-    ".hypothesis",
-)  # fmt: skip
+_LEFT_OUT = shutil.ignore_patterns("__pycache__", ".*_cache", ".hypothesis")
+_LEFT_OUT_AT_TOP = shutil.ignore_patterns(
+    ".git", ".venv*", "results", "build", "dist", "site", "*.egg-info"
+)
 # Those that take the interpreter a minute or more; see KERNELS in the Makefile.
 SLOW = "not (fewer_items or diffuses or in_a_crowd or drop_rate or ctrl_c or in_a_run)"
 NO_END = "no end"  # what is said of tests that were stopped, or whose process crashed
@@ -31,7 +32,7 @@ class Copies:
         for name in range(count):
             copy = folder / str(name)
             shutil.rmtree(copy, ignore_errors=True)
-            shutil.copytree(root, copy, symlinks=True, ignore=LEFT_OUT)
+            shutil.copytree(root, copy, symlinks=True, ignore=partial(_left_out, root))
             self._free.put(copy)
 
     @contextmanager
@@ -42,6 +43,12 @@ class Copies:
             yield copy
         finally:
             self._free.put(copy)
+
+
+def _left_out(root: Path, folder: str, names: list[str]) -> set[str]:
+    """Return what of a folder is no part of the tree."""
+    left_out = _LEFT_OUT(folder, names)
+    return left_out | _LEFT_OUT_AT_TOP(folder, names) if Path(folder) == root else left_out
 
 
 @contextmanager
