@@ -13,6 +13,7 @@ from swarm_logistics_env.train.learner import make_learner
 from swarm_logistics_env.train.privileged import PRIVILEGED
 from swarm_logistics_env.train.settings import PPOSettings
 from swarm_logistics_env.train.training_worlds import NetworkView
+from swarm_logistics_env.world.motion.frame import OUTPUTS
 from swarm_logistics_env.world.motion.network_inputs import INPUTS
 
 
@@ -43,3 +44,18 @@ def test_the_learner_learns_as_the_settings_say_and_begins_by_driving_ahead(smal
         first = learner.policy.get_distribution(torch.zeros(1, len(INPUTS) + len(PRIVILEGED)))
     assert first.distribution.mean.tolist() == [pytest.approx([0.8, 0.0, 0.0])]
     assert first.distribution.stddev.tolist() == [pytest.approx([0.5, 0.3, 0.2])]
+
+
+def test_where_a_teacher_pulls_ppo_is_paid_for_entropy_less_the_error_beside_it(small: Any) -> None:
+    training = small()
+    policy = make_learner(NetworkView(training), training.network, training.ppo, 0, "cpu").policy
+    columns = torch.randn(50, len(INPUTS) + len(PRIVILEGED) + len(OUTPUTS))
+    actions = torch.zeros(50, len(OUTPUTS))
+    with torch.no_grad():
+        entropy = policy.evaluate_actions(columns, actions)[2]
+        error = policy.error(
+            policy.answers_of(columns[:, : len(INPUTS)]), columns[:, -len(OUTPUTS) :]
+        )
+        policy.pull, policy.entropy_weight = 0.2, 0.5
+        pulled = policy.evaluate_actions(columns, actions)[2]
+    torch.testing.assert_close(pulled, 0.5 * entropy - 0.2 * error)

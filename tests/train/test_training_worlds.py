@@ -108,7 +108,7 @@ def test_a_large_swarm_may_learn_beside_a_room_in_which_it_has_no_place(small: A
 def test_a_row_whose_episode_is_over_remembers_nothing_of_it(small: Any) -> None:
     view = NetworkView(small())
     view.seed(0)
-    view.reset()
+    assert view.observation_space.contains(view.reset()[0])
     n_steps, commands = 0, np.ones((view.num_envs, 3), np.float32)
     dones = np.zeros(view.num_envs, np.bool_)
     while not dones.any():

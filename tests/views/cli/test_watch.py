@@ -18,18 +18,28 @@ import pytest
 from swarm_logistics_env.compiler.numba_fence import QUIET
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.views.watch import server
+from swarm_logistics_env.world.rendering import renderer
 from tests.views.cli.conftest import Command
 
 
 @pytest.mark.parametrize(
     "words",
-    ["film.mp4 --policy swarm-dt --policy random-walk", "film.gif --fault FM4:2 --twin"],
+    [
+        "film.mp4 --policy swarm-dt --policy random-walk",
+        "film.gif --fault FM4:2 --twin --set floor=aisles",
+    ],
 )
-def test_film_is_written(words: str, folder: Path, command: Command) -> None:
+def test_film_is_written(
+    words: str, folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plans: list[bool] = []
+    colours = renderer.film_colours
+    monkeypatch.setattr(renderer, "film_colours", lambda plan: plans.append(plan) or colours(plan))
     printed = command(f"run --film {words} --until 1 --set n_robots=4")
     (film,) = folder.iterdir()
     assert re.fullmatch(rf"{film.name}: \d+ frames, [\d.]+ s, [\d.]+ MB\n", printed)
     assert film.stat().st_size > 1000
+    assert plans == ([True] if film.suffix == ".gif" else [])  # a floor plan takes further colours
     assert film.read_bytes()[:8].endswith(b"ftyp") == (film.suffix == ".mp4")
 
 
@@ -72,7 +82,7 @@ def test_page_is_served_until_ctrl_c_without_pygame() -> None:
     ("words", "at_terminal", "screen", "opens"),
     [
         ("watch", True, ":0", True),
-        ("watch", False, ":0", False),
+        ("watch --show-fault", False, ":0", False),
         ("watch", True, "", False),
         ("watch --no-open", True, ":0", False),
     ],
@@ -90,6 +100,7 @@ def test_the_browser_opens_at_a_terminal_with_a_screen(
     assert app.run(words.split()) == 0
     ((session, port, _, show),) = served
     assert (session.policy, port) == ("ppo-delivery", 8765)
+    assert session.note.startswith("two robots of 25") is ("--show-fault" in words)
     assert show is (webbrowser.open if opens else None)
 
 

@@ -91,6 +91,7 @@ def test_a_seed_decides_the_episode_whatever_came_before() -> None:
     for _ in range(30):
         commands = rng.uniform(-1, 1, (8, 4))
         np.testing.assert_array_equal(used.step(commands), fresh.step(commands))
+    np.testing.assert_array_equal(used.reset(), fresh.reset(0))
 
 
 def test_what_is_assigned_to_the_state_is_what_the_next_step_works_on() -> None:
