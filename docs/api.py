@@ -28,7 +28,8 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS
 from swarm_logistics_env.study.questions.presets import PRESETS
 from swarm_logistics_env.study.questions.specification import Specification
 from swarm_logistics_env.study.runs.store import SCHEMA_VERSION, Runs
-from swarm_logistics_env.study.tasks.task import TASKS, Case, Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import TASKS, Case, Run
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.trials.words import COLUMN_NAMES
 from swarm_logistics_env.study.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS

@@ -15,7 +15,8 @@ import pettingzoo
 from swarm_logistics_env.core import moved_names
 
 if TYPE_CHECKING:
-    from swarm_logistics_env import adapters, policies, spi, study, swarm_logistics_v0, wrappers
+    from swarm_logistics_env import adapters, policies, spi, study, wrappers
+    from swarm_logistics_env.adapters import swarm_logistics_v0
     from swarm_logistics_env.policies.demonstrations import record
     from swarm_logistics_env.policies.episode import Episode, run_episode
     from swarm_logistics_env.study.trial_study import judge
@@ -57,6 +58,7 @@ _MODULES = {
     "judge": "study.trial_study",
     "record": "policies.demonstrations",
     "run_episode": "policies.episode",
+    "swarm_logistics_v0": "adapters.swarm_logistics_v0",
 }
 
 moved_names.install()
@@ -67,7 +69,7 @@ gymnasium.register(
     "SwarmLogisticsRows-v0", vector_entry_point=f"{__name__}.adapters.vector_env:SwarmRows"
 )
 if hasattr(pettingzoo, "register"):  # since 1.27
-    _house = f"{__name__}.swarm_logistics_v0"
+    _house = f"{__name__}.adapters.swarm_logistics_v0"
     pettingzoo.register("aec", "swarm_logistics_v0", entry_point=f"{_house}:env")
     pettingzoo.register("parallel", "swarm_logistics_v0", entry_point=f"{_house}:parallel_env")
 
@@ -78,7 +80,7 @@ def __getattr__(name: str) -> object:
     if name not in __all__:
         return moved_names.moved_attribute(__name__, name)
     module = importlib.import_module(f"{__name__}.{_MODULES.get(name, name)}")
-    return getattr(module, name) if name in _MODULES else module
+    return getattr(module, name, module)  # or the module itself
 
 
 def __dir__() -> list[str]:

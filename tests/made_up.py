@@ -14,7 +14,7 @@ from swarm_logistics_env.study.questions.comparison import NO_FAULT, Setting
 from swarm_logistics_env.study.runs.rows import row_digest
 from swarm_logistics_env.study.runs.store import Runs, export
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.study.verdicts.verdict import Decision

@@ -21,7 +21,8 @@ from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.report.section import Section
 from swarm_logistics_env.study.report.tables import cell_tables
 from swarm_logistics_env.study.report.write import section_markdown
-from swarm_logistics_env.study.tasks.task import Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Run
 from swarm_logistics_env.study.verdicts.cell import Cell
 
 PACKAGE = str(Path(swarm_logistics_env.__file__).parent)

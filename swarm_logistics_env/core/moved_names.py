@@ -39,6 +39,7 @@ MOVED = {
     "spi.trials": "study.trials",
     "streams": "core.streams",
     "studies": "study.studies",
+    "swarm_logistics_v0": "adapters.swarm_logistics_v0",
     "tasks": "study.tasks",
     "testing": "policies.testing",
     "verdicts": "study.verdicts",

@@ -21,7 +21,8 @@ from swarm_logistics_env.spi import Estimate, robustness
 from swarm_logistics_env.study.questions.comparison import NO_FAULT, Arm
 from swarm_logistics_env.study.runs.engines import Engine
 from swarm_logistics_env.study.runs.store import Runs
-from swarm_logistics_env.study.tasks.task import Case, Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Case, Run
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.verdicts.cell import Cell, same_runs
 from swarm_logistics_env.world.scenario import ROLES, Scenario

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, swarm_logistics_v0
 from swarm_logistics_env.adapters import CentralEnv
+from swarm_logistics_env.adapters.swarm_logistics_v0 import parallel_env
 from swarm_logistics_env.core.errors import ArgumentError, CommandError, ScenarioError, SetupError
 from swarm_logistics_env.environment.parallel_env import SwarmLogisticsEnv
 from swarm_logistics_env.environment.requests import gather_commands
 from swarm_logistics_env.environment.spaces import agent_names
-from swarm_logistics_env.swarm_logistics_v0 import parallel_env
 from swarm_logistics_env.wrappers import FaultInjection
 from tests.wrappers.conftest import eastward
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from swarm_logistics_env import Scenario
+from swarm_logistics_env.adapters.swarm_logistics_v0 import parallel_env
 from swarm_logistics_env.policies import SwarmDT, testing
-from swarm_logistics_env.swarm_logistics_v0 import parallel_env
 from swarm_logistics_env.wrappers import (
     DiscreteActions,
     FaultInjection,

@@ -17,7 +17,8 @@ from swarm_logistics_env.core.errors import SetupError
 from swarm_logistics_env.study.attack import STORE, Attack, attack, search
 from swarm_logistics_env.study.runs.engines import serial
 from swarm_logistics_env.study.runs.store import Runs
-from swarm_logistics_env.study.tasks.task import Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Run
 from swarm_logistics_env.world.scenario import ROLES
 from tests.made_up import delivered
 

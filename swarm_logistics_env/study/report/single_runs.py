@@ -11,7 +11,8 @@ from more_itertools import map_reduce
 from pydantic import JsonValue
 
 from swarm_logistics_env.study.questions.comparison import Arm, Comparison
-from swarm_logistics_env.study.tasks.task import Case, Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Case
 from swarm_logistics_env.study.tasks.task_world import p_of, world_of
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults

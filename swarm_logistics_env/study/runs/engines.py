@@ -21,7 +21,8 @@ from typing import Self
 from swarm_logistics_env.core.current_folder import current_folder_modules
 from swarm_logistics_env.core.errors import StudyError, how_to_install, suggest, users_line
 from swarm_logistics_env.core.progress_bar import ProgressBar
-from swarm_logistics_env.study.tasks.task import Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Run
 
 from .store import Runs
 from .worker_processes import Played, RunQueue, in_processes, pickled, play_pickled

@@ -26,7 +26,8 @@ from swarm_logistics_env.study.questions.comparison import (
 from swarm_logistics_env.study.questions.declaration import Declaration
 from swarm_logistics_env.study.questions.plan import Origin, Plan
 from swarm_logistics_env.study.questions.specification import Specification
-from swarm_logistics_env.study.tasks.task import Case, Outcome, Outcomes, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Case, Outcomes, Run
 from swarm_logistics_env.study.tasks.warehouse_task import RECORDED, RecordedFault, RecordedScenario
 from swarm_logistics_env.study.trials import NO_FAULT_WORD, REPEATED, Trial, Trials
 

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple, TypeAlias
 from pydantic import TypeAdapter
 
 from swarm_logistics_env.core.records import canonical_json
-from swarm_logistics_env.study.tasks.task import Case, Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Case, Run
 from swarm_logistics_env.world.warehouse.contacts import ContactMeasures
 from swarm_logistics_env.world.warehouse.orders import OrderMeasures
 

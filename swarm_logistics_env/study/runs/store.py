@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.core.records import atomic_write, canonical_json, plain, write_csv
-from swarm_logistics_env.study.tasks.task import Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Run
 
 from .rows import OF_ORDERS, StoredRow, case_of, content_of, outcome_of, record_of, row_digest
 

@@ -27,7 +27,8 @@ import cloudpickle
 from swarm_logistics_env.compiler.numba_fence import QUIET
 from swarm_logistics_env.core.current_folder import current_folder_modules, search_current_folder
 from swarm_logistics_env.core.errors import RAISED_BY_OTHERS, StudyError
-from swarm_logistics_env.study.tasks.task import Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Run
 
 Played = Generator[tuple[Run, Outcome], None, None]
 

@@ -21,6 +21,7 @@ from swarm_logistics_env.policies.evaluation_mode import in_evaluation
 from swarm_logistics_env.policies.policy import one_thread
 from swarm_logistics_env.policies.spec import NO_MAKERS, Makers
 
+from .outcome import Outcome
 from .parallel_policies import (
     Gain,
     RandomActions,
@@ -41,7 +42,7 @@ from .parallel_wrappers import (
     Value,
     failing_rows,
 )
-from .task import Case, Fields, Outcome, TaskScenario, digest_of
+from .task import Case, Fields, TaskScenario, digest_of
 
 # These files decide what a run in somebody else's environment gives.
 ENVIRONMENT_CODE = (

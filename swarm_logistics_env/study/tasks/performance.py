@@ -6,7 +6,7 @@ measure is better, its worst value is declared and counts as P = 0, and 0 of it 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from pydantic import PositiveFloat, model_validator
 
@@ -14,8 +14,7 @@ from swarm_logistics_env.core.errors import StudyError, suggest
 from swarm_logistics_env.core.records import Record
 from swarm_logistics_env.world.scenario import Scenario
 
-if TYPE_CHECKING:
-    from .task import Outcome, TaskScenario
+from .outcome import Outcome
 
 
 class Measure(NamedTuple):
@@ -125,7 +124,7 @@ class Performance(Record):
         measure = MEASURES[self.measure]
         return measure.largest if measure.is_gain else 1.0
 
-    def refuse_unmeasured(self, scenario: TaskScenario) -> None:
+    def refuse_unmeasured(self, scenario: object) -> None:
         """Raise StudyError if nothing of this measure is to be had in a scenario."""
         needs = MEASURES[self.measure].needs
         if not needs:

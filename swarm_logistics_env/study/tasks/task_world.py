@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .task import Case, Outcome, Task, TaskFault, TaskScenario
+from .outcome import Outcome
+from .task import Case, Task, TaskFault, TaskScenario
 
 
 class TaskWorld:

@@ -23,7 +23,8 @@ from swarm_logistics_env.world.scenario import SCENARIO_PRESETS, Scenario, kinds
 from swarm_logistics_env.world.warehouse import FAILURE_MODES, Fault
 from swarm_logistics_env.world.warehouse.faults import failed_robots, text_of
 
-from .task import Case, Fields, Outcome, TaskFault, TaskScenario
+from .outcome import Outcome
+from .task import Case, Fields, TaskFault, TaskScenario
 from .task_world import TaskWorld
 
 _MOST_CHANGES = 4  # of a preset that is still named

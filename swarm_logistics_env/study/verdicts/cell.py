@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swarm_logistics_env import spi
 from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE, Arm
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.tasks.task_world import is_capped, largest_performance, p_of
 
 from .reference import Reference

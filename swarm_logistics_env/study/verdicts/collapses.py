@@ -15,7 +15,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.spi.phases import FEWEST_RUNS, LEVEL, collapsed_runs, critical_size
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 
 from .cell import Cell
 

@@ -13,7 +13,7 @@ from swarm_logistics_env import spi
 from swarm_logistics_env.spi.inputs import Numbers
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE, Arm, Comparison
 from swarm_logistics_env.study.questions.plan import CellKey
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 
 from .cell import same_runs
 from .results import StudyResults

@@ -11,7 +11,8 @@ from swarm_logistics_env.study.questions.comparison import Arm, Comparison
 from swarm_logistics_env.study.questions.declaration import Declaration
 from swarm_logistics_env.study.questions.plan import CellKey, Plan
 from swarm_logistics_env.study.questions.specification import seeds_in_words
-from swarm_logistics_env.study.tasks.task import Outcome, Outcomes
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Outcomes
 
 from .agreement import Agreement, agreements
 from .cell import Cell

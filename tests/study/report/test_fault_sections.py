@@ -13,7 +13,7 @@ from swarm_logistics_env.study.report.curves import Curve, CurvePanel, curves
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.write import markdown
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.verdicts.mid_run_faults import (
     Resilience,
     rate_curves,

@@ -14,7 +14,7 @@ from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
 from swarm_logistics_env.study.report.policies_compared import comparison_in_words
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.trial_study import judge
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from tests.made_up import delivered, judged

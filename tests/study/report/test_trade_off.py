@@ -13,7 +13,7 @@ from swarm_logistics_env.study.report.figures import trade_off_figure
 from swarm_logistics_env.study.report.section import NOTHING
 from swarm_logistics_env.study.report.tables import CONTACTS_HEADING, cell_tables
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from tests.conftest import figures_drawn
 from tests.made_up import delivered, judged

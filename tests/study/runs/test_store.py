@@ -28,7 +28,8 @@ from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.study.runs.rows import COUNTED
 from swarm_logistics_env.study.runs.store import FILE_NAME, Runs, export
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Case, Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Case, Run
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE
 from swarm_logistics_env.study.trials import read_trials
 from swarm_logistics_env.views.cli import app

@@ -12,8 +12,8 @@ import pytest
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.studies import Study
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.tasks.performance import MEASURES, Performance
-from swarm_logistics_env.study.tasks.task import Outcome
 from swarm_logistics_env.study.tasks.task_world import largest_performance
 from tests.study.tasks.lane import LANE
 

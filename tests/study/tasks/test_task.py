@@ -16,7 +16,6 @@ from swarm_logistics_env.policies import PolicySpec, SwarmDT
 from swarm_logistics_env.study.studies import Study
 from swarm_logistics_env.study.tasks.task import Case
 from swarm_logistics_env.study.tasks.warehouse_task import EPISODE_CODE, WAREHOUSE
-from tests.made_up import delivered
 from tests.study.tasks.lane import LANE
 
 PACKAGE = Path(swarm_logistics_env.__file__).parent
@@ -112,16 +111,6 @@ def test_clearing_is_a_rate_that_no_number_of_items_caps() -> None:
     assert (outcome.time_to_clear, outcome.delivered) == (math.inf, 0.0)
     with pytest.raises(StudyError, match="restock = True: should be False"):
         Study(task="clearing", scenario={"restock": True})
-
-
-@pytest.mark.parametrize(
-    ("length", "kept_length"), [(19_999, 19_999), (20_000, 20_000), (99_999, 20_006)]
-)
-def test_of_an_endless_error_beginning_and_end_are_kept(length: int, kept_length: int) -> None:
-    error = "begins" + "." * (length - 10) + "ends"
-    text = str(delivered(0, error=error).error)
-    assert (len(text), text[:6], text[-4:]) == (kept_length, "begins", "ends")
-    assert (text == error) == (" [..] " not in text)
 
 
 FILE = """

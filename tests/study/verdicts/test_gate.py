@@ -13,7 +13,7 @@ from swarm_logistics_env import judge as judge_trials
 from swarm_logistics_env import spi
 from swarm_logistics_env.core.errors import StudyError
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.verdicts.cell import same_runs
 from swarm_logistics_env.study.verdicts.gate import Gate, answers, match
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge

@@ -12,7 +12,7 @@ from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.questions.declaration import Declaration
 from swarm_logistics_env.study.report.answer_notes import warnings
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Outcome
+from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.verdicts.columns import CELL_COLUMNS, VERDICT_COLUMNS, frame
 from swarm_logistics_env.study.verdicts.results import StudyResults, judge
 from swarm_logistics_env.study.verdicts.verdict import Verdict

@@ -22,7 +22,8 @@ from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.sentences import sentence
 from swarm_logistics_env.study.runs.engines import Shard
 from swarm_logistics_env.study.studies import Study
-from swarm_logistics_env.study.tasks.task import Outcome, Run
+from swarm_logistics_env.study.tasks.outcome import Outcome
+from swarm_logistics_env.study.tasks.task import Run
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.until_clear import predictive_power
 from swarm_logistics_env.study.verdicts.verdict import Verdict

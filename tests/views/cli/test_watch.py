@@ -19,6 +19,7 @@ from swarm_logistics_env.compiler.numba_fence import QUIET
 from swarm_logistics_env.views.cli import app
 from swarm_logistics_env.views.watch import server
 from swarm_logistics_env.world.rendering import renderer
+from swarm_logistics_env.world.rendering.palette import RGB, film_colours
 from tests.views.cli.conftest import Command
 
 
@@ -33,8 +34,12 @@ def test_film_is_written(
     words: str, folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plans: list[bool] = []
-    colours = renderer.film_colours
-    monkeypatch.setattr(renderer, "film_colours", lambda plan: plans.append(plan) or colours(plan))
+
+    def noted(has_plan: bool) -> list[RGB]:
+        plans.append(has_plan)
+        return film_colours(has_plan)
+
+    monkeypatch.setattr(renderer, "film_colours", noted)
     printed = command(f"run --film {words} --until 1 --set n_robots=4")
     (film,) = folder.iterdir()
     assert re.fullmatch(rf"{film.name}: \d+ frames, [\d.]+ s, [\d.]+ MB\n", printed)
