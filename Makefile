@@ -95,9 +95,9 @@ tables: $(STUDY)/installed
 # Kernels of steps and of networks are compiled beside mypy: two workers that begin with tests would compile each of them twice.
 test: lint
 	$(DEV)/bin/mypy & types=$$!; \
-	$(DEV)/bin/python -m verification.trajectories && \
+	$(DEV)/bin/python -m pytest -q tests/verification/test_trajectories.py -m "not daily" && \
 	$(DEV)/bin/swarm-logistics run --policy ppo-robust --set duration=5 && wait $$types
-	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup -m "not daily" --cov --cov-report=
+	$(DEV)/bin/python -m pytest --numprocesses=2 --dist=loadgroup -m "not daily" --cov --cov-report= --ignore=tests/verification/test_trajectories.py
 	$(DEV)/bin/python -m coverage report --fail-under=94
 
 # Once a day: whole commands, pages, examples and processes, whose parts the gate tests.

@@ -64,7 +64,7 @@ print([part.tolist() for part in grid if isinstance(part, np.ndarray)])
 """
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_plain_kernels_give_the_same_bits() -> None:
     from swarm_logistics_env.world.warehouse.grid import blank_grid, fill
 

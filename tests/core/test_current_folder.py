@@ -174,6 +174,7 @@ def test_an_installed_module_that_was_named_finds_nothing_here(
     assert finder.imported == {"optional_one"}
 
 
+@pytest.mark.daily
 def test_a_script_finds_what_python_finds(tmp_path: Path) -> None:
     current, script = tmp_path / "here", tmp_path / "script.py"
     current.mkdir()

@@ -52,6 +52,7 @@ def test_what_never_was_is_an_attribute_error() -> None:
         importlib.import_module("swarm_logistics_env.warehouse.no_such_name")
 
 
+@pytest.mark.daily
 def test_the_command_line_starts_under_its_former_name() -> None:
     command = [sys.executable, "-m", "swarm_logistics_env.cli", "--help"]
     assert "judge" in subprocess.run(command, capture_output=True, text=True, check=True).stdout

@@ -93,6 +93,7 @@ def test_the_page_of_published_sets_shows_what_was_judged(tmp_path: Path) -> Non
     assert refused["refused"].startswith("the number of robots and 'tags' change together")
 
 
+@pytest.mark.daily
 def test_published_controllers_stand_beside_published_times(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,7 +24,7 @@ from verification.soak import Tally, play, towards
 
 # `python -m verification.soak --first NUMBER --worlds 1 --steps 80` plays a world again.
 @given(number=st.integers(0, 2**32))
-@settings(max_examples=max(16, settings().max_examples // 8))
+@settings(max_examples=settings().max_examples // 8)
 def test_no_random_world_breaks_a_promise(number: int) -> None:
     play(random.Random(number), 80, Tally())
 

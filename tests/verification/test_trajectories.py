@@ -42,14 +42,13 @@ def test_every_golden_trajectory_is_as_recorded_when_a_copy_goes_on_beside_other
     def digests_of_half_a_copy(golden: GoldenTrajectory) -> Digests:
         return digests(golden, copied_at=max(golden.steps // 2, 1))
 
-    # Four worlds at any time, in no order that anybody chose. `make test` begins with all of them,
-    # one after the other and without a copy.
+    # Four worlds at any time, in no order that anybody chose.
     with ThreadPoolExecutor(4) as pool:
         played = pool.map(digests_of_half_a_copy, GOLDEN.values())
         complain(explained(dict(zip(GOLDEN, played, strict=True))))
 
 
-@pytest.mark.daily  # The gate begins with all of them, in a process of its own.
+@pytest.mark.daily
 def test_another_process_plays_them_as_recorded() -> None:
     words = [sys.executable, "-c", ANOTHER_PROCESS]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -88,7 +88,7 @@ class Failing(SwarmDT):
             raise RuntimeError("a wheel came off")
 
 
-@pytest.mark.parametrize("processes", [1, 2])
+@pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.daily)])
 def test_a_study_in_which_nothing_works_is_given_up(sizes: dict[str, Any], processes: int) -> None:
     study = Study(**{**sizes, "policies": [Failing(seeds=range(8))], "seeds": 8})
     tally = study.run(processes=processes)

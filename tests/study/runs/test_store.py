@@ -236,7 +236,7 @@ for line in sys.stdin:
 """
 
 
-@pytest.mark.unmeasured
+@pytest.mark.daily
 def test_two_processes_may_make_the_store_at_once(tmp_path: Path) -> None:
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     makers = [subprocess.Popen([sys.executable, "-c", MAKER, name], **pipes) for name in "01"]

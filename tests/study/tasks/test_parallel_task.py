@@ -265,6 +265,7 @@ def test_a_task_is_known_by_what_its_functions_hold() -> None:
     assert closed(6).code() != partly(6).code()
 
 
+@pytest.mark.daily
 def test_a_task_has_one_code_version_in_every_process_and_folder(tmp_path: Path) -> None:
     script = (
         "import functools\nfrom pettingzoo.test.example_envs import generated_agents_parallel_v0\n"

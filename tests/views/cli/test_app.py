@@ -86,7 +86,13 @@ def test_an_error_of_usage_is_a_line_and_names_the_help(command: Command) -> Non
 
 
 @pytest.mark.unmeasured
-@pytest.mark.parametrize("module", ["swarm_logistics_env", "swarm_logistics_env.views.cli"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        "swarm_logistics_env",
+        pytest.param("swarm_logistics_env.views.cli", marks=pytest.mark.daily),
+    ],
+)
 def test_the_package_is_the_command(module: str) -> None:
     words = [sys.executable, "-m", module, "--version"]
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout
