@@ -349,7 +349,8 @@ def forest(canvas: Canvas, columns: Mapping[str, Rows], title: str = "") -> None
     grid[0, 0].set_title(title)
     grid[0, 0].set_yticks(range(len(rows)), [label for label, _ in rows])
     grid[0, 0].set_ylim(len(rows) - 0.4, -0.6)
-    if any(len(points) > 1 for _, points in rows):
+    series = {point.series for column in columns.values() for _, row in column for point in row}
+    if len(series) > 1:
         add_legend(canvas, grid[0, 0])
 
 

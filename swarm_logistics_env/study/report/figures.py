@@ -46,22 +46,26 @@ def forest_label(answer: Answer) -> str:
 
 
 def forest_figure(results: StudyResults, answer: Answer, points: Sequence[Point]) -> Figure:
-    """Return the lines of the answer as a forest of intervals, a group for each policy and task."""
-    rows: list[tuple[str, list[Point]]] = []
+    """Return the lines of the answer as a forest of intervals.
+
+    Where there are several policies or tasks, those with the same question share its row.
+    """
     groups = answer.lines_by_subject
+    # What stands between two policies has the colour of neither.
+    subjects = sorted(groups, key=lambda subject: groups[subject][0].verdict.compares_policies)
+    rows: dict[str, list[Point]] = {}
     for line, point in zip(answer.lines, points):
-        if len(groups) > 1 and line is groups[line.subject][0]:
-            rows.append((line.subject, []))
-        rows.append((line.question, [point]))
+        of_subject = point._replace(series=line.subject, style=subjects.index(line.subject))
+        rows.setdefault(line.question, []).append(of_subject)
     verdicts = [line.verdict for line in answer.lines]
-    # Where there are several, each group has its own.
-    title = results.policies[0] if len(groups) == 1 else ""
+    # Where there are several, the legend names them.
+    title = results.policies[0] if len(subjects) == 1 else ""
     return Figure(
         "answer",
         f"{answer.scope} Every question with its interval.",
         _rows(results, verdicts),
-        0.9 + 0.2 * len(rows),
-        partial(drawing.forest, columns={forest_label(answer): rows}, title=title),
+        0.9 + sum(max(0.2, 0.05 + 0.1 * len(of_row)) for of_row in rows.values()),
+        partial(drawing.forest, columns={forest_label(answer): [*rows.items()]}, title=title),
         note_on_verdicts(results, verdicts),
     )
 

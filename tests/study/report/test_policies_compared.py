@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 
 from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.questions.comparison import Setting
@@ -56,6 +57,20 @@ def test_the_first_line_has_the_direction_of_the_rows() -> None:
     assert "; also less in 1 of 3 other conditions; the other way round: FM4 m = 3;" in words
     row = next(line for line in answer(results).lines if "N = 25" in line.question)
     assert (row.question, row.value) == ("P of swarm-dt, N = 25", "-0.50")
+
+
+def test_policies_share_the_row_of_a_question_in_the_figure_and_the_legend_names_them() -> None:
+    results = judged(study_of("homing", "swarm-dt", indicators=["R"]), play)
+    figure = next(figure for figure in document(results).figures if figure.name == "answer")
+    canvas = Canvas()
+    figure.draw(canvas)
+    (axes,) = canvas.axes
+    labels = [tick.get_text() for tick in axes.get_yticklabels()]
+    of_both = ["R FM1, 1 of 25", "R FM1, 3 of 25", "R FM4, 1 of 25", "R FM4, 3 of 25"]
+    assert (len(answer(results).lines), labels[-4:]) == (len(labels) + 4, of_both)
+    (legend,) = canvas.legends
+    names = ["homing against swarm-dt", "homing", "swarm-dt"]
+    assert [text.get_text() for text in legend.get_texts()] == names
 
 
 def test_three_policies_stand_in_one_table_beside_the_first_and_holm_counts_all_conditions() -> (
