@@ -17,7 +17,8 @@ Three parameters keep the swarm going where lifting takes time:
 
 * `density`: the more items there are, the deeper is the stock. A shallow one of many items is a
   wall: laden robots do not get through, least in the corners beside the area. Where lifting takes
-  no time, robots make their way, and the stock is `near`.
+  no time, robots make their way, and the stock is as deep as `near` and the way in which they
+  brake.
 * `patience`: a robot that carries the requested item for too long, because it is caged by the stock
   or takes a wrong way for the way home, puts it down, clears the way (`clear_the_way`), and leaves
   the item to others for as long.
@@ -109,12 +110,12 @@ class HomingStockParameters(DrivingParameters):
 
     near: PositiveFloat = Field(
         0.6898,
-        description="robots put items down nearer to the area than this, and lift for the stock "
-        "those that lie 0.5 m farther still [m]",
+        description="robots put items down nearer to the area than this and the distance in which "
+        "they brake from top speed, and lift for the stock those that lie 0.5 m farther still [m]",
     )
     density: NonNegativeFloat = Field(
         0.8709,
-        description="where lifting takes time, `near` is what makes all items, put down before the "
+        description="where lifting takes time, this distance is what makes all items, put down before the "
         "area over the whole height of the warehouse, as dense as this [1/m2]; 0: it stays",
     )
     holders: PositiveFloat = Field(
@@ -342,7 +343,11 @@ class HomingStock(Homing):
         super().configure(scenario)
         parameters = self.parameters
         share = math.sqrt(scenario.n_robots / scenario.n_items)
-        changes = {"holders": min(1.0, parameters.holders * share)}
+        braking_distance = scenario.max_speed**2 / (2.0 * scenario.max_acceleration)
+        changes = {
+            "holders": min(1.0, parameters.holders * share),
+            "near": parameters.near + braking_distance,
+        }
         if parameters.density > 0.0 and scenario.handling_time > 0.0:
             changes["near"] = scenario.n_items / (parameters.density * scenario.warehouse_height)
         self._values = parameters.model_copy(update=changes).values()
