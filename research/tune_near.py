@@ -17,7 +17,7 @@ worlds has a 95 % interval above 0 on `CONFIRMED` fresh seeds, and that of no wo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from functools import partial
 
@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 from research import tune
 from research.search_again import delivered
 from research.tables import rewrite, table, write_rows
-from swarm_logistics_env import Scenario
 from swarm_logistics_env.spi import Interval
 from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.study.report import section
@@ -41,24 +40,21 @@ VALUES = (0.25, 0.3, 0.35, 0.4, 0.45)
 WORLDS = {name: tune.WORLDS[name] for name in ("dots", "dotbots", "paper")}
 
 
-def log_p(
-    near_in: Callable[[Scenario], float], seeds: range, processes: Executor
-) -> NDArray[np.float64]:
+def log_p(near_in: Mapping[str, float], seeds: range, processes: Executor) -> NDArray[np.float64]:
     """Return ln(P) in each world at each seed, P of a run at least 1, shape (worlds, seeds)."""
     p = [
-        list(
-            processes.map(
-                partial(delivered, "homing-stock", {"near": near_in(scenario)}, scenario), seeds
-            )
-        )
-        for scenario in WORLDS.values()
+        [*processes.map(partial(delivered, "homing-stock", {"near": near}, WORLDS[name]), seeds)]
+        for name, near in near_in.items()
     ]
     return np.log(np.maximum(p, 1))
 
 
-def near_before(scenario: Scenario) -> float:
-    """Return the parameter that makes the stock as deep as before."""
-    return DEPTH_BEFORE - scenario.max_speed**2 / (2.0 * scenario.max_acceleration)
+def near_before() -> dict[str, float]:
+    """Return the parameter that makes the stock as deep as before, in each world."""
+    return {
+        name: DEPTH_BEFORE - scenario.max_speed**2 / (2.0 * scenario.max_acceleration)
+        for name, scenario in WORLDS.items()
+    }
 
 
 def main() -> None:
@@ -67,11 +63,12 @@ def main() -> None:
     fresh = range(FIRST_SEED + 5_000, FIRST_SEED + 5_000 + CONFIRMED)
     with ProcessPoolExecutor(usable_cores()) as processes:
         means = {
-            near: log_p(lambda _, near=near: near, searched, processes).mean(axis=1)
+            near: log_p(dict.fromkeys(WORLDS, near), searched, processes).mean(axis=1)
             for near in VALUES
         }
         best = max(VALUES, key=lambda near: float(means[near].mean()))
-        gains = log_p(lambda _: best, fresh, processes) - log_p(near_before, fresh, processes)
+        gains = log_p(dict.fromkeys(WORLDS, best), fresh, processes)
+        gains -= log_p(near_before(), fresh, processes)
     write_rows(
         tune.RESULTS / "near.csv",
         ("near", *WORLDS),
@@ -79,8 +76,7 @@ def main() -> None:
     )
     intervals = [t_interval(of_world) for of_world in gains] + [t_interval(gains.mean(axis=0))]
     changes = [
-        Interval(*(None if end is None else 100.0 * math.expm1(end) for end in interval))
-        for interval in intervals
+        Interval(*(100.0 * math.expm1(end or 0.0) for end in interval)) for interval in intervals
     ]
     rows = [
         *((f"{near:g}", *(f"{np.exp(mean):.1f}" for mean in means[near]), "") for near in VALUES),

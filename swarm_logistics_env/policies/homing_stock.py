@@ -31,7 +31,7 @@ The likely reason: who sees an item fetches it anyway, and nobody can tell of on
 
 Constants of the code are fitted, for the most deliveries, on seeds from 400,000 to 400,045 in the
 paper's world and from 430,000 to 430,707 in `realistic`, both with `restock`; the parameters are
-those of the second search that docs/research/tuning.md tells of.
+those of the searches that docs/research/tuning.md tells of.
 """
 
 from __future__ import annotations
@@ -109,14 +109,15 @@ class HomingStockParameters(DrivingParameters):
     obstacle_range: ObstacleRange = 1.809
 
     near: PositiveFloat = Field(
-        0.6898,
+        0.3,
         description="robots put items down nearer to the area than this and the distance in which "
         "they brake from top speed, and lift for the stock those that lie 0.5 m farther still [m]",
     )
     density: NonNegativeFloat = Field(
         0.8709,
-        description="where lifting takes time, this distance is what makes all items, put down before the "
-        "area over the whole height of the warehouse, as dense as this [1/m2]; 0: it stays",
+        description="where lifting takes time, this distance is what makes all items, put down "
+        "before the area over the whole height of the warehouse, as dense as this [1/m2]; 0: it "
+        "stays",
     )
     holders: PositiveFloat = Field(
         0.5341,
