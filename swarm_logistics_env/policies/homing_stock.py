@@ -18,7 +18,8 @@ Three parameters keep the swarm going where lifting takes time:
 * `density`: the more items there are, the deeper is the stock. A shallow one of many items is a
   wall: laden robots do not get through, least in the corners beside the area. Where lifting takes
   no time, robots make their way, and the stock is `near`, less half the distance in which they
-  brake: those that brake slowly get through a shallower one alone.
+  brake: those that brake slowly get through a shallower one alone. Where several items are asked
+  for at a time more of the stock is wanted, and it is `near`.
 * `patience`: a robot that carries the requested item for too long, because it is caged by the stock
   or takes a wrong way for the way home, puts it down, clears the way (`clear_the_way`), and leaves
   the item to others for as long.
@@ -110,8 +111,9 @@ class HomingStockParameters(DrivingParameters):
 
     near: PositiveFloat = Field(
         0.6898,
-        description="robots put items down nearer to the area than this less half the distance in "
-        "which they brake from top speed, and lift for the stock those that lie 0.5 m farther [m]",
+        description="robots put items down nearer to the area than this, where one item is asked "
+        "for at a time less half the distance in which they brake from top speed, and lift for the "
+        "stock those that lie 0.5 m farther [m]",
     )
     density: NonNegativeFloat = Field(
         0.8709,
@@ -344,11 +346,10 @@ class HomingStock(Homing):
         super().configure(scenario)
         parameters = self.parameters
         share = math.sqrt(scenario.n_robots / scenario.n_items)
-        braking_distance = scenario.max_speed**2 / (2.0 * scenario.max_acceleration)
-        changes = {
-            "holders": min(1.0, parameters.holders * share),
-            "near": max(parameters.near - 0.5 * braking_distance, 0.0),
-        }
+        changes = {"holders": min(1.0, parameters.holders * share)}
+        if scenario.n_requests == 1:
+            braking_distance = scenario.max_speed**2 / (2.0 * scenario.max_acceleration)
+            changes["near"] = max(parameters.near - 0.5 * braking_distance, 0.0)
         if parameters.density > 0.0 and scenario.handling_time > 0.0:
             changes["near"] = scenario.n_items / (parameters.density * scenario.warehouse_height)
         self._values = parameters.model_copy(update=changes).values()
