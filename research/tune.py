@@ -47,7 +47,8 @@ from swarm_logistics_env.spi.summaries import t_interval
 from swarm_logistics_env.study.report import section
 from swarm_logistics_env.study.runs.engines import usable_cores
 
-# Of a script 10,000 from here on; nothing else has those from 5,500,000 to 5,599,999.
+# Of a script 10,000 from here on; nothing else has those from 5,500,000 to 5,599,999. The searches
+# of `homing-stock` before had those from 5,520,000 on.
 FIRST_SEEDS = {"swarm-dt": 5_500_000, "homing": 5_510_000, "homing-stock": 5_540_000}
 CONFIRMED = 24  # fresh seeds
 RANGE = 4.0  # times and parts of the shipped value

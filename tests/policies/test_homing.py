@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_logistics_env import Fault, Scenario, run_episode
 from swarm_logistics_env.policies import load
+from swarm_logistics_env.policies.homing_stock import Parameters
 from swarm_logistics_env.world import observations as row
 
 EAST, NORTH = (1.0, 0.0), (0.0, 1.0)
@@ -156,3 +157,21 @@ def test_a_stock_is_the_deeper_the_more_items_there_are_if_lifting_takes_time(
     leaving[:, row.ITEMS : row.ITEMS + 3] = (1.0, 0.1, 0.0)  # 2 m from the area
     lifted = (policy.act(leaving)[:, 3] == 1.0).mean()
     assert lifted == pytest.approx(1.0 if is_stocked else holders(scenario), abs=0.08)
+
+
+@pytest.mark.parametrize(
+    ("fields", "depth"),
+    [
+        ({}, 0.6398),  # brakes in 0.1 m
+        ({"max_speed": 1.0, "max_acceleration": 2.0}, 0.5648),
+        ({"max_speed": 2.0, "max_acceleration": 0.5}, 0.0),
+        ({"max_acceleration": 2.0, "n_requests": 2}, 0.6898),
+        ({"max_acceleration": 2.0, "handling_time": 1.0}, 60 / 8.709),
+    ],
+)
+def test_a_stock_is_the_less_deep_the_longer_robots_brake_where_lifting_takes_no_time(
+    fields: dict[str, Any], depth: float
+) -> None:
+    policy: Any = load("homing-stock")
+    policy.configure(Scenario(**fields))
+    assert Parameters(*policy._values).near == pytest.approx(depth)
