@@ -166,10 +166,11 @@ def test_a_stock_is_the_deeper_the_more_items_there_are_if_lifting_takes_time(
         ({"max_speed": 1.0, "max_acceleration": 2.0}, 0.5648),
         ({"max_speed": 2.0, "max_acceleration": 0.5}, 0.0),
         ({"max_acceleration": 2.0, "n_requests": 2}, 0.6898),
+        ({"robot_radius": 0.05, "n_requests": 2}, 0.27592),
         ({"max_acceleration": 2.0, "handling_time": 1.0}, 60 / 8.709),
     ],
 )
-def test_a_stock_is_the_less_deep_the_longer_robots_brake_where_lifting_takes_no_time(
+def test_a_stock_is_the_less_deep_the_longer_robots_brake_and_the_smaller_they_are(
     fields: dict[str, Any], depth: float
 ) -> None:
     policy: Any = load("homing-stock")
