@@ -20,6 +20,8 @@ world has one below 0, those of docs/results.md in which the other one lost amon
 It gained 12 % [10, 15] over the presets and lost 4 % [3, 5] with five requests at a time. So it is
 taken where one item is asked for at a time, and where several are the depth stays: that world has
 no change since then, and the others the same runs as in that test.
+Later the script's lengths began to go with the radius of its robots, which makes other runs of
+`dotbots` alone.
 """
 
 from __future__ import annotations

@@ -189,6 +189,11 @@ class Charging(RowPolicy, Holding):
         shares = {"at": self.parameters.at, "until": self.parameters.until}
         return {"class": "Charging", **shares, "policy": policy, **prints}
 
+    def fit_to(self, swarm: Scenario) -> None:
+        """Take what the policy takes."""
+        if isinstance(self.policy, RowPolicy):
+            self.policy.fit_to(swarm)
+
     def configure(self, scenario: Scenario) -> None:
         """Take what the policy takes, the body, and whether there are batteries."""
         configure = getattr(self.policy, "configure", None)

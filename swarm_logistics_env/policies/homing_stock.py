@@ -346,15 +346,19 @@ class HomingStock(Homing):
     def configure(self, scenario: Scenario) -> None:
         """Take what a robot's maker knows, and how many robots and items there are."""
         super().configure(scenario)
+        self.fit_to(scenario)
+
+    def fit_to(self, swarm: Scenario) -> None:
+        """Take how many robots and items there are, how large robots are, and how they brake."""
         parameters = self.parameters
-        share = math.sqrt(scenario.n_robots / scenario.n_items)
+        share = math.sqrt(swarm.n_robots / swarm.n_items)
         changes = {"holders": min(1.0, parameters.holders * share)}
-        size = scenario.robot_radius / FITTED_RADIUS
+        size = swarm.robot_radius / FITTED_RADIUS
         for name in ("near", "spread_range", "avoid_range", "clearance", "obstacle_range"):
             changes[name] = size * getattr(parameters, name)
-        if scenario.n_requests == 1:
-            braking_distance = scenario.max_speed**2 / (2.0 * scenario.max_acceleration)
+        if swarm.n_requests == 1:
+            braking_distance = swarm.max_speed**2 / (2.0 * swarm.max_acceleration)
             changes["near"] = max(changes["near"] - 0.5 * braking_distance, 0.0)
-        if parameters.density > 0.0 and scenario.handling_time > 0.0:
-            changes["near"] = scenario.n_items / (parameters.density * scenario.warehouse_height)
+        if parameters.density > 0.0 and swarm.handling_time > 0.0:
+            changes["near"] = swarm.n_items / (parameters.density * swarm.warehouse_height)
         self._values = parameters.model_copy(update=changes).values()

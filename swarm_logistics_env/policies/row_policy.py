@@ -52,6 +52,9 @@ class RowPolicy:
         """Take what a robot's maker knows; what was begun before is not changed."""
         raise NotImplementedError
 
+    def fit_to(self, swarm: Scenario) -> None:
+        """Take what all robots of a swarm share, of whatever kind one is; most take nothing."""
+
     def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode of robots whose streams have these keys (N,)."""
         raise NotImplementedError
@@ -133,6 +136,7 @@ class Robot:
         if operator.index(number) < 0:
             raise PolicyError(f"number = {number}: should be 0 or more")
         self._policy = copy.copy(check_row_policy(policy))  # configured, it shares constants alone
+        swarm = body
         self.body = body = body.of_robot(number)
         if period != body.control_period:
             # Nobody plays physics here, and a scenario wants whole steps of it.
@@ -140,6 +144,7 @@ class Robot:
             self.body = body.replace(control_period=period, physics_period=period / substeps)
         self._width = n_columns(body)
         self._policy.configure(self.body)
+        self._policy.fit_to(swarm)
         self._policy.begin(row_keys(seed, self._policy.stream, number + 1)[number:])
 
     @property
