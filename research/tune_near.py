@@ -14,7 +14,7 @@ shipped either. In the paper's world the depth matters little, in `dots` much.
 
 Declared before its first run: `near` less half of the braking distance, which is 0.56 m in `dots`,
 0.64 m in the paper's world and 0.68 m in `dotbots`, is shipped if the mean of ln(P / P of the depth
-before) over the presets has a 95 % interval above 0 on `CONFIRMED` fresh seeds, and that of no
+before) over the presets has a 95 % interval above 0 on `SEEDS`, which are fresh, and that of no
 world has one below 0, those of docs/results.md in which the other one lost among them.
 
 It gained 12 % [10, 15] over the presets and lost 4 % [3, 5] with five requests at a time. So it is
