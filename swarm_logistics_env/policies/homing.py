@@ -161,10 +161,14 @@ class Homing(RowPolicy, Scripted):
     _fill_commands: ClassVar[Callable[..., None]] = staticmethod(act_homing)
 
     def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows: the control period."""
-        self._values = self.parameters.values()
+        """Take what a robot's maker knows: the control period, and how large robots are."""
         self._period = scenario.control_period
         self._frame = MotionView(scenario)
+        self.fit_to(scenario)
+
+    def fit_to(self, swarm: Scenario) -> None:
+        """Take how large robots are."""
+        self._values = self.parameters.scaled_to(swarm).values()
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
         """Begin an episode with random headings and empty memories."""

@@ -13,8 +13,8 @@ Robots sense and remember what those of `homing` do, and six simple mechanisms a
 * A laden robot that stands still goes in a random direction, not away from home, for a moment.
 * A robot that never entered the area goes to the lowest timer heard.
 
-The lengths among the parameters, but for `wall_range`, go with the radius of the robots. Three
-parameters keep the swarm going where lifting takes time:
+The lengths among the parameters go with the radius of the robots. Three parameters keep the swarm
+going where lifting takes time:
 
 * `density`: the more items there are, the deeper is the stock. A shallow one of many items is a
   wall: laden robots do not get through, least in the corners beside the area. Where lifting takes
@@ -93,7 +93,6 @@ CARRIED_OFF = 1.0  # where an item is put down for which there is no gap
 LEAST_CERTAINTY = 0.3  # of a direction home that was taken once, after 72 s
 BAND = 0.5  # behind the stock, in which items stay where they are
 STUCK = 0.4  # a robot tries a random direction until the memory's 1 has fallen to this
-FITTED_RADIUS = 0.125  # of the robots for which the parameters were fitted; lengths go with it
 TRIES_AGAIN = 0.5  # of `cannot_deliver`: below it a robot holds items inside again
 PULL = 0.4  # home, beside a random direction of length 1
 
@@ -343,22 +342,14 @@ class HomingStock(Homing):
 
     _fill_commands = staticmethod(act_homing_stock)
 
-    def configure(self, scenario: Scenario) -> None:
-        """Take what a robot's maker knows, and how many robots and items there are."""
-        super().configure(scenario)
-        self.fit_to(scenario)
-
     def fit_to(self, swarm: Scenario) -> None:
         """Take how many robots and items there are, how large robots are, and how they brake."""
-        parameters = self.parameters
+        parameters = self.parameters.scaled_to(swarm)
         share = math.sqrt(swarm.n_robots / swarm.n_items)
         changes = {"holders": min(1.0, parameters.holders * share)}
-        size = swarm.robot_radius / FITTED_RADIUS
-        for name in ("near", "spread_range", "avoid_range", "clearance", "obstacle_range"):
-            changes[name] = size * getattr(parameters, name)
         if swarm.n_requests == 1:
             braking_distance = swarm.max_speed**2 / (2.0 * swarm.max_acceleration)
-            changes["near"] = max(changes["near"] - 0.5 * braking_distance, 0.0)
+            changes["near"] = max(parameters.near - 0.5 * braking_distance, 0.0)
         if parameters.density > 0.0 and swarm.handling_time > 0.0:
             changes["near"] = swarm.n_items / (parameters.density * swarm.warehouse_height)
         self._values = parameters.model_copy(update=changes).values()

@@ -82,6 +82,9 @@ class Described:
         return f"<b>{html.escape(repr(self))}</b><br>{html.escape(' '.join(about.split()))}"
 
 
+FITTED_RADIUS = 0.125  # of the robots for which parameters were fitted [m]
+
+
 class ScriptParameters(Record):
     """The parameters of a script, each with its unit and its meaning. This one has none.
 
@@ -103,6 +106,16 @@ class ScriptParameters(Record):
     def values(self) -> tuple[Any, ...]:
         """Return the values of the fields, in their order."""
         return tuple(dict(self).values())
+
+    def scaled_to(self, swarm: Scenario) -> Self:
+        """Return these with lengths as much larger as these robots are than those of the fit."""
+        scale = swarm.robot_radius / FITTED_RADIUS
+        lengths = {
+            name: scale * getattr(self, name)
+            for name, field in type(self).model_fields.items()
+            if field.description and "[m]" in field.description
+        }
+        return self.model_copy(update=lengths)
 
 
 class Scripted(Described):

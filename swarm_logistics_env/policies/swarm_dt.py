@@ -68,6 +68,9 @@ class SwarmDTParameters(ScriptParameters):
         description="always drives at its top speed; else it slows where the pushes on it cancel "
         "each other; source: simulator",
     )
+    scales: bool = Field(
+        False, description="whether the lengths go with the radius of the robots; fitted"
+    )
 
 
 # The simulator's noise, U(+-0.5 rad) in a step of 0.06 s, and its drop, 3 % in one of 0.02 s.
@@ -93,6 +96,7 @@ CONSTANTS_TUNED = {
     "wall_distance": 0.3223,
     "taxis_gain": 0.8622,
     "drop_rate": 0.9005,
+    "scales": True,
 }
 
 
@@ -144,7 +148,7 @@ class SwarmDT(RowPolicy, Scripted):
     }  # fmt: skip
 
     def configure(self, scenario: Scenario) -> None:
-        """Take what the maker of a robot knows: its control period and its drive."""
+        """Take what the maker of a robot knows: its control period, its drive and its radius."""
         parameters = self.parameters
         period = scenario.control_period
         self._constants = StepConstants(
@@ -153,6 +157,12 @@ class SwarmDT(RowPolicy, Scripted):
             turn_of_body=turn_of_body(scenario),
         )
         self._turns = [turn_of_body(body) for body in of_first_robots(scenario)]
+        self.fit_to(scenario)
+
+    def fit_to(self, swarm: Scenario) -> None:
+        """Take how large robots are, if the lengths go with it."""
+        scales = self.parameters.scales
+        parameters = self.parameters.scaled_to(swarm) if scales else self.parameters
         self._values = parameters.values()
 
     def begin(self, keys: NDArray[np.uint64]) -> None:
