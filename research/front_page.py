@@ -17,6 +17,7 @@ from research.play_paper_fit import by_set
 from research.tables import ROOT, read_rows, table, with_blocks
 from swarm_logistics_env.spi.summaries import Interval
 from swarm_logistics_env.study.report import drawing, section
+from swarm_logistics_env.study.report.points import Point
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -146,11 +147,11 @@ def draw(rows: Rows, path: Path) -> None:
     """Draw the forest plot: a row a policy, a panel a question; equal rows give equal bytes."""
     names = list(rows["P, N = 25"])
 
-    def points(label: str, name: str) -> list[drawing.Point]:
+    def points(label: str, name: str) -> list[Point]:
         if name not in rows[label]:
             return []
         style = int(name.startswith(_LEARNED))
-        return [drawing.Point(name, style, "", *rows[label][name].interval, decided=True)]
+        return [Point(name, style, "", *rows[label][name].interval, decided=True)]
 
     def draw_panels(canvas: "Figure") -> None:
         columns = {label: [(name, points(label, name)) for name in names] for label in _PANELS}

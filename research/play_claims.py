@@ -49,7 +49,7 @@ from swarm_logistics_env.spi.definitions import DEFINITIONS, Change
 from swarm_logistics_env.spi.estimate import Estimate
 from swarm_logistics_env.study.questions.comparison import NO_FAULT, Question, Setting
 from swarm_logistics_env.study.report import drawing
-from swarm_logistics_env.study.report.drawing import Point
+from swarm_logistics_env.study.report.points import Point
 from swarm_logistics_env.study.verdicts.reference import PAPER
 from swarm_logistics_env.world.scenario import Scenario
 

@@ -20,8 +20,9 @@ from research.tables import ROOT, example, play, rewrite
 from swarm_logistics_env.study.report import drawing
 from swarm_logistics_env.study.report.curves import Curve, CurvePanel, curves
 from swarm_logistics_env.study.report.document import document
-from swarm_logistics_env.study.report.drawing import Draw, Panel, Point
+from swarm_logistics_env.study.report.drawing import Draw
 from swarm_logistics_env.study.report.figures import note_on_verdicts
+from swarm_logistics_env.study.report.points import Panel, Point
 from swarm_logistics_env.study.verdicts.mid_run_faults import rate_curves
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict

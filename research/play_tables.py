@@ -38,6 +38,7 @@ from research.tables import (
 )
 from swarm_logistics_env.spi.summaries import Interval, t_interval
 from swarm_logistics_env.study.report import drawing, section
+from swarm_logistics_env.study.report.points import Point
 from swarm_logistics_env.study.report.tables import contacts_text
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
@@ -83,7 +84,7 @@ def robust_block(results: StudyResults) -> str:
         results.verdicts, lambda verdict: verdict.compared.label
     )
     for label, tests in by_label.items():
-        cell = results.cells_of(tests[0].compared)[tests[0].compared.changed]
+        cell = tests[0].cells[tests[0].compared.changed]
         by_symbol = {test.compared.indicator: test for test in tests}
         row = [label, section.mean_p(cell), contacts_text(cell)]
         for symbol in ("R", "FT"):
@@ -231,7 +232,7 @@ def draw_ladder(path: Path) -> None:
     rows = []
     for rung, _, at_once, _, in_a_second in block_rows(PAGE, "ladder"):
         points = [
-            drawing.Point(world, style, "", *interval_in(text), decided=True)
+            Point(world, style, "", *interval_in(text), decided=True)
             for style, (world, text) in enumerate(zip(worlds, (at_once, in_a_second)))
         ]
         rows.append((rung, points))

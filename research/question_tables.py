@@ -35,8 +35,7 @@ def difference(results: StudyResults, upper: Verdict, lower: Verdict) -> Interva
     """Return how much an indicator is above another over the same seeds, with its interval."""
 
     def value(test: Verdict, seeds: NDArray[np.intp]) -> float:
-        cells = results.cells_of(test.compared)
-        samples = {arm: cell.by_seed[seeds] for arm, cell in cells.items()}
+        samples = {arm: cell.by_seed[seeds] for arm, cell in test.cells.items()}
         return test.compared.estimate(samples).value
 
     n_seeds = len(results.plan.seeds)
@@ -117,7 +116,7 @@ def repairs(results: StudyResults) -> str:
     """Return what a repair brings."""
     body = []
     for policy, mode, tests in repaired_tests(results):
-        samples = (results.cells_of(t.compared)[t.compared.changed].by_seed for t in tests)
+        samples = (test.cells[test.compared.changed].by_seed for test in tests)
         body.append((policy, mode, *map(with_verdict, tests), _change(*samples)))
     head = ("policy", "mode", "R, not repaired", "R, repaired", "the repair adds to P [%]")
     return table(head, body)
@@ -148,8 +147,8 @@ def wear(results: StudyResults) -> str:
     for test in results.verdicts:
         comparison = test.compared
         if comparison.table == "Wear":
-            cells = results.cells_of(comparison)
-            change = _change(cells[comparison.original].by_seed, cells[comparison.changed].by_seed)
+            arms = comparison.original, comparison.changed
+            change = _change(*(test.cells[arm].by_seed for arm in arms))
             policy = f"`{comparison.policy}`"
             body.append((policy, comparison.label, with_verdict(test), change))
     return table(("policy", "worn robots", "R", "change of P [%]"), body)

@@ -83,6 +83,9 @@ class SwarmLogisticsEnv(DictView):
         **fields: Any,
     ) -> None:
         self.scenario = _scenario_of(scenario, fields)
+        n_possible = self.scenario.n_robots
+        if max_robots is not None:
+            n_possible = checked_count("max_robots", max_robots, n_possible)
         self.faults = checked_faults("faults", faults, SetupError)
         self.max_cycles = None if max_cycles is None else checked_count("max_cycles", max_cycles)
         modes = self.metadata["render_modes"]
@@ -94,14 +97,11 @@ class SwarmLogisticsEnv(DictView):
         self.warehouse = Warehouse(self.scenario)
         self.agents: list[str] = []
         self.is_begun = False
-        self.possible_agents = agent_names(range(self.scenario.n_robots))
+        self.possible_agents = agent_names(range(n_possible))
         self._spaces = Spaces(self.scenario)
         self._rewards = RewardTerms(rewards)
         self.next_seed = int(np.random.default_rng().integers(2**63))
         self.max_robots = max_robots
-        if max_robots is not None:
-            most = checked_count("max_robots", max_robots, self.scenario.n_robots)
-            self.declare_spaces(self.scenario.replace(n_robots=most))
 
     def __repr__(self) -> str:
         changed = self.scenario.model_dump(exclude_defaults=True)
@@ -289,9 +289,9 @@ class SwarmLogisticsEnv(DictView):
             SetupError: the rows or commands of `scenario` have another length than this
                 environment's.
         """
-        self._spaces.widen(scenario)
         if scenario.n_robots > len(self.possible_agents):
             self.possible_agents = agent_names(range(scenario.n_robots))
+        self._spaces.widen(scenario)
 
     @in_one_thread
     def render(self) -> NDArray[np.uint8] | None:

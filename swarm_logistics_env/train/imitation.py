@@ -14,7 +14,6 @@ import torch
 from numpy.typing import NDArray
 
 from swarm_logistics_env.core.progress_bar import ProgressBar
-from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.train.settings import Teaching
 from swarm_logistics_env.train.training import Training
 from swarm_logistics_env.train.training_worlds import check_finite
@@ -27,13 +26,14 @@ LATE_RATE = 0.4  # times the settings' rate
 NOISE_SHARES = np.array([1.0, 1.0, 0.5])  # of the settings' noise, of each output
 
 
-def imitate(training: Training, learner: Any, log: Any) -> None:
+def imitate(training: Training, learner: Any, log: Any, rng: np.random.Generator) -> None:
     """Let the learner's network imitate the teacher, if there is one, always to the same bits.
 
     Afterwards the learner's worlds begin new episodes. There is no checkpoint before the end.
 
     Args:
         log: its `seconds` and `cpu_seconds` go on.
+        rng: what is drawn meanwhile.
 
     Raises:
         FloatingPointError: the loss, an observation or a reward is not finite.
@@ -41,25 +41,27 @@ def imitate(training: Training, learner: Any, log: Any) -> None:
     began = time.monotonic()
     cpu = time.process_time()
     if training.teacher is not None and training.teacher.decisions > 0:
-        _imitate(training, training.teacher, learner)
+        _imitate(training, training.teacher, learner, rng)
     log.seconds += time.monotonic() - began
     log.cpu_seconds += time.process_time() - cpu
 
 
-def _imitate(training: Training, settings: Teaching, learner: Any) -> None:
+def _imitate(
+    training: Training, settings: Teaching, learner: Any, rng: np.random.Generator
+) -> None:
     policy = learner.policy
-    rng = generator(training.seed, "imitation")
     n_steps = max(1, round(settings.decisions / (ROUNDS * training.rows)))
     n_new = n_steps * training.rows
     rows = np.empty((ROUNDS * n_new, training.network.widths[0]), np.float32)
     labels = np.empty((len(rows), len(OUTPUTS)), np.float32)
     optimizer = torch.optim.Adam(policy.actor_parameters(), settings.rate)
+    first, last = settings.shares
     columns = learner.env.reset()
     with ProgressBar(f"{training.name}, imitation", len(rows), "decisions") as progress:
         for number in range(ROUNDS):
             done = number / (ROUNDS - 1)
             new = slice(number * n_new, (number + 1) * n_new)
-            share = settings.share_at(done)
+            share = first + done * (last - first)
             columns = _collect(learner, columns, share, settings.noise, rng, rows[new], labels[new])
             rate = settings.rate * (LATE_RATE if done > LATE else 1.0)
             for group in optimizer.param_groups:

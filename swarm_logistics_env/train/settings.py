@@ -246,10 +246,12 @@ class Teaching(Part):
             )
         return policy
 
-    def share_at(self, done: float) -> float:
-        """Return the teacher's share of the robots once a share `done` of the rows is there."""
-        first, last = self.shares
-        return first + done * (last - first)
+    @property
+    def new_script(self) -> Homing:
+        """The script, as it is before it has seen anything."""
+        script = self.policy.load()
+        assert isinstance(script, Homing)
+        return script
 
     def pull_at(self, done: float) -> float:
         """Return the weight of the pull once a share `done` of the training is over."""

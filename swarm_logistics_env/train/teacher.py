@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_logistics_env.adapters import SwarmVecEnv
-from swarm_logistics_env.policies.spec import PolicySpec
+from swarm_logistics_env.train.settings import Teaching
 from swarm_logistics_env.world.motion.memory import MEMORY
 from swarm_logistics_env.world.scenario import Scenario
 
@@ -21,12 +19,12 @@ class Teacher:
     What it remembers of its last command is that which the robot was given.
 
     Args:
-        policy: homing or homing-stock, see `settings.Teaching`.
+        teaching: names the script.
         worlds: whose rows it reads.
     """
 
-    def __init__(self, policy: PolicySpec, worlds: SwarmVecEnv) -> None:
-        self._scripts: list[Any] = [policy.load() for _ in worlds.worlds]
+    def __init__(self, teaching: Teaching, worlds: SwarmVecEnv) -> None:
+        self._scripts = [teaching.new_script for _ in worlds.worlds]
         self._rows = worlds.rows_of_worlds
 
     def begin(self, world: int, scenario: Scenario, keys: NDArray[np.uint64]) -> None:

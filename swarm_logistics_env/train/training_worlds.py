@@ -38,11 +38,11 @@ def make_worlds(training: Training) -> SwarmVecEnv:
         kind, scenario = worlds[number]
         conditions = kind.conditions or training.conditions
         indicators = training.indicators
-        if indicators is None:
-            return EpisodeMix(SwarmLogisticsEnv(scenario, rewards=training.rewards), conditions)
-        smallest = training.smallest_alike(scenario)
-        base = smallest if "S" in indicators.weights else scenario
+        smallest = scenario if indicators is None else training.smallest_alike(scenario)
+        base = smallest if indicators and "S" in indicators.weights else scenario
         env: Wrapper = EpisodeMix(SwarmLogisticsEnv(base, rewards=training.rewards), conditions)
+        if indicators is None:
+            return env
         if base != scenario:
             env = SwarmSize(env, [kind.n_robots])
         arguments = dict(indicators)
@@ -125,7 +125,7 @@ class NetworkView(VecEnvWrapper):  # type: ignore[misc]  # not in the environmen
         self.frame = MotionView(training.scenario, network.listens, network.role)
         self._says_classes = network.says_classes
         teaching = training.teacher
-        self.teacher = None if teaching is None else Teacher(teaching.policy, worlds)
+        self.teacher = None if teaching is None else Teacher(teaching, worlds)
         self.advice = np.zeros((worlds.num_envs, len(OUTPUTS)))
         self._has_labels = teaching is not None and teaching.pull > 0.0
         self._privileged = np.zeros((worlds.num_envs, len(PRIVILEGED)), np.float32)

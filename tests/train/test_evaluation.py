@@ -18,7 +18,7 @@ from swarm_logistics_env.policies.swarm_dt import SwarmDT
 from swarm_logistics_env.study.questions.specification import MOST_SEEDS
 from swarm_logistics_env.train import evaluation
 from swarm_logistics_env.train.settings import Evaluation, Scores
-from swarm_logistics_env.train.trainer import TrainingLog
+from swarm_logistics_env.train.training_callback import TrainingLog
 from tests.conftest import PACKAGE, figures_drawn
 
 SCENARIO = Scenario(

@@ -40,14 +40,14 @@ restock = true
 SCRIPT = """\
 import os, signal, sys
 from swarm_logistics_env.views.cli import app
-from swarm_logistics_env.train import trainer
-last, save, saved = int(sys.argv.pop(1)), trainer.save_checkpoint, []
+from swarm_logistics_env.train import training_callback
+last, save, saved = int(sys.argv.pop(1)), training_callback.save_checkpoint, []
 def save_and_die(*given):
     save(*given)
     saved.append(given)
     if len(saved) == last:
         os.kill(os.getpid(), signal.SIGKILL)
-trainer.CHECKPOINT_EVERY, trainer.save_checkpoint = 0.0, save_and_die
+training_callback.CHECKPOINT_EVERY, training_callback.save_checkpoint = 0.0, save_and_die
 app()
 """
 

@@ -16,12 +16,14 @@ import torch
 from stable_baselines3.common.callbacks import ConvertCallback
 
 from swarm_logistics_env import policies
+from swarm_logistics_env.core.streams import generator
 from swarm_logistics_env.policies.learned import Network
 from swarm_logistics_env.policies.policy import one_thread
-from swarm_logistics_env.train import trainer
+from swarm_logistics_env.train import training_callback
 from swarm_logistics_env.train.imitation import imitate
 from swarm_logistics_env.train.learner import make_learner, tensors_of
-from swarm_logistics_env.train.trainer import TrainingLog, train
+from swarm_logistics_env.train.trainer import train
+from swarm_logistics_env.train.training_callback import TrainingLog
 from swarm_logistics_env.train.training_worlds import NetworkView
 
 CLASSES = Network(hidden=(8,), head="classes", role=True, exploration=0.5)
@@ -68,7 +70,7 @@ def test_a_training_with_a_teacher_goes_on_to_the_same_bits_and_keeps_the_best_n
 
     uncut = weights(train(training, tmp_path / "uncut"))
     assert uncut == weights(tmp_path / "uncut/best.safetensors")
-    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr(training_callback, "CHECKPOINT_EVERY", 0.0)
     with pytest.raises(KeyboardInterrupt):
         train(training, tmp_path / "cut", callbacks=[ConvertCallback(interrupt)])
     assert weights(train(training, tmp_path / "cut")) == uncut
@@ -90,7 +92,7 @@ def test_the_network_comes_to_say_what_the_teacher_says_and_the_critic_warms_up_
     policy = learner.policy
     before = policy.error(policy.answers_of(columns), labels).mean().item()
     with one_thread():
-        imitate(training, learner, TrainingLog())
+        imitate(training, learner, TrainingLog(), generator(training.seed, "imitation"))
     assert policy.error(policy.answers_of(columns), labels).mean().item() < 0.8 * before
     imitated = {name: tensor.tobytes() for name, tensor in tensors_of(learner.policy).items()}
     shorter = training.replace(agent_steps=320)

@@ -23,7 +23,7 @@ from swarm_logistics_env import Scenario, policies, run_episode
 from swarm_logistics_env.core.errors import SwarmLogisticsError, TrainingError
 from swarm_logistics_env.policies.learned import LearnedPolicy, PolicyCard
 from swarm_logistics_env.study.tasks.warehouse_task import WAREHOUSE, WarehouseTask
-from swarm_logistics_env.train import trainer
+from swarm_logistics_env.train import training_callback
 from swarm_logistics_env.train.evaluation import versions
 from swarm_logistics_env.train.learner import (
     CHECKPOINT,
@@ -259,7 +259,7 @@ def test_a_training_whose_numbers_are_not_finite_ends_in_a_sentence_and_keeps_th
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("own_reward.py").write_text(OWN_REWARD)
-    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr(training_callback, "CHECKPOINT_EVERY", 0.0)
     if not fields:
         spoil_observations(monkeypatch)
     settings = {name: value for name, value in fields.items() if name != "rewards"}
@@ -297,7 +297,7 @@ def test_a_training_on_a_full_disk_ends_in_a_sentence_and_goes_on_when_there_is_
     writer: str,
     name: str,
 ) -> None:
-    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr(training_callback, "CHECKPOINT_EVERY", 0.0)
     save, saved = save_checkpoint, list[bytes]()
     with monkeypatch.context() as changed:
 
@@ -306,7 +306,7 @@ def test_a_training_on_a_full_disk_ends_in_a_sentence_and_goes_on_when_there_is_
             saved.append((tmp_path / CHECKPOINT).read_bytes())
             changed.setattr(pkgutil.resolve_name(writer), name, full)
 
-        changed.setattr(trainer, "save_checkpoint", save_and_fill)
+        changed.setattr(training_callback, "save_checkpoint", save_and_fill)
         with pytest.raises(TrainingError, match="No space left on device"):
             train(small(), tmp_path)
     assert saved[-1] == (tmp_path / CHECKPOINT).read_bytes()
@@ -322,7 +322,8 @@ def test_a_missing_library_is_told_before_anything_is_written(
     package: str,
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
-    monkeypatch.delitem(sys.modules, "swarm_logistics_env.train.trainer")
+    for module in ("trainer", "training_callback"):
+        monkeypatch.delitem(sys.modules, f"swarm_logistics_env.train.{module}")
     assert app.run(["train", "delivery", "--out", str(tmp_path / "out")]) == 2
     printed = capsys.readouterr().err
     assert package in printed
@@ -351,7 +352,7 @@ def test_where_the_rate_begins_anew_adam_does_too_also_in_a_training_that_goes_o
             raise KeyboardInterrupt
         return True
 
-    monkeypatch.setattr(trainer, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr(training_callback, "CHECKPOINT_EVERY", 0.0)
     with pytest.raises(KeyboardInterrupt):
         train(training, tmp_path / "cut", callbacks=[ConvertCallback(interrupt)])
     assert n_decisions == [2] * training.rows

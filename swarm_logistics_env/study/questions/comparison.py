@@ -131,6 +131,20 @@ class Comparison:
         return self.original.case.scenario.n_robots
 
     @property
+    def change(self) -> str:
+        """What changes, as the answer of a study has it, e.g. "FM4, 1 of 25"."""
+        after = self.changed.setting
+        if after.condition:
+            return f"to {after.name}, {after.condition}"
+        if after.kind == "fault":
+            start = f" from {after.onset:g} s" if after.onset else ""
+            return f"{after.name}{start}, {after.value:g} of {self.n_robots}"
+        if after.kind == "policy":
+            return f"with {after.name}"
+        name = "N" if after.kind == "size" else after.name
+        return f"{name} {self.original.setting.value:g}→{after.value:g}"
+
+    @property
     def label(self) -> str:
         """The step in words, e.g. "N 5 -> 10" or "FM1, m = 2"."""
         before = self.original.setting

@@ -137,6 +137,14 @@ class Plan:
             return performance.words if performance else self.specification.played.performance
         return f"{self.origin.performance!r} of {self.origin.file}"
 
+    @property
+    def unusual_engine(self) -> str:
+        """What moves the bodies; empty: what usually does in this task."""
+        task = self.specification.played
+        world = world_of(task)
+        engine = world.engine(self.specification.scenario)
+        return "" if engine == world.engine(task.default) else engine
+
     def __str__(self) -> str:
         n_cells = len(self.cells)
         n_cases = len(self.cases)

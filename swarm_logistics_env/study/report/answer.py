@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from more_itertools import map_reduce
@@ -18,21 +18,8 @@ from swarm_logistics_env.study.verdicts.verdict import (
 
 from . import section
 from .answer_notes import notes
-from .performances import (
-    condition_in_words,
-    p_alone,
-    performance_in_words,
-    sound_cells_of,
-    unusual_engine,
-)
-from .policies_compared import (
-    between_policies,
-    comparison_in_words,
-    factors,
-    has_no_name,
-    subject_of,
-    turns_in_words,
-)
+from .performances import performances
+from .policies_compared import compare_policies
 from .section import Section
 
 _MOST_WITH_SENTENCES = 2  # policies and tasks; more have a table, and sentences together
@@ -111,6 +98,7 @@ class Answer(NamedTuple):
     """What a study found.
 
     Attributes:
+        title: the study's name with its policies in front of it.
         comparison: by which factor P of two policies differs; empty: they are not compared.
         overview: P of each policy and task where there are many, and how that compares; None:
             there are few, and each has sentences of its own.
@@ -123,6 +111,7 @@ class Answer(NamedTuple):
         level: of the intervals, as a heading says; a line with another one says its own.
     """
 
+    title: str
     comparison: str
     overview: Section | None
     turns: str
@@ -190,35 +179,42 @@ class Answer(NamedTuple):
 
 def answer(results: StudyResults) -> Answer:
     """Return what a study found."""
+    policies = section.join_names(results.policies)
+    compared = compare_policies(results)
+    performance_of = performances(results)
     lines = list(_lines(results))
     level = _common_level(lines)
-    engine = unusual_engine(results)
-    subjects = []
-    for name, cell in sound_cells_of(results).items():
-        of_subject = [line for line in lines if line.subject == name]
-        subjects.append(
-            SubjectAnswer(
-                name,
-                performance_in_words(results, cell) + engine,
-                p_alone(cell),
-                condition_in_words(results, cell),
-                tuple(_sentences(of_subject, level)),
-            )
+    subjects = tuple(
+        SubjectAnswer(
+            name,
+            *performance,
+            tuple(_sentences([line for line in lines if line.subject == name], level)),
         )
+        for name, performance in performance_of.items()
+    )
     if not subjects:
-        policies = section.join_names(results.policies)
-        subjects = [SubjectAnswer(policies, "P: no run has succeeded", section.NOTHING, "", ())]
+        subjects = (SubjectAnswer(policies, "P: no run has succeeded", section.NOTHING, "", ()),)
     return Answer(
-        comparison_in_words(results),
-        _overview(results, subjects),
-        turns_in_words(results),
+        _title(results, policies),
+        compared.sentence,
+        _overview(results, subjects, compared.factors),
+        compared.turns,
         _scope(results),
-        tuple(subjects),
+        subjects,
         tuple(lines),
         notes(results, level),
         results.seeds_text,
         level,
     )
+
+
+def _title(results: StudyResults, policies: str) -> str:
+    """Return the study's name with its policies in front of it, e.g. "homing: study 'paper'"."""
+    name = results.plan.specification.name
+    if policies == name:  # of trials: nobody named it
+        return f"Study {name!r}"
+    n_policies = len(results.policies)
+    return f"{policies if n_policies < 4 else f'{n_policies} policies'}: study {name!r}"
 
 
 def _common_level(lines: Sequence[Line]) -> str:
@@ -227,7 +223,11 @@ def _common_level(lines: Sequence[Line]) -> str:
     return levels.most_common(1)[0][0] if levels else section.P_LEVEL
 
 
-def _overview(results: StudyResults, subjects: Sequence[SubjectAnswer]) -> Section | None:
+def _overview(
+    results: StudyResults,
+    subjects: Sequence[SubjectAnswer],
+    factors: Mapping[str, tuple[str, str]],
+) -> Section | None:
     """Return P of each policy and task, and its factor to the first policy; None: they are few."""
     if len(subjects) <= _MOST_WITH_SENTENCES:
         return None
@@ -238,10 +238,10 @@ def _overview(results: StudyResults, subjects: Sequence[SubjectAnswer]) -> Secti
         rows = [[subject.name, subject.p] for subject in subjects]
     else:
         rows = [[f"{subject.name}, {subject.condition}", subject.p] for subject in subjects]
-    if by_subject := factors(results):
+    if factors:
         columns += ["times the first", ""]
         for row, subject in zip(rows, subjects):
-            row += by_subject.get(subject.name, ("", ""))
+            row += factors.get(subject.name, ("", ""))
     return Section("", tuple(columns), tuple(map(tuple, rows)))
 
 
@@ -250,8 +250,8 @@ def _lines(results: StudyResults) -> Iterator[Line]:
     lines = []
     for number, verdict in enumerate(results.verdicts):
         comparison = verdict.compared
-        subject = subject_of(results, comparison.original.case, comparison.policy)
-        question = section.question_of(verdict)
+        subject = results.subjects[comparison.original.case].name
+        question = verdict.question
         if verdict.compares_policies:
             subject = f"{verdict.after.name} against {subject}"
             question = f"P of {verdict.after.name}, {verdict.after.condition}"
@@ -282,14 +282,13 @@ def _p_before_and_after(results: StudyResults, verdict: Verdict) -> str:
     """Return the means of P that a value comes of, over its seeds; empty: not played."""
     comparison = verdict.compared
     estimate = verdict.estimate
-    cells = results.cells_of(comparison)
     arms = (comparison.removed or comparison.original, comparison.changed)
-    if not all(cells[arm].n_seeds for arm in arms):
+    cells = [verdict.cells[arm] for arm in arms]
+    if not all(cell.n_seeds for cell in cells):
         return ""
+    before, after = (f"{cell.by_seed.mean():.3g}" for cell in cells)
     # Until it is clear, conditions may be played further than this question looks.
-    n_seeds = estimate.n_seeds if estimate and results.looks else None
-    before, after = (f"{cells[arm].by_seed[..., :n_seeds].mean():.3g}" for arm in arms)
-    seeds = f" ({n_seeds} seeds)" if n_seeds else ""
+    seeds = f" ({estimate.n_seeds} seeds)" if estimate and results.looks else ""
     if comparison.removed:
         return f"P without them {before}, with them {after}{seeds}"
     return f"P {before}→{after}{seeds}"
@@ -301,9 +300,7 @@ def _sentences(lines: Sequence[Line], level: str) -> Iterator[str]:
         lines, lambda line: line.verdict.compared.indicator
     )
     for indicator, alike in by_indicator.items():
-        compared = between_policies([line.verdict for line in alike])
-        questions = [line for line in alike if line.verdict not in compared]
-        if questions:
+        if questions := [line for line in alike if not line.verdict.compares_policies]:
             yield _sentence(DEFINITIONS[indicator].heading, questions, level)
 
 
@@ -351,7 +348,7 @@ def _scope(results: StudyResults) -> str:
     policies = results.policies
     origin = results.plan.origin
     policies_text = policies[0] if len(policies) == 1 else f"{len(policies)} policies"
-    if origin and has_no_name(results):
+    if origin and results.names_no_policy:
         policies_text = f"trials of {origin.file}"
     seeds = results.seeds_text.split(" (")[0]
     if any(cell.problem for cell in results.cells):

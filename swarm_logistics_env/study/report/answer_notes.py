@@ -148,7 +148,7 @@ def _notes_that_apply(results: StudyResults) -> Iterator[str]:
 
 def _delivers_little(results: StudyResults) -> bool:
     """Return whether swarms that are as they should be, and count, deliver hardly anything."""
-    originals = [results.cells_of(v.compared)[v.compared.original] for v in results.verdicts]
+    originals = [verdict.cells[verdict.compared.original] for verdict in results.verdicts]
     return any(
         cell.n_seeds and counted_in(cell.arm.case) and cell.mean.value < _FEW_ITEMS
         for cell in originals

@@ -105,12 +105,11 @@ def played_cells(results: StudyResults, half: str) -> list[PlayedCell]:
     for verdict in results.verdicts:
         comparison = verdict.compared
         if comparison.table.startswith(half):
-            cells = results.cells_of(comparison)
-            for cell in cells.values():
+            for cell in verdict.cells.values():
                 if cell.problem:
                     problem = f"{cell.arm.setting.name}, {comparison.table}: {cell.problem}"
                     raise StudyError(f"{problem}, so there is no score")
-            pair = cells[comparison.original], cells[comparison.changed]
+            pair = verdict.cells[comparison.original], verdict.cells[comparison.changed]
             title = f"{comparison.table}: {words[comparison.table]}"
             played.append(PlayedCell(title, *pair))
     return played

@@ -10,7 +10,6 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 
 from .answer import Answer, answer
 from .answer_notes import warnings
-from .drawing import Point
 from .fault_sections import fault_sections
 from .figures import (
     forest_figure,
@@ -20,7 +19,8 @@ from .figures import (
     trade_off_figure,
 )
 from .for_a_paper import PaperTables, paper_tables
-from .section import Figure, Section, join_names
+from .points import Point
+from .section import Figure, Section
 from .sentences import sentence, verdict_sections
 from .set_up import methods, setup_sheet
 from .single_runs import SingleRuns, single_runs
@@ -42,7 +42,7 @@ class Document(NamedTuple):
     """The whole report: all that is written, and nothing that is still to be asked.
 
     Attributes:
-        title, text: its heading and the sentences below it.
+        text: the sentences below its heading, which the answer has.
         answer: what the study found.
         points: the value of each line of the answer, as it is drawn.
         chapters: its parts, in order.
@@ -51,7 +51,6 @@ class Document(NamedTuple):
         cells, claims: P of every condition and every verdict, a row each.
     """
 
-    title: str
     text: tuple[str, ...]
     answer: Answer
     points: tuple[Point, ...]
@@ -87,18 +86,26 @@ class Document(NamedTuple):
 def document(results: StudyResults) -> Document:
     """Return the report on a study's results."""
     plan = results.plan
+    text = tuple(_text(results))
     study_answer = answer(results)
     lines = tuple(warnings(results))
     sentences = [sentence(results, verdict) for verdict in results.verdicts]
+    verdicts_in_words = tuple(verdict_sections(results.verdicts, sentences))
     points = forest_points(results, study_answer)
     figures = (
         *policies_figure(results),
         forest_figure(results, study_answer, points),
         *indicator_figures(results),
     )
-    of_faults = tuple(fault_sections(tuple(resiliences(results)), results.seeds_text))
+    trade_off = tuple(Section("", figures=(figure,)) for figure in trade_off_figure(results))
+    runs = single_runs(results, sentences)
+    measures = tuple(resiliences(results))
+    of_faults = tuple(fault_sections(measures, results.seeds_text))
+    tables = tuple(cell_tables(results))
     paper_sections = tuple(cell_tables(results, for_paper=True))
     further = tuple(further_tables(results))
+    how = Section("", lines=(methods(plan, results.looks),))
+    set_up = setup_sheet(plan)
     chapters = [
         Chapter("Warnings", "", (Section("Warnings", lines=lines),) if lines else ()),
         Chapter(
@@ -110,46 +117,35 @@ def document(results: StudyResults) -> Document:
             "Verdicts",
             "One sentence per question. Verdicts are Holm-adjusted; the family is all comparisons "
             "of one indicator for one policy.",
-            tuple(verdict_sections(results.verdicts, sentences)),
+            verdicts_in_words,
         ),
         Chapter(
             "Results",
             f"P is {plan.what_p_is}. Square brackets hold intervals at the "
             "level that the heading gives, or at that behind them; "
             '"one run" is where a single further run falls.',
-            (*cell_tables(results), *further),
+            (*tables, *further),
         ),
         Chapter(
             "Beyond the paper",
             "Measures that the paper does not define; none of them enters a verdict above.",
-            (*(Section("", figures=(f,)) for f in trade_off_figure(results)), *of_faults),
+            (*trade_off, *of_faults),
         ),
-        Chapter("Set-up", "", setup_sheet(plan)),
-        Chapter("Methods", "", (Section("", lines=(methods(plan, results.looks),)),)),
+        Chapter("Set-up", "", set_up),
+        Chapter("Methods", "", (how,)),
     ]
     report = Document(
-        _title(results),
-        tuple(_text(results)),
+        text,
         study_answer,
         points,
         tuple(chapter for chapter in chapters if chapter.sections),
         paper_tables(results, study_answer, (*paper_sections, *further, *of_faults)),
-        single_runs(results, sentences),
+        runs,
         results.cell_table,
         results.verdict_table,
     )
     _make_names_differ(report.figures)
     return report
-
-
-def _title(results: StudyResults) -> str:
-    """Return the study's name with its policies in front of it, e.g. "homing: study 'paper'"."""
-    policies = results.policies
-    name = results.plan.specification.name
-    if policies == (name,):  # of trials: nobody named it
-        return f"Study {name!r}"
-    names = join_names(policies) if len(policies) < 4 else f"{len(policies)} policies"
-    return f"{names}: study {name!r}"
 
 
 def _text(results: StudyResults) -> Iterator[str]:

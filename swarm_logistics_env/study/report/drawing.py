@@ -11,12 +11,13 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from textwrap import wrap
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
+
+from .points import Panel, Point, axis_limits, has_far_values
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,6 @@ _LETTERS_OF_AN_INCH = 16.0  # of a note
 _LINE_HEIGHT = 0.15  # inch, of a note
 _WIDEST = 30.0  # times the smallest P, up to which an axis of P is linear
 _MARGIN = 1.5  # of a logarithmic axis, to both sides
-_FAR = 5.0  # an indicator from which on axes are linear up to 1 alone, and logarithmic beyond
 _STYLE: Any = {  # matplotlib types each of its names
     "axes.edgecolor": INK, "axes.labelcolor": INK, "text.color": INK, "grid.color": INK,
     "xtick.color": INK, "ytick.color": INK, "axes.facecolor": "none",
@@ -149,46 +149,6 @@ def _matplotlib() -> ModuleType:
     return mpl
 
 
-class Point(NamedTuple):
-    """One value with its interval.
-
-    Attributes:
-        series: label of its series.
-        style: index of its colour and marker.
-        category: where it stands on the axis.
-        value, low, high: None: missing.
-        published: a cross beside it; None: none.
-        decided: whether it is filled.
-        saturated: whether it is marked.
-        link: id of its marks in the SVG: what a click on them shows in the page, "question-7" or
-            "condition-3"; empty: nothing.
-        runs: single runs, drawn as dots, seed by seed; None: missing.
-    """
-
-    series: str
-    style: int
-    category: str
-    value: float | None
-    low: float | None
-    high: float | None
-    published: float | None = None
-    decided: bool = False
-    saturated: bool = False
-    link: str = ""
-    runs: tuple[float | None, ...] = ()
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One pair of axes: series over shared categories, and thresholds."""
-
-    title: str
-    y_label: str
-    points: tuple[Point, ...]
-    thresholds: tuple[float, ...]
-    x_label: str
-
-
 def intervals(canvas: Canvas, panels: Sequence[Panel]) -> None:
     """Draw values with their intervals over categories, one panel below the other."""
     grid = canvas.subplots(len(panels), 1, squeeze=False)
@@ -220,7 +180,7 @@ def _panel(axes: Axes, panel: Panel) -> None:
     width = axes.bbox.width / axes.figure.dpi
     if sum(len(category) + 2 for category in categories) > 20 * width:
         axes.tick_params(axis="x", rotation=40)
-    axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=limits(panel.points))
+    axes.set(xlim=(-0.6, len(categories) - 0.4), ylim=axis_limits(panel.points))
     if not panel.thresholds:  # P is never below 0
         axes.set_ylim(bottom=0.0)
         _stretch(axes, panel.points)
@@ -229,26 +189,6 @@ def _panel(axes: Axes, panel: Panel) -> None:
         axes.yaxis.set_major_formatter("{x:g}")
         axes.set_ylim(*(_MARGIN * end for end in axes.get_ylim()))
     axes.set(ylabel=panel.y_label, xlabel=panel.x_label, title=panel.title)
-
-
-def limits(points: Sequence[Point]) -> tuple[float, float]:
-    """Return axis limits: 0, all values, and intervals up to twice the values' span beyond."""
-    values = [0.0, *(x for p in points for x in (p.value, p.published) if x is not None)]
-    values += [p for point in points for p in point.runs if p is not None]
-    ends = [*values, *(x for p in points for x in (p.low, p.high) if x is not None)]
-    reach = max(2.0 * (max(values) - min(values)), 1.0)
-    low = max(min(ends), min(values) - reach)
-    high = min(max(ends), max(values) + reach)
-    margin = 0.06 * max(high - low, 0.5)
-    return low - margin, high + margin
-
-
-def cuts_intervals(points: Sequence[Point]) -> bool:
-    """Return whether an interval ends beyond the axis that shows these values."""
-    low, high = limits(points)
-    lows = [point.low for point in points if point.low is not None]
-    highs = [point.high for point in points if point.high is not None]
-    return min(lows, default=low) < low or max(highs, default=high) > high
 
 
 def _stretch(axes: Axes, points: Sequence[Point]) -> None:
@@ -276,11 +216,6 @@ def make_logarithmic(axes: Axes) -> None:
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_locator(NullLocator())
-
-
-def has_far_values(points: Sequence[Point]) -> bool:
-    """Return whether indicators are so large that others would lie on a heap at 0."""
-    return any(abs(point.value) > _FAR for point in points if point.value is not None)
 
 
 _GOLDEN = 0.618034  # spreads any number of dots evenly
@@ -365,7 +300,7 @@ def _forest(axes: Axes, rows: Rows) -> None:
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
     all_points = [point for _, points in rows for point in points]
-    axes.set_xlim(limits(all_points))
+    axes.set_xlim(axis_limits(all_points))
     is_of_indicators = any(point.published is not None for point in all_points)
     if is_of_indicators and has_far_values(all_points):
         axes.set_xscale("symlog", linthresh=1.0)

@@ -19,8 +19,7 @@ from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 
 from . import drawing
 from .answer import Answer
-from .drawing import Panel, Point
-from .policies_compared import between_policies, condition_of, has_no_name
+from .points import Panel, Point, cuts_intervals
 from .section import P_LEVEL, Figure, join_names, levels, slug
 
 if TYPE_CHECKING:
@@ -74,24 +73,25 @@ def policies_figure(results: StudyResults) -> Iterator[Figure]:
     """Yield P of policies that are compared, in every condition; a panel for each task."""
     import pandas as pd
 
-    compared = between_policies(results.verdicts)
+    compared = results.on_policies
     if not compared:
         return
     keys = list(dict.fromkeys(arm.case.key for _, _, arm in results.plan.cells))
     policies = list(dict.fromkeys([compared[0].after.name, *(v.compared.policy for v in compared)]))
     points: dict[str, dict[str, Point]] = {}  # each condition of a policy once, by the task
     for verdict in compared:
-        task = condition_of(verdict).removesuffix(verdict.after.condition).strip()
-        cells = results.cells_of(verdict.compared)
-        for arm in (verdict.compared.changed, verdict.compared.original):
+        comparison = verdict.compared
+        task = results.subjects[comparison.original.case].task
+        for arm in (comparison.changed, comparison.original):
+            cell = results.cells_by_key[comparison.policy, comparison.table, arm]
             policy = arm.case.policy.title
             points.setdefault(task, {})[arm.case.key] = Point(
                 policy,
                 policies.index(policy),
                 verdict.after.condition,
-                *cells[arm].mean,
+                *cell.mean,
                 decided=True,
-                saturated=cells[arm].saturated,
+                saturated=cell.saturated,
                 link=f"condition-{keys.index(arm.case.key)}",
             )
     panels = tuple(
@@ -128,7 +128,7 @@ def indicator_figures(results: StudyResults) -> Iterator[Figure]:
         symbols = [definition.symbol for definition in definitions]
         names = list(dict.fromkeys(v.compared.policy for v in verdicts))
         policies = join_names(names)
-        is_of_one = len(names) == 1 and not has_no_name(results)
+        is_of_one = len(names) == 1 and not results.names_no_policy
         first_title = f"{policies}: {condition}" if is_of_one else condition
         panels[0] = replace(panels[0], title=first_title)
         has_published = any(verdict.published is not None for verdict in verdicts)
@@ -193,9 +193,9 @@ def _by_figure(results: StudyResults) -> dict[tuple[str, FactorKind, float, int]
         swarm = verdict.compared.n_robots if after.kind == "fault" else 0
         return verdict.compared.table, after.kind, after.onset, swarm
 
-    compared = between_policies(results.verdicts)  # P itself is drawn of these
+    # P itself is drawn of those on policies.
     by_value: dict[tuple[str, ...], list[Verdict]] = map_reduce(
-        (verdict for verdict in results.verdicts if verdict not in compared),
+        (verdict for verdict in results.verdicts if not verdict.compares_policies),
         lambda verdict: (*verdict.compared.family, verdict.compared.table, verdict.compared.label),
     )
     # The verdict on the lowest threshold shows the value for them all.
@@ -295,7 +295,7 @@ def note_on_verdicts(results: StudyResults, verdicts: Sequence[Verdict]) -> str:
     """Return what the marks of verdicts mean, and over which seeds they are."""
     caps = f" {CAPPED}" if any(verdict.saturated for verdict in verdicts) else ""
     points = [_point(results, verdict, "", None) for verdict in verdicts]
-    cut = ", without an end where they leave the axis" if drawing.cuts_intervals(points) else ""
+    cut = ", without an end where they leave the axis" if cuts_intervals(points) else ""
     return (
         f"{results.seeds_text.capitalize()}. Bars: {levels(verdicts)} intervals{cut}; filled: "
         "decided by Holm's method; hollow: open, even where the bar lies beside a threshold; "

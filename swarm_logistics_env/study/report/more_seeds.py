@@ -11,8 +11,6 @@ from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.until_clear import MOST_SEEDS_UNTIL_CLEAR
 from swarm_logistics_env.study.verdicts.verdict import POWER, Verdict
 
-from . import section
-
 EFFECT = 0.1  # the smallest for which more seeds are worth while
 _MOST_NAMED = 3  # questions
 # What questions need, by the case that applies to them.
@@ -85,9 +83,7 @@ def _need(verdict: Verdict, reach: int) -> tuple[str, int | None]:
 def _named(questions: Sequence[tuple[Verdict, int | None]]) -> str:
     """Return the first of some questions with the seeds that each needs."""
     names = [
-        section.question_of(verdict)
-        if n_seeds is None
-        else f"{section.question_of(verdict)}: {n_seeds}"
+        verdict.question if n_seeds is None else f"{verdict.question}: {n_seeds}"
         for verdict, n_seeds in questions[:_MOST_NAMED]
     ]
     left = len(questions) - len(names)

@@ -18,8 +18,8 @@ from swarm_logistics_env.study.verdicts.verdict import Verdict
 from . import drawing
 from .answer import Answer
 from .document import Document
-from .drawing import Panel, Point
 from .inline_svg import inline
+from .points import Panel, Point, axis_limits, has_far_values
 from .section import bracketed, digits_of, ratio, width_of
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def _forest(answer: Answer, points: Sequence[Point]) -> tuple[list[str], str]:
     Args:
         points: the value of each line.
     """
-    axis = _Axis(*drawing.limits(points), drawing.has_far_values(points))
+    axis = _Axis(*axis_limits(points), has_far_values(points))
     drawn = [_row(axis, point, line.verdict) for point, line in zip(points, answer.lines)]
     numbers = "".join(
         f'{axis.upright(tick, 14, 18, "axis")}<text x="{axis.place(tick)}" y="11">{tick:g}</text>'

@@ -3,25 +3,59 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from more_itertools import map_reduce
 
 from swarm_logistics_env.study.questions.comparison import CONFIDENCE
-from swarm_logistics_env.study.tasks.task_world import counted_in, world_of
+from swarm_logistics_env.study.tasks.task_world import counted_in
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 
 from . import section
-from .policies_compared import subject_of
 
 
-def sound_cells_of(results: StudyResults) -> dict[str, Cell]:
+class Performance(NamedTuple):
+    """P of a policy, in one task, where the swarm is as it should be.
+
+    Attributes:
+        in_words: e.g. "P [95 %] = 40.0 [39.5, 40.5] items in 500 s, N = 25, no fault".
+        p: P alone, with its interval.
+        condition: where that is, e.g. "N = 25, no fault".
+    """
+
+    in_words: str
+    p: str
+    condition: str
+
+
+def performances(results: StudyResults) -> dict[str, Performance]:
+    """Return P of each policy and task where the swarm is as it should be."""
+    sound_cells = _sound_cells(results)
+    means = {subject: section.mean_p(cell) for subject, cell in sound_cells.items()}
+    engine = results.plan.unusual_engine
+    behind = f", engine {engine}" if engine else ""
+    by_subject = {}
+    for subject, cell in sound_cells.items():
+        case = cell.arm.case
+        has_interval = _counts_anything(cell) and cell.mean.low is not None
+        level = f" [{section.P_LEVEL}]" if has_interval else ""
+        text = f"{results.plan.name_of_p}{level} = {_mean_in_words(cell, means[subject])}"
+        if counted := counted_in(case):
+            text += f" {counted} in {case.scenario.duration:g} s"
+        condition = _condition(results, cell)
+        p = _p_alone(cell, means[subject])
+        by_subject[subject] = Performance(f"{text}, {condition}{behind}", p, condition)
+    return by_subject
+
+
+def _sound_cells(results: StudyResults) -> dict[str, Cell]:
     """Return the cell of each policy and task where the swarm is as it should be."""
     played = [cell for cell in results.cells if cell.n_seeds]
     conditions = [cell for cell in played if cell.arm.setting.kind != "policy"]
     sound_cells: dict[str, Cell] = {}
     by_subject: dict[str, list[Cell]] = map_reduce(
-        conditions, lambda cell: subject_of(results, cell.arm.case, cell.policy)
+        conditions, lambda cell: results.subjects[cell.arm.case].name
     )
     for subject, cells in by_subject.items():
         # Where the swarm is as it should be, or else in the first condition.
@@ -41,26 +75,7 @@ def sound_cells_of(results: StudyResults) -> dict[str, Cell]:
     return {subject: sound_cells[subject] for subject in sorted(sound_cells, key=place)}
 
 
-def unusual_engine(results: StudyResults) -> str:
-    """Return what moves the bodies, behind a comma; empty: what usually does."""
-    task = results.plan.specification.played
-    world = world_of(task)
-    engine = world.engine(results.plan.specification.scenario)
-    return "" if engine == world.engine(task.default) else f", engine {engine}"
-
-
-def performance_in_words(results: StudyResults, cell: Cell) -> str:
-    """Return P of a policy in words, e.g. "P [95 %] = 40.0 [39.5, 40.5] items in 500 s, N = 25"."""
-    case = cell.arm.case
-    has_interval = _counts_anything(cell) and cell.mean.low is not None
-    level = f" [{section.P_LEVEL}]" if has_interval else ""
-    performance = f"{results.plan.name_of_p}{level} = {_mean(cell)}"
-    if counted := counted_in(case):
-        performance += f" {counted} in {case.scenario.duration:g} s"
-    return f"{performance}, {condition_in_words(results, cell)}"
-
-
-def condition_in_words(results: StudyResults, cell: Cell) -> str:
+def _condition(results: StudyResults, cell: Cell) -> str:
     """Return where P of a policy is told, e.g. "N = 25, no fault"."""
     setting = cell.arm.setting
     task = results.plan.specification.played
@@ -79,21 +94,20 @@ def _counts_anything(cell: Cell) -> bool:
     return bool(cell.by_seed.any() or cell.arm.case.performance)
 
 
-def p_alone(cell: Cell) -> str:
-    """Return mean P for a table."""
+def _p_alone(cell: Cell, mean: str) -> str:
+    """Return mean P for a table; where nothing was delivered, the upper limit of a Poisson mean."""
     if _counts_anything(cell):
-        return section.mean_p(cell)
+        return mean
     return f"0 (at most {-math.log(1.0 - CONFIDENCE) / cell.n_seeds:.2f})"
 
 
-def _mean(cell: Cell) -> str:
-    """Return mean P; where nothing was delivered, with the upper limit of a Poisson mean."""
+def _mean_in_words(cell: Cell, mean: str) -> str:
+    """Return mean P with what limits it."""
     if not _counts_anything(cell):
         reason = f"as none of {cell.n_seeds} runs delivered anything"
         if cell.problem:
             reason += f"; {cell.problem}"
-        return f"{p_alone(cell).removesuffix(')')} at {section.P_LEVEL}, {reason})"
-    mean = section.mean_p(cell)
+        return f"{_p_alone(cell, mean).removesuffix(')')} at {section.P_LEVEL}, {reason})"
     if cell.problem:
         mean += f" ({cell.problem} and do not count)"
     if any(outcome.all_delivered for outcome in cell.outcomes):

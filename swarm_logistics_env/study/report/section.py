@@ -20,7 +20,8 @@ from swarm_logistics_env.study.verdicts.verdict import DECIDED, Verdict
 if TYPE_CHECKING:
     import pandas as pd
 
-    from .drawing import Draw, Panel
+    from .drawing import Draw
+    from .points import Panel
 
 SATURATED = "†"
 _SAME = 1e-9  # a value so near a threshold differs from it by rounding alone
@@ -205,25 +206,6 @@ def ratio(verdict: Verdict, *, names_level: bool = True) -> str:
     if estimate is not None and estimate.collapsed is not None:
         text += f" ({estimate.collapsed})"
     return text
-
-
-def question_of(verdict: Verdict) -> str:
-    """Return what a verdict answers, e.g. "R FM4, 1 of 25"."""
-    comparison = verdict.compared
-    after = verdict.after
-    if after.condition:
-        return f"{comparison.indicator} to {after.name}, {after.condition}"
-    if after.kind == "fault":
-        start = f" from {after.onset:g} s" if after.onset else ""
-        change = f"{after.name}{start}, {after.value:g} of {comparison.n_robots}"
-    elif after.kind == "policy":
-        change = f"with {after.name}"
-    else:
-        name = "N" if after.kind == "size" else after.name
-        change = f"{name} {comparison.original.setting.value:g}→{after.value:g}"
-    if verdict.property_name != comparison.definition.adjectives.get(0.0):
-        change += f", {verdict.property_name}"
-    return f"{comparison.indicator} {change}"
 
 
 def word_to_count(verdict: Verdict, word: str) -> str:

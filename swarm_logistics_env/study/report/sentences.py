@@ -13,7 +13,6 @@ from swarm_logistics_env.study.questions.comparison import Family
 from swarm_logistics_env.study.verdicts.results import StudyResults
 from swarm_logistics_env.study.verdicts.verdict import Verdict
 
-from .policies_compared import subject_of
 from .section import SATURATED, Section, Sentence, bracketed, fixed, limits, percent
 
 # What limits a verdict, by the flag of its estimate.
@@ -64,7 +63,7 @@ def sentence(results: StudyResults, verdict: Verdict) -> Sentence:
     swarm = f", N = {comparison.n_robots}"
     if comparison.original.setting.kind in ("size", "policy"):
         swarm = ""
-    subject = subject_of(results, comparison.original.case, comparison.policy)
+    subject = results.subjects[comparison.original.case].name
     head = f"{subject}, {verdict.property_name}? {comparison.label}{swarm}."
     text = " ".join(_parts(results, verdict))
     return Sentence(head, text, verdict.conclusion, verdict.in_words)

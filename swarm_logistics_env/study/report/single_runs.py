@@ -17,8 +17,8 @@ from swarm_logistics_env.study.tasks.task_world import p_of, world_of
 from swarm_logistics_env.study.verdicts.cell import Cell
 from swarm_logistics_env.study.verdicts.results import StudyResults
 
-from .drawing import Panel, Point
 from .figures import X_LABELS
+from .points import Panel, Point
 from .section import P_LEVEL, Sentence
 
 Json: TypeAlias = dict[str, JsonValue]

@@ -100,7 +100,7 @@ def markdown(document: Document, *, pictures: str | None = None, note: str = "")
         pictures: folder of the drawings beside the report; None: there are none.
         note: a sentence to put below the title.
     """
-    lines = [f"# {document.title}", ""]
+    lines = [f"# {document.answer.title}", ""]
     for paragraph in (*document.text, note):
         lines += [_inert(paragraph), ""] if paragraph else []
     answer = document.answer

@@ -249,7 +249,8 @@ def _indicators(gate: Gate, new: StudyResults) -> Iterator[tuple[str, _Found]]:
         name = f"{comparison.policy}: {comparison.indicator}, {label}"
         if gate.at not in name:
             continue
-        cells = new.cells_of(comparison)
+        policy, table = comparison.policy, comparison.table
+        cells = {arm: new.cells_by_key[policy, table, arm] for arm in comparison.arms}
         margin = new.plan.specification.margin
         verdict = judge_comparison(comparison, cells, paired=new.plan.paired, margin=margin)
         estimate = verdict.estimate

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from swarm_logistics_env.study.questions.comparison import Arm, Comparison
 from swarm_logistics_env.study.questions.declaration import Declaration
 from swarm_logistics_env.study.questions.plan import CellKey, Plan
 from swarm_logistics_env.study.questions.specification import seeds_in_words
 from swarm_logistics_env.study.tasks.outcome import Outcome
-from swarm_logistics_env.study.tasks.task import Outcomes
+from swarm_logistics_env.study.tasks.task import Case, Outcomes
+from swarm_logistics_env.study.tasks.warehouse_task import RecordedScenario
 
 from .agreement import Agreement, agreements
 from .cell import Cell
@@ -24,6 +25,23 @@ from .verdict import Verdict, adjust_families, judge_comparison, level_of
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+class Subject(NamedTuple):
+    """Whose swarm a question is about.
+
+    Attributes:
+        policy: its label; empty: the trials name none.
+        task: which of a file's tables the trials stand in; empty: they are of one, or played.
+    """
+
+    policy: str
+    task: str
+
+    @property
+    def name(self) -> str:
+        """Both, behind each other."""
+        return ", ".join(filter(None, self))
 
 
 @dataclass(frozen=True)
@@ -58,19 +76,35 @@ class StudyResults:
     damage: str | None = None
 
     @cached_property
-    def _cells_by_key(self) -> dict[CellKey, Cell]:
+    def cells_by_key(self) -> Mapping[CellKey, Cell]:
+        """The cells by policy, table and arm."""
         return {(cell.policy, cell.table, cell.arm): cell for cell in self.cells}
-
-    def cells_of(self, comparison: Comparison) -> dict[Arm, Cell]:
-        """Return the cells of a comparison's arms."""
-        policy = comparison.policy
-        table = comparison.table
-        return {arm: self._cells_by_key[policy, table, arm] for arm in comparison.arms}
 
     @property
     def policies(self) -> tuple[str, ...]:
         """Labels of the policies that are judged, the baseline first."""
         return tuple(dict.fromkeys(verdict.compared.policy for verdict in self.verdicts))
+
+    @property
+    def names_no_policy(self) -> bool:
+        """Whether recorded trials name no policy, so that it is called as their file."""
+        return bool(self.plan.origin) and self.policies == (self.plan.specification.name,)
+
+    @cached_property
+    def subjects(self) -> Mapping[Case, Subject]:
+        """Whose swarm each case is about."""
+        subjects = {}
+        for _, _, arm in self.plan.cells:
+            scenario = arm.case.scenario
+            task = scenario.table if isinstance(scenario, RecordedScenario) else ""
+            policy = "" if task and self.names_no_policy else arm.case.policy.title
+            subjects[arm.case] = Subject(policy, task)
+        return subjects
+
+    @cached_property
+    def on_policies(self) -> tuple[Verdict, ...]:
+        """The verdicts on P of a policy and of the first one."""
+        return tuple(verdict for verdict in self.verdicts if verdict.compares_policies)
 
     @cached_property
     def succeeded(self) -> Outcomes:

@@ -78,6 +78,7 @@ class Verdict:
 
     Attributes:
         compared: the comparison.
+        cells: P of its arms, by which it was judged.
         estimate: the indicator; None: undefined.
         problem: why it is undefined, e.g. by a failed run; None: it is not.
         equivalence: the test whether P is unchanged; None: undefined, or S, which has none.
@@ -96,6 +97,7 @@ class Verdict:
     """
 
     compared: Comparison
+    cells: Mapping[Arm, Cell]
     estimate: Estimate | None
     problem: str | None
     equivalence: Equivalence | None
@@ -153,6 +155,13 @@ class Verdict:
         is_below = self.claimed is False
         definition = self.compared.definition
         return definition.property_name(self.compared.threshold, claimed_below=is_below)
+
+    @property
+    def question(self) -> str:
+        """What it answers, e.g. "R FM4, 1 of 25"."""
+        question = f"{self.compared.indicator} {self.compared.change}"
+        is_usual = self.property_name == self.compared.definition.adjectives.get(0.0)
+        return question if is_usual or self.after.condition else f"{question}, {self.property_name}"
 
     @property
     def _property_is_a_fall(self) -> bool:
@@ -324,6 +333,7 @@ def judge_comparison(
     on_equivalence = Decision(unchanged.verdict if unchanged else UNDEFINED)
     return Verdict(
         comparison,
+        cells,
         estimate,
         "; ".join(problems) or None,
         unchanged,

@@ -61,7 +61,8 @@ def train_command(
 
 
 def _show_training(path: Path) -> None:
-    from swarm_logistics_env.train.trainer import BEST, PICTURE
+    from swarm_logistics_env.train.trainer import PICTURE
+    from swarm_logistics_env.train.training_callback import BEST
 
     card = read_card(path)
     rows = tuple(

@@ -52,11 +52,14 @@ def test_the_head_says_p_and_each_indicator_with_its_worst_value(stopped: StudyR
     lowest = min(stopped.verdicts, key=lambda verdict: verdict.value or 0.0)
     assert lowest.estimate is not None
     assert lowest.value is not None
-    cells = stopped.cells_of(lowest.compared)
+    comparison = lowest.compared
+    cells = [
+        stopped.cells_by_key[comparison.policy, comparison.table, arm] for arm in comparison.arms
+    ]
     # The value follows from the P beside it: other questions play these conditions further.
     n_seeds = lowest.estimate.n_seeds
-    before, after = (cells[arm].by_seed[:n_seeds].mean() for arm in lowest.compared.arms)
-    assert n_seeds < max(cell.n_seeds for cell in cells.values())
+    before, after = (cell.by_seed[:n_seeds].mean() for cell in cells)
+    assert n_seeds < max(cell.n_seeds for cell in cells)
     assert lowest.value == pytest.approx(after / before - (1.0 - 1 / 25))
     p = f"P {before:.3g}→{after:.3g}"
     assert f"; lowest at FM4, 1 of 25: {p} ({n_seeds} seeds), R {lowest.value:.2f} [" in robustness

@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from swarm_logistics_env.study.report import drawing
+from swarm_logistics_env.study.report.points import Panel, Point
 from tests.conftest import figures_drawn
 
 DRAW = """
@@ -49,8 +50,8 @@ def test_thirty_six_series_have_marks_of_their_own() -> None:
     assert len(marks) == 36
 
 
-POINT = drawing.Point("homing", 0, "N = 5", 4.0, 3.0, 6.0, decided=True)
-PANEL = drawing.Panel("P", "P", (POINT,), (1.0,), "N")
+POINT = Point("homing", 0, "N = 5", 4.0, 3.0, 6.0, decided=True)
+PANEL = Panel("P", "P", (POINT,), (1.0,), "N")
 
 
 @pytest.mark.parametrize(
@@ -75,9 +76,9 @@ def test_a_value_has_a_mark_and_each_of_its_intervals_a_bar(
 
 def test_a_legend_of_long_names_is_no_wider_than_its_figure() -> None:
     names = ("homing+charging", "homing-stock+charging", "ppo-robust+charging")
-    points = [drawing.Point(name, i, "N", 4.0, 3.0, 6.0, True) for i, name in enumerate(names)]
+    points = [Point(name, i, "N", 4.0, 3.0, 6.0, True) for i, name in enumerate(names)]
     canvas = Figure(figsize=(drawing.WIDTH, 3.0), layout="constrained")
-    drawing.intervals(canvas, [drawing.Panel("P", "P", tuple(points), (1.0,), "N")])
+    drawing.intervals(canvas, [Panel("P", "P", tuple(points), (1.0,), "N")])
     canvas.draw_without_rendering()
     assert canvas.legends[0].get_window_extent().x1 <= canvas.bbox.x1
 
@@ -96,11 +97,10 @@ def test_columns_of_a_forest_have_scales_of_their_own_and_one_legend() -> None:
 
 def drawn_scale(values: list[float], thresholds: tuple[float, ...]) -> str:
     points = tuple(
-        drawing.Point("homing", 0, f"N = {value:g}", value, value - 1.0, value + 1.0)
-        for value in values
+        Point("homing", 0, f"N = {value:g}", value, value - 1.0, value + 1.0) for value in values
     )
     canvas = Figure()
-    drawing.intervals(canvas, [drawing.Panel("", "", points, thresholds, "")])
+    drawing.intervals(canvas, [Panel("", "", points, thresholds, "")])
     (axes,) = canvas.axes
     low, high = axes.get_ylim()
     assert low <= min(values) <= max(values) < high
@@ -128,28 +128,8 @@ def test_a_run_of_0_has_its_dot_where_the_others_are_far_apart() -> None:
         POINT._replace(category="a", value=2.0, low=1.0, high=3.0, runs=(0.0, 4.0), link="a"),
         POINT._replace(category="b", value=200.0, low=190.0, high=210.0, link="b"),
     )
-    panel = drawing.Panel("", "", points, (), "")
+    panel = Panel("", "", points, (), "")
     with figures_drawn("svg"):
         svg = drawing.svg_image(lambda canvas: drawing.intervals(canvas, [panel]), 3.0)
     (dots,) = ElementTree.fromstring(svg).iterfind(".//*[@id='a-seeds-0-1']")
     assert len(list(dots.iterfind(".//{*}use"))) == 2
-
-
-@pytest.mark.parametrize(
-    ("points", "low", "high"),
-    [
-        ([POINT], 0.0, 6.0),
-        ([POINT._replace(value=-4.0, low=-6.0, high=-3.0)], -6.0, 0.0),
-        ([POINT._replace(published=9.0)], 0.0, 9.0),
-        ([POINT._replace(runs=(2.0, None, 7.0))], 0.0, 7.0),
-        ([POINT._replace(value=None, low=None, high=None)], 0.0, 0.0),
-        # An interval far from all values would hide them: a part of it is left out.
-        ([POINT._replace(value=2.0, low=-10.0, high=30.0)], -4.0, 6.0),
-        ([POINT._replace(value=0.1, low=-10.0, high=30.0)], -1.0, 1.1),
-    ],
-)
-def test_axes_hold_zero_all_values_and_a_margin(
-    points: list[drawing.Point], low: float, high: float
-) -> None:
-    margin = 0.06 * max(high - low, 0.5)
-    assert drawing.limits(points) == pytest.approx((low - margin, high + margin))

@@ -13,7 +13,6 @@ from swarm_logistics_env.study import Study
 from swarm_logistics_env.study.questions.comparison import Setting
 from swarm_logistics_env.study.report.answer import answer
 from swarm_logistics_env.study.report.document import document
-from swarm_logistics_env.study.report.policies_compared import comparison_in_words
 from swarm_logistics_env.study.report.terminal_answer import terminal_answer
 from swarm_logistics_env.study.tasks.outcome import Outcome
 from swarm_logistics_env.study.trial_study import judge
@@ -42,7 +41,7 @@ def play(policy: str, setting: Setting, seed: int) -> Outcome:
 @pytest.mark.unmeasured
 def test_the_first_line_says_the_factor_where_it_holds_turns_and_is_open() -> None:
     results = judged(study_of("homing", "swarm-dt"), play)
-    words = comparison_in_words(results)
+    words = answer(results).comparison
     assert words == (
         "P of homing is 2.00 [2.00, 2.00] times that of swarm-dt (N = 25); also more in 1 of 3 "
         "other conditions; the other way round: FM4 m = 3; open: FM1 m = 3."
@@ -52,7 +51,7 @@ def test_the_first_line_says_the_factor_where_it_holds_turns_and_is_open() -> No
 
 def test_the_first_line_has_the_direction_of_the_rows() -> None:
     results = judged(study_of("swarm-dt", "homing"), play)
-    words = comparison_in_words(results)
+    words = answer(results).comparison
     assert words.startswith("P of swarm-dt is 0.50 [0.50, 0.50] times that of homing (N = 25); ")
     assert "; also less in 1 of 3 other conditions; the other way round: FM4 m = 3;" in words
     row = next(line for line in answer(results).lines if "N = 25" in line.question)
@@ -104,7 +103,7 @@ def test_three_policies_stand_in_one_table_beside_the_first_and_holm_counts_all_
 def test_nothing_is_compared_unless_it_is_asked_for() -> None:
     study = Study(policies=["homing", "swarm-dt"], seeds=3, sizes=[SIZES])
     results: StudyResults = judged(study, play)
-    assert comparison_in_words(results) == ""
+    assert answer(results).comparison == ""
     assert terminal_answer(answer(results), 80).startswith("study: ")
     assert "policies" not in [figure.name for figure in document(results).figures]
 
